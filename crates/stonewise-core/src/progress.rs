@@ -1,0 +1,36 @@
+//! How long work tells its caller where it stands, and how the caller stops it.
+
+/// The work was stopped by the caller before it was done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
+
+/// Receiver of progress, and carrier of the wish to stop.
+pub trait Progress: Sync {
+    /// A piece of work of `total` units starts under this name.
+    fn begin(&self, what: &str, total: u64);
+    /// `units` more are done.
+    fn advance(&self, units: u64);
+    /// True once the caller wants the work to stop.
+    fn is_cancelled(&self) -> bool;
+
+    /// `Err(Interrupted)` once the caller wants the work to stop.
+    fn check(&self) -> Result<(), Interrupted> {
+        if self.is_cancelled() {
+            Err(Interrupted)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Reports nothing and never cancels.
+pub struct Silent;
+
+impl Progress for Silent {
+    fn begin(&self, _what: &str, _total: u64) {}
+    fn advance(&self, _units: u64) {}
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}

@@ -1,0 +1,5 @@
+//! Images of anything: colours, depths, labels.
+
+mod raster_type;
+
+pub use raster_type::{DepthMap, LabelImage, Raster};

@@ -1,0 +1,112 @@
+//! What is known of a stone within one epoch, and of its motion between two.
+
+use crate::geometry::Rigid3;
+use crate::id::StoneId;
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// A stone of one epoch, as the labelled points show it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stone {
+    /// Unique within the epoch; ascending in every list of stones.
+    pub id: StoneId,
+    /// Mean of the stone's points, world frame.
+    pub centroid: Point3<f64>,
+    /// Unit normal of the wall's face around the stone, pointing out of the wall (at the cameras).
+    pub normal: Vector3<f64>,
+    /// Area of the stone's visible face, m^2.
+    pub area_m2: f64,
+    /// Number of points.
+    pub points: u32,
+    /// Number of photos that show the stone.
+    pub photos: u32,
+    /// Mean share of the votes that the stone's points gave it, 0..1.
+    pub confidence: f64,
+}
+
+/// What became of an epoch-1 stone when its partner in epoch 2 was sought.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum MatchOutcome {
+    /// Found, with the quality of the match.
+    Matched {
+        /// The stone of the second epoch.
+        second: StoneId,
+    },
+    /// Not found.
+    Unmatched(UnmatchedReason),
+}
+
+/// Why a stone has no partner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UnmatchedReason {
+    /// The second epoch has no points, or no photo that sees them, where the stone should be.
+    Unseen,
+    /// The second epoch sees the place but has no stone there.
+    Lost,
+    /// Two candidates are too alike (ratio test), or another stone is the better partner.
+    Ambiguous,
+    /// The nearest candidate's face is too large or too small: masks merged or split.
+    AreaMismatch,
+}
+
+/// The rigid motion of one stone, second epoch minus first, world frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoneMotion {
+    /// `p2 = second_from_first * p1`, world frame, metres.
+    pub second_from_first: Rigid3,
+    /// Displacement of the epoch-1 centroid, (R - I) c + t, metres.
+    pub displacement: Vector3<f64>,
+    /// Rotation vector, radians.
+    pub rotation: Vector3<f64>,
+    /// Covariance of (displacement, rotation), absolute, m^2, m rad, rad^2; without registration error of the epochs.
+    pub covariance: Matrix6<f64>,
+    /// Displacement against what the neighbours predict, metres.
+    pub relative: Vector3<f64>,
+    /// Covariance of `relative`, m^2.
+    pub relative_covariance: Matrix3<f64>,
+    /// Moves unlike its neighbours, significantly (false discovery rate controlled).
+    pub loose: bool,
+    /// Share of the least observable direction of the displacement, 0 (not observable) to 1; `sep_obs`.
+    pub observability: f64,
+    /// RMS of the final residuals along the normal, metres.
+    pub rmse_m: f64,
+}
+
+/// Why a matched stone has no motion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+pub enum MotionFailure {
+    /// Fewer points than an estimate needs.
+    #[error("{first} and {second} points, at least {needed} needed")]
+    TooFewPoints {
+        /// Points in the first epoch.
+        first: usize,
+        /// Points in the second epoch.
+        second: usize,
+        /// Points needed in each.
+        needed: usize,
+    },
+    /// The data do not show the motion along this direction.
+    #[error("motion along ({:.2}, {:.2}, {:.2}) is not observable", .direction.x, .direction.y, .direction.z)]
+    Unobservable {
+        /// World unit vector.
+        direction: Vector3<f64>,
+    },
+    /// The iteration did not settle.
+    #[error("no convergence")]
+    NotConverged,
+    /// The two epochs' points of this stone do not show the same surface (a wrong or spoilt mask).
+    #[error("the surfaces of the two epochs do not agree")]
+    Disagreement,
+}
+
+/// A matched pair and its motion, or the reason why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PairResult {
+    /// Stone of the first epoch.
+    pub first: StoneId,
+    /// Its partner in the second.
+    pub second: StoneId,
+    /// The motion.
+    pub motion: Result<StoneMotion, MotionFailure>,
+}
