@@ -1,8 +1,11 @@
-//! Camera models: from a direction in the camera frame to a pixel and back.
+//! Camera models: from a point in the camera frame to a pixel and back.
 //!
 //! Camera frame: x right, y down, z along the view. Pixel frame: x right, y down, first pixel centre (0.5, 0.5).
 
-/// Interior orientation of a frame camera.
+use super::distortion::Distortion;
+use nalgebra::{Point3, Vector3};
+
+/// Interior orientation of a frame or fisheye camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// Image width, pixels.
@@ -19,9 +22,46 @@ pub struct Camera {
     pub distortion: Distortion,
 }
 
-/// Lens distortion of normalised coordinates (x, y) = (X/Z, Y/Z).
-#[derive(Clone, Debug, PartialEq)]
-pub enum Distortion {
-    /// A pinhole.
-    None,
+impl Camera {
+    /// A camera without distortion or skew whose principal point is the middle of the image.
+    pub fn pinhole(width: u32, height: u32, focal_px: f64) -> Self {
+        Self {
+            width,
+            height,
+            focal_px: [focal_px; 2],
+            center_px: [f64::from(width) / 2.0, f64::from(height) / 2.0],
+            skew_px: 0.0,
+            distortion: Distortion::None,
+        }
+    }
+
+    /// Pixel of a point in the camera frame, which may lie outside the image.
+    ///
+    /// `None` behind the camera and where the distortion folds over, that is, where a point outside the field of view
+    /// would seem to be inside it.
+    #[inline]
+    pub fn project_camera_point(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
+        if !(point.z > 0.0) {
+            return None;
+        }
+        let [x, y] = self.distortion.distort([point.x / point.z, point.y / point.z])?;
+        Some([
+            self.focal_px[0] * x + self.skew_px * y + self.center_px[0],
+            self.focal_px[1] * y + self.center_px[1],
+        ])
+    }
+
+    /// Ray through a pixel in the camera frame, scaled to z = 1; `None` where the lens shows nothing.
+    pub fn unproject(&self, pixel: [f64; 2]) -> Option<Vector3<f64>> {
+        let yd = (pixel[1] - self.center_px[1]) / self.focal_px[1];
+        let xd = (pixel[0] - self.center_px[0] - self.skew_px * yd) / self.focal_px[0];
+        let [x, y] = self.distortion.undistort([xd, yd])?;
+        Some(Vector3::new(x, y, 1.0))
+    }
+
+    /// Whether a pixel coordinate lies in the image.
+    #[inline]
+    pub fn is_inside(&self, [x, y]: [f64; 2]) -> bool {
+        x >= 0.0 && y >= 0.0 && x < f64::from(self.width) && y < f64::from(self.height)
+    }
 }

@@ -1,16 +1,20 @@
 //! Rigid motions, cameras, views and local frames.
 
 mod bounds;
+mod brown;
 mod camera;
+mod distortion;
 mod face_frame;
 mod plane;
 mod view;
 
 pub use bounds::Bounds;
-pub use camera::{Camera, Distortion};
+pub use brown::Brown;
+pub use camera::Camera;
+pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use plane::Plane;
-pub use view::View;
+pub use view::{Projection, View};
 
 /// A rigid motion in metres: `p_b = b_from_a * p_a`.
 pub type Rigid3 = nalgebra::Isometry3<f64>;
