@@ -1,1 +1,4 @@
-//! stonewise-io
+//! Readers and writers of the formats that surveys come in and results go out.
+
+pub mod atomic;
+pub mod table;

@@ -1,0 +1,105 @@
+//! Tables as comma-separated text.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+
+use super::column::Values;
+use super::{Column, Table, TableError};
+use crate::atomic::write_atomically;
+
+/// Writes a table as CSV: a header line, then one line per row, `\n` at each end.
+///
+/// An empty cell stays empty; an empty string is written as `""`. Floats have the fewest digits that read back to
+/// the same value; booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break or
+/// spaces at an end (RFC 4180). Metadata is not written.
+///
+/// # Errors
+/// The file cannot be written; an earlier file is kept then.
+pub fn write_csv(path: &Path, table: &Table) -> Result<(), TableError> {
+    write_atomically(path, |partial| {
+        let mut out = BufWriter::new(File::create(partial)?);
+        write_rows(&mut out, table)?;
+        out.flush()
+    })
+    .map_err(|e| TableError::Write {
+        path: path.to_owned(),
+        reason: e.to_string(),
+    })
+}
+
+fn write_rows(out: &mut impl Write, table: &Table) -> io::Result<()> {
+    for (i, name) in table.names().enumerate() {
+        separate(out, i)?;
+        write_text(out, name)?;
+    }
+    writeln!(out)?;
+    for row in 0..table.rows() {
+        for (i, (_, column)) in table.columns().enumerate() {
+            separate(out, i)?;
+            write_cell(out, column, row)?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+fn separate(out: &mut impl Write, column: usize) -> io::Result<()> {
+    if column > 0 { out.write_all(b",") } else { Ok(()) }
+}
+
+fn write_cell(out: &mut impl Write, column: &Column, row: usize) -> io::Result<()> {
+    if !column.is_filled(row) {
+        return Ok(());
+    }
+    match column.raw() {
+        Values::F64(v) if is_plain(v[row]) => write!(out, "{}", v[row]),
+        Values::F64(v) => write!(out, "{:e}", v[row]),
+        Values::F32(v) if is_plain(f64::from(v[row])) => write!(out, "{}", v[row]),
+        Values::F32(v) => write!(out, "{:e}", v[row]),
+        Values::I64(v) => write!(out, "{}", v[row]),
+        Values::U64(v) => write!(out, "{}", v[row]),
+        Values::U32(v) => write!(out, "{}", v[row]),
+        Values::U16(v) => write!(out, "{}", v[row]),
+        Values::U8(v) => write!(out, "{}", v[row]),
+        Values::Bool(v) => write!(out, "{}", u8::from(v[row])),
+        Values::Text(v) => write_text(out, &v[row]),
+    }
+}
+
+/// Whether a number is short without an exponent.
+fn is_plain(value: f64) -> bool {
+    value == 0.0 || !value.is_finite() || (1e-5..1e15).contains(&value.abs())
+}
+
+fn write_text(out: &mut impl Write, text: &str) -> io::Result<()> {
+    let quoted = text.is_empty() || text.contains([',', '"', '\n', '\r']) || text.trim() != text;
+    if quoted {
+        write!(out, "\"{}\"", text.replace('"', "\"\""))
+    } else {
+        out.write_all(text.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_written_by_type() {
+        let mut table = Table::new();
+        table.push("id", vec![1u32, 2, 3]).unwrap();
+        table.push("d, m", vec![Some(0.1), None, Some(1.5e-9)]).unwrap();
+        table.push("f", vec![0.1f32, 1e20, -2.0]).unwrap();
+        table.push("ok", vec![Some(true), Some(false), None]).unwrap();
+        let words = ["plain", "", "say \"no\", twice"].map(str::to_owned);
+        table.push("word", words.to_vec()).unwrap();
+        let mut out = Vec::new();
+        write_rows(&mut out, &table).unwrap();
+        let expected = "id,\"d, m\",f,ok,word\n\
+                        1,0.1,0.1,1,plain\n\
+                        2,,1e20,0,\"\"\n\
+                        3,1.5e-9,-2,,\"say \"\"no\"\", twice\"\n";
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
+    }
+}

@@ -1,0 +1,63 @@
+//! What can go wrong with tables.
+
+use std::io;
+use std::path::PathBuf;
+
+/// Why a table could not be built, read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// A column does not fit the others.
+    #[error("column {name:?} has {rows} rows, the table has {expected}")]
+    Rows {
+        /// The column.
+        name: String,
+        /// Its length.
+        rows: usize,
+        /// The length of the table.
+        expected: usize,
+    },
+    /// Two columns of one name.
+    #[error("column {0:?} is there twice")]
+    Duplicate(String),
+    /// A column that was asked for is not there.
+    #[error("there is no column {name:?}; there are: {}", .present.join(", "))]
+    Missing {
+        /// The column.
+        name: String,
+        /// The columns of the table.
+        present: Vec<String>,
+    },
+    /// A column has another type than asked for.
+    #[error("column {name:?} holds {found}, not {expected}")]
+    Type {
+        /// The column.
+        name: String,
+        /// Type in the table.
+        found: &'static str,
+        /// Type asked for.
+        expected: &'static str,
+    },
+    /// A column has empty cells where none are allowed.
+    #[error("column {0:?} has empty cells")]
+    Empty(String),
+    /// The file is no Parquet file, is damaged, or holds what a table cannot.
+    #[error("cannot read {}: {reason}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The file could not be written.
+    #[error("cannot write {}: {reason}", .path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The operating system refused.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}

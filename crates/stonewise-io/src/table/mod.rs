@@ -1,0 +1,15 @@
+//! Tables of named columns: written as Parquet or CSV, read back from Parquet.
+
+mod column;
+mod csv;
+mod error;
+mod parquet_read;
+mod parquet_write;
+mod table_type;
+
+pub use column::{Cell, Column};
+pub use csv::write_csv;
+pub use error::TableError;
+pub use parquet_read::{read_columns, read_metadata, read_parquet};
+pub use parquet_write::write_parquet;
+pub use table_type::Table;
