@@ -3,8 +3,13 @@
 mod bounds;
 mod brown;
 mod camera;
+<<<<<<< HEAD
 mod distortion;
+=======
+mod contour;
+>>>>>>> 8f59ab8 (Draw the outline of a stone from its points)
 mod face_frame;
+mod outline;
 mod plane;
 mod view;
 
@@ -13,6 +18,7 @@ pub use brown::Brown;
 pub use camera::Camera;
 pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
+pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};
 pub use plane::Plane;
 pub use view::{Projection, View};
 

@@ -1,0 +1,320 @@
+//! The outline of a patch of points.
+
+use crate::geometry::{FaceFrame, contour};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// How an outline is drawn around points.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutlineParams {
+    /// Gaps and bays narrower than twice this many point spacings are closed. Scanned points are irregular, so 3
+    /// spacings close the holes of a real cloud and keep the bays of a real stone.
+    pub closing_spacings: f64,
+    /// Largest distance between the traced and the simplified outline, in point spacings. The border of irregular
+    /// points is not known better.
+    pub simplify_spacings: f64,
+    /// Raster cells along the longer side at most; bounds the cost of a patch with one far outlier.
+    pub max_cells: usize,
+}
+
+impl Default for OutlineParams {
+    fn default() -> Self {
+        Self {
+            closing_spacings: 3.0,
+            simplify_spacings: 0.75,
+            max_cells: 512,
+        }
+    }
+}
+
+/// Outline of points in their plane, a simple polygon, counter-clockwise, first vertex not repeated.
+///
+/// The points grow to discs, the union of the discs shrinks again until the border lies half a point spacing outside
+/// the outermost points (a closing on a distance raster), and the largest piece is traced and simplified
+/// (Douglas & Peucker 1973). Holes are dropped. The point spacing is sqrt(area / n) of the convex hull.
+/// `None` under four points or where they cover no area. Cost: O(n log n + cells).
+pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Point2<f64>>> {
+    let hull = convex_hull(points);
+    let area = signed_area(&hull);
+    if points.len() < 4 || area.is_nan() || area <= 0.0 {
+        return None;
+    }
+    let spacing = (area / points.len() as f64).sqrt();
+    let radius = params.closing_spacings.max(1.0) * spacing;
+    let min = hull.iter().fold(hull[0], |m, p| m.inf(p));
+    let max = hull.iter().fold(hull[0], |m, p| m.sup(p));
+    let longer = (max - min).max() + 2.0 * radius;
+    let cell = (spacing / 2.5).max(longer / params.max_cells.max(16) as f64);
+    // Three empty cells beyond the discs, so that the contour never touches the raster's border.
+    let origin = min - Vector2::repeat(radius + 3.0 * cell);
+    let size = (max - origin + Vector2::repeat(radius + 3.0 * cell)) / cell;
+    let (width, height) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
+
+    let mut seeds = vec![false; width * height];
+    for p in points {
+        let at = (p - origin) / cell;
+        seeds[at.y.round() as usize * width + at.x.round() as usize] = true;
+    }
+    let to_points = contour::distance(&seeds, width, height);
+    let outside: Vec<bool> = to_points.iter().map(|d| d * cell > radius).collect();
+    // Depth inside the union of discs; the border of the patch lies half a spacing outside its outermost points.
+    let depth = contour::distance(&outside, width, height);
+    let level = ((radius - 0.5 * spacing) / cell).max(0.5);
+    let traced = contour::trace_largest(&depth, width, height, level)?;
+    let ring: Vec<Point2<f64>> = traced.iter().map(|p| origin + p.coords * cell).collect();
+    Some(simplify_ring(ring, params.simplify_spacings * spacing))
+}
+
+/// Outline of points on a face, as a polygon in the plane through their mean, counter-clockwise for a viewer in front.
+///
+/// `outward`: normal of the face. See [`outline`].
+pub fn face_outline(
+    points: &[Point3<f64>],
+    outward: &Vector3<f64>,
+    params: &OutlineParams,
+) -> Option<Vec<Point3<f64>>> {
+    let frame = FaceFrame::from_normal(outward);
+    let base = *points.first()?;
+    let mean = base + points.iter().map(|p| p - base).sum::<Vector3<f64>>() / points.len() as f64;
+    let flat: Vec<Point2<f64>> = points
+        .iter()
+        .map(|p| Point2::new((p - mean).dot(&frame.along), (p - mean).dot(&frame.up)))
+        .collect();
+    let ring = outline(&flat, params)?;
+    Some(
+        ring.iter()
+            .map(|p| mean + frame.along * p.x + frame.up * p.y)
+            .collect(),
+    )
+}
+
+/// Area of a polygon, positive where it runs counter-clockwise (the shoelace formula).
+pub fn signed_area(ring: &[Point2<f64>]) -> f64 {
+    let Some(base) = ring.first() else { return 0.0 };
+    let cross = |i: usize| (ring[i] - base).perp(&(ring[(i + 1) % ring.len()] - base));
+    (0..ring.len()).map(cross).sum::<f64>() / 2.0
+}
+
+/// Whether no two sides of the polygon touch, apart from neighbours at their common corner. Cost: O(sides^2).
+pub fn is_simple(ring: &[Point2<f64>]) -> bool {
+    let n = ring.len();
+    let side = |i: usize| (ring[i], ring[(i + 1) % n]);
+    n >= 3
+        && (0..n).all(|i| {
+            (i + 1..n).all(|j| {
+                let adjacent = j == i + 1 || (i == 0 && j == n - 1);
+                adjacent || !touches(side(i), side(j))
+            })
+        })
+}
+
+/// Corners of the smallest convex polygon around the points, counter-clockwise (Andrew 1979, monotone chain).
+fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+    let mut sorted: Vec<Point2<f64>> = points
+        .iter()
+        .copied()
+        .filter(|p| p.x.is_finite() && p.y.is_finite())
+        .collect();
+    sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut hull: Vec<Point2<f64>> = Vec::new();
+    let mut chain = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
+        let start = hull.len();
+        for p in points {
+            while hull.len() >= start + 2 {
+                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+                if (b - a).perp(&(p - b)) > 0.0 {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(*p);
+        }
+        hull.pop();
+    };
+    chain(&mut sorted.iter());
+    chain(&mut sorted.iter().rev());
+    hull
+}
+
+/// The simplest polygon within the tolerance that is still simple; the ring itself where simplifying breaks it.
+fn simplify_ring(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
+    let mut tolerance = tolerance;
+    for _ in 0..4 {
+        let simpler = douglas_peucker_ring(&ring, tolerance);
+        if simpler.len() >= 3 && signed_area(&simpler) > 0.0 && is_simple(&simpler) {
+            return simpler;
+        }
+        tolerance /= 2.0;
+    }
+    ring
+}
+
+/// Douglas-Peucker on a ring, cut at two opposite corners: the vertex of smallest x and the one farthest from it.
+fn douglas_peucker_ring(ring: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>> {
+    let n = ring.len();
+    let first = (0..n)
+        .min_by(|&a, &b| ring[a].x.total_cmp(&ring[b].x))
+        .unwrap_or(0);
+    let rotated: Vec<Point2<f64>> = (0..=n).map(|i| ring[(first + i) % n]).collect();
+    let far = (0..n)
+        .max_by(|&a, &b| {
+            (rotated[a] - rotated[0])
+                .norm()
+                .total_cmp(&(rotated[b] - rotated[0]).norm())
+        })
+        .unwrap_or(0);
+    let mut keep = vec![false; n + 1];
+    keep[0] = true;
+    keep[far] = true;
+    let mut open = vec![(0, far), (far, n)];
+    while let Some((from, to)) = open.pop() {
+        let distance = |i: usize| distance_to_segment(&rotated[i], &rotated[from], &rotated[to]);
+        let worst = (from + 1..to).max_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+        if let Some(worst) = worst.filter(|&i| distance(i) > tolerance) {
+            keep[worst] = true;
+            open.extend([(from, worst), (worst, to)]);
+        }
+    }
+    (0..n).filter(|&i| keep[i]).map(|i| rotated[i]).collect()
+}
+
+fn distance_to_segment(p: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> f64 {
+    let (ab, ap) = (b - a, p - a);
+    let along = if ab.norm_squared() > 0.0 {
+        (ap.dot(&ab) / ab.norm_squared()).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (ap - ab * along).norm()
+}
+
+/// Whether two segments share a point.
+fn touches((a, b): (Point2<f64>, Point2<f64>), (c, d): (Point2<f64>, Point2<f64>)) -> bool {
+    let side = |p: &Point2<f64>, q: &Point2<f64>, r: &Point2<f64>| (q - p).perp(&(r - p));
+    let (s1, s2, s3, s4) = (
+        side(&a, &b, &c),
+        side(&a, &b, &d),
+        side(&c, &d, &a),
+        side(&c, &d, &b),
+    );
+    let boxes = a.inf(&b).x <= c.sup(&d).x
+        && c.inf(&d).x <= a.sup(&b).x
+        && a.inf(&b).y <= c.sup(&d).y
+        && c.inf(&d).y <= a.sup(&b).y;
+    boxes && s1 * s2 <= 0.0 && s3 * s4 <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use rand::{RngExt, SeedableRng};
+
+    /// Uniformly random points of a shape within (-1, 1)^2, about `n` of them in the square.
+    fn scatter(n: usize, seed: u64, inside: impl Fn(&Point2<f64>) -> bool) -> Vec<Point2<f64>> {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        (0..n)
+            .map(|_| Point2::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0)))
+            .filter(inside)
+            .collect()
+    }
+
+    fn check(points: &[Point2<f64>], true_area: f64, tolerance: f64) {
+        let ring = outline(points, &OutlineParams::default()).unwrap();
+        assert!(is_simple(&ring));
+        let area = signed_area(&ring);
+        assert!(
+            (area / true_area - 1.0).abs() < tolerance,
+            "area {area} instead of {true_area}"
+        );
+    }
+
+    #[test]
+    fn a_disc_a_rectangle_and_a_bay_keep_their_area() {
+        check(
+            &scatter(4000, 1, |p| p.coords.norm() < 0.9),
+            std::f64::consts::PI * 0.81,
+            0.03,
+        );
+        check(
+            &scatter(4000, 2, |p| p.x.abs() < 0.8 && p.y.abs() < 0.5),
+            1.6,
+            0.03,
+        );
+        // An L: its convex hull is a quarter larger.
+        check(&scatter(4000, 3, |p| p.x < 0.0 || p.y < 0.0), 3.0, 0.03);
+    }
+
+    #[test]
+    fn a_regular_grid_covers_its_cells() {
+        let points: Vec<_> = (0..600)
+            .map(|i| Point2::new(f64::from(i % 30), f64::from(i / 30)) * 0.01)
+            .collect();
+        check(&points, 0.3 * 0.2, 0.03);
+    }
+
+    #[test]
+    fn a_far_speck_and_a_hole_are_left_out() {
+        let mut points = scatter(4000, 4, |p| p.coords.norm() < 0.9 && p.coords.norm() > 0.4);
+        points.extend([
+            Point2::new(1.6, 0.0),
+            Point2::new(1.61, 0.0),
+            Point2::new(1.6, 0.01),
+        ]);
+        let ring = outline(&points, &OutlineParams::default()).unwrap();
+        assert!(
+            ring.iter()
+                .all(|p| p.coords.norm() < 1.1 && p.coords.norm() > 0.7)
+        );
+    }
+
+    #[test]
+    fn few_points_and_points_on_a_line_have_no_outline() {
+        let line: Vec<_> = (0..50)
+            .map(|i| Point2::new(f64::from(i), 2.0 * f64::from(i)))
+            .collect();
+        assert!(outline(&line, &OutlineParams::default()).is_none());
+        assert!(outline(&line[..2], &OutlineParams::default()).is_none());
+        assert!(outline(&[], &OutlineParams::default()).is_none());
+        assert!(face_outline(&[], &Vector3::x(), &OutlineParams::default()).is_none());
+    }
+
+    #[test]
+    fn on_a_face_far_away_it_runs_counter_clockwise_for_a_viewer_in_front() {
+        let frame = FaceFrame::from_normal(&Vector3::new(0.8, -0.3, 0.2));
+        let origin = Point3::new(4.5e5, 5.6e6, 300.0);
+        let flat = scatter(3000, 5, |p| p.x.abs() < 0.8 && p.y.abs() < 0.5);
+        let points: Vec<_> = flat
+            .iter()
+            .map(|p| origin + frame.along * p.x + frame.up * p.y)
+            .collect();
+        let ring = face_outline(&points, &frame.out, &OutlineParams::default()).unwrap();
+        let twice_area: Vector3<f64> = (0..ring.len())
+            .map(|i| (ring[i] - origin).cross(&(ring[(i + 1) % ring.len()] - origin)))
+            .sum();
+        assert!((twice_area.dot(&frame.out) / 3.2 - 1.0).abs() < 0.04);
+        assert!(ring.iter().all(|p| (p - origin).dot(&frame.out).abs() < 1e-6));
+    }
+
+    #[test]
+    fn a_bow_tie_is_not_simple() {
+        let p = |x: f64, y: f64| Point2::new(x, y);
+        assert!(is_simple(&[p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 1.0)]));
+        assert!(!is_simple(&[p(0.0, 0.0), p(1.0, 1.0), p(1.0, 0.0), p(0.0, 1.0)]));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_points_give_a_simple_counter_clockwise_polygon_or_none(
+            seed in 0u64..1_000_000, n in 4usize..400, squeeze in 0.01f64..1.0,
+        ) {
+            let points: Vec<_> = scatter(n, seed, |_| true).iter().map(|p| Point2::new(p.x, p.y * squeeze)).collect();
+            if let Some(ring) = outline(&points, &OutlineParams::default()) {
+                prop_assert!(is_simple(&ring));
+                prop_assert!(signed_area(&ring) > 0.0);
+            }
+        }
+    }
+}
