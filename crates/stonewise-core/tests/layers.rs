@@ -25,7 +25,11 @@ fn modules_use_only_those_below_them() {
             for file in rust_files(&src, module) {
                 for used in used_modules(&fs::read_to_string(&file).unwrap()) {
                     let below = LAYERS[..level].iter().any(|l| l.contains(&used.as_str()));
-                    assert!(below || used == *module, "{} uses {used}, which is not below {module}", file.display());
+                    assert!(
+                        below || used == *module,
+                        "{} uses {used}, which is not below {module}",
+                        file.display()
+                    );
                     uses += 1;
                 }
             }
@@ -50,6 +54,11 @@ fn rust_files(src: &Path, module: &str) -> Vec<std::path::PathBuf> {
 /// First path segment after every `crate::`, outside comments.
 fn used_modules(text: &str) -> Vec<String> {
     let code = text.lines().map(|line| line.split("//").next().unwrap_or(""));
-    let name = |rest: &str| rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
-    code.flat_map(|line| line.split("crate::").skip(1).map(name).collect::<Vec<_>>()).collect()
+    let name = |rest: &str| {
+        rest.chars()
+            .take_while(|c| c.is_alphanumeric() || *c == '_')
+            .collect::<String>()
+    };
+    code.flat_map(|line| line.split("crate::").skip(1).map(name).collect::<Vec<_>>())
+        .collect()
 }

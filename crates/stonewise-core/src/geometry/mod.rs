@@ -3,11 +3,8 @@
 mod bounds;
 mod brown;
 mod camera;
-<<<<<<< HEAD
-mod distortion;
-=======
 mod contour;
->>>>>>> 8f59ab8 (Draw the outline of a stone from its points)
+mod distortion;
 mod face_frame;
 mod outline;
 mod plane;
