@@ -1,1 +1,28 @@
-//! change
+//! Change between two clouds: M3C2 as the reference method, cloud to cloud, cloud to mesh.
+//!
+//! Positive M3C2 distances mean that the second epoch lies on the normal's side of the first, and normals
+//! point out of the wall, so positive is downstream.
+
+mod c2c;
+mod c2m;
+mod cloudcompare;
+mod core_points;
+mod field;
+mod m3c2;
+mod mesh;
+mod normals;
+mod params;
+mod spread;
+mod survey;
+mod triangle;
+
+pub use c2c::c2c;
+pub use c2m::{MeshIndex, c2m};
+pub use cloudcompare::{CloudCompareError, params_from_cloudcompare};
+pub use core_points::thin_to_voxels;
+pub use field::{ChangeField, ChangePoint};
+pub use m3c2::m3c2;
+pub use mesh::{MeshError, TriangleMesh};
+pub use normals::{OutwardReference, estimate_normals};
+pub use params::{M3c2Params, M3c2ParamsError};
+pub use survey::{SinkError, SurveyError, c2c_survey, c2m_survey, m3c2_survey};

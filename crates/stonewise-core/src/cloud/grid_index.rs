@@ -8,14 +8,14 @@ use nalgebra::Point3;
 /// is about as large as the usual search radius. Results come in ascending order of point index within a
 /// cell and of cell, so they do not depend on threads.
 pub struct GridIndex {
-    points: Vec<Point3<f64>>,
+    pub(super) points: Vec<Point3<f64>>,
     /// Index of each sorted point in the input.
-    order: Vec<u32>,
+    pub(super) order: Vec<u32>,
     /// Start of each cell in `points`; one more entry than cells.
-    starts: Vec<u32>,
-    origin: Point3<f64>,
-    cell_m: f64,
-    dims: [usize; 3],
+    pub(super) starts: Vec<u32>,
+    pub(super) origin: Point3<f64>,
+    pub(super) cell_m: f64,
+    pub(super) dims: [usize; 3],
 }
 
 /// More cells than this are never made; the cell grows instead.
@@ -80,6 +80,22 @@ impl GridIndex {
             let d2 = (self.points[slot] - centre).norm_squared();
             if d2 <= r2 {
                 visit(self.order[slot] as usize, d2);
+            }
+        });
+    }
+
+    /// As [`within`](Self::within), with the position in place of the distance.
+    pub fn positions_within(
+        &self,
+        centre: &Point3<f64>,
+        radius_m: f64,
+        mut visit: impl FnMut(usize, &Point3<f64>),
+    ) {
+        let r2 = radius_m * radius_m;
+        self.visit_box(centre, radius_m, |slot| {
+            let p = &self.points[slot];
+            if (p - centre).norm_squared() <= r2 {
+                visit(self.order[slot] as usize, p);
             }
         });
     }

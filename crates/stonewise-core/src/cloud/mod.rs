@@ -1,9 +1,11 @@
 //! Point clouds and searching in them.
 
 mod cloud_type;
+mod cylinder;
 mod grid_index;
 mod tiles;
 
 pub use cloud_type::Cloud;
+pub use cylinder::Cylinder;
 pub use grid_index::GridIndex;
 pub use tiles::{MemoryTiles, TileSource};
