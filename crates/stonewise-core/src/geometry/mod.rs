@@ -8,6 +8,7 @@ mod distortion;
 mod face_frame;
 mod outline;
 mod plane;
+mod rotation;
 mod view;
 
 pub use bounds::Bounds;
@@ -17,6 +18,7 @@ pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};
 pub use plane::Plane;
+pub use rotation::nearest_rotation;
 pub use view::{Projection, View};
 
 /// A rigid motion in metres: `p_b = b_from_a * p_a`.

@@ -1,0 +1,96 @@
+//! COLMAP models: cameras and images as text or binary files.
+//!
+//! Poses take world to camera; first pixel centre at (0.5, 0.5). The 3D points are not read.
+
+mod binary;
+mod model;
+mod text;
+mod write;
+
+pub use write::write_colmap;
+
+use super::{CameraError, CameraFile};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_core::geometry::{Camera, Rigid3, View};
+use stonewise_core::id::ImageId;
+
+/// A line of the camera list.
+struct RawCamera {
+    model: String,
+    width: u64,
+    height: u64,
+    params: Vec<f64>,
+    /// Where in the file, for messages.
+    place: String,
+}
+
+/// A line of the image list.
+struct RawImage {
+    rotation_wxyz: [f64; 4],
+    translation: [f64; 3],
+    camera_id: u32,
+    name: String,
+    place: String,
+}
+
+/// Reads the model in a folder, or in its `sparse/0`, `sparse` or `0`.
+pub fn read_folder(folder: &Path) -> Result<CameraFile, CameraError> {
+    for inner in ["", "sparse/0", "sparse", "0"] {
+        for extension in ["bin", "txt"] {
+            let base = folder.join(inner);
+            let cameras = base.join("cameras").with_extension(extension);
+            let images = base.join("images").with_extension(extension);
+            if cameras.is_file() && images.is_file() {
+                return read_pair(&cameras, &images);
+            }
+        }
+    }
+    Err(CameraError::UnknownFormat {
+        path: PathBuf::from(folder),
+    })
+}
+
+fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
+    let is_binary = cameras.extension().is_some_and(|e| e == "bin");
+    let (raw_cameras, raw_images) = if is_binary {
+        (binary::read_cameras(cameras)?, binary::read_images(images)?)
+    } else {
+        (text::read_cameras(cameras)?, text::read_images(images)?)
+    };
+    let mut converted: BTreeMap<u32, Camera> = BTreeMap::new();
+    let mut file = CameraFile::default();
+    for raw in raw_images {
+        let bad = |problem: String| super::malformed(images, raw.place.clone(), problem);
+        if !converted.contains_key(&raw.camera_id) {
+            let camera = raw_cameras.get(&raw.camera_id).ok_or_else(|| {
+                bad(format!(
+                    "photo {} names camera {}, which {} does not list",
+                    raw.name,
+                    raw.camera_id,
+                    cameras.display()
+                ))
+            })?;
+            converted.insert(raw.camera_id, model::camera(camera, &raw.name, cameras)?);
+        }
+        let [w, x, y, z] = raw.rotation_wxyz;
+        let quaternion = Quaternion::new(w, x, y, z);
+        if !((quaternion.norm() - 1.0).abs() < 0.1 && raw.translation.iter().all(|v| v.is_finite())) {
+            return Err(bad(format!(
+                "photo {} has no valid rotation and translation",
+                raw.name
+            )));
+        }
+        file.views.push(View {
+            image: ImageId(file.views.len() as u32),
+            camera: converted[&raw.camera_id].clone(),
+            cam_from_world: Rigid3::from_parts(
+                Translation3::from(raw.translation),
+                UnitQuaternion::from_quaternion(quaternion),
+            ),
+            name: raw.name,
+        });
+    }
+    Ok(file)
+}

@@ -1,0 +1,95 @@
+//! What can go wrong with camera files and photo folders.
+
+use std::path::PathBuf;
+
+/// Why cameras or photos could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CameraError {
+    /// The file system refused.
+    #[error("cannot read cameras or photos: {source}: {}", path.display())]
+    Read {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file system refused to write.
+    #[error("cannot write cameras: {source}: {}", path.display())]
+    Write {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not a camera file.
+    #[error(
+        "not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin) or an OpenSfM \
+         reconstruction.json: {}", path.display()
+    )]
+    UnknownFormat {
+        /// File or folder.
+        path: PathBuf,
+    },
+    /// A value is missing or impossible.
+    #[error("{problem}, at {place}: {}", path.display())]
+    Malformed {
+        /// File.
+        path: PathBuf,
+        /// Line, element or photo.
+        place: String,
+        /// What is wrong there.
+        problem: String,
+    },
+    /// No photo has a pose.
+    #[error(
+        "no aligned camera in the file ({skipped} without a usable pose): align the photos and export the cameras again: {}",
+        path.display()
+    )]
+    NoPoses {
+        /// File or folder.
+        path: PathBuf,
+        /// Photos listed without a usable pose.
+        skipped: usize,
+    },
+    /// The lens model is none of ours.
+    #[error(
+        "camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame or fisheye \
+         model: {}", path.display()
+    )]
+    UnsupportedModel {
+        /// File.
+        path: PathBuf,
+        /// Model as the file names it.
+        model: String,
+        /// First photo that uses it.
+        photo: String,
+    },
+    /// The world frame is not Cartesian.
+    #[error(
+        "cameras refer to {crs}, in which Metashape stores poses geocentrically: set the chunk's reference to local \
+         coordinates, the frame of the point cloud, and export the cameras again: {}", path.display()
+    )]
+    UnsupportedCrs {
+        /// File.
+        path: PathBuf,
+        /// Name of the reference system.
+        crs: String,
+    },
+    /// No photo in the folder.
+    #[error("no photo (jpg, jpeg, png, tif) in the folder: {}", folder.display())]
+    NoPhotos {
+        /// Folder of photos.
+        folder: PathBuf,
+    },
+    /// Two photos fit one camera equally well.
+    #[error("camera {camera} could be either of two photos, {} and {}: rename one or move it away", first.display(), second.display())]
+    AmbiguousPhoto {
+        /// Name in the camera file.
+        camera: String,
+        /// One photo.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+}
