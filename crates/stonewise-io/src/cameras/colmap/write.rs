@@ -1,6 +1,7 @@
 //! Writing of COLMAP's text files.
 
 use super::super::CameraError;
+use crate::atomic::write_atomically;
 use std::fmt::Write as _;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion, View};
@@ -51,7 +52,8 @@ pub fn write_colmap(folder: &Path, views: &[View]) -> Result<(), CameraError> {
     }
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|source| CameraError::Write { path, source })
+        write_atomically(&path, |partial| std::fs::write(partial, text))
+            .map_err(|source| CameraError::Write { path, source })
     };
     std::fs::create_dir_all(folder).map_err(|source| CameraError::Write {
         path: folder.to_owned(),

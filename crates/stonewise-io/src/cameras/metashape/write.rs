@@ -1,6 +1,7 @@
 //! Writing of Metashape's camera XML.
 
 use super::super::CameraError;
+use crate::atomic::write_atomically;
 use std::fmt::Write as _;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion, View};
@@ -59,7 +60,7 @@ pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result
         text,
         "    </cameras>\n    <reference>{crs}</reference>\n  </chunk>\n</document>"
     );
-    std::fs::write(path, text).map_err(|source| CameraError::Write {
+    write_atomically(path, |partial| std::fs::write(partial, text)).map_err(|source| CameraError::Write {
         path: path.to_owned(),
         source,
     })
