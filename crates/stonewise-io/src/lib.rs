@@ -2,4 +2,5 @@
 
 pub mod atomic;
 pub mod cameras;
+pub mod cloud;
 pub mod table;

@@ -1,0 +1,126 @@
+//! Some points of a cloud, as they pass by.
+
+use nalgebra::Point3;
+
+/// A run of points of one file, in the order of the file.
+///
+/// Records without a finite position are left out, so `indices` may have gaps; the other columns are parallel
+/// to it. A chunk never crosses from one scan of an E57 file into the next.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointChunk {
+    /// Index of each point's record in the file, from 0, ascending; counts across the scans of an E57 file.
+    pub indices: Vec<u64>,
+    /// Positions in the world frame, metres; the pose of an E57 scan is applied.
+    pub positions: Vec<Point3<f64>>,
+    /// Red, green, blue, 16 bits each (8-bit colours are times 257), where the file has colours.
+    pub colors: Option<Vec<[u16; 3]>>,
+    /// Intensities as the file has them (LAS: 0 to 65535; E57: scaled to 0 to 1), where it has any.
+    pub intensities: Option<Vec<f32>>,
+    /// Index of the scan in [`CloudInfo::scans`](super::CloudInfo::scans), where the file keeps scans apart.
+    pub scan: Option<usize>,
+}
+
+impl PointChunk {
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are no points.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+}
+
+/// What a pass over a file found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ReadSummary {
+    /// Records in the file.
+    pub records: u64,
+    /// Records left out because they have no finite position (marked invalid, NaN, infinite).
+    pub skipped: u64,
+}
+
+/// Receives chunks.
+pub(super) type Visit<'a, E> = &'a mut dyn FnMut(&PointChunk) -> Result<(), E>;
+
+/// Collects points and hands them on when a chunk is full.
+pub(super) struct Chunker<'a, E> {
+    chunk: PointChunk,
+    capacity: usize,
+    visit: Visit<'a, E>,
+    summary: ReadSummary,
+}
+
+/// One record, as a reader without columns sees it.
+pub(super) struct PointRecord {
+    pub position: Option<Point3<f64>>,
+    pub color: Option<[u16; 3]>,
+    pub intensity: Option<f32>,
+}
+
+impl<'a, E> Chunker<'a, E> {
+    pub fn new(capacity: usize, has_color: bool, has_intensity: bool, visit: Visit<'a, E>) -> Self {
+        let chunk = PointChunk {
+            colors: has_color.then(Vec::new),
+            intensities: has_intensity.then(Vec::new),
+            ..PointChunk::default()
+        };
+        Self {
+            chunk,
+            capacity: capacity.max(1),
+            visit,
+            summary: ReadSummary::default(),
+        }
+    }
+
+    /// Starts the next scan.
+    pub fn begin_scan(&mut self, scan: usize, has_color: bool, has_intensity: bool) -> Result<(), E> {
+        self.flush()?;
+        self.chunk.scan = Some(scan);
+        self.chunk.colors = has_color.then(Vec::new);
+        self.chunk.intensities = has_intensity.then(Vec::new);
+        Ok(())
+    }
+
+    pub fn push(&mut self, record: PointRecord) -> Result<(), E> {
+        let index = self.summary.records;
+        self.summary.records += 1;
+        let Some(position) = record.position.filter(|p| p.iter().all(|c| c.is_finite())) else {
+            self.summary.skipped += 1;
+            return Ok(());
+        };
+        self.chunk.indices.push(index);
+        self.chunk.positions.push(position);
+        if let Some(colors) = &mut self.chunk.colors {
+            colors.push(record.color.unwrap_or_default());
+        }
+        if let Some(intensities) = &mut self.chunk.intensities {
+            intensities.push(record.intensity.unwrap_or_default());
+        }
+        if self.chunk.len() >= self.capacity {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    pub fn finish(mut self) -> Result<ReadSummary, E> {
+        self.flush()?;
+        Ok(self.summary)
+    }
+
+    fn flush(&mut self) -> Result<(), E> {
+        if !self.chunk.is_empty() {
+            (self.visit)(&self.chunk)?;
+        }
+        self.chunk.indices.clear();
+        self.chunk.positions.clear();
+        if let Some(colors) = &mut self.chunk.colors {
+            colors.clear();
+        }
+        if let Some(intensities) = &mut self.chunk.intensities {
+            intensities.clear();
+        }
+        Ok(())
+    }
+}

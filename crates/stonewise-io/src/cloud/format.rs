@@ -1,0 +1,60 @@
+//! Telling formats apart.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::CloudError;
+
+/// A family of point cloud files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CloudFormat {
+    /// LAS 1.0 to 1.4, plain, compressed as LAZ, or ordered as COPC.
+    Las,
+    /// ASTM E2807.
+    E57,
+    /// Stanford PLY, text or binary of either byte order.
+    Ply,
+    /// Text, one point per line.
+    Text,
+}
+
+/// Extensions of text files; every other format says what it is in its first bytes.
+const TEXT_EXTENSIONS: [&str; 7] = ["xyz", "txt", "csv", "asc", "pts", "xyzrgb", "neu"];
+
+impl CloudFormat {
+    /// The format of a file: by its first bytes, else by its extension.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is none that this crate knows.
+    pub fn of(path: &Path) -> Result<Self, CloudError> {
+        let mut start = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(8).read_to_end(&mut start))
+            .map_err(|e| CloudError::read(path, e))?;
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        let extension = extension.to_ascii_lowercase();
+        match start.as_slice() {
+            s if s.starts_with(b"LASF") => Ok(Self::Las),
+            s if s.starts_with(b"ASTM-E57") => Ok(Self::E57),
+            s if s.starts_with(b"ply\n") || s.starts_with(b"ply\r") => Ok(Self::Ply),
+            _ if TEXT_EXTENSIONS.contains(&extension.as_str()) => Ok(Self::Text),
+            _ => Err(wrong_start(path, &extension, start.is_empty())),
+        }
+    }
+}
+
+fn wrong_start(path: &Path, extension: &str, empty: bool) -> CloudError {
+    let signature = match extension {
+        "las" | "laz" => "LASF",
+        "e57" => "ASTM-E57",
+        "ply" => "ply",
+        _ => return CloudError::UnknownFormat(path.to_owned()),
+    };
+    let reason = if empty {
+        "the file is empty".to_owned()
+    } else {
+        format!("not a {extension} file: it does not begin with {signature:?}")
+    };
+    CloudError::malformed(path, reason)
+}

@@ -1,0 +1,7 @@
+//! LAS, LAZ and COPC.
+
+mod layout;
+mod read;
+
+pub(super) use layout::Layout;
+pub(super) use read::{LasSource, read};

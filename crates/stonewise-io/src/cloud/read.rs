@@ -1,0 +1,26 @@
+//! One way into every format.
+
+use std::path::Path;
+
+use super::chunk::Visit;
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary, las};
+
+/// Passes the points of a file to `visit`, at most `chunk_points` at a time, in the order of the file.
+///
+/// Reads LAS 1.0 to 1.4, LAZ, COPC, E57, PLY and text (see [`CloudFormat`]); memory is bounded by the chunk
+/// (LAZ unpacks faster with several times 50,000 points). An error of `visit` stops the pass and is returned.
+///
+/// # Errors
+/// The file cannot be read, is of an unknown format, damaged or cut off; then some chunks may have been
+/// visited already.
+pub fn read_cloud<E: From<CloudError>>(
+    path: &Path,
+    chunk_points: usize,
+    mut visit: impl FnMut(&PointChunk) -> Result<(), E>,
+) -> Result<ReadSummary, E> {
+    let visit: Visit<'_, E> = &mut visit;
+    match CloudFormat::of(path)? {
+        CloudFormat::Las => las::read(path, chunk_points, visit),
+        _ => Err(CloudError::UnknownFormat(path.to_owned()).into()),
+    }
+}
