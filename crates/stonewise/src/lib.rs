@@ -1,1 +1,3 @@
 //! stonewise
+
+pub mod report;

@@ -1,0 +1,19 @@
+//! Result tables and the report, made from result files alone.
+
+mod change_points;
+mod error;
+mod facade;
+mod outlines;
+mod result_set;
+mod stone_row;
+mod stone_table;
+#[cfg(test)]
+mod testing;
+
+pub use change_points::DistancePoint;
+pub use error::ReportError;
+pub use facade::Facade;
+pub use outlines::{OUTLINES_FILE, StoneOutline, write_outlines};
+pub use result_set::ResultSet;
+pub use stone_row::{RowMotion, Status, StoneRow, detection_limit_m};
+pub use stone_table::{STONE_COLUMNS, read_stones, stone_table, write_stones, write_stones_named};
