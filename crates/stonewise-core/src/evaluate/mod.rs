@@ -1,1 +1,33 @@
-//! evaluate
+//! How right results are, where the truth is known: a field that moved the points, or a simulated survey.
+//!
+//! No stage of the method uses this module. Errors are estimate minus truth, metres.
+
+mod calibration;
+mod definitions;
+mod detection;
+mod evaluation;
+mod external_truth;
+mod instances;
+mod labels;
+mod matches;
+mod motion_field;
+mod moved_tiles;
+mod sample;
+mod score;
+mod statistics;
+
+pub use calibration::{Calibration, Coverage};
+pub use definitions::definitions;
+pub use detection::{Detection, LooseDetection};
+pub use evaluation::Evaluation;
+pub use external_truth::{
+    Owner, TrueStone, TruthScore, owners_by_centroid, owners_by_labels, score_against_truth,
+};
+pub use instances::InstanceScore;
+pub use labels::{LabelConfusion, LabelScore};
+pub use matches::{MatchScore, score_matches};
+pub use motion_field::{MotionField, MotionFieldError};
+pub use moved_tiles::MovedTiles;
+pub use sample::{EvaluationParams, MotionSample, StoneOutcome};
+pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};
+pub use statistics::{ErrorStatistics, quantile};

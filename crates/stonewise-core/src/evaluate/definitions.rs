@@ -1,0 +1,75 @@
+//! What the figures of an evaluation mean, in words that travel with them.
+
+use std::collections::BTreeMap;
+
+const WORDS: [(&str, &str); 22] = [
+    ("error", "estimate minus truth; all lengths in metres"),
+    (
+        "truth",
+        "true displacement (second epoch minus first) at the stone's epoch-1 centroid, or at the core point; for a bulge the field at that place, not its mean over the stone",
+    ),
+    (
+        "along",
+        "signed error along the dam: horizontal in the face, to the right of a viewer who faces it",
+    ),
+    ("up", "signed error up the face, along the batter"),
+    (
+        "in_plane_per_axis",
+        "signed along and up errors pooled; its RMSE is sqrt((along^2 + up^2) / 2), the in-plane RMSE per axis",
+    ),
+    ("in_plane_2d", "norm of the (along, up) error"),
+    (
+        "out_of_plane",
+        "signed error along the outward normal of the face",
+    ),
+    ("norm_3d", "norm of the whole error"),
+    ("count", "number of errors the figures rest on"),
+    ("rmse_m", "root of the mean squared error"),
+    ("mean_m", "mean error: the bias of a signed component"),
+    ("median_m", "median error, with its sign"),
+    ("nmad_m", "1.4826 times the median of |error - median error|"),
+    (
+        "p95_m",
+        "95th percentile of the absolute errors, interpolated linearly between order statistics",
+    ),
+    (
+        "outlier_rate",
+        "share of absolute errors beyond outlier_m; at the top of a score that of the 3D error",
+    ),
+    (
+        "zero_predictor_rmse_m",
+        "RMSE of an estimator that always answers zero: the figure to beat",
+    ),
+    (
+        "coverage_95",
+        "share of true components inside the estimate +- 1.96 standard deviations; for M3C2 out of plane inside +- its detection limit; 0.95 is right",
+    ),
+    (
+        "chi_square",
+        "error' covariance^-1 error, chi-square with 3 degrees of freedom when the covariance is right: mean 3, median 2.37, 95 % below 7.81",
+    ),
+    (
+        "significance",
+        "alarms (significant at 95 %) among places that truly moved at most still_m (false alarms) and more (hits); detectable: truly moved more than the place's own detection limit",
+    ),
+    (
+        "m3c2",
+        "displacement vector of M3C2 is distance times normal; it claims nothing in the plane",
+    ),
+    (
+        "labels",
+        "a point is right when it carries the label that stands for its true stone; label and stone stand for each other when each is the other's largest overlap",
+    ),
+    (
+        "instances",
+        "found: IoU of at least 0.5, one to one; mean_iou_found over the pairs found, mean_iou_all over all true instances, zero where nothing overlaps",
+    ),
+];
+
+/// The definitions, by the key they explain.
+pub fn definitions() -> BTreeMap<String, String> {
+    WORDS
+        .iter()
+        .map(|(key, words)| ((*key).to_owned(), (*words).to_owned()))
+        .collect()
+}

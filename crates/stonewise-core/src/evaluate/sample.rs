@@ -1,0 +1,119 @@
+//! One estimated motion beside the truth.
+
+use crate::geometry::FaceFrame;
+use crate::id::StoneId;
+use nalgebra::{Matrix3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the evaluation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EvaluationParams {
+    /// Larger absolute errors are outliers, metres.
+    pub outlier_m: f64,
+    /// What truly moves less counts as still when alarms are counted, metres.
+    pub still_m: f64,
+    /// Share of a simulated stone's face that both epochs must show for the stone to count.
+    pub min_visible_share: f64,
+    /// A true label or centroid further than this from a result's centroid does not own the result, metres.
+    pub owner_reach_m: f64,
+}
+
+impl Default for EvaluationParams {
+    fn default() -> Self {
+        Self {
+            // Twice the paper's RMSE on terrestrial scans.
+            outlier_m: 0.01,
+            // Below what any scanner of today resolves on a stone.
+            still_m: 1e-4,
+            // The rule that the simulated surveys are scored by.
+            min_visible_share: 0.35,
+            // The centroid of a stone's points lies behind its face by up to its relief, a few centimetres.
+            owner_reach_m: 0.1,
+        }
+    }
+}
+
+/// What a run says about one stone, as far as the evaluation needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoneOutcome {
+    /// Stone of the first epoch.
+    pub stone: StoneId,
+    /// Its centroid in the first epoch, world frame, metres.
+    pub centroid: Point3<f64>,
+    /// Outward normal of the wall's face around it.
+    pub normal: Vector3<f64>,
+    /// Displacement of the centroid, metres; `None` where there is no estimate, for whatever reason.
+    pub displacement: Option<Vector3<f64>>,
+    /// Covariance of the displacement, m^2, registration error included.
+    pub covariance: Option<Matrix3<f64>>,
+    /// Smallest significant displacement at 95 %, metres.
+    pub detection_limit_m: Option<f64>,
+    /// Reported as moved, at 95 %.
+    pub significant: Option<bool>,
+    /// Reported as moving unlike its neighbours.
+    pub loose: Option<bool>,
+}
+
+/// An estimated displacement with its truth and what was claimed about it.
+#[derive(Clone, Debug)]
+pub struct MotionSample {
+    /// Along-dam, up and out-of-plane axes at the place.
+    pub frame: FaceFrame,
+    /// Estimated displacement, world frame, metres.
+    pub estimated: Vector3<f64>,
+    /// True displacement, world frame, metres.
+    pub truth: Vector3<f64>,
+    /// Covariance of the estimate, world frame, m^2.
+    pub covariance: Option<Matrix3<f64>>,
+    /// Half-widths of the claimed 95 % intervals along, up and out, metres; `None` where nothing is claimed.
+    pub half_width_m: [Option<f64>; 3],
+    /// Smallest significant displacement at 95 %, metres.
+    pub detection_limit_m: Option<f64>,
+    /// Reported as moved, at 95 %.
+    pub significant: Option<bool>,
+    /// Reported as loose, and truly loose.
+    pub loose: Option<(bool, bool)>,
+}
+
+/// Half-width of a 95 % interval of the normal distribution, in standard deviations.
+const Z95: f64 = 1.959_963_984_540_054;
+
+impl MotionSample {
+    /// A stone's motion beside the truth at its centroid; `None` where the stone has no estimate.
+    ///
+    /// 95 % intervals are 1.96 standard deviations of the covariance along each axis.
+    pub fn of_stone(
+        outcome: &StoneOutcome,
+        normal: &Vector3<f64>,
+        truth: Vector3<f64>,
+        truly_loose: Option<bool>,
+    ) -> Option<Self> {
+        let frame = FaceFrame::from_normal(normal);
+        let axes = [frame.along, frame.up, frame.out];
+        Some(Self {
+            frame,
+            estimated: outcome.displacement?,
+            truth,
+            covariance: outcome.covariance,
+            half_width_m: axes.map(|axis| {
+                outcome
+                    .covariance
+                    .map(|c| Z95 * axis.dot(&(c * axis)).max(0.0).sqrt())
+            }),
+            detection_limit_m: outcome.detection_limit_m,
+            significant: outcome.significant,
+            loose: outcome.loose.zip(truly_loose),
+        })
+    }
+
+    /// Estimate minus truth in (along, up, out), metres.
+    pub fn error(&self) -> Vector3<f64> {
+        self.frame.face_from_world() * (self.estimated - self.truth)
+    }
+
+    /// Truth in (along, up, out), metres.
+    pub fn local_truth(&self) -> Vector3<f64> {
+        self.frame.face_from_world() * self.truth
+    }
+}
