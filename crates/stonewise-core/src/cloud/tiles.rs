@@ -6,7 +6,7 @@ use crate::geometry::Bounds;
 /// A cloud cut into tiles; only what is asked for is in memory.
 pub trait TileSource: Sync {
     /// Why a tile could not be read.
-    type Error: std::error::Error + Send + 'static;
+    type Error: std::error::Error + Send + Sync + 'static;
 
     /// Number of tiles; none of them is empty.
     fn tile_count(&self) -> usize;

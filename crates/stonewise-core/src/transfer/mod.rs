@@ -1,1 +1,37 @@
-//! transfer
+//! From instances in photos to stones in the point cloud.
+//!
+//! Every point is projected into every photo that can see it; instances of different photos that cover the same
+//! surface become one stone; the majority of the photos decides about each point. Three passes over the cloud: depth
+//! maps, overlaps of instances, labels. Memory holds one tile, all depth maps (bounded by a parameter) and the masks as
+//! runs, never the survey.
+//!
+//! Limits: a photo that looks at the back of a wall whose back is not in the cloud would see its front's points;
+//! leave such photos without masks.
+
+mod area;
+mod assign;
+mod atoms;
+mod audit;
+mod depth;
+mod error;
+mod face;
+mod frustum;
+mod islands;
+mod labels;
+mod majority;
+mod overlap;
+mod params;
+mod run_labels;
+mod stones;
+mod surface_cells;
+mod tracks;
+mod transfer_labels;
+mod visibility;
+mod vote;
+
+pub use audit::AuditEvent;
+pub use error::TransferError;
+pub use labels::{LabelStore, MemoryLabels, TileLabels};
+pub use params::TransferParams;
+pub use stones::{StoneParams, build_stones};
+pub use transfer_labels::{PhotoVotes, StoneInstances, Transfer, transfer_labels};

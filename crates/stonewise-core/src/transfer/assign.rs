@@ -1,0 +1,143 @@
+//! Which instance of one photo is which instance of another.
+
+use super::overlap::Overlaps;
+use pathfinding::prelude::{Matrix, kuhn_munkres};
+use std::collections::BTreeMap;
+
+/// Pairs of instances of different photos that may be one stone, each instance at most once per pair of photos:
+/// the assignment with the greatest sum of intersection over union (Kuhn 1955).
+///
+/// Solved block by block: pairs under `min_iou` could never be accepted and are no edges, so the blocks are a few
+/// instances large on a wall of any size. Cost: cubic in the instances of a block.
+pub(super) fn assign(overlaps: &Overlaps, min_iou: f64) -> Vec<(u32, u32)> {
+    let mut edges: BTreeMap<(u32, u32), Vec<(u32, u32, f64)>> = BTreeMap::new();
+    for &(i, j) in overlaps.common.keys() {
+        let [common, union] = overlaps.intersection_union(i, j);
+        let iou = f64::from(common) / f64::from(union);
+        if iou >= min_iou {
+            let photo = |k: u32| overlaps.instances[k as usize].photo;
+            edges.entry((photo(i), photo(j))).or_default().push((i, j, iou));
+        }
+    }
+    let mut pairs: Vec<(u32, u32)> = edges
+        .values()
+        .flat_map(|edges| blocks(edges))
+        .flat_map(|block| solve(&block))
+        .collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+type Edge = (u32, u32, f64);
+
+/// Connected components of the graph of one pair of photos.
+fn blocks(edges: &[Edge]) -> Vec<Vec<Edge>> {
+    let mut block_of: BTreeMap<u32, usize> = BTreeMap::new();
+    let mut blocks: Vec<Vec<Edge>> = Vec::new();
+    for &(i, j, iou) in edges {
+        let target = match (block_of.get(&i).copied(), block_of.get(&j).copied()) {
+            (Some(a), Some(b)) if a != b => {
+                let (keep, lose) = (a.min(b), a.max(b));
+                let moved = std::mem::take(&mut blocks[lose]);
+                for &(k, l, _) in &moved {
+                    block_of.insert(k, keep);
+                    block_of.insert(l, keep);
+                }
+                blocks[keep].extend(moved);
+                keep
+            }
+            (Some(a), _) | (None, Some(a)) => a,
+            (None, None) => {
+                blocks.push(Vec::new());
+                blocks.len() - 1
+            }
+        };
+        block_of.insert(i, target);
+        block_of.insert(j, target);
+        blocks[target].push((i, j, iou));
+    }
+    blocks.retain(|b| !b.is_empty());
+    blocks
+}
+
+fn solve(block: &[Edge]) -> Vec<(u32, u32)> {
+    if let [(i, j, _)] = block {
+        return vec![(*i, *j)];
+    }
+    let mut rows: Vec<u32> = block.iter().map(|e| e.0).collect();
+    let mut columns: Vec<u32> = block.iter().map(|e| e.1).collect();
+    for side in [&mut rows, &mut columns] {
+        side.sort_unstable();
+        side.dedup();
+    }
+    let turned = rows.len() > columns.len();
+    if turned {
+        std::mem::swap(&mut rows, &mut columns);
+    }
+    let mut weights = Matrix::new(rows.len(), columns.len(), 0i64);
+    for &(i, j, iou) in block {
+        let (row, column) = if turned { (j, i) } else { (i, j) };
+        if let (Ok(r), Ok(c)) = (rows.binary_search(&row), columns.binary_search(&column)) {
+            weights[(r, c)] = (iou * 1e9) as i64;
+        }
+    }
+    let (_, assigned) = kuhn_munkres(&weights);
+    assigned
+        .iter()
+        .enumerate()
+        .filter(|&(r, &c)| weights[(r, c)] > 0)
+        .map(|(r, &c)| {
+            if turned {
+                (columns[c], rows[r])
+            } else {
+                (rows[r], columns[c])
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The best sum over all one-to-one choices, by trying them all.
+    fn best(edges: &[Edge], used: &mut Vec<u32>) -> f64 {
+        let Some((&(i, j, iou), rest)) = edges.split_first() else {
+            return 0.0;
+        };
+        let without = best(rest, used);
+        if used.contains(&i) || used.contains(&j) {
+            return without;
+        }
+        used.extend([i, j]);
+        let with = iou + best(rest, used);
+        used.truncate(used.len() - 2);
+        with.max(without)
+    }
+
+    #[test]
+    fn a_block_reaches_the_sum_of_an_exhaustive_search() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+        for _ in 0..200 {
+            let mut edges: Vec<Edge> = Vec::new();
+            for i in 0..rng.random_range(1..5u32) {
+                for j in 10..10 + rng.random_range(1..5u32) {
+                    if rng.random_bool(0.6) {
+                        edges.push((i, j, rng.random_range(0.01..1.0)));
+                    }
+                }
+            }
+            let pairs: Vec<_> = blocks(&edges).iter().flat_map(|b| solve(b)).collect();
+            let sum: f64 = pairs
+                .iter()
+                .map(|p| edges.iter().find(|e| (e.0, e.1) == *p).unwrap().2)
+                .sum();
+            assert!((sum - best(&edges, &mut Vec::new())).abs() < 1e-6);
+            let mut ends: Vec<u32> = pairs.iter().flat_map(|p| [p.0, p.1]).collect();
+            ends.sort_unstable();
+            ends.dedup();
+            assert_eq!(ends.len(), 2 * pairs.len());
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Depth maps of photos by splatting.
+
+use super::frustum::Cone;
+use super::surface_cells::SurfaceCells;
+use super::{TransferError, TransferParams};
+use crate::cloud::{Cloud, TileSource};
+use crate::geometry::View;
+use crate::progress::Progress;
+use crate::raster::DepthMap;
+use rayon::prelude::*;
+
+/// Splats are never wider than this many map pixels to each side: keeps a lone near point from covering a photo.
+const MAX_SPLAT_PX: i64 = 24;
+
+/// The nearest surface of each pixel of a photo, possibly at reduced resolution.
+pub(super) struct SplatDepth {
+    map: DepthMap,
+    /// Map pixels per photo pixel, at most 1.
+    scale: f64,
+}
+
+impl SplatDepth {
+    pub(super) fn new(view: &View, scale: f64) -> Self {
+        let side = |pixels: u32| (f64::from(pixels) * scale).ceil() as u32;
+        Self {
+            map: DepthMap::filled(side(view.camera.width), side(view.camera.height), f32::INFINITY),
+            scale,
+        }
+    }
+
+    /// Lets a point cover the square of half width `radius_px` (photo pixels) around its pixel.
+    pub(super) fn splat(&mut self, pixel: [f64; 2], depth_m: f64, radius_px: f64) {
+        let radius = (radius_px * self.scale).min(MAX_SPLAT_PX as f64);
+        let depth = depth_m as f32;
+        let width = i64::from(self.map.width());
+        let height = i64::from(self.map.height());
+        let range = |centre: f64, size: i64| {
+            let low = ((centre - radius).floor() as i64).max(0);
+            let high = ((centre + radius).floor() as i64).min(size - 1);
+            (low, high)
+        };
+        let (x0, x1) = range(pixel[0] * self.scale, width);
+        let (y0, y1) = range(pixel[1] * self.scale, height);
+        if x0 > x1 {
+            return;
+        }
+        for y in y0..=y1 {
+            let row = (y * width) as usize;
+            for value in &mut self.map.data_mut()[row + x0 as usize..=row + x1 as usize] {
+                *value = value.min(depth);
+            }
+        }
+    }
+
+    /// Depth of the nearest surface at a pixel, and the least and greatest depth within `radius_px` (photo pixels).
+    pub(super) fn around(&self, pixel: [f64; 2], radius_px: f64) -> Option<[f32; 3]> {
+        let centre = [pixel[0] * self.scale, pixel[1] * self.scale];
+        let here = *self.map.at(centre)?;
+        let radius = (radius_px * self.scale).max(1.0);
+        let (mut least, mut greatest) = (here, if here.is_finite() { here } else { 0.0 });
+        for dy in [-radius, 0.0, radius] {
+            for dx in [-radius, 0.0, radius] {
+                let Some(&depth) = self.map.at([centre[0] + dx, centre[1] + dy]) else {
+                    continue;
+                };
+                if depth.is_finite() {
+                    least = least.min(depth);
+                    greatest = greatest.max(depth);
+                }
+            }
+        }
+        Some([here, least, greatest])
+    }
+}
+
+/// Depth maps of the photos and the local surface of all tiles, from one pass over the cloud.
+///
+/// Cost: one projection a point and photo whose cone touches the tile, and one write a pixel of each splat.
+pub(super) fn splat_all<T: TileSource>(
+    tiles: &T,
+    views: &[&View],
+    params: &TransferParams,
+    progress: &dyn Progress,
+) -> Result<(Vec<SplatDepth>, Vec<SurfaceCells>), TransferError> {
+    let scale = map_scale(views, params.depth_memory_mib);
+    let mut maps: Vec<SplatDepth> = views.iter().map(|v| SplatDepth::new(v, scale)).collect();
+    let cones: Vec<Cone> = views.iter().map(|v| Cone::of(v)).collect();
+    let mut surfaces = Vec::with_capacity(tiles.tile_count());
+    progress.begin("depth maps", tiles.tile_count() as u64);
+    for tile in 0..tiles.tile_count() {
+        progress.check()?;
+        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+        let surface = SurfaceCells::new(&cloud, params.cell_m);
+        let bounds = tiles.bounds(tile);
+        maps.par_iter_mut()
+            .zip(views.par_iter().zip(&cones))
+            .filter(|(_, (_, cone))| cone.touches(&bounds))
+            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, &surface, params));
+        surfaces.push(surface);
+        progress.advance(1);
+    }
+    Ok((maps, surfaces))
+}
+
+fn splat_tile(
+    map: &mut SplatDepth,
+    view: &View,
+    cloud: &Cloud,
+    surface: &SurfaceCells,
+    params: &TransferParams,
+) {
+    for i in 0..cloud.len() {
+        let Some(seen) = view.project(&cloud.world(i)) else {
+            continue;
+        };
+        if !view.is_inside(seen.pixel) {
+            continue;
+        }
+        let spacing = surface
+            .at(&cloud.local(i))
+            .map_or(0.0, |s| f64::from(s.spacing_m));
+        let radius = params.splat_spacings * spacing / view.gsd_m(seen.depth_m);
+        map.splat(seen.pixel, seen.depth_m, radius);
+    }
+}
+
+/// The resolution at which the maps of all photos fit in the memory allowed to them.
+fn map_scale(views: &[&View], memory_mib: u32) -> f64 {
+    let pixels: f64 = views
+        .iter()
+        .map(|v| f64::from(v.camera.width) * f64::from(v.camera.height))
+        .sum();
+    let allowed = f64::from(memory_mib.max(1)) * 1024.0 * 1024.0 / 4.0;
+    (allowed / pixels.max(1.0)).sqrt().min(1.0)
+}

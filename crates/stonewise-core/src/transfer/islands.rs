@@ -1,0 +1,156 @@
+//! Parts of a stone that are cut off from its main body.
+
+use super::TransferParams;
+use nalgebra::Point3;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+/// Cubic cell of a world-aligned grid.
+pub(super) type Voxel = [i64; 3];
+
+/// Where each stone has points, counted in voxels across all tiles.
+pub(super) struct Occupancy {
+    voxel_m: f64,
+    counts: HashMap<(u32, Voxel), u32>,
+}
+
+/// What must lose its label.
+pub(super) struct Removal {
+    voxel_m: f64,
+    /// Voxels of islands and of whole stones.
+    pub voxels: HashSet<(u32, Voxel)>,
+    /// Islands and points on them, of stones that stay.
+    pub islands: BTreeMap<u32, (u32, u64)>,
+    /// Stones that go, with their points.
+    pub stones: BTreeMap<u32, u64>,
+    /// Stones that stay.
+    pub kept: BTreeSet<u32>,
+}
+
+impl Occupancy {
+    pub(super) fn new(voxel_m: f64) -> Self {
+        Self {
+            voxel_m,
+            counts: HashMap::new(),
+        }
+    }
+
+    pub(super) fn add(&mut self, stone: u32, world: &Point3<f64>) {
+        *self
+            .counts
+            .entry((stone, voxel_of(world, self.voxel_m)))
+            .or_insert(0) += 1;
+    }
+
+    /// Finds islands smaller than a share of their stone's largest part, and stones with too few points.
+    ///
+    /// Parts hang together where their voxels touch, corners included.
+    pub(super) fn removal(self, params: &TransferParams) -> Removal {
+        let mut stones: BTreeMap<u32, BTreeMap<Voxel, u32>> = BTreeMap::new();
+        for ((stone, voxel), count) in self.counts {
+            stones.entry(stone).or_default().insert(voxel, count);
+        }
+        let mut removal = Removal {
+            voxel_m: self.voxel_m,
+            voxels: HashSet::new(),
+            islands: BTreeMap::new(),
+            stones: BTreeMap::new(),
+            kept: BTreeSet::new(),
+        };
+        for (stone, voxels) in stones {
+            removal.judge(stone, parts(voxels), params);
+        }
+        removal
+    }
+}
+
+/// A connected part: its voxels and the number of its points.
+type Part = (Vec<Voxel>, u64);
+
+impl Removal {
+    fn judge(&mut self, stone: u32, parts: Vec<Part>, params: &TransferParams) {
+        let largest = parts.iter().map(|p| p.1).max().unwrap_or(0);
+        let limit = params.island_share * largest as f64;
+        let (kept, dropped): (Vec<Part>, Vec<Part>) = parts.into_iter().partition(|p| p.1 as f64 >= limit);
+        let points = |parts: &[Part]| parts.iter().map(|p| p.1).sum::<u64>();
+        let remaining = points(&kept);
+        let gone = remaining < u64::from(params.min_points);
+        if gone {
+            self.stones.insert(stone, remaining + points(&dropped));
+        } else {
+            self.kept.insert(stone);
+            if !dropped.is_empty() {
+                self.islands
+                    .insert(stone, (dropped.len() as u32, points(&dropped)));
+            }
+        }
+        let gone = if gone { kept } else { Vec::new() };
+        let voxels = dropped.into_iter().chain(gone).flat_map(|p| p.0);
+        self.voxels.extend(voxels.map(|v| (stone, v)));
+    }
+
+    /// Whether a point of a stone loses its label.
+    pub(super) fn takes(&self, stone: u32, world: &Point3<f64>) -> bool {
+        self.voxels.contains(&(stone, voxel_of(world, self.voxel_m)))
+    }
+
+    /// Side of the voxels, metres.
+    pub(super) fn voxel_m(&self) -> f64 {
+        self.voxel_m
+    }
+}
+
+fn voxel_of(p: &Point3<f64>, voxel_m: f64) -> Voxel {
+    [0, 1, 2].map(|a| (p[a] / voxel_m).floor() as i64)
+}
+
+fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {
+    let mut parts = Vec::new();
+    while let Some((seed, count)) = voxels.pop_first() {
+        let mut part = (vec![seed], u64::from(count));
+        let mut next = 0;
+        while next < part.0.len() {
+            let v = part.0[next];
+            next += 1;
+            for n in neighbours(v) {
+                if let Some(count) = voxels.remove(&n) {
+                    part.0.push(n);
+                    part.1 += u64::from(count);
+                }
+            }
+        }
+        parts.push(part);
+    }
+    parts
+}
+
+fn neighbours([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
+    (0..27i64).map(move |i| [x + i % 3 - 1, y + i / 3 % 3 - 1, z + i / 9 - 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_far_speck_goes_a_second_half_stays_and_a_tiny_stone_goes() {
+        let mut occupancy = Occupancy::new(0.04);
+        let mut patch = |stone, x0: f64, n: i32| {
+            for i in 0..n {
+                for j in 0..n {
+                    let p = Point3::new(x0 + 0.01 * f64::from(i), 0.01 * f64::from(j), 0.0);
+                    occupancy.add(stone, &p);
+                }
+            }
+        };
+        patch(1, 0.0, 20);
+        patch(1, 0.5, 15);
+        patch(1, 1.0, 3);
+        patch(2, 2.0, 4);
+        let removal = occupancy.removal(&TransferParams::default());
+        assert_eq!(removal.islands, BTreeMap::from([(1, (1, 9))]));
+        assert_eq!(removal.stones, BTreeMap::from([(2, 16)]));
+        assert!(removal.takes(1, &Point3::new(1.01, 0.01, 0.0)));
+        assert!(!removal.takes(1, &Point3::new(0.51, 0.01, 0.0)));
+        assert!(removal.takes(2, &Point3::new(2.0, 0.0, 0.0)));
+    }
+}

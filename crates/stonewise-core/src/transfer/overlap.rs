@@ -1,0 +1,85 @@
+//! How far the instances of different photos cover the same surface.
+
+use super::atoms::Atom;
+use std::collections::{BTreeMap, HashMap};
+
+/// One instance of one photo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Instance {
+    /// Position of the photo among those with a mask.
+    pub photo: u32,
+    /// Label in that photo's mask.
+    pub label: u32,
+    /// Sampled points on it.
+    pub area: u32,
+}
+
+/// Areas that instances share, counted on the sampled points.
+pub(super) struct Overlaps {
+    /// All instances with points, ascending by photo and label.
+    pub instances: Vec<Instance>,
+    index: HashMap<(u32, u32), u32>,
+    /// Area common to two instances (ascending indices) of different photos.
+    pub common: BTreeMap<(u32, u32), u32>,
+    /// Area of an instance that another photo sees, whatever it says about it.
+    seen_by: HashMap<(u32, u32), u32>,
+}
+
+impl Overlaps {
+    pub(super) fn of(atoms: &[Atom]) -> Self {
+        let mut areas: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        for atom in atoms {
+            for s in atom.sightings.iter().filter(|s| s.instance != 0) {
+                *areas.entry((s.photo, s.instance)).or_insert(0) += atom.area;
+            }
+        }
+        let index: HashMap<_, _> = areas.keys().copied().zip(0..).collect();
+        let mut overlaps = Self {
+            instances: areas
+                .into_iter()
+                .map(|((photo, label), area)| Instance { photo, label, area })
+                .collect(),
+            index,
+            common: BTreeMap::new(),
+            seen_by: HashMap::new(),
+        };
+        for atom in atoms {
+            overlaps.count(atom);
+        }
+        overlaps
+    }
+
+    fn count(&mut self, atom: &Atom) {
+        for (k, a) in atom.sightings.iter().enumerate() {
+            let Some(i) = self.find(a.photo, a.instance) else {
+                continue;
+            };
+            for (l, b) in atom.sightings.iter().enumerate() {
+                if l == k {
+                    continue;
+                }
+                *self.seen_by.entry((i, b.photo)).or_insert(0) += atom.area;
+                if l > k
+                    && let Some(j) = self.find(b.photo, b.instance)
+                {
+                    *self.common.entry((i.min(j), i.max(j))).or_insert(0) += atom.area;
+                }
+            }
+        }
+    }
+
+    /// Index of an instance; `None` for background.
+    pub(super) fn find(&self, photo: u32, label: u32) -> Option<u32> {
+        self.index.get(&(photo, label)).copied()
+    }
+
+    /// Intersection and union of two instances over the points that both photos see.
+    pub(super) fn intersection_union(&self, i: u32, j: u32) -> [u32; 2] {
+        let common = self.common.get(&(i.min(j), i.max(j))).copied().unwrap_or(0);
+        let seen = |a: u32, b: u32| {
+            let photo = self.instances[b as usize].photo;
+            self.seen_by.get(&(a, photo)).copied().unwrap_or(0)
+        };
+        [common, seen(i, j) + seen(j, i) - common]
+    }
+}

@@ -1,0 +1,158 @@
+//! Local spacing, noise and orientation of a tile's surface.
+
+use crate::cloud::{Cloud, GridIndex};
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// What the surface is like around a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LocalSurface {
+    /// Unit normal of the face, sign arbitrary.
+    pub normal: Vector3<f32>,
+    /// Distance between points of an even surface sampling of the same density, metres.
+    pub spacing_m: f32,
+    /// Standard deviation of points about a small plane, metres.
+    pub noise_m: f32,
+}
+
+/// Local surface in cubic cells of a tile.
+pub(super) struct SurfaceCells {
+    cell_m: f64,
+    cells: HashMap<[i32; 3], LocalSurface>,
+}
+
+/// Points around a sample of which spacing and noise are measured.
+const NEIGHBOURS: usize = 12;
+/// Samples per cell at most; the median of them is kept.
+const SAMPLES: usize = 5;
+/// Neighbours farther away than this say nothing about a surface, metres.
+const MAX_NEIGHBOUR_M: f64 = 0.5;
+
+impl SurfaceCells {
+    /// Measures the surface of a tile. Cost: one neighbour index and a few searches per cell.
+    pub(super) fn new(cloud: &Cloud, cell_m: f64) -> Self {
+        let points: Vec<Point3<f64>> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
+        let mut members: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
+        for (i, p) in points.iter().enumerate() {
+            members.entry(key(p, cell_m)).or_default().push(i as u32);
+        }
+        let mut members: Vec<_> = members.into_iter().collect();
+        members.sort_unstable_by_key(|(key, _)| *key);
+        let index = GridIndex::new(&points, search_cell(&points, &members, cell_m));
+        let cells = members
+            .par_iter()
+            .map(|(key, ids)| (*key, measure(&points, &index, ids, cell_m)))
+            .collect();
+        Self { cell_m, cells }
+    }
+
+    /// Surface around a point given relative to the tile's origin.
+    pub(super) fn at(&self, local: &Point3<f64>) -> Option<&LocalSurface> {
+        self.cells.get(&key(local, self.cell_m))
+    }
+
+    /// Spacings of all cells, in no particular order.
+    pub(super) fn spacings(&self) -> impl Iterator<Item = f32> {
+        self.cells.values().map(|c| c.spacing_m)
+    }
+}
+
+fn key(p: &Point3<f64>, cell_m: f64) -> [i32; 3] {
+    [0, 1, 2].map(|a| (p[a] / cell_m).floor() as i32)
+}
+
+/// A cell for the index that holds a handful of points where the cloud is as dense as usual.
+fn search_cell(points: &[Point3<f64>], members: &[([i32; 3], Vec<u32>)], cell_m: f64) -> f64 {
+    let mean = points.len() as f64 / members.len().max(1) as f64;
+    (3.0 * cell_m / mean.sqrt()).clamp(0.005, MAX_NEIGHBOUR_M)
+}
+
+fn measure(points: &[Point3<f64>], index: &GridIndex, ids: &[u32], cell_m: f64) -> LocalSurface {
+    let step = ids.len().div_ceil(SAMPLES).max(1);
+    let mut spacings = Vec::new();
+    let mut noises = Vec::new();
+    for &i in ids.iter().skip(step / 2).step_by(step) {
+        let found = index.nearest_k(&points[i as usize], NEIGHBOURS + 1, MAX_NEIGHBOUR_M);
+        let around: Vec<Point3<f64>> = found.iter().map(|f| points[f.0]).collect();
+        let reach2 = found.last().map_or(0.0, |f| f.1);
+        spacings.push(if found.len() > 1 {
+            (std::f64::consts::PI * reach2 / (found.len() - 1) as f64).sqrt()
+        } else {
+            MAX_NEIGHBOUR_M
+        });
+        // Three parameters of the plane are free: the residuals of k points hold k - 3 degrees of freedom.
+        if around.len() > 4 {
+            let (_, spread) = principal(&around);
+            noises.push(spread * (around.len() as f64 / (around.len() - 3) as f64).sqrt());
+        }
+    }
+    let spacing = median(&mut spacings);
+    let cell: Vec<Point3<f64>> = thinned(points, ids);
+    let normal = if cell.len() >= 3 {
+        principal(&cell).0
+    } else {
+        Vector3::zeros()
+    };
+    LocalSurface {
+        normal: normal.cast(),
+        spacing_m: spacing.min(cell_m) as f32,
+        noise_m: median(&mut noises) as f32,
+    }
+}
+
+fn thinned(points: &[Point3<f64>], ids: &[u32]) -> Vec<Point3<f64>> {
+    let step = ids.len().div_ceil(400).max(1);
+    ids.iter().step_by(step).map(|&i| points[i as usize]).collect()
+}
+
+/// Normal of the least-squares plane and the standard deviation along it.
+fn principal(points: &[Point3<f64>]) -> (Vector3<f64>, f64) {
+    let n = points.len() as f64;
+    let mean = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / n;
+    let covariance: Matrix3<f64> = points
+        .iter()
+        .map(|p| (p.coords - mean) * (p.coords - mean).transpose() / n)
+        .sum();
+    let eigen = covariance.symmetric_eigen();
+    let smallest = eigen.eigenvalues.imin();
+    let value = eigen.eigenvalues[smallest].max(0.0).sqrt();
+    (eigen.eigenvectors.column(smallest).into_owned(), value)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    #[test]
+    fn finds_spacing_noise_and_normal_of_a_noisy_plane() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let normal = Vector3::new(0.8, 0.0, 0.6);
+        let (u, v) = (Vector3::new(-0.6, 0.0, 0.8), Vector3::y());
+        let mut gauss = || (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>();
+        let points: Vec<Point3<f64>> = (0..100 * 100)
+            .map(|i| {
+                let (a, b) = (f64::from(i % 100), f64::from(i / 100));
+                Point3::origin() + u * (0.01 * a) + v * (0.01 * b) + normal * (0.001 * gauss())
+            })
+            .collect();
+        let cloud = Cloud::from_world(Point3::origin(), points);
+        let cells = SurfaceCells::new(&cloud, 0.25);
+        let surface = cells.at(&cloud.local(5050)).unwrap();
+        assert!(
+            (f64::from(surface.spacing_m) - 0.01).abs() < 0.0025,
+            "{surface:?}"
+        );
+        assert!((f64::from(surface.noise_m) - 0.001).abs() < 0.0005, "{surface:?}");
+        assert!(surface.normal.cast::<f64>().cross(&normal).norm() < 0.05);
+    }
+}

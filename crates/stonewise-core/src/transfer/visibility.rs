@@ -1,0 +1,139 @@
+//! What each photo says about a point that it can see.
+
+use super::TransferError;
+use super::TransferParams;
+use super::depth::{SplatDepth, splat_all};
+use super::frustum::Cone;
+use super::run_labels::RunLabels;
+use super::surface_cells::SurfaceCells;
+use crate::cloud::{Cloud, TileSource};
+use crate::geometry::{Bounds, View};
+use crate::progress::Progress;
+use nalgebra::Point3;
+
+/// One photo's word on one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sighting {
+    /// Position of the photo among those with a mask.
+    pub photo: u32,
+    /// Instance of that photo's mask, 0 for background.
+    pub instance: u32,
+    /// How much the word counts; only ratios matter.
+    pub weight: f32,
+}
+
+/// Everything needed to ask all photos about any point.
+pub(super) struct Observer<'a> {
+    views: Vec<&'a View>,
+    centres: Vec<Point3<f64>>,
+    cones: Vec<Cone>,
+    labels: Vec<RunLabels>,
+    depths: Vec<SplatDepth>,
+    surfaces: Vec<SurfaceCells>,
+    params: &'a TransferParams,
+}
+
+impl<'a> Observer<'a> {
+    /// Makes the depth maps of the photos that have masks.
+    pub(super) fn new<T: TileSource>(
+        tiles: &T,
+        masked: Vec<(&'a View, RunLabels)>,
+        params: &'a TransferParams,
+        progress: &dyn Progress,
+    ) -> Result<Self, TransferError> {
+        let (views, labels): (Vec<&View>, Vec<RunLabels>) = masked.into_iter().unzip();
+        let (depths, surfaces) = splat_all(tiles, &views, params, progress)?;
+        Ok(Self {
+            centres: views.iter().map(|v| v.centre()).collect(),
+            cones: views.iter().map(|v| Cone::of(v)).collect(),
+            views,
+            labels,
+            depths,
+            surfaces,
+            params,
+        })
+    }
+
+    /// The photos that have masks.
+    pub(super) fn views(&self) -> &[&'a View] {
+        &self.views
+    }
+
+    /// Photos that may show a part of the box.
+    pub(super) fn candidates(&self, bounds: &Bounds) -> Vec<u32> {
+        (0..self.views.len() as u32)
+            .filter(|&p| self.cones[p as usize].touches(bounds))
+            .collect()
+    }
+
+    /// Median point spacing over the cells of the whole cloud, metres.
+    pub(super) fn spacing_m(&self) -> f64 {
+        let mut all: Vec<f32> = self.surfaces.iter().flat_map(SurfaceCells::spacings).collect();
+        all.sort_by(f32::total_cmp);
+        all.get(all.len() / 2).copied().map_or(0.0, f64::from)
+    }
+
+    /// Sightings of point `i` of a tile by the candidate photos, in their order.
+    pub(super) fn sight(
+        &self,
+        tile: usize,
+        cloud: &Cloud,
+        i: usize,
+        candidates: &[u32],
+        found: &mut Vec<Sighting>,
+    ) {
+        found.clear();
+        let world = cloud.world(i);
+        let local = cloud.local(i);
+        for &photo in candidates {
+            if let Some(sighting) = self.sight_in(photo, tile, &local, &world) {
+                found.push(sighting);
+            }
+        }
+    }
+
+    fn sight_in(
+        &self,
+        photo: u32,
+        tile: usize,
+        local: &Point3<f64>,
+        world: &Point3<f64>,
+    ) -> Option<Sighting> {
+        let p = photo as usize;
+        let view = self.views[p];
+        let seen = view.project(world)?;
+        let instance = self.labels[p].at(seen.pixel)?;
+        let surface = self.surfaces[tile].at(local)?;
+        let line = (world - self.centres[p]).normalize();
+        let cosine = line.dot(&surface.normal.cast()).abs();
+        // A cell without a normal (one or two points) says nothing about incidence.
+        let cosine = if surface.normal == nalgebra::Vector3::zeros() {
+            0.5
+        } else {
+            cosine
+        };
+        if cosine < self.params.max_incidence_rad.cos() {
+            return None;
+        }
+        let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+        let tolerance = self.params.tolerance_spacings * f64::from(surface.spacing_m) * (1.0 + tangent)
+            + self.params.tolerance_noises * f64::from(surface.noise_m);
+        let [here, least, greatest] = self.depths[p].around(seen.pixel, self.params.silhouette_px)?;
+        let depth = seen.depth_m;
+        let step = self.params.silhouette_step_m + tolerance;
+        let hidden = depth > f64::from(here) + tolerance;
+        let beside_an_occluder = depth > f64::from(least) + step;
+        let on_an_edge = f64::from(greatest) > depth + step;
+        if hidden || beside_an_occluder || on_an_edge {
+            return None;
+        }
+        // Precision of a border on the face: finer and less oblique photos know better where a stone ends. The
+        // root keeps one close photo from outvoting the majority.
+        let weight = (cosine / view.gsd_m(depth)).sqrt() as f32;
+        Some(Sighting {
+            photo,
+            instance,
+            weight,
+        })
+    }
+}

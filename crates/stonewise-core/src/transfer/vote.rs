@@ -1,0 +1,136 @@
+//! The majority of the photos.
+
+use super::overlap::Overlaps;
+use super::visibility::Sighting;
+use std::collections::HashSet;
+
+/// What an instance votes for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Ballot {
+    /// One stone.
+    One(u32),
+    /// Whichever of these stones the other photos see at a point: a mask that merges them.
+    AnyOf(Vec<u32>),
+    /// Nothing: an instance that the majority does not confirm.
+    Nothing,
+}
+
+/// What the votes of all photos come to at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Verdict {
+    /// Stone, or `None` for background.
+    pub stone: Option<u32>,
+    /// Share of the weight of all votes that agree, 0..1.
+    pub share: f64,
+}
+
+/// The ballots of all instances, ready to be counted.
+pub(super) struct Electorate<'a> {
+    overlaps: &'a Overlaps,
+    ballots: Vec<Ballot>,
+    /// (stone, photo) where the photo shows a part of the stone.
+    shown: HashSet<(u32, u32)>,
+    missed_weight: f64,
+}
+
+impl<'a> Electorate<'a> {
+    pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>, missed_weight: f64) -> Self {
+        let mut shown = HashSet::new();
+        for (instance, ballot) in overlaps.instances.iter().zip(&ballots) {
+            let stones: &[u32] = match ballot {
+                Ballot::One(stone) => std::slice::from_ref(stone),
+                Ballot::AnyOf(stones) => stones,
+                Ballot::Nothing => &[],
+            };
+            shown.extend(stones.iter().map(|&stone| (stone, instance.photo)));
+        }
+        Self {
+            overlaps,
+            ballots,
+            shown,
+            missed_weight,
+        }
+    }
+
+    pub(super) fn ballots(&self) -> &[Ballot] {
+        &self.ballots
+    }
+
+    /// Counts the votes at a point; `None` where no photo votes.
+    ///
+    /// A photo that shows background where others show a stone that it does not have at all counts less than one
+    /// that has the stone but ends it elsewhere. Between a stone and background a tie goes to the stone, between
+    /// stones to the lower index.
+    pub(super) fn count(&self, sightings: &[Sighting]) -> Option<Verdict> {
+        let mut tally: Vec<(u32, f64)> = Vec::with_capacity(4);
+        let mut total = 0.0;
+        let mut undecided: Vec<(f64, &[u32])> = Vec::new();
+        let mut background = 0.0;
+        for s in sightings {
+            let weight = f64::from(s.weight);
+            match self
+                .overlaps
+                .find(s.photo, s.instance)
+                .map(|i| &self.ballots[i as usize])
+            {
+                None => background += weight,
+                Some(Ballot::One(stone)) => cast(&mut tally, *stone, weight),
+                Some(Ballot::AnyOf(stones)) => undecided.push((weight, stones)),
+                Some(Ballot::Nothing) => continue,
+            }
+            total += weight;
+        }
+        for (weight, stones) in undecided {
+            if let Some((stone, _)) = leader(tally.iter().filter(|t| stones.contains(&t.0))) {
+                cast(&mut tally, stone, weight);
+            }
+        }
+        if total <= 0.0 {
+            return None;
+        }
+        let Some((stone, votes)) = leader(tally.iter()) else {
+            // Only background, or only merged masks, which cannot say which stone it is.
+            return (background > 0.0).then_some(Verdict {
+                stone: None,
+                share: background / total,
+            });
+        };
+        let against: f64 = sightings
+            .iter()
+            .filter(|s| self.overlaps.find(s.photo, s.instance).is_none())
+            .map(|s| {
+                let shown = self.shown.contains(&(stone, s.photo));
+                f64::from(s.weight) * if shown { 1.0 } else { self.missed_weight }
+            })
+            .sum();
+        Some(if votes >= against {
+            Verdict {
+                stone: Some(stone),
+                share: votes / total,
+            }
+        } else {
+            Verdict {
+                stone: None,
+                share: background / total,
+            }
+        })
+    }
+}
+
+fn cast(tally: &mut Vec<(u32, f64)>, stone: u32, weight: f64) {
+    match tally.iter_mut().find(|t| t.0 == stone) {
+        Some(entry) => entry.1 += weight,
+        None => tally.push((stone, weight)),
+    }
+}
+
+/// The entry with most votes, the lower stone among equals.
+fn leader<'t>(tally: impl Iterator<Item = &'t (u32, f64)>) -> Option<(u32, f64)> {
+    tally.copied().reduce(|best, t| {
+        if t.1 > best.1 || (t.1 == best.1 && t.0 < best.0) {
+            t
+        } else {
+            best
+        }
+    })
+}
