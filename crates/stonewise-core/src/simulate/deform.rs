@@ -1,0 +1,199 @@
+//! How the wall moved between the epochs: fields that every stone follows as a rigid body, and stones that are loose.
+
+use crate::geometry::Rigid3;
+use crate::simulate::noise::normal;
+use crate::simulate::wall::{SimStone, Wall};
+use nalgebra::{Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+
+/// One cause of motion; a survey has any number of them, and they add up. No entry: nothing moved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum WallMotion {
+    /// All stones move alike.
+    Translation {
+        /// Displacement, world frame, metres.
+        d_m: [f64; 3],
+    },
+    /// The face swells: `depth cos^2(pi r / diameter)` along the outward normal.
+    Bulge {
+        /// Centre on the face, along and up, metres.
+        centre_m: [f64; 2],
+        /// Displacement of the centre, metres; negative swells inwards.
+        depth_m: f64,
+        /// Where the bulge ends, metres.
+        diameter_m: f64,
+    },
+    /// The foundation gives way on one side: down, linearly from nothing at `from_m` to `depth_m` at `to_m`.
+    Settlement {
+        /// Where it starts, metres along the face.
+        from_m: f64,
+        /// Where it is complete, metres along the face.
+        to_m: f64,
+        /// Largest settlement, metres, positive downwards.
+        depth_m: f64,
+    },
+    /// The crown moves out against the foot, as a dam that the sun warms or the water loads: quadratic in height.
+    Bending {
+        /// Displacement of the crown along the outward normal, metres.
+        crown_m: f64,
+    },
+    /// A joint opens: everything right of a line through the wall moves.
+    Crack {
+        /// Where the line crosses u = 0, metres along the face.
+        along_m: f64,
+        /// How far the line goes sideways per metre of height.
+        slope: f64,
+        /// Displacement of the right side: along, up, out, metres.
+        d_m: [f64; 3],
+    },
+    /// Single stones that move on their own.
+    Loose {
+        /// Share of the stones, 0..1.
+        share: f64,
+        /// At least this many.
+        at_least: usize,
+        /// Smallest and largest displacement, metres, any direction (outwards more than inwards).
+        shift_m: [f64; 2],
+        /// Largest rotation, radians.
+        rotation_rad: f64,
+    },
+}
+
+/// What one stone did, with its parts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrueMotion {
+    /// World frame: `p2 = second_from_first * p1`.
+    pub second_from_first: Rigid3,
+    /// Motion that it shares with its neighbours, at its middle, metres.
+    pub shared: Vector3<f64>,
+    /// Moves on its own.
+    pub loose: bool,
+}
+
+/// The rigid motion of every stone. `seed`: which stones are loose, and how they move.
+pub fn move_stones(wall: &Wall, motions: &[WallMotion], seed: u64) -> Vec<TrueMotion> {
+    let mut moved: Vec<TrueMotion> = wall.stones.iter().map(|s| follow(wall, s, motions)).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for motion in motions {
+        if let WallMotion::Loose {
+            share,
+            at_least,
+            shift_m,
+            rotation_rad,
+        } = motion
+        {
+            let whole: Vec<usize> = (0..wall.stones.len()).filter(|&i| !wall.stones[i].edge).collect();
+            let wanted = ((share * whole.len() as f64).round() as usize).max(*at_least);
+            for i in choose(&whole, wanted, &mut rng) {
+                loosen(&mut moved[i], &wall.stones[i], *shift_m, *rotation_rad, &mut rng);
+            }
+        }
+    }
+    moved
+}
+
+/// Displacement that the motions prescribe for a place on the face, world frame, metres; loose stones apart.
+pub fn shared_displacement(wall: &Wall, motions: &[WallMotion], a: f64, u: f64) -> Vector3<f64> {
+    motions.iter().map(|m| displacement(wall, m, a, u, false)).sum()
+}
+
+fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks: bool) -> Vector3<f64> {
+    let frame = wall.face.frame(a);
+    match motion {
+        WallMotion::Translation { d_m } => Vector3::from(*d_m),
+        WallMotion::Bulge {
+            centre_m,
+            depth_m,
+            diameter_m,
+        } => {
+            let r = (a - centre_m[0]).hypot(u - centre_m[1]);
+            let inside = r < diameter_m / 2.0;
+            let size = if inside {
+                (PI * r / diameter_m).cos().powi(2)
+            } else {
+                0.0
+            };
+            frame.out * (depth_m * size)
+        }
+        WallMotion::Settlement {
+            from_m,
+            to_m,
+            depth_m,
+        } => {
+            let t = ((a - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
+            Vector3::new(0.0, 0.0, -depth_m * t)
+        }
+        WallMotion::Bending { crown_m } => {
+            let t = (u / wall.params().height_m).max(0.0);
+            frame.out * (crown_m * t * t)
+        }
+        WallMotion::Crack { along_m, slope, d_m } => {
+            if without_breaks || a < along_m + slope * u {
+                Vector3::zeros()
+            } else {
+                frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2]
+            }
+        }
+        WallMotion::Loose { .. } => Vector3::zeros(),
+    }
+}
+
+/// A stone follows the field at its middle, and turns with the field's gradient there.
+fn follow(wall: &Wall, stone: &SimStone, motions: &[WallMotion]) -> TrueMotion {
+    const STEP_M: f64 = 0.02;
+    let [a, u] = stone.middle;
+    let smooth =
+        |a: f64, u: f64| -> Vector3<f64> { motions.iter().map(|m| displacement(wall, m, a, u, true)).sum() };
+    let frame = wall.face.frame(a);
+    let to_face = frame.face_from_world();
+    let by_a = to_face * (smooth(a + STEP_M, u) - smooth(a - STEP_M, u)) / (2.0 * STEP_M);
+    let by_u = to_face * (smooth(a, u + STEP_M) - smooth(a, u - STEP_M)) / (2.0 * STEP_M);
+    let turn = Vector3::new(by_u.z, -by_a.z, 0.5 * (by_a.y - by_u.x));
+    let shared = shared_displacement(wall, motions, a, u);
+    TrueMotion {
+        second_from_first: about_middle(stone, shared, to_face.transpose() * turn),
+        shared,
+        loose: false,
+    }
+}
+
+fn loosen(
+    motion: &mut TrueMotion,
+    stone: &SimStone,
+    shift_m: [f64; 2],
+    rotation_rad: f64,
+    rng: &mut ChaCha8Rng,
+) {
+    let mut direction = Vector3::from_fn(|_, _| normal(rng));
+    let out = stone.world_from_stone * Vector3::z();
+    let outwards = direction.dot(&out);
+    if outwards < 0.0 {
+        // The wall behind holds a stone back.
+        direction -= 1.5 * outwards * out;
+    }
+    let shift = direction.normalize() * rng.random_range(shift_m[0]..=shift_m[1]);
+    let axis = Vector3::from_fn(|_, _| normal(rng)).normalize();
+    let turn = axis * (rotation_rad * rng.random::<f64>());
+    let own = about_middle(stone, shift, turn);
+    motion.second_from_first = motion.second_from_first * own;
+    motion.loose = true;
+}
+
+/// The motion that turns a stone about its middle and then shifts it.
+fn about_middle(stone: &SimStone, shift: Vector3<f64>, turn: Vector3<f64>) -> Rigid3 {
+    let middle = stone.world_from_stone.translation.vector;
+    let rotation = UnitQuaternion::from_scaled_axis(turn);
+    Rigid3::from_parts(Translation3::from(middle + shift - rotation * middle), rotation)
+}
+
+/// `count` different entries, in the order they are drawn.
+fn choose(from: &[usize], count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    let mut pool = from.to_vec();
+    (0..count.min(pool.len()))
+        .map(|_| pool.swap_remove(rng.random_range(0..pool.len())))
+        .collect()
+}

@@ -1,0 +1,145 @@
+//! The idealised face of the dam: battered, straight or curved in plan.
+
+use crate::geometry::{FaceFrame, Rigid3};
+use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
+
+/// A battered face and its coordinates: `a` along the face from its middle, `u` up in the face, `n` out of it.
+///
+/// World frame: x downstream (out of the face, at the middle), y along the dam, z up; (0, 0, 0) has a = u = n = 0.
+/// Lengths along `a` are measured at u = n = 0.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Face {
+    /// Cosine and sine of the lean.
+    lean: [f64; 2],
+    /// Radius in plan, metres; infinite for a straight wall.
+    radius_m: f64,
+}
+
+/// Coordinates on the face, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FacePoint {
+    /// Along the face.
+    pub a: f64,
+    /// Up in the face.
+    pub u: f64,
+    /// Out of the face.
+    pub n: f64,
+}
+
+impl Face {
+    /// A face that leans back by `batter` metres per metre of height. `plan_radius_m`: radius of the plan, centre
+    /// downstream where positive (the visible face is hollow, as on most dams); 0 means straight.
+    pub fn new(batter: f64, plan_radius_m: f64) -> Self {
+        let length = batter.hypot(1.0);
+        Self {
+            lean: [1.0 / length, batter / length],
+            radius_m: if plan_radius_m == 0.0 {
+                f64::INFINITY
+            } else {
+                plan_radius_m
+            },
+        }
+    }
+
+    /// Whether the plan is straight, so that the face is a plane.
+    pub fn is_plane(&self) -> bool {
+        self.radius_m.is_infinite()
+    }
+
+    /// Where a world point lies in face coordinates.
+    #[inline]
+    pub fn face_of(&self, p: &Point3<f64>) -> FacePoint {
+        let (x, a) = if self.is_plane() {
+            (p.x, p.y)
+        } else {
+            let side = self.radius_m.signum();
+            let from_axis = (self.radius_m - p.x).hypot(p.y);
+            let angle = (p.y * side).atan2((self.radius_m - p.x) * side);
+            (self.radius_m - side * from_axis, angle * self.radius_m)
+        };
+        let [c, s] = self.lean;
+        FacePoint {
+            a,
+            u: c * p.z - s * x,
+            n: c * x + s * p.z,
+        }
+    }
+
+    /// The world point at face coordinates; inverse of [`Face::face_of`].
+    pub fn world_of(&self, f: &FacePoint) -> Point3<f64> {
+        let [c, s] = self.lean;
+        let (x, z) = (c * f.n - s * f.u, c * f.u + s * f.n);
+        if self.is_plane() {
+            return Point3::new(x, f.a, z);
+        }
+        let (from_axis, angle) = (self.radius_m - x, f.a / self.radius_m);
+        Point3::new(
+            self.radius_m - from_axis * angle.cos(),
+            from_axis * angle.sin(),
+            z,
+        )
+    }
+
+    /// Axes (along, up, out) of the face at `a`.
+    pub fn frame(&self, a: f64) -> FaceFrame {
+        let angle = if self.is_plane() { 0.0 } else { a / self.radius_m };
+        let turn = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -angle);
+        let [c, s] = self.lean;
+        FaceFrame {
+            along: turn * nalgebra::Vector3::y(),
+            up: turn * nalgebra::Vector3::new(-s, 0.0, c),
+            out: turn * nalgebra::Vector3::new(c, 0.0, s),
+        }
+    }
+
+    /// Outward normal of the face at `a`.
+    #[inline]
+    pub fn frame_out(&self, a: f64) -> nalgebra::Vector3<f64> {
+        let [c, s] = self.lean;
+        if self.is_plane() {
+            return nalgebra::Vector3::new(c, 0.0, s);
+        }
+        let (sin, cos) = (-a / self.radius_m).sin_cos();
+        nalgebra::Vector3::new(c * cos, c * sin, s)
+    }
+
+    /// Pose of a flat patch that touches the face at (a, u): its x, y, z are along, up, out.
+    pub fn world_from_patch(&self, a: f64, u: f64) -> Rigid3 {
+        let frame = self.frame(a);
+        let axes =
+            Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[frame.along, frame.up, frame.out]));
+        let at = self.world_of(&FacePoint { a, u, n: 0.0 });
+        Rigid3::from_parts(
+            Translation3::from(at.coords),
+            UnitQuaternion::from_rotation_matrix(&axes),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn face_coordinates_round_trip_and_follow_the_frame() {
+        for radius in [0.0, 120.0, -80.0] {
+            let face = Face::new(0.2, radius);
+            for (a, u, n) in [(0.0, 0.0, 0.0), (3.0, 2.0, 0.05), (-60.0, 20.0, -0.1)] {
+                let there = FacePoint { a, u, n };
+                let back = face.face_of(&face.world_of(&there));
+                assert!((back.a - a).abs() < 1e-9 && (back.u - u).abs() < 1e-9 && (back.n - n).abs() < 1e-9);
+                let patch = face.world_from_patch(a, u);
+                let out = face.world_of(&FacePoint { a, u, n: 0.3 });
+                assert!((patch * Point3::new(0.0, 0.0, 0.3) - out).norm() < 1e-9);
+                let beside = face.world_of(&FacePoint {
+                    a: a + 1e-4,
+                    u: 0.0,
+                    n: 0.0,
+                });
+                let here = face.world_of(&FacePoint { a, u: 0.0, n: 0.0 });
+                assert!(((beside - here) / 1e-4 - face.frame(a).along).norm() < 1e-5);
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What every simulated scanner shares: beams, footprints, noise, and the cloud that comes out.
+
+use crate::cloud::Cloud;
+use crate::simulate::noise::normal;
+use crate::simulate::scene::{Hit, Scene};
+use nalgebra::{Point3, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
+
+/// A simulated cloud with its truth, in the order it was measured.
+#[derive(Clone, Debug)]
+pub struct Scan {
+    /// Measured positions, with all errors.
+    pub cloud: Cloud,
+    /// True stone of each point, 0 for joints and surroundings.
+    pub stone: Vec<u32>,
+    /// Which station or strip measured the point.
+    pub station: Vec<u16>,
+    /// Where the beam truly met the scene, relative to the cloud's origin, metres.
+    pub exact: Vec<[f32; 3]>,
+    /// Cosine of the angle of incidence.
+    pub cos_incidence: Vec<f32>,
+}
+
+/// How well a scanner measures along one beam.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BeamParams {
+    /// Range noise on a bright surface met square on at 10 m, standard deviation, metres.
+    pub range_noise_m: f64,
+    /// Growth of the range noise with range, metres per metre beyond 10 m.
+    pub range_noise_per_m: f64,
+    /// Pointing noise, standard deviation across the beam, radians.
+    pub pointing_noise_rad: f64,
+    /// Radius of the beam where it leaves the scanner, metres.
+    pub exit_radius_m: f64,
+    /// Half angle by which the beam widens, radians.
+    pub divergence_rad: f64,
+    /// Two surfaces within one beam closer than this give one point between them (a mixed pixel), metres.
+    pub mixing_m: f64,
+}
+
+impl BeamParams {
+    /// A phase or fast pulse scanner on a tripod: 1.5 mm, beam of 3 mm that widens by 0.15 mrad.
+    pub fn terrestrial() -> Self {
+        Self {
+            range_noise_m: 0.0015,
+            range_noise_per_m: 2e-5,
+            pointing_noise_rad: 1.5e-5,
+            exit_radius_m: 0.0015,
+            divergence_rad: 1.5e-4,
+            mixing_m: 0.25,
+        }
+    }
+
+    /// A light scanner under a drone: 11 mm, beam that widens by 0.5 mrad.
+    pub fn airborne() -> Self {
+        Self {
+            range_noise_m: 0.011,
+            range_noise_per_m: 1e-4,
+            pointing_noise_rad: 1e-4,
+            exit_radius_m: 0.003,
+            divergence_rad: 5e-4,
+            mixing_m: 0.5,
+        }
+    }
+}
+
+impl Default for BeamParams {
+    fn default() -> Self {
+        Self::terrestrial()
+    }
+}
+
+/// One measurement along one beam.
+pub(super) struct Shot {
+    pub hit: Hit,
+    pub measured: Point3<f64>,
+    pub cos_incidence: f64,
+}
+
+/// Sends one beam. The range is that of the beam's middle, mixed with that of a random place in its footprint:
+/// square on this changes nothing, at an angle it adds footprint times tangent, at an edge it makes mixed pixels.
+/// Range noise grows with 1/sqrt(cos incidence), as the returned light fades.
+pub(super) fn shoot(
+    scene: &Scene,
+    from: &Point3<f64>,
+    along: &Vector3<f64>,
+    beam: &BeamParams,
+    rng: &mut ChaCha8Rng,
+) -> Option<Shot> {
+    let across = along
+        .cross(&Vector3::z())
+        .try_normalize(1e-9)
+        .unwrap_or_else(Vector3::x);
+    let upward = across.cross(along);
+    // All numbers are drawn whether they are needed or not, so that one beam never changes the next one's noise.
+    let draws: [f64; 5] = std::array::from_fn(|_| normal(rng));
+    let share: f64 = rng.random::<f64>() * 0.5;
+    let off = |x: f64, y: f64| (along + across * x + upward * y).normalize();
+
+    let true_along = off(
+        draws[0] * beam.pointing_noise_rad,
+        draws[1] * beam.pointing_noise_rad,
+    );
+    let hit = scene.trace(from, &true_along)?;
+    let mut range = hit.range_m;
+    let radius_rad = beam.exit_radius_m / hit.range_m + beam.divergence_rad;
+    if radius_rad > 0.0 {
+        let beside = off(0.5 * radius_rad * draws[2], 0.5 * radius_rad * draws[3]);
+        if let Some(second) = scene.trace(from, &beside) {
+            let apart = second.range_m - hit.range_m;
+            if apart.abs() < beam.mixing_m {
+                range += share * apart;
+            }
+        }
+    }
+    let cos_incidence = (-hit.normal.dot(&true_along)).clamp(0.05, 1.0);
+    let sigma = beam.range_noise_m + beam.range_noise_per_m * (hit.range_m - 10.0).max(0.0);
+    range += draws[4] * sigma / cos_incidence.sqrt();
+    Some(Shot {
+        hit,
+        // The scanner believes that the beam went where it aimed.
+        measured: from + along * range,
+        cos_incidence,
+    })
+}
+
+impl Scan {
+    /// A cloud without points.
+    pub fn empty(origin: Point3<f64>) -> Self {
+        Self {
+            cloud: Cloud::new(origin, Vec::new()),
+            stone: Vec::new(),
+            station: Vec::new(),
+            exact: Vec::new(),
+            cos_incidence: Vec::new(),
+        }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.stone.len()
+    }
+
+    /// Whether there are no points.
+    pub fn is_empty(&self) -> bool {
+        self.stone.is_empty()
+    }
+
+    /// Adds measurements; `error` is what registration and trajectory do to the measured place.
+    pub(super) fn push(&mut self, shots: Vec<(Shot, Point3<f64>)>, station: u16) {
+        let origin = self.cloud.origin();
+        let measured = Cloud::from_world(origin, shots.iter().map(|(_, p)| *p));
+        self.cloud.append(&measured);
+        for (shot, _) in shots {
+            self.stone.push(shot.hit.target.stone().map_or(0, |s| s.0));
+            self.station.push(station);
+            self.exact.push((shot.hit.point - origin).cast::<f32>().into());
+            self.cos_incidence.push(shot.cos_incidence as f32);
+        }
+    }
+}

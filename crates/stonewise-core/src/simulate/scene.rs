@@ -1,0 +1,505 @@
+//! One epoch of the wall and its surroundings, as rays meet it.
+
+use crate::geometry::Rigid3;
+use crate::id::StoneId;
+use crate::simulate::deform::TrueMotion;
+use crate::simulate::face::FacePoint;
+use crate::simulate::props::{Material, Prop};
+use crate::simulate::surface::Surface;
+use crate::simulate::wall::Wall;
+use nalgebra::{Point3, Vector3};
+
+/// What a ray met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance along the ray, metres.
+    pub range_m: f64,
+    /// Where, world frame.
+    pub point: Point3<f64>,
+    /// Outward unit normal there.
+    pub normal: Vector3<f64>,
+    /// What it is.
+    pub target: Target,
+}
+
+/// A stone, or anything else.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Index in [`Wall::stones`], and the place in the stone's own frame, metres.
+    Stone(usize, [f64; 2]),
+    /// Mortar, with its place on the face of the first epoch, metres; or a thing that does not move.
+    Other(Material, [f64; 2]),
+}
+
+impl Target {
+    /// The stone's number; `None` on joints and surroundings.
+    pub fn stone(&self) -> Option<StoneId> {
+        match self {
+            Self::Stone(i, _) => Some(StoneId(*i as u32 + 1)),
+            Self::Other(..) => None,
+        }
+    }
+}
+
+/// A wall after its stones moved, with everything that stands around it.
+pub struct Scene<'a> {
+    wall: &'a Wall,
+    surface: &'a Surface,
+    props: &'a [Prop],
+    stones: Vec<Placed>,
+    cells: CellLists,
+    drift: DriftGrid,
+    /// No part of the wall lies outside these heights over the face, metres.
+    layer: [f64; 2],
+}
+
+/// World to stone, as rows, for speed.
+struct Placed {
+    rows: [[f64; 4]; 3],
+    world_from_stone: Rigid3,
+    wall_index: usize,
+    /// Index in the surface.
+    patch: usize,
+}
+
+/// The wall's surface at a point: what lies there and how far above it the point is along the outward normal.
+struct Clearance {
+    height_m: f64,
+    stone: Option<usize>,
+    at: [f64; 2],
+}
+
+const CELL_M: f64 = 0.04;
+
+impl<'a> Scene<'a> {
+    /// The scene with stone `i` of the wall moved by `motions[i]`.
+    pub fn new(wall: &'a Wall, surface: &'a Surface, motions: &[TrueMotion], props: &'a [Prop]) -> Self {
+        let stones: Vec<Placed> = surface
+            .stones
+            .iter()
+            .enumerate()
+            .map(|(patch, (i, _))| {
+                Placed::new(
+                    &(motions[*i].second_from_first * wall.stones[*i].world_from_stone),
+                    *i,
+                    patch,
+                )
+            })
+            .collect();
+        let drift = DriftGrid::new(wall, surface.window, motions);
+        let cells = CellLists::new(wall, surface.window, &stones);
+        let reach = |get: fn(f64, f64) -> f64, start: f64| {
+            stones
+                .iter()
+                .map(|s| face_n(wall, &s.world_from_stone))
+                .fold(start, get)
+        };
+        // A stone of half a metre that turns by 0.1 rad lifts a corner by 5 cm at most.
+        let layer = [
+            reach(f64::min, 0.0) - 0.25,
+            reach(f64::max, 0.0) + surface.top_m + 0.03,
+        ];
+        Self {
+            wall,
+            surface,
+            props,
+            stones,
+            cells,
+            drift,
+            layer,
+        }
+    }
+
+    /// The wall.
+    pub fn wall(&self) -> &'a Wall {
+        self.wall
+    }
+
+    /// The window of the face that the scene holds: smallest a, largest a, smallest u, largest u, metres.
+    pub fn window(&self) -> [f64; 4] {
+        self.surface.window
+    }
+
+    /// The first thing on the ray; `along` is a unit vector. Cost: about a microsecond.
+    pub fn trace(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<Hit> {
+        let mut nearest: Option<(f64, Vector3<f64>, Material)> = None;
+        for prop in self.props {
+            let limit = nearest.map_or(f64::MAX, |n| n.0);
+            if let Some((t, normal)) = prop.trace(from, along, limit) {
+                nearest = Some((t, normal, prop.material));
+            }
+        }
+        let limit = nearest.map_or(f64::MAX, |n| n.0);
+        if let Some(range_m) = self.march(from, along, limit) {
+            return Some(self.wall_hit(from + along * range_m, range_m));
+        }
+        nearest.map(|(range_m, normal, material)| {
+            let point = from + along * range_m;
+            Hit {
+                range_m,
+                point,
+                normal,
+                target: Target::Other(material, [point.y, point.z]),
+            }
+        })
+    }
+
+    /// Whether anything stands on the ray within `limit` metres.
+    pub fn blocked(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> bool {
+        self.props.iter().any(|p| p.trace(from, along, limit).is_some())
+            || self.march(from, along, limit).is_some()
+    }
+
+    /// The wall's surface straight below or above a place on the face; `None` outside the masonry.
+    pub fn on_face(&self, a: f64, u: f64) -> Option<Hit> {
+        let top = self.wall.face.world_of(&FacePoint {
+            a,
+            u,
+            n: self.layer[1],
+        });
+        let inwards = -self.wall.face.frame(a).out;
+        let t = self.march(&top, &inwards, 1.0)?;
+        Some(self.wall_hit(top + inwards * t, t))
+    }
+
+    fn wall_hit(&self, point: Point3<f64>, range_m: f64) -> Hit {
+        let f = self.wall.face.face_of(&point);
+        let found = self.clearance(&point, &f);
+        let (normal, target) = match found.stone {
+            Some(k) => {
+                let stone = &self.stones[k];
+                let grid = &self.surface.stones[stone.patch].1;
+                let normal = stone.world_from_stone * grid.normal(found.at[0], found.at[1]);
+                (normal, Target::Stone(stone.wall_index, found.at))
+            }
+            None => {
+                let frame = self.wall.face.frame(f.a);
+                let local = self.surface.mortar.normal(found.at[0], found.at[1]);
+                let normal = frame.face_from_world().transpose() * local;
+                (normal, Target::Other(Material::Mortar, found.at))
+            }
+        };
+        Hit {
+            range_m,
+            point,
+            normal,
+            target,
+        }
+    }
+
+    /// Marches along the ray to the wall's surface and then closes in on it to a micrometre.
+    fn march(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<f64> {
+        let face = &self.wall.face;
+        let mut t = self.enter_layer(from, along, limit)?;
+        let mut above: Option<(f64, f64)> = None;
+        for _ in 0..200 {
+            if t > limit {
+                return None;
+            }
+            let p = from + along * t;
+            let f = face.face_of(&p);
+            let descent = -along.dot(&face.frame_out(f.a));
+            if f.n < self.layer[0] || (f.n > self.layer[1] && descent <= 0.0) {
+                return None;
+            }
+            let Some(gap) = self.gap(&p, &f) else {
+                above = None;
+                t += 0.008;
+                continue;
+            };
+            if gap <= 0.0 {
+                // A ray that starts inside, or comes in from beside the masonry, meets nothing it could see.
+                let (t0, g0) = above?;
+                return Some(self.close_in(from, along, (t0, g0), (t, gap)));
+            }
+            above = Some((t, gap));
+            let sideways = (1.0 - descent * descent).max(0.0).sqrt();
+            t += (gap / (descent.max(0.0) + 1.1 * sideways)).max(4e-4);
+        }
+        None
+    }
+
+    /// Distance at which the ray comes into the layer that the wall's surface lies in.
+    fn enter_layer(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<f64> {
+        let face = &self.wall.face;
+        let mut t = 0.0;
+        for _ in 0..400 {
+            let f = face.face_of(&(from + along * t));
+            let above = f.n - self.layer[1];
+            if above <= 1e-6 {
+                return Some(t);
+            }
+            let descent = -along.dot(&face.frame_out(f.a));
+            // Height over the face changes by at most a metre a metre; on a plane its rate is known.
+            t += if face.is_plane() {
+                if descent <= 1e-9 {
+                    return None;
+                }
+                above / descent + 1e-7
+            } else {
+                above + 1e-6
+            };
+            if t > limit || t > 2000.0 {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Root of the gap between a place above and one below the surface (Illinois variant of regula falsi).
+    fn close_in(
+        &self,
+        from: &Point3<f64>,
+        along: &Vector3<f64>,
+        above: (f64, f64),
+        below: (f64, f64),
+    ) -> f64 {
+        let ((mut t0, mut g0), (mut t1, mut g1)) = (above, below);
+        let mut side = 0;
+        for _ in 0..40 {
+            let t = (t0 * g1 - t1 * g0) / (g1 - g0);
+            let p = from + along * t;
+            let g = self.gap(&p, &self.wall.face.face_of(&p)).unwrap_or(g0);
+            if g.abs() < 1e-7 || (t1 - t0).abs() < 1e-7 {
+                return t;
+            }
+            if g > 0.0 {
+                (t0, g0) = (t, g);
+                if side == 1 {
+                    g1 *= 0.5;
+                }
+                side = 1;
+            } else {
+                (t1, g1) = (t, g);
+                if side == -1 {
+                    g0 *= 0.5;
+                }
+                side = -1;
+            }
+        }
+        0.5 * (t0 + t1)
+    }
+
+    /// Height of a point over the wall's surface; `None` beside the masonry.
+    fn gap(&self, p: &Point3<f64>, f: &FacePoint) -> Option<f64> {
+        let w = &self.surface.window;
+        let inside = f.a >= w[0] && f.a <= w[1] && f.u >= w[2] && f.u <= w[3];
+        inside.then(|| self.clearance(p, f).height_m)
+    }
+
+    #[inline]
+    fn clearance(&self, p: &Point3<f64>, f: &FacePoint) -> Clearance {
+        let drift = self.drift.at(f.a, f.u);
+        let (a, u) = (f.a - drift[0], f.u - drift[1]);
+        let mortar = self.surface.mortar.height(a, u).unwrap_or(-0.02) + drift[2];
+        let mut lowest = Clearance {
+            height_m: f.n - mortar,
+            stone: None,
+            at: [a, u],
+        };
+        for &k in self.cells.at(f.a, f.u) {
+            let stone = &self.stones[k as usize];
+            let [x, y, z] = stone.local(p);
+            if let Some(h) = self.surface.stones[stone.patch].1.height(x, y)
+                && z - h < lowest.height_m
+            {
+                lowest = Clearance {
+                    height_m: z - h,
+                    stone: Some(k as usize),
+                    at: [x, y],
+                };
+            }
+        }
+        lowest
+    }
+}
+
+impl Placed {
+    fn new(world_from_stone: &Rigid3, wall_index: usize, patch: usize) -> Self {
+        let m = world_from_stone.inverse().to_homogeneous();
+        Self {
+            rows: [0, 1, 2].map(|i| [m[(i, 0)], m[(i, 1)], m[(i, 2)], m[(i, 3)]]),
+            world_from_stone: *world_from_stone,
+            wall_index,
+            patch,
+        }
+    }
+
+    #[inline]
+    fn local(&self, p: &Point3<f64>) -> [f64; 3] {
+        self.rows.map(|r| r[0] * p.x + r[1] * p.y + r[2] * p.z + r[3])
+    }
+}
+
+fn face_n(wall: &Wall, world_from_stone: &Rigid3) -> f64 {
+    wall.face
+        .face_of(&Point3::from(world_from_stone.translation.vector))
+        .n
+}
+
+/// Which stones can lie over a place on the face, after they moved.
+struct CellLists {
+    origin: [f64; 2],
+    size: [usize; 2],
+    starts: Vec<u32>,
+    stones: Vec<u32>,
+}
+
+impl CellLists {
+    fn new(wall: &Wall, window: [f64; 4], stones: &[Placed]) -> Self {
+        let origin = [window[0], window[2]];
+        let size = [0, 2].map(|i| ((window[i + 1] - window[i]) / CELL_M) as usize + 1);
+        let mut lists: Vec<Vec<u32>> = vec![Vec::new(); size[0] * size[1]];
+        for (k, placed) in stones.iter().enumerate() {
+            let b = moved_bounds(wall, placed);
+            let range = |axis: usize| {
+                let cell = |v: f64| {
+                    ((v - origin[axis]) / CELL_M)
+                        .floor()
+                        .clamp(-1.0, size[axis] as f64)
+                };
+                let (low, high) = (
+                    cell(b[2 * axis]).max(0.0),
+                    cell(b[2 * axis + 1]).min(size[axis] as f64 - 1.0),
+                );
+                (low as usize)..((high + 1.0).max(0.0) as usize)
+            };
+            for j in range(1) {
+                for i in range(0) {
+                    lists[j * size[0] + i].push(k as u32);
+                }
+            }
+        }
+        let mut starts = vec![0u32];
+        let mut flat = Vec::new();
+        for list in lists {
+            flat.extend(list);
+            starts.push(flat.len() as u32);
+        }
+        Self {
+            origin,
+            size,
+            starts,
+            stones: flat,
+        }
+    }
+
+    #[inline]
+    fn at(&self, a: f64, u: f64) -> &[u32] {
+        let i = (((a - self.origin[0]) / CELL_M) as usize).min(self.size[0] - 1);
+        let j = (((u - self.origin[1]) / CELL_M) as usize).min(self.size[1] - 1);
+        let cell = j * self.size[0] + i;
+        &self.stones[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+}
+
+/// Bounds on the face of a stone where it lies now.
+fn moved_bounds(wall: &Wall, placed: &Placed) -> [f64; 4] {
+    const MARGIN_M: f64 = 0.03;
+    let stone = &wall.stones[placed.wall_index];
+    let mut b = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
+    for i in 0..4 {
+        let (a, u) = (stone.bounds[i & 1], stone.bounds[2 + (i >> 1)]);
+        let corner = Point3::new(a - stone.middle[0], u - stone.middle[1], 0.0);
+        let f = wall.face.face_of(&(placed.world_from_stone * corner));
+        b = [b[0].min(f.a), b[1].max(f.a), b[2].min(f.u), b[3].max(f.u)];
+    }
+    [b[0] - MARGIN_M, b[1] + MARGIN_M, b[2] - MARGIN_M, b[3] + MARGIN_M]
+}
+
+/// How the mortar follows its stones: the mean of the motions around, in face components, smooth between nodes.
+struct DriftGrid {
+    origin: [f64; 2],
+    size: [usize; 2],
+    nodes: Vec<[f64; 3]>,
+}
+
+const DRIFT_STEP_M: f64 = 0.05;
+
+impl DriftGrid {
+    fn new(wall: &Wall, window: [f64; 4], motions: &[TrueMotion]) -> Self {
+        use rayon::prelude::*;
+        let origin = [window[0] - DRIFT_STEP_M, window[2] - DRIFT_STEP_M];
+        let size = [0, 2].map(|i| ((window[i + 1] - window[i]) / DRIFT_STEP_M) as usize + 4);
+        let followed = near_window(wall, window, motions);
+        let nodes = (0..size[0] * size[1])
+            .into_par_iter()
+            .map(|k| {
+                let a = origin[0] + (k % size[0]) as f64 * DRIFT_STEP_M;
+                let u = origin[1] + (k / size[0]) as f64 * DRIFT_STEP_M;
+                drift_at(wall, motions, &followed, a, u)
+            })
+            .collect();
+        Self { origin, size, nodes }
+    }
+
+    #[inline]
+    fn at(&self, a: f64, u: f64) -> [f64; 3] {
+        let gx = ((a - self.origin[0]) / DRIFT_STEP_M).clamp(0.0, self.size[0] as f64 - 1.001);
+        let gy = ((u - self.origin[1]) / DRIFT_STEP_M).clamp(0.0, self.size[1] as f64 - 1.001);
+        let (i, j) = (gx as usize, gy as usize);
+        let (fx, fy) = (gx - i as f64, gy - j as f64);
+        let k = j * self.size[0] + i;
+        let (p, q) = (&self.nodes[k], &self.nodes[k + 1]);
+        let (r, s) = (&self.nodes[k + self.size[0]], &self.nodes[k + self.size[0] + 1]);
+        std::array::from_fn(|c| {
+            let low = p[c] + (q[c] - p[c]) * fx;
+            let high = r[c] + (s[c] - r[c]) * fx;
+            low + (high - low) * fy
+        })
+    }
+}
+
+/// Stones that move with the wall, sorted into square cells for the search around a node.
+struct Neighbours {
+    origin: [f64; 2],
+    size: [usize; 2],
+    cells: Vec<Vec<usize>>,
+}
+
+const NEIGHBOUR_M: f64 = 0.5;
+
+fn near_window(wall: &Wall, window: [f64; 4], motions: &[TrueMotion]) -> Neighbours {
+    let origin = [window[0] - NEIGHBOUR_M, window[2] - NEIGHBOUR_M];
+    let size = [0, 2].map(|i| ((window[i + 1] - window[i]) / NEIGHBOUR_M) as usize + 3);
+    let mut cells = vec![Vec::new(); size[0] * size[1]];
+    for (i, stone) in wall.stones.iter().enumerate() {
+        let c = [0, 1].map(|k| ((stone.middle[k] - origin[k]) / NEIGHBOUR_M).floor());
+        let inside = (0..2).all(|k| c[k] >= 0.0 && c[k] < size[k] as f64);
+        if inside && !motions[i].loose {
+            cells[c[1] as usize * size[0] + c[0] as usize].push(i);
+        }
+    }
+    Neighbours { origin, size, cells }
+}
+
+fn drift_at(wall: &Wall, motions: &[TrueMotion], near: &Neighbours, a: f64, u: f64) -> [f64; 3] {
+    let middle = [a, u];
+    let cell = [0, 1].map(|k| ((middle[k] - near.origin[k]) / NEIGHBOUR_M).floor() as isize);
+    let (mut weights, mut sum) = (0.0, [0.0; 3]);
+    for j in cell[1] - 1..=cell[1] + 1 {
+        for i in cell[0] - 1..=cell[0] + 1 {
+            let outside = i < 0 || j < 0 || i >= near.size[0] as isize || j >= near.size[1] as isize;
+            if outside {
+                continue;
+            }
+            for &s in &near.cells[j as usize * near.size[0] + i as usize] {
+                let b = &wall.stones[s].bounds;
+                let dx = (b[0] - a).max(a - b[1]).max(0.0);
+                let dy = (b[2] - u).max(u - b[3]).max(0.0);
+                let weight = 1.0 / (dx * dx + dy * dy + 4e-4).powi(2);
+                let p = wall.face.world_of(&FacePoint { a, u, n: 0.0 });
+                let f = wall.face.face_of(&(motions[s].second_from_first * p));
+                weights += weight;
+                for (total, d) in sum.iter_mut().zip([f.a - a, f.u - u, f.n]) {
+                    *total += weight * d;
+                }
+            }
+        }
+    }
+    if weights > 0.0 {
+        sum.map(|d| d / weights)
+    } else {
+        sum
+    }
+}
