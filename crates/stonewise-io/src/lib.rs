@@ -3,4 +3,7 @@
 pub mod atomic;
 pub mod cameras;
 pub mod cloud;
+pub mod image_io;
+pub mod masks;
+mod photo_name;
 pub mod table;

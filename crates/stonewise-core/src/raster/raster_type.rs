@@ -10,6 +10,8 @@ pub struct Raster<T> {
 
 /// Distance along the view axis, metres; infinite where nothing was seen.
 pub type DepthMap = Raster<f32>;
+/// Red, green, blue.
+pub type RgbImage = Raster<[u8; 3]>;
 /// Instance per pixel; 0 is background.
 pub type LabelImage = Raster<u32>;
 

@@ -1,6 +1,8 @@
 //! Which file in a folder is which camera's photo.
 
-use super::{CameraError, CameraFile, extension};
+use super::{CameraError, CameraFile};
+use crate::photo_name::{PhotoName, is_photo};
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 
 /// Photos of a folder, joined to the views of a camera file.
@@ -29,18 +31,18 @@ pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, Camera
         });
     }
     files.sort();
-    let names: Vec<FileName> = files
+    let names: Vec<PhotoName> = files
         .iter()
-        .map(|path| FileName::new(&path.strip_prefix(folder).unwrap_or(path).to_string_lossy()))
+        .map(|path| PhotoName::new(&path.strip_prefix(folder).unwrap_or(path).to_string_lossy()))
         .collect();
     let mut is_used = vec![false; files.len()];
     let mut paths = Vec::with_capacity(cameras.views.len());
     for view in &cameras.views {
-        let wanted = FileName::new(&view.name);
-        let scored = names
-            .iter()
-            .enumerate()
-            .filter_map(|(i, name)| Some((wanted.fit(name)?, i)));
+        let wanted = PhotoName::new(&view.name);
+        let scored = names.iter().enumerate().filter_map(|(i, name)| {
+            let (sort, shared) = wanted.fit(name)?;
+            Some(((sort, shared, Reverse(name.depth())), i))
+        });
         let best = scored.clone().map(|(fit, _)| fit).max();
         let mut fitting = scored.filter(|(fit, _)| Some(*fit) == best).map(|(_, i)| i);
         let (first, second) = (fitting.next(), fitting.next());
@@ -65,45 +67,6 @@ pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, Camera
         paths,
         without_camera: without_camera.collect(),
     })
-}
-
-/// A name in lower case, cut into folders and file.
-struct FileName {
-    folders: Vec<String>,
-    file: String,
-}
-
-impl FileName {
-    fn new(name: &str) -> Self {
-        let lower = name.to_lowercase();
-        let mut folders: Vec<String> = lower.split(['/', '\\']).map(str::to_owned).collect();
-        let file = folders.pop().unwrap_or_default();
-        Self { folders, file }
-    }
-
-    /// How well a file fits this camera name, larger is better; `None` if not at all.
-    fn fit(&self, file: &Self) -> Option<(u8, usize, std::cmp::Reverse<usize>)> {
-        let sort = if self.file == file.file {
-            2
-        } else if self.file == stem(&file.file) {
-            1
-        } else if stem(&self.file) == stem(&file.file) && is_photo(Path::new(&self.file)) {
-            0
-        } else {
-            return None;
-        };
-        let pairs = self.folders.iter().rev().zip(file.folders.iter().rev());
-        let shared = pairs.take_while(|(a, b)| a == b).count();
-        Some((sort, shared, std::cmp::Reverse(file.folders.len())))
-    }
-}
-
-fn stem(file: &str) -> &str {
-    file.rsplit_once('.').map_or(file, |(stem, _)| stem)
-}
-
-fn is_photo(path: &Path) -> bool {
-    matches!(extension(path).as_str(), "jpg" | "jpeg" | "png" | "tif" | "tiff")
 }
 
 /// Photos in a folder and below; hidden files and folders are left out.

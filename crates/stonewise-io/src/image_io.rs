@@ -1,0 +1,128 @@
+//! Photos and pictures as files.
+//!
+//! Rotation flags in a photo's EXIF are not applied: cameras refer to the pixels as they are stored.
+
+use crate::atomic::write_atomically;
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, ImageError, ImageReader};
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use stonewise_core::raster::{Raster, RgbImage};
+
+/// Why a picture could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ImageIoError {
+    /// The file cannot be read or is no intact JPEG or PNG.
+    #[error("cannot read the image: {source}: {}", path.display())]
+    Read {
+        /// File.
+        path: PathBuf,
+        /// What the decoder said.
+        source: ImageError,
+    },
+    /// The file cannot be written.
+    #[error("cannot write the image: {source}: {}", path.display())]
+    Write {
+        /// File.
+        path: PathBuf,
+        /// What the encoder said.
+        source: ImageError,
+    },
+}
+
+/// Reads a JPEG or PNG as 8-bit RGB; the format is told from the content, not the name.
+///
+/// # Errors
+/// The file is missing, truncated or in another format.
+pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
+    let read = || -> Result<image::RgbImage, ImageError> {
+        Ok(ImageReader::open(path)?
+            .with_guessed_format()?
+            .decode()?
+            .into_rgb8())
+    };
+    let decoded = read().map_err(|source| read_error(path, source))?;
+    let (width, height) = decoded.dimensions();
+    let pixels = decoded.pixels().map(|p| p.0).collect();
+    Ok(Raster::from_vec(width, height, pixels).unwrap_or_else(|| Raster::filled(0, 0, [0; 3])))
+}
+
+/// Width and height, pixels, from the file's header alone.
+///
+/// # Errors
+/// The file is missing or in another format.
+pub fn image_size(path: &Path) -> Result<(u32, u32), ImageIoError> {
+    let read = || -> Result<(u32, u32), ImageError> {
+        ImageReader::open(path)?.with_guessed_format()?.into_dimensions()
+    };
+    read().map_err(|source| read_error(path, source))
+}
+
+/// Writes an RGB PNG.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_png_rgb(path: &Path, picture: &RgbImage) -> Result<(), ImageIoError> {
+    write(path, |file| {
+        let (width, height) = (picture.width(), picture.height());
+        PngEncoder::new(file).write_image(
+            picture.data().as_flattened(),
+            width,
+            height,
+            ExtendedColorType::Rgb8,
+        )
+    })
+}
+
+/// Writes a JPEG of this quality (1 to 100).
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_jpeg(path: &Path, picture: &RgbImage, quality: u8) -> Result<(), ImageIoError> {
+    write(path, |file| {
+        let (width, height) = (picture.width(), picture.height());
+        let encoder = JpegEncoder::new_with_quality(file, quality.clamp(1, 100));
+        encoder.write_image(
+            picture.data().as_flattened(),
+            width,
+            height,
+            ExtendedColorType::Rgb8,
+        )
+    })
+}
+
+/// Writes whole or not at all.
+pub(crate) fn write(
+    path: &Path,
+    encode: impl FnOnce(&mut BufWriter<File>) -> Result<(), ImageError>,
+) -> Result<(), ImageIoError> {
+    let written = write_atomically(path, |partial| -> Result<(), Failure> {
+        let mut file = BufWriter::new(File::create(partial)?);
+        encode(&mut file).map_err(Failure)?;
+        std::io::Write::flush(&mut file)?;
+        Ok(())
+    });
+    written.map_err(|Failure(source)| ImageIoError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Lets the file system's and the encoder's errors share a way out.
+struct Failure(ImageError);
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Self {
+        Self(ImageError::IoError(error))
+    }
+}
+
+pub(crate) fn read_error(path: &Path, source: ImageError) -> ImageIoError {
+    ImageIoError::Read {
+        path: path.to_owned(),
+        source,
+    }
+}

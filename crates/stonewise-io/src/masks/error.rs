@@ -1,0 +1,98 @@
+//! What can go wrong with masks.
+
+use crate::image_io::ImageIoError;
+use std::path::PathBuf;
+
+/// Why masks could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MaskError {
+    /// The file system refused.
+    #[error("cannot read masks: {source}: {}", path.display())]
+    Read {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file system refused to write.
+    #[error("cannot write masks: {source}: {}", path.display())]
+    Write {
+        /// File.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not COCO json.
+    #[error("not a COCO instances file: {problem}: {}", path.display())]
+    Json {
+        /// File.
+        path: PathBuf,
+        /// What and where.
+        problem: String,
+    },
+    /// Nothing in it.
+    #[error("no masks: {expected}: {}", path.display())]
+    Empty {
+        /// File or folder.
+        path: PathBuf,
+        /// What was expected there.
+        expected: &'static str,
+    },
+    /// An annotation cannot be understood.
+    #[error("annotation {annotation}: {problem}: {}", path.display())]
+    BadAnnotation {
+        /// File.
+        path: PathBuf,
+        /// The annotation's id.
+        annotation: u64,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// Made for another image size.
+    #[error(
+        "masks of photo {photo} are {}x{} px, its camera {}x{} px: give masks of the original photo: {}",
+        found.0, found.1, expected.0, expected.1, path.display()
+    )]
+    WrongSize {
+        /// Mask file.
+        path: PathBuf,
+        /// Photo.
+        photo: String,
+        /// Size of the masks.
+        found: (u32, u32),
+        /// Size of the photo's camera.
+        expected: (u32, u32),
+    },
+    /// Two entries fit one photo.
+    #[error("photo {photo} could be either of {first} and {second}: rename one, or give each epoch its own masks: {}", path.display())]
+    Ambiguous {
+        /// File or folder.
+        path: PathBuf,
+        /// Photo.
+        photo: String,
+        /// One entry.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A PNG that is not a label image.
+    #[error("a label image must be a greyscale PNG of 8 or 16 bits, this is {found}: {}", path.display())]
+    NotGrey {
+        /// File.
+        path: PathBuf,
+        /// What it is.
+        found: String,
+    },
+    /// A label does not fit the format.
+    #[error("label {label} does not fit a 16-bit PNG: write COCO json instead: {}", path.display())]
+    LabelTooLarge {
+        /// File.
+        path: PathBuf,
+        /// The label.
+        label: u32,
+    },
+    /// The picture itself is broken or cannot be written.
+    #[error(transparent)]
+    Image(#[from] ImageIoError),
+}

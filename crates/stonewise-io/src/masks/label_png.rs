@@ -1,0 +1,187 @@
+//! Greyscale PNGs whose values are instances.
+
+use super::{InstanceInfo, LabelledPhoto, MaskError};
+use crate::image_io;
+use crate::photo_name::PhotoName;
+use image::codecs::png::{PngDecoder, PngEncoder};
+use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder};
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use stonewise_core::raster::{LabelImage, Raster};
+
+/// A folder of label images, each named after its photo: NAME.png, NAME_ids.png or NAME_mask.png.
+#[derive(Clone, Debug)]
+pub struct LabelFolder {
+    folder: PathBuf,
+    files: Vec<PathBuf>,
+}
+
+impl LabelFolder {
+    /// Lists the PNGs of a folder and of those below it.
+    ///
+    /// # Errors
+    /// The folder cannot be read or holds no PNG.
+    pub fn open(folder: &Path) -> Result<Self, MaskError> {
+        let mut files = Vec::new();
+        collect(folder, &mut files)?;
+        if files.is_empty() {
+            return Err(MaskError::Empty {
+                path: folder.to_owned(),
+                expected: "the folder holds no label PNG",
+            });
+        }
+        files.sort();
+        Ok(Self {
+            folder: folder.to_owned(),
+            files,
+        })
+    }
+
+    /// The labels of a photo, see [`super::MaskSource::labels_for`].
+    ///
+    /// # Errors
+    /// As [`super::MaskSource::labels_for`].
+    pub fn labels_for(
+        &self,
+        photo_name: &str,
+        width: u32,
+        height: u32,
+    ) -> Result<Option<LabelledPhoto>, MaskError> {
+        let Some(path) = self.find(photo_name)? else {
+            return Ok(None);
+        };
+        let labels = read_label_png(path)?;
+        if (labels.width(), labels.height()) != (width, height) {
+            return Err(MaskError::WrongSize {
+                path: path.clone(),
+                photo: photo_name.to_owned(),
+                found: (labels.width(), labels.height()),
+                expected: (width, height),
+            });
+        }
+        let ids: BTreeSet<u32> = labels.data().iter().copied().filter(|&id| id != 0).collect();
+        let mut warnings = Vec::new();
+        if ids.len() == 1 && ids.contains(&255) {
+            warnings.push(format!(
+                "{} has one instance of value 255: stones need values of their own",
+                path.display()
+            ));
+        }
+        let info = |id| InstanceInfo {
+            id,
+            score: 1.0,
+            stone_ref: None,
+        };
+        Ok(Some(LabelledPhoto {
+            instances: ids.into_iter().map(info).collect(),
+            labels,
+            warnings,
+        }))
+    }
+
+    fn find(&self, photo_name: &str) -> Result<Option<&PathBuf>, MaskError> {
+        let wanted = PhotoName::new(photo_name);
+        let candidates =
+            ["", "_ids", "_mask"].map(|ending| wanted.with_file(format!("{}{ending}.png", wanted.stem())));
+        let mut fitting: Vec<(usize, &PathBuf)> = Vec::new();
+        for file in &self.files {
+            let name = PhotoName::new(&file.strip_prefix(&self.folder).unwrap_or(file).to_string_lossy());
+            let shared = candidates
+                .iter()
+                .filter_map(|c| c.fit(&name))
+                .filter(|fit| fit.0 == 2);
+            if let Some((_, shared)) = shared.max() {
+                fitting.push((shared, file));
+            }
+        }
+        let best = fitting.iter().map(|f| f.0).max();
+        let mut best = fitting.into_iter().filter(|f| Some(f.0) == best).map(|f| f.1);
+        match (best.next(), best.next()) {
+            (Some(first), Some(second)) => Err(MaskError::Ambiguous {
+                path: self.folder.clone(),
+                photo: photo_name.to_owned(),
+                first: first.display().to_string(),
+                second: second.display().to_string(),
+            }),
+            (first, _) => Ok(first),
+        }
+    }
+}
+
+/// Reads an 8-bit or 16-bit greyscale PNG as labels.
+///
+/// # Errors
+/// The file is missing, broken, or has colours, transparency or another depth.
+pub fn read_label_png(path: &Path) -> Result<LabelImage, MaskError> {
+    let file = File::open(path).map_err(|source| MaskError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let broken = |e| image_io::read_error(path, e);
+    let decoder = PngDecoder::new(BufReader::new(file)).map_err(broken)?;
+    let found = decoder.original_color_type();
+    if !matches!(found, ExtendedColorType::L8 | ExtendedColorType::L16) {
+        return Err(MaskError::NotGrey {
+            path: path.to_owned(),
+            found: format!("{found:?}"),
+        });
+    }
+    let (width, height) = decoder.dimensions();
+    let values: Vec<u32> = match DynamicImage::from_decoder(decoder).map_err(broken)? {
+        DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(u32::from).collect(),
+        other => other
+            .into_luma16()
+            .into_raw()
+            .into_iter()
+            .map(u32::from)
+            .collect(),
+    };
+    Raster::from_vec(width, height, values).ok_or_else(|| MaskError::NotGrey {
+        path: path.to_owned(),
+        found: "incomplete".to_owned(),
+    })
+}
+
+/// Writes labels as a 16-bit greyscale PNG.
+///
+/// # Errors
+/// A label is above 65535, or the file cannot be written.
+pub fn write_label_png(path: &Path, labels: &LabelImage) -> Result<(), MaskError> {
+    let mut bytes = Vec::with_capacity(labels.data().len() * 2);
+    for &label in labels.data() {
+        let value = u16::try_from(label).map_err(|_| MaskError::LabelTooLarge {
+            path: path.to_owned(),
+            label,
+        })?;
+        bytes.extend(value.to_ne_bytes());
+    }
+    image_io::write(path, |file| {
+        PngEncoder::new(file).write_image(&bytes, labels.width(), labels.height(), ExtendedColorType::L16)
+    })?;
+    Ok(())
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), MaskError> {
+    let failed = |source| MaskError::Read {
+        path: folder.to_owned(),
+        source,
+    };
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let is_hidden = path
+            .file_name()
+            .is_some_and(|n| n.to_string_lossy().starts_with('.'));
+        let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
+        if is_hidden {
+            continue;
+        }
+        if path.is_dir() {
+            collect(&path, files)?;
+        } else if is_png {
+            files.push(path);
+        }
+    }
+    Ok(())
+}
