@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// # Errors
-/// What `write` returns, or the failure to sync or rename, naming the file.
+/// What `write` returns, or the failure to sync or rename; naming the file is left to the caller.
 pub fn write_atomically<T, E: From<io::Error>>(
     path: &Path,
     write: impl FnOnce(&Path) -> Result<T, E>,
@@ -29,7 +29,7 @@ pub fn write_atomically<T, E: From<io::Error>>(
         path: partial_name(path)?,
     };
     let value = write(&partial.path)?;
-    publish(&partial.path, path).map_err(|e| named(&e, path))?;
+    publish(&partial.path, path)?;
     Ok(value)
 }
 
@@ -60,10 +60,6 @@ fn partial_name(path: &Path) -> io::Result<PathBuf> {
 fn publish(partial: &Path, path: &Path) -> io::Result<()> {
     File::options().write(true).open(partial)?.sync_all()?;
     fs::rename(partial, path)
-}
-
-fn named(error: &io::Error, path: &Path) -> io::Error {
-    io::Error::new(error.kind(), format!("cannot write {}: {error}", path.display()))
 }
 
 #[cfg(test)]

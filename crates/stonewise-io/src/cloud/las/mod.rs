@@ -1,7 +1,15 @@
 //! LAS, LAZ and COPC.
 
+mod copy;
+mod export;
+mod extra_bytes;
 mod layout;
 mod read;
+mod writer;
 
+pub(super) use copy::copy_labelled;
+pub(super) use export::{Export, export_header, transforms_for};
+pub(super) use extra_bytes::{DESCRIPTOR_BYTES, ExtraType, describe};
 pub(super) use layout::Layout;
-pub(super) use read::{LasSource, read};
+pub(super) use read::read;
+pub(super) use writer::LazWriter;

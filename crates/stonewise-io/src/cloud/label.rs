@@ -1,0 +1,209 @@
+//! Results written back onto the points.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+use stonewise_core::geometry::Bounds;
+use stonewise_core::id::StoneId;
+
+use super::las::{
+    DESCRIPTOR_BYTES, Export, ExtraType, LazWriter, copy_labelled, describe, export_header, transforms_for,
+};
+use super::whole::write_whole;
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary, read_cloud};
+
+/// Step of the coordinates of files that were not LAS before, metres.
+const SCALE_M: f64 = 1e-4;
+const CHUNK_POINTS: usize = 400_000;
+
+/// What is known about one point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PointLabel {
+    /// The stone that the point lies on.
+    pub stone: Option<StoneId>,
+    /// How the stone moved at this point, where that is known.
+    pub motion: Option<PointMotion>,
+}
+
+/// Movement of a point from the first epoch to the second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointMotion {
+    /// Metres, world frame.
+    pub displacement_m: Vector3<f32>,
+    /// Whether it is larger than its uncertainty.
+    pub significant: bool,
+}
+
+/// Dimensions that are added to each point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LabelColumns {
+    /// `stone_id` (u32, 0 for no stone).
+    Stone,
+    /// `stone_id`; `dx`, `dy`, `dz` (f32, metres, NaN where no motion is known) and `significant` (u16, 0 or 1).
+    StoneAndMotion,
+}
+
+/// Copies a cloud to a LAZ file and adds what is known about each point.
+///
+/// The points keep their order. A LAS, LAZ or COPC file keeps every record with all its attributes, its
+/// scale, offset and coordinate system, and its own extra dimensions (but one of a name that is added is
+/// replaced); it becomes LAS 1.4 of the same point format, without the index of COPC. Other formats become
+/// LAS 1.4 with a step of 0.1 mm, colour and intensity where present and the number of the E57 scan (from 1)
+/// as the point source; records without a position are left out there.
+///
+/// `label` gives one label per point of a chunk. An unknown motion is NaN, not zero: it must not look like rest.
+///
+/// # Errors
+/// As [`read_cloud`], or what `label` returns, or the file cannot be written; `output` then stays as it was.
+pub fn write_labelled<E: From<CloudError>>(
+    input: &Path,
+    output: &Path,
+    columns: LabelColumns,
+    mut label: impl FnMut(&PointChunk) -> Result<Vec<PointLabel>, E>,
+) -> Result<ReadSummary, E> {
+    let format = CloudFormat::of(input)?;
+    write_whole(output, |partial| match format {
+        CloudFormat::Las => copy_labelled(input, partial, output, columns, &mut label),
+        _ => export_labelled(input, partial, output, columns, &mut label),
+    })
+}
+
+/// Gives the labels of a chunk.
+pub(super) type Fill<'a, E> = &'a mut dyn FnMut(&PointChunk) -> Result<Vec<PointLabel>, E>;
+
+impl LabelColumns {
+    fn dimensions(self) -> &'static [(&'static str, ExtraType, &'static str)] {
+        const ALL: [(&str, ExtraType, &str); 5] = [
+            ("stone_id", ExtraType::U32, "stone, 0 for none"),
+            ("dx", ExtraType::F32, "displacement x, m"),
+            ("dy", ExtraType::F32, "displacement y, m"),
+            ("dz", ExtraType::F32, "displacement z, m"),
+            ("significant", ExtraType::U16, "1: beyond the detection limit"),
+        ];
+        match self {
+            Self::Stone => &ALL[..1],
+            Self::StoneAndMotion => &ALL,
+        }
+    }
+
+    pub(super) fn names(self) -> impl Iterator<Item = &'static str> {
+        self.dimensions().iter().map(|(name, _, _)| *name)
+    }
+
+    /// Bytes per point.
+    pub(super) fn size(self) -> u16 {
+        self.dimensions().iter().map(|(_, kind, _)| kind.size()).sum()
+    }
+
+    pub(super) fn descriptors(self) -> Vec<u8> {
+        let all = self.dimensions().iter();
+        let all = all.filter_map(|(name, kind, text)| describe(name, *kind, text));
+        all.flat_map(<[u8; DESCRIPTOR_BYTES]>::into_iter).collect()
+    }
+
+    pub(super) fn append(self, label: &PointLabel, out: &mut Vec<u8>) {
+        out.extend(label.stone.map_or(0, |s| s.0).to_le_bytes());
+        if self == Self::Stone {
+            return;
+        }
+        let unknown = Vector3::repeat(f32::NAN);
+        let displacement = label.motion.map_or(unknown, |m| m.displacement_m);
+        for component in displacement.iter() {
+            out.extend(component.to_le_bytes());
+        }
+        let significant = label.motion.is_some_and(|m| m.significant);
+        out.extend(u16::from(significant).to_le_bytes());
+    }
+
+    pub(super) fn check(
+        self,
+        name: &Path,
+        chunk: &PointChunk,
+        labels: &[PointLabel],
+    ) -> Result<(), CloudError> {
+        if labels.len() == chunk.len() {
+            return Ok(());
+        }
+        let reason = format!("{} labels for {} points", labels.len(), chunk.len());
+        Err(CloudError::unwritable(name, reason))
+    }
+}
+
+/// What must be known of a cloud before its first point is written.
+#[derive(Default)]
+struct Survey {
+    bounds: Option<Bounds>,
+    has_color: bool,
+    max_intensity: f32,
+}
+
+impl Survey {
+    fn of(input: &Path) -> Result<Self, CloudError> {
+        let mut survey = Self::default();
+        read_cloud(input, CHUNK_POINTS, |chunk| {
+            if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
+                survey.bounds = Some(survey.bounds.map_or(new, |b| b.union(&new)));
+            }
+            survey.has_color |= chunk.colors.is_some();
+            let intensities = chunk.intensities.iter().flatten();
+            survey.max_intensity = intensities.fold(survey.max_intensity, |max, i| max.max(*i));
+            Ok::<(), CloudError>(())
+        })?;
+        Ok(survey)
+    }
+
+    /// Intensities up to 1 are stretched to 16 bits; others are cut to them.
+    fn intensity(&self, value: f32) -> u16 {
+        let factor = if self.max_intensity <= 1.0 { 65535.0 } else { 1.0 };
+        (value * factor).round() as u16
+    }
+}
+
+fn export_labelled<E: From<CloudError>>(
+    input: &Path,
+    partial: &Path,
+    name: &Path,
+    columns: LabelColumns,
+    fill: Fill<'_, E>,
+) -> Result<ReadSummary, E> {
+    let survey = Survey::of(input)?;
+    let origin = nalgebra::Point3::origin();
+    let bounds = survey.bounds.unwrap_or(Bounds {
+        min: origin,
+        max: origin,
+    });
+    let transforms = transforms_for(&bounds, SCALE_M)
+        .ok_or_else(|| CloudError::unwritable(name, format!("too large for LAS: {bounds:?}")))?;
+    let header = export_header(
+        survey.has_color,
+        transforms,
+        columns.size(),
+        columns.descriptors(),
+    );
+    let mut writer = LazWriter::create(partial, name, header)?;
+    let summary = read_cloud(input, CHUNK_POINTS, |chunk| {
+        let labels = fill(chunk)?;
+        columns.check(name, chunk, &labels)?;
+        let mut out = Vec::new();
+        for (i, label) in labels.iter().enumerate() {
+            let own = |colors: &Vec<[u16; 3]>| colors[i];
+            let record = Export {
+                position: chunk.positions[i],
+                intensity: chunk
+                    .intensities
+                    .as_ref()
+                    .map_or(0, |all| survey.intensity(all[i])),
+                color: survey
+                    .has_color
+                    .then(|| chunk.colors.as_ref().map(own).unwrap_or_default()),
+                source: chunk.scan.map_or(0, |scan| (scan + 1) as u16),
+            };
+            record.append(&transforms, &mut out);
+            columns.append(label, &mut out);
+        }
+        writer.write(out)?;
+        Ok::<(), E>(())
+    })?;
+    writer.finish()?;
+    Ok(summary)
+}

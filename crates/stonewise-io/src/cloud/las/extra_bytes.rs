@@ -1,0 +1,127 @@
+//! Extra dimensions of LAS points: the "Extra Bytes" record of LAS 1.4 R15, section 2.8.
+
+use std::ops::Range;
+
+/// Size of the description of one dimension.
+pub const DESCRIPTOR_BYTES: usize = 192;
+const USER_ID: &str = "LASF_Spec";
+const RECORD_ID: u16 = 4;
+const NAME: Range<usize> = 4..36;
+const DESCRIPTION: Range<usize> = 160..192;
+
+/// A type of extra dimension that is written here.
+#[derive(Clone, Copy)]
+pub enum ExtraType {
+    U16,
+    U32,
+    F32,
+    F64,
+}
+
+impl ExtraType {
+    fn code(self) -> u8 {
+        match self {
+            Self::U16 => 3,
+            Self::U32 => 5,
+            Self::F32 => 9,
+            Self::F64 => 10,
+        }
+    }
+
+    /// Bytes per point.
+    pub fn size(self) -> u16 {
+        match self {
+            Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// The description of a dimension; `None` where the name is longer than 32 bytes, empty or not plain ASCII.
+pub fn describe(name: &str, kind: ExtraType, description: &str) -> Option<[u8; DESCRIPTOR_BYTES]> {
+    if name.is_empty() || name.len() > NAME.len() || !name.is_ascii() {
+        return None;
+    }
+    let mut bytes = [0; DESCRIPTOR_BYTES];
+    bytes[2] = kind.code();
+    bytes[NAME][..name.len()].copy_from_slice(name.as_bytes());
+    let length = description.len().min(DESCRIPTION.len());
+    bytes[DESCRIPTION][..length].copy_from_slice(&description.as_bytes()[..length]);
+    Some(bytes)
+}
+
+/// A dimension that a file already has.
+pub struct ExistingDimension {
+    pub descriptor: [u8; DESCRIPTOR_BYTES],
+    /// Place among the extra bytes of a record.
+    pub bytes: Range<usize>,
+}
+
+impl ExistingDimension {
+    pub fn name(&self) -> &[u8] {
+        let name = &self.descriptor[NAME];
+        let end = name.iter().position(|&b| b == 0).unwrap_or(name.len());
+        &name[..end]
+    }
+}
+
+/// Whether a record describes extra dimensions.
+pub fn is_description(record: &las::Vlr) -> bool {
+    record.user_id == USER_ID && record.record_id == RECORD_ID
+}
+
+/// The record that describes dimensions.
+pub fn description_record(descriptors: Vec<u8>) -> las::Vlr {
+    las::Vlr {
+        user_id: USER_ID.to_owned(),
+        record_id: RECORD_ID,
+        description: "Extra Bytes Record".to_owned(),
+        data: descriptors,
+    }
+}
+
+/// The dimensions of a file with `extra_bytes` per point.
+///
+/// Bytes that no description covers become dimensions of undocumented bytes, so that what follows them is
+/// found in its place. Descriptions that do not fit the record are not believed.
+pub fn existing<'a>(records: impl Iterator<Item = &'a las::Vlr>, extra_bytes: u16) -> Vec<ExistingDimension> {
+    let total = usize::from(extra_bytes);
+    let mut found = Vec::new();
+    let mut start = 0;
+    for record in records.filter(|r| is_description(r)) {
+        for descriptor in record.data.as_chunks::<DESCRIPTOR_BYTES>().0 {
+            let end = start + size_of(descriptor);
+            found.push(ExistingDimension {
+                descriptor: *descriptor,
+                bytes: start..end,
+            });
+            start = end;
+        }
+    }
+    if start > total {
+        found.clear();
+        start = 0;
+    }
+    while start < total {
+        let end = total.min(start + usize::from(u8::MAX));
+        let mut descriptor = [0; DESCRIPTOR_BYTES];
+        descriptor[3] = (end - start) as u8;
+        found.push(ExistingDimension {
+            descriptor,
+            bytes: start..end,
+        });
+        start = end;
+    }
+    found
+}
+
+/// Bytes per point of a described dimension; types 11 to 30 are pairs and triples of types 1 to 10.
+fn size_of(descriptor: &[u8; DESCRIPTOR_BYTES]) -> usize {
+    const SIZES: [usize; 10] = [1, 1, 2, 2, 4, 4, 8, 8, 4, 8];
+    match usize::from(descriptor[2]) {
+        0 => usize::from(descriptor[3]),
+        kind @ 1..=30 => SIZES[(kind - 1) % 10] * ((kind - 1) / 10 + 1),
+        _ => 0,
+    }
+}
