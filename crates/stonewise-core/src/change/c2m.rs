@@ -211,6 +211,7 @@ fn normals(mesh: &TriangleMesh) -> Normals {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::change::MeshError;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -258,6 +259,44 @@ mod tests {
         }
     }
 
+    /// A thin pyramid: at its sharp tip and edges single face normals point the wrong way.
+    #[test]
+    fn signs_hold_at_sharp_tips_and_edges() {
+        let vertices = [
+            [0.3, 0.3, 0.0],
+            [-0.3, 0.3, 0.0],
+            [-0.3, -0.3, 0.0],
+            [0.3, -0.3, 0.0],
+            [0.0, 0.0, 2.0],
+        ]
+        .map(Point3::from)
+        .to_vec();
+        let triangles = vec![[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [0, 2, 1], [0, 3, 2]];
+        let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+        // Inside of a convex body is behind all of its faces.
+        let inside = |p: &Point3<f64>| {
+            (0..6).all(|t| {
+                let [a, b, c] = mesh.corners(t);
+                (b - a).cross(&(c - a)).dot(&(p - a)) < 0.0
+            })
+        };
+        let index = MeshIndex::new(mesh.clone());
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut features = std::collections::BTreeSet::new();
+        for _ in 0..4000 {
+            let p = Point3::new(
+                rng.random_range(-0.6..0.6),
+                rng.random_range(-0.6..0.6),
+                rng.random_range(-0.3..2.5),
+            );
+            let distance = index.signed_distance(&p, 5.0).unwrap();
+            assert_eq!(distance < 0.0, inside(&p), "{p}: {distance}");
+            let (_, _, feature) = index.nearest(&p, 5.0).unwrap();
+            features.insert(format!("{feature:?}")[..4].to_owned());
+        }
+        assert_eq!(features.len(), 3);
+    }
+
     #[test]
     fn meshes_that_cannot_work_are_refused() {
         let corners = vec![
@@ -272,6 +311,4 @@ mod tests {
             Err(MeshError::NoFaces)
         );
     }
-
-    use crate::change::MeshError;
 }
