@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
-use super::{CloudError, CloudFormat, las, read_cloud};
+use super::{CloudError, CloudFormat, e57_file, las, read_cloud};
 
 /// Points per chunk of a pass that only looks.
 const CHUNK_POINTS: usize = 100_000;
@@ -54,12 +54,16 @@ pub fn cloud_info(path: &Path) -> Result<CloudInfo, CloudError> {
         }
         Ok::<(), CloudError>(())
     })?;
+    let (scans, crs) = match format {
+        CloudFormat::E57 => e57_file::scans(path)?,
+        _ => Default::default(),
+    };
     Ok(CloudInfo {
         format,
         records: summary.records,
         bounds,
-        crs: None,
-        scans: Vec::new(),
+        crs,
+        scans,
     })
 }
 

@@ -1,14 +1,18 @@
 //! Point clouds of every usual format in, results out.
 
 mod chunk;
+mod e57_file;
 mod error;
 mod format;
 mod guard;
 mod info;
 mod label;
 mod las;
+mod lines;
+mod ply;
 mod points;
 mod read;
+mod text;
 mod whole;
 
 pub use chunk::{PointChunk, ReadSummary};

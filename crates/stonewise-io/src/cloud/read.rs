@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::chunk::Visit;
-use super::{CloudError, CloudFormat, PointChunk, ReadSummary, las};
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, las, ply, text};
 
 /// Passes the points of a file to `visit`, at most `chunk_points` at a time, in the order of the file.
 ///
@@ -21,6 +21,8 @@ pub fn read_cloud<E: From<CloudError>>(
     let visit: Visit<'_, E> = &mut visit;
     match CloudFormat::of(path)? {
         CloudFormat::Las => las::read(path, chunk_points, visit),
-        _ => Err(CloudError::UnknownFormat(path.to_owned()).into()),
+        CloudFormat::E57 => e57_file::read(path, chunk_points, visit),
+        CloudFormat::Ply => ply::read(path, chunk_points, visit),
+        CloudFormat::Text => text::read(path, chunk_points, visit),
     }
 }

@@ -1,0 +1,106 @@
+//! E57 files: several scans, each with its pose.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordName};
+use nalgebra::Point3;
+
+use super::chunk::{Chunker, PointRecord, Visit};
+use super::guard::guarded;
+use super::info::Scan;
+use super::{CloudError, ReadSummary};
+
+/// Points decoded between two looks at the caller's wish to stop.
+const STEP_POINTS: usize = 8192;
+
+type Reader = E57Reader<BufReader<File>>;
+
+/// Passes the points of all scans to `visit`, scan after scan, in the world frame.
+pub fn read<E: From<CloudError>>(
+    path: &Path,
+    chunk_points: usize,
+    visit: Visit<'_, E>,
+) -> Result<ReadSummary, E> {
+    let mut reader = open(path)?;
+    let mut chunker = Chunker::new(chunk_points, false, false, visit);
+    for (number, scan) in reader.pointclouds().iter().enumerate() {
+        let has = |name| scan.prototype.iter().any(|record| record.name == name);
+        chunker.begin_scan(number, has(RecordName::ColorRed), has(RecordName::Intensity))?;
+        read_scan(path, &mut reader, scan, &mut chunker)?;
+    }
+    chunker.finish()
+}
+
+/// The scans and the coordinate system of a file.
+pub fn scans(path: &Path) -> Result<(Vec<Scan>, Option<String>), CloudError> {
+    let reader = open(path)?;
+    let scans = reader.pointclouds();
+    let describe = |(number, scan): (usize, &PointCloud)| Scan {
+        name: scan
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("scan {}", number + 1)),
+        records: scan.records,
+        origin: scan.transform.as_ref().map(|pose| {
+            let t = &pose.translation;
+            Point3::new(t.x, t.y, t.z)
+        }),
+    };
+    let crs = reader.coordinate_metadata().map(str::trim);
+    let crs = crs.filter(|text| !text.is_empty()).map(str::to_owned);
+    Ok((scans.iter().enumerate().map(describe).collect(), crs))
+}
+
+fn open(path: &Path) -> Result<Reader, CloudError> {
+    let file = File::open(path).map_err(|e| CloudError::read(path, e))?;
+    guarded(path, || {
+        E57Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|e| e57_error(path, &e))
+    })
+}
+
+fn read_scan<E: From<CloudError>>(
+    path: &Path,
+    reader: &mut Reader,
+    scan: &PointCloud,
+    chunker: &mut Chunker<'_, E>,
+) -> Result<(), E> {
+    let mut points = guarded(path, || {
+        reader.pointcloud_simple(scan).map_err(|e| e57_error(path, &e))
+    })?;
+    points.intensity_to_color(false);
+    loop {
+        let step: Vec<Point> = guarded(path, || {
+            let step = points.by_ref().take(STEP_POINTS).collect::<Result<_, _>>();
+            step.map_err(|e| e57_error(path, &e))
+        })?;
+        if step.is_empty() {
+            return Ok(());
+        }
+        for point in &step {
+            chunker.push(record(point))?;
+        }
+    }
+}
+
+fn record(point: &Point) -> PointRecord {
+    let position = match point.cartesian {
+        CartesianCoordinate::Valid { x, y, z } => Some(Point3::new(x, y, z)),
+        CartesianCoordinate::Direction { .. } | CartesianCoordinate::Invalid => None,
+    };
+    let to_16_bit = |value: f32| (value * 65535.0).round() as u16;
+    PointRecord {
+        position,
+        color: point
+            .color
+            .as_ref()
+            .map(|c| [c.red, c.green, c.blue].map(to_16_bit)),
+        // A constant intensity has no range to scale it by.
+        intensity: point.intensity.filter(|i| i.is_finite()),
+    }
+}
+
+fn e57_error(path: &Path, error: &e57::Error) -> CloudError {
+    CloudError::malformed(path, error.to_string())
+}

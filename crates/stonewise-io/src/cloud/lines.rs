@@ -1,0 +1,67 @@
+//! Lines of text files, without trust in their length.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use super::CloudError;
+
+/// A longer line is no line of a point cloud, but a file of another kind.
+const MAX_LINE_BYTES: u64 = 1 << 16;
+
+/// A file that is read line by line, and can be read as bytes from any line on.
+pub(super) struct Lines {
+    path: PathBuf,
+    reader: BufReader<File>,
+    line: Vec<u8>,
+    number: u64,
+}
+
+impl Lines {
+    pub fn open(path: &Path) -> Result<Self, CloudError> {
+        let file = File::open(path).map_err(|e| CloudError::read(path, e))?;
+        Ok(Self {
+            path: path.to_owned(),
+            reader: BufReader::with_capacity(1 << 20, file),
+            line: Vec::new(),
+            number: 0,
+        })
+    }
+
+    /// The next line without spaces at its ends; `None` at the end of the file.
+    pub fn next(&mut self) -> Result<Option<&str>, CloudError> {
+        self.line.clear();
+        let mut limited = self.reader.by_ref().take(MAX_LINE_BYTES);
+        let read = limited.read_until(b'\n', &mut self.line);
+        if read.map_err(|e| CloudError::read(&self.path, e))? == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        if self.line.len() as u64 == MAX_LINE_BYTES {
+            return Err(self.error("the line is too long for text with one point per line"));
+        }
+        match str::from_utf8(&self.line) {
+            Ok(line) => Ok(Some(line.trim_start_matches('\u{feff}').trim())),
+            Err(_) => Err(self.error("the line is not text in UTF-8")),
+        }
+    }
+
+    /// Number of the line that was read last, from 1.
+    pub fn number(&self) -> u64 {
+        self.number
+    }
+
+    /// An error in the line that was read last.
+    pub fn error(&self, reason: impl Into<String>) -> CloudError {
+        CloudError::Line {
+            path: self.path.clone(),
+            line: self.number,
+            reason: reason.into(),
+        }
+    }
+
+    /// The bytes after the line that was read last.
+    pub fn into_bytes(self) -> BufReader<File> {
+        self.reader
+    }
+}

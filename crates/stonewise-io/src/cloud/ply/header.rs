@@ -1,0 +1,140 @@
+//! The header: which elements with which properties follow.
+
+use crate::cloud::CloudError;
+use crate::cloud::lines::Lines;
+
+/// How values are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    Text,
+    LittleEndian,
+    BigEndian,
+}
+
+/// Type of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Scalar {
+    fn parse(word: &str) -> Option<Self> {
+        Some(match word {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+
+    /// Bytes of a value.
+    pub fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// Kind of a property.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    One(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+#[derive(Debug)]
+pub struct Property {
+    pub name: String,
+    pub kind: Kind,
+}
+
+#[derive(Debug)]
+pub struct Element {
+    pub name: String,
+    pub count: u64,
+    pub properties: Vec<Property>,
+}
+
+#[derive(Debug)]
+pub struct Header {
+    pub encoding: Encoding,
+    pub elements: Vec<Element>,
+}
+
+impl Header {
+    /// Reads up to and including `end_header`.
+    pub fn read(lines: &mut Lines) -> Result<Self, CloudError> {
+        let mut encoding = None;
+        let mut elements: Vec<Element> = Vec::new();
+        while let Some(line) = lines.next()? {
+            let line = line.to_owned();
+            let words: Vec<&str> = line.split_whitespace().collect();
+            match words.as_slice() {
+                ["end_header"] => {
+                    let missing = "the header has no known format line before this";
+                    let encoding = encoding.ok_or_else(|| lines.error(missing))?;
+                    return Ok(Self { encoding, elements });
+                }
+                ["format", name, "1.0"] => encoding = Some(parse_encoding(name, lines)?),
+                ["element", name, count] => elements.push(Element {
+                    name: (*name).to_owned(),
+                    count: count
+                        .parse()
+                        .map_err(|_| lines.error(format!("{count:?} is not a count")))?,
+                    properties: Vec::new(),
+                }),
+                ["property", rest @ ..] => {
+                    let property = parse_property(rest, lines)?;
+                    let orphan = || lines.error("a property before any element");
+                    elements.last_mut().ok_or_else(orphan)?.properties.push(property);
+                }
+                [] | ["ply"] | ["comment" | "obj_info", ..] => {}
+                _ => return Err(lines.error(format!("not a line of a ply header: {line:?}"))),
+            }
+        }
+        Err(lines.error("the header has no end_header"))
+    }
+}
+
+fn parse_encoding(name: &str, lines: &Lines) -> Result<Encoding, CloudError> {
+    match name {
+        "ascii" => Ok(Encoding::Text),
+        "binary_little_endian" => Ok(Encoding::LittleEndian),
+        "binary_big_endian" => Ok(Encoding::BigEndian),
+        _ => Err(lines.error(format!("unknown ply format {name:?}"))),
+    }
+}
+
+fn parse_property(words: &[&str], lines: &Lines) -> Result<Property, CloudError> {
+    let scalar = |word: &str| {
+        Scalar::parse(word).ok_or_else(|| lines.error(format!("unknown type of property {word:?}")))
+    };
+    let (kind, name) = match words {
+        ["list", count, item, name] => {
+            let (count, item) = (scalar(count)?, scalar(item)?);
+            if matches!(count, Scalar::F32 | Scalar::F64) {
+                return Err(lines.error("the length of a list must be an integer"));
+            }
+            (Kind::List { count, item }, name)
+        }
+        [kind, name] => (Kind::One(scalar(kind)?), name),
+        _ => return Err(lines.error("a property needs a type and a name")),
+    };
+    let name = (*name).to_owned();
+    Ok(Property { name, kind })
+}

@@ -1,0 +1,6 @@
+//! Stanford PLY files.
+
+mod header;
+mod read;
+
+pub(super) use read::read;

@@ -1,0 +1,202 @@
+//! Streaming the vertices.
+
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use nalgebra::Point3;
+
+use super::header::{Element, Encoding, Header, Kind, Scalar};
+use crate::cloud::chunk::{Chunker, PointRecord, Visit};
+use crate::cloud::lines::Lines;
+use crate::cloud::{CloudError, ReadSummary};
+
+/// Passes all vertices to `visit`.
+pub fn read<E: From<CloudError>>(
+    path: &Path,
+    chunk_points: usize,
+    visit: Visit<'_, E>,
+) -> Result<ReadSummary, E> {
+    let mut lines = Lines::open(path)?;
+    let header = Header::read(&mut lines)?;
+    let vertices = header.elements.iter().position(|e| e.name == "vertex");
+    let no_vertices = || CloudError::malformed(path, "the ply header has no element vertex");
+    let vertices = vertices.ok_or_else(no_vertices)?;
+    let (before, vertex) = (&header.elements[..vertices], &header.elements[vertices]);
+    let columns = Columns::find(vertex).ok_or_else(|| {
+        CloudError::malformed(path, "the vertices of the ply header have no numbers x, y and z")
+    })?;
+    let mut values = match header.encoding {
+        Encoding::Text => Values::Text(lines),
+        encoding => Values::Binary {
+            bytes: lines.into_bytes(),
+            big_endian: encoding == Encoding::BigEndian,
+        },
+    };
+    let mut row = Vec::new();
+    for element in before {
+        for _ in 0..element.count {
+            values.next(path, element, &mut row)?;
+        }
+    }
+    let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
+    let mut chunker = Chunker::new(chunk_points, has_color, has_intensity, visit);
+    for index in 0..vertex.count {
+        if !values.next(path, vertex, &mut row)? {
+            let reason = format!("it holds {index} of {} vertices", vertex.count);
+            return Err(CloudError::truncated(path, reason).into());
+        }
+        chunker.push(columns.record(&row))?;
+    }
+    chunker.finish()
+}
+
+/// Places of what is wanted among the properties of a vertex.
+struct Columns {
+    position: [usize; 3],
+    color: Option<[(usize, Scalar); 3]>,
+    intensity: Option<usize>,
+}
+
+impl Columns {
+    fn find(vertex: &Element) -> Option<Self> {
+        let find = |names: &[&str]| {
+            let known = |name: &str| names.iter().any(|n| n.eq_ignore_ascii_case(name));
+            let place = vertex.properties.iter().position(|p| known(&p.name))?;
+            match vertex.properties[place].kind {
+                Kind::One(scalar) => Some((place, scalar)),
+                Kind::List { .. } => None,
+            }
+        };
+        let place = |name| find(&[name]).map(|(place, _)| place);
+        let color = [
+            find(&["red", "r", "diffuse_red"]),
+            find(&["green", "g", "diffuse_green"]),
+            find(&["blue", "b", "diffuse_blue"]),
+        ];
+        Some(Self {
+            position: [place("x")?, place("y")?, place("z")?],
+            color: match color {
+                [Some(r), Some(g), Some(b)] => Some([r, g, b]),
+                _ => None,
+            },
+            intensity: find(&["intensity", "scalar_intensity", "reflectance"]).map(|(place, _)| place),
+        })
+    }
+
+    fn record(&self, row: &[f64]) -> PointRecord {
+        PointRecord {
+            position: Some(Point3::from(self.position.map(|place| row[place]))),
+            color: self
+                .color
+                .map(|channels| channels.map(|(place, scalar)| to_16_bit(row[place], scalar))),
+            intensity: self.intensity.map(|place| row[place] as f32),
+        }
+    }
+}
+
+/// A colour value: floats go from 0 to 1, 16-bit integers to 65535, all other integers to 255.
+fn to_16_bit(value: f64, scalar: Scalar) -> u16 {
+    let factor = match scalar {
+        Scalar::F32 | Scalar::F64 => 65535.0,
+        Scalar::U16 | Scalar::I16 => 1.0,
+        _ => 257.0,
+    };
+    (value * factor).round() as u16
+}
+
+/// The values of the elements, one row at a time.
+enum Values {
+    Text(Lines),
+    Binary {
+        bytes: BufReader<File>,
+        big_endian: bool,
+    },
+}
+
+impl Values {
+    /// Reads one value per property into `row` (the length, where it is a list); false at the end of the file.
+    fn next(&mut self, path: &Path, element: &Element, row: &mut Vec<f64>) -> Result<bool, CloudError> {
+        row.clear();
+        match self {
+            Self::Text(lines) => next_line(lines, element, row),
+            Self::Binary { bytes, big_endian } => match next_binary(bytes, *big_endian, element, row) {
+                Ok(()) => Ok(true),
+                Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
+                Err(e) => Err(CloudError::read(path, e)),
+            },
+        }
+    }
+}
+
+fn next_line(lines: &mut Lines, element: &Element, row: &mut Vec<f64>) -> Result<bool, CloudError> {
+    let mut line = lines.next()?;
+    while line == Some("") {
+        line = lines.next()?;
+    }
+    let Some(line) = line else { return Ok(false) };
+    let parsed = parse_line(line, element, row);
+    parsed.map(|()| true).map_err(|reason| lines.error(reason))
+}
+
+fn parse_line(line: &str, element: &Element, row: &mut Vec<f64>) -> Result<(), String> {
+    let mut words = line.split_ascii_whitespace();
+    for property in &element.properties {
+        let short = || format!("the line ends before its property {:?}", property.name);
+        let word = words.next().ok_or_else(short)?;
+        let value: f64 = word
+            .parse()
+            .map_err(|_| format!("{word:?} is not a number (property {:?})", property.name))?;
+        if let Kind::List { .. } = property.kind {
+            for _ in 0..value as u64 {
+                words.next().ok_or_else(short)?;
+            }
+        }
+        row.push(value);
+    }
+    Ok(())
+}
+
+fn next_binary(
+    bytes: &mut impl Read,
+    big_endian: bool,
+    element: &Element,
+    row: &mut Vec<f64>,
+) -> std::io::Result<()> {
+    for property in &element.properties {
+        let value = match property.kind {
+            Kind::One(scalar) => next_scalar(bytes, big_endian, scalar)?,
+            Kind::List { count, item } => {
+                let length = next_scalar(bytes, big_endian, count)?;
+                let size = length as u64 * item.size() as u64;
+                let skipped = std::io::copy(&mut bytes.by_ref().take(size), &mut std::io::sink())?;
+                if skipped < size {
+                    return Err(std::io::ErrorKind::UnexpectedEof.into());
+                }
+                length
+            }
+        };
+        row.push(value);
+    }
+    Ok(())
+}
+
+fn next_scalar(bytes: &mut impl Read, big_endian: bool, scalar: Scalar) -> std::io::Result<f64> {
+    let mut raw = [0; 8];
+    let size = scalar.size();
+    bytes.read_exact(&mut raw[..size])?;
+    if big_endian {
+        raw[..size].reverse();
+    }
+    let [a, b, c, d, ..] = raw;
+    Ok(match scalar {
+        Scalar::I8 => f64::from(a.cast_signed()),
+        Scalar::U8 => f64::from(a),
+        Scalar::I16 => f64::from(i16::from_le_bytes([a, b])),
+        Scalar::U16 => f64::from(u16::from_le_bytes([a, b])),
+        Scalar::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+        Scalar::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+        Scalar::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
+        Scalar::F64 => f64::from_le_bytes(raw),
+    })
+}
