@@ -3,7 +3,11 @@
 mod deform;
 mod face;
 mod layout;
+mod lens;
+mod light;
+mod material;
 mod noise;
+mod photo;
 mod props;
 mod scan;
 mod scene;
@@ -15,7 +19,10 @@ mod wall;
 
 pub use deform::{TrueMotion, WallMotion, move_stones, shared_displacement};
 pub use face::{Face, FacePoint};
+pub use lens::SensorParams;
+pub use light::Light;
 pub use noise::Noise;
+pub use photo::{Photo, PhotoParams, Studio, disturb_views, plan_views};
 pub use props::{Material, Prop, SurroundingsParams, surroundings};
 pub use scan::{BeamParams, Scan};
 pub use scene::{Hit, Scene, Target};
