@@ -142,24 +142,24 @@ impl Brown {
     fn invert_radius(&self, rd: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.max_radius);
         let mut r = rd.min(high);
-        for _ in 0..NEWTON_STEPS {
+        for i in 0..NEWTON_STEPS {
             let (s, ds) = self.factor(r * r);
             let error = r * s - rd;
+            if error.abs() <= 1e-9 * (1.0 + rd) {
+                break;
+            }
             if error > 0.0 {
                 high = r;
             } else {
                 low = r;
             }
             let newton = r - error / (s + 2.0 * r * r * ds);
-            let next = if newton > low && newton < high {
+            // Near a pole of the rational terms Newton's steps are tiny, so every third halves the bracket.
+            r = if i % 3 < 2 && newton > low && newton < high {
                 newton
             } else {
                 0.5 * (low + high)
             };
-            if (next - r).abs() < 1e-9 {
-                return next;
-            }
-            r = next;
         }
         r
     }
