@@ -37,7 +37,7 @@ pub fn write_colmap(folder: &Path, views: &[View]) -> Result<(), CameraError> {
         let t = view.cam_from_world.translation;
         let _ = writeln!(
             image_lines,
-            "{} {:.17} {:.17} {:.17} {:.17} {:.17} {:.17} {:.17} {} {}\n",
+            "{} {:.16e} {:.16e} {:.16e} {:.16e} {:.16e} {:.16e} {:.16e} {} {}\n",
             index + 1,
             q.w,
             q.i,

@@ -1,0 +1,247 @@
+//! Camera files of every format against pixels computed elsewhere, and back through the writers.
+
+use nalgebra::{Point3, Translation3, UnitQuaternion};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
+use stonewise_core::id::ImageId;
+use stonewise_io::cameras::{CameraError, CameraFile, read_cameras, write_colmap, write_metashape};
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata/cameras")
+        .join(name)
+}
+
+type Expected = BTreeMap<String, Vec<[f64; 5]>>;
+
+fn expected(section: &str) -> Expected {
+    let text = std::fs::read_to_string(fixture("expected.json")).unwrap();
+    let file: Value = serde_json::from_str(&text).unwrap();
+    serde_json::from_value(file[section].clone()).unwrap()
+}
+
+fn assert_pixels(file: &CameraFile, expected: &Expected) {
+    assert_eq!(file.views.len(), expected.len());
+    for (index, view) in file.views.iter().enumerate() {
+        assert_eq!(view.image, ImageId(index as u32));
+        let rows = &expected[&view.name];
+        assert_eq!(rows.len(), 20);
+        for [x, y, z, u, v] in rows {
+            let pixel = view.project(&Point3::new(*x, *y, *z)).unwrap().pixel;
+            let error = (pixel[0] - u).hypot(pixel[1] - v);
+            assert!(error < 1e-6, "{}: {error:e} px", view.name);
+        }
+    }
+}
+
+#[test]
+fn colmap_text_and_binary_put_points_where_opencv_does() {
+    for folder in [
+        "colmap_txt",
+        "colmap_bin",
+        "colmap_bin/images.bin",
+        "colmap_txt/cameras.txt",
+    ] {
+        let file = read_cameras(&fixture(folder)).unwrap();
+        assert_pixels(&file, &expected("colmap"));
+        assert_eq!(file.views[0].name, "flight 0/simple_pinhole.JPG");
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+    }
+}
+
+#[test]
+fn metashape_puts_points_where_its_formulae_do() {
+    let file = read_cameras(&fixture("metashape.xml")).unwrap();
+    assert_pixels(&file, &expected("metashape"));
+    let names: Vec<&str> = file.views.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["DJI_0001", "DJI_0002.v2", "DJI_0003", "DJI & 4"]);
+    let skipped = [("unaligned", "not aligned"), ("off", "disabled in Metashape")];
+    let skipped = skipped.map(|(name, reason)| (name.to_owned(), reason.to_owned()));
+    assert_eq!(file.skipped, skipped);
+    assert_eq!(file.warnings, ["chunk old try is disabled and was not read"]);
+    assert!(file.crs.unwrap().starts_with("LOCAL_CS"));
+}
+
+#[test]
+fn opensfm_puts_points_where_opencv_does() {
+    let file = read_cameras(&fixture("opensfm.json")).unwrap();
+    assert_pixels(&file, &expected("opensfm"));
+    assert_eq!(file.skipped.len(), 1);
+    assert_eq!(file.skipped[0].0, "alone.jpg");
+    assert_eq!(file.warnings.len(), 1);
+}
+
+fn message(path: &Path) -> String {
+    let error = read_cameras(path).unwrap_err();
+    let text = error.to_string();
+    let file = path.file_name().unwrap().to_string_lossy();
+    assert!(text.contains(&*file), "{text} names the file");
+    text
+}
+
+#[test]
+fn colmap_folders_that_cannot_be_read_say_why() {
+    let fov = message(&fixture("rejected/fov"));
+    assert!(fov.contains("FOV") && fov.contains("photo_1.jpg"), "{fov}");
+    let missing = message(&fixture("rejected/missing_parameter"));
+    assert!(
+        missing.contains("OPENCV has 8 parameters, found 7") && missing.contains("line 1"),
+        "{missing}"
+    );
+    let lines = message(&fixture("rejected/no_points_lines"));
+    assert!(
+        lines.contains("line 2") && lines.contains("image points"),
+        "{lines}"
+    );
+    assert!(message(&fixture("rejected")).contains("not a camera file"));
+}
+
+#[test]
+fn every_truncation_of_a_binary_file_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(
+        fixture("colmap_bin/cameras.bin"),
+        folder.path().join("cameras.bin"),
+    )
+    .unwrap();
+    let bytes = std::fs::read(fixture("colmap_bin/images.bin")).unwrap();
+    for length in 0..bytes.len() {
+        std::fs::write(folder.path().join("images.bin"), &bytes[..length]).unwrap();
+        let error = read_cameras(folder.path()).unwrap_err();
+        assert!(error.to_string().contains("complete"), "{length}: {error}");
+    }
+}
+
+#[test]
+fn metashape_files_that_cannot_be_read_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.xml");
+    let good = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
+    let check = |text: String, parts: &[&str]| {
+        std::fs::write(&path, text).unwrap();
+        let error = message(&path);
+        for part in parts {
+            assert!(error.contains(part), "{error} has {part}");
+        }
+    };
+    check(good[..good.len() / 2].to_owned(), &["line", "complete"]);
+    check(String::new(), &["no xml element"]);
+    check("<svg/>".to_owned(), &["<svg>", "<document>"]);
+    check("<document/>".to_owned(), &["no aligned camera"]);
+    check(
+        good.replace("<transform>", "<other>")
+            .replace("</transform>", "</other>"),
+        &["no aligned camera", "7 without"],
+    );
+    check(
+        good.replace("fisheye", "spherical"),
+        &["spherical", "DJI_0002.v2"],
+    );
+    check(
+        good.replace("<f>2897.25", "<f>nonsense"),
+        &["<f>", "line", "nonsense"],
+    );
+    check(
+        good.replace("sensor_id=\"7\"", "sensor_id=\"70\""),
+        &["70", "line"],
+    );
+    check(
+        good.replace("LOCAL_CS[", "PROJCS["),
+        &["PROJCS", "local coordinates"],
+    );
+    let scaled = good.replace("<scale locked=\"true\">", "<scale locked=\"true\">-");
+    check(scaled, &["scale must be positive"]);
+}
+
+#[test]
+fn other_files_are_not_camera_files() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(matches!(
+        read_cameras(folder.path()),
+        Err(CameraError::UnknownFormat { .. })
+    ));
+    let path = folder.path().join("reconstruction.json");
+    std::fs::write(&path, "[{\"cameras\": 3}]").unwrap();
+    assert!(message(&path).contains("line 1"));
+    assert!(message(&folder.path().join("cameras.las")).contains("not a camera file"));
+    assert!(message(&folder.path().join("missing.xml")).contains("cannot read"));
+}
+
+/// Views that differ in pose and lens.
+fn views(lenses: &[Distortion], skew_px: f64) -> Vec<View> {
+    let view = |(i, lens): (usize, &Distortion)| {
+        let angle = i as f64 + 0.3;
+        View {
+            image: ImageId(i as u32),
+            name: format!("left & right <{i}>.jpg"),
+            camera: Camera {
+                focal_px: [2900.123_456_789_1, 2899.1],
+                center_px: [2010.3, 1480.0 / 3.0],
+                skew_px,
+                distortion: lens.clone(),
+                ..Camera::pinhole(4000, 3000, 1.0)
+            },
+            cam_from_world: Rigid3::from_parts(
+                Translation3::new(4.5e5 / 3.0, 5.6e6 / 7.0, -angle),
+                UnitQuaternion::from_euler_angles(angle, 0.1 * angle, -angle),
+            ),
+        }
+    };
+    lenses.iter().enumerate().map(view).collect()
+}
+
+fn assert_same(a: &[View], b: &[View]) {
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!((&a.name, a.image), (&b.name, b.image));
+        for i in 0..100 {
+            let pixel = [f64::from(i % 10) * 400.0 + 1.0, f64::from(i / 10) * 300.0 + 1.0];
+            let (Some((origin, direction)), Some((origin_b, direction_b))) = (a.ray(pixel), b.ray(pixel))
+            else {
+                panic!("{pixel:?}");
+            };
+            assert!((origin - origin_b).norm() < 1e-8, "{}", origin - origin_b);
+            assert!((direction - direction_b).norm() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn written_metashape_files_read_back() {
+    let lenses = [
+        Distortion::None,
+        Distortion::brown([-0.11, 0.03, -0.01, 0.002], [0.0; 3], [0.001, -0.002]),
+        Distortion::fisheye([0.03, -0.01, 0.0, 0.0], [0.001, -0.002]),
+        Distortion::None,
+    ];
+    let written = views(&lenses, -1.25);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cameras.xml");
+    write_metashape(&path, &written, None).unwrap();
+    let read = read_cameras(&path).unwrap();
+    assert_same(&written, &read.views);
+    assert!(read.warnings.is_empty() && read.skipped.is_empty());
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert_eq!(text.matches("<sensor ").count(), 3);
+    let rational = views(&[Distortion::brown([0.1; 4], [0.1; 3], [0.0; 2])], 0.0);
+    assert!(write_metashape(&path, &rational, None).is_err());
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+}
+
+#[test]
+fn written_colmap_folders_read_back() {
+    let lenses = [
+        Distortion::brown([-0.11, 0.03, 0.0, 0.0], [0.0; 3], [0.001, -0.002]),
+        Distortion::None,
+        Distortion::brown([-0.11, 0.03, -0.01, 0.0], [0.02, -0.01, 0.005], [0.001, -0.002]),
+        Distortion::fisheye([0.03, -0.01, 0.002, 0.001], [0.0; 2]),
+    ];
+    let written = views(&lenses, 0.0);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sparse/0");
+    write_colmap(&path, &written).unwrap();
+    assert_same(&written, &read_cameras(folder.path()).unwrap().views);
+    assert!(write_colmap(&path, &views(&lenses, 0.5)).is_err());
+}
