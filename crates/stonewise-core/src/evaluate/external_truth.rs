@@ -1,5 +1,6 @@
 //! Results against the truth of a simulated survey.
 
+use crate::change::ChangeField;
 use crate::cloud::GridIndex;
 use crate::evaluate::detection::share;
 use crate::evaluate::{EvaluationParams, MotionSample, MotionScore, StoneOutcome, score_motions};
@@ -151,9 +152,40 @@ pub fn score_against_truth(
     }
 }
 
+/// Scores M3C2 against a simulated survey; `owners` runs parallel to the core points.
+///
+/// The truth of a core point is the rigid motion of the countable stone that owns it; core points on anything
+/// else are left out.
+pub fn score_change_against_truth(
+    field: &ChangeField,
+    owners: &[Owner],
+    stones: &[TrueStone],
+    params: &EvaluationParams,
+) -> MotionScore {
+    let countable: BTreeMap<u32, &TrueStone> = stones
+        .iter()
+        .filter(|s| s.is_countable(params))
+        .map(|s| (s.stone_id, s))
+        .collect();
+    let owned: Vec<_> = field
+        .points
+        .iter()
+        .zip(owners)
+        .filter_map(|(p, owner)| Some((p, *countable.get(&(*owner)?)?)))
+        .collect();
+    let samples: Vec<_> = owned
+        .iter()
+        .filter_map(|(p, stone)| {
+            MotionSample::of_change(p, &stone.normal, stone.displacement_at(&p.position))
+        })
+        .collect();
+    score_motions(&samples, owned.len(), params)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::change::ChangePoint;
     use crate::id::StoneId;
 
     fn stone(stone_id: u32, y: f64) -> TrueStone {
@@ -214,6 +246,35 @@ mod tests {
         assert_eq!((loose.reported, loose.truly_loose, loose.right), (2, 1, 1));
         // The row at 1.01 counts: off by the turn over 1 cm.
         assert!(score.motions.errors.norm_3d.unwrap().rmse_m < 2e-4);
+    }
+
+    #[test]
+    fn core_points_take_the_motion_of_the_stone_they_lie_on() {
+        let params = EvaluationParams::default();
+        let stones: Vec<_> = (1..=5).map(|id| stone(id, f64::from(id))).collect();
+        let point = |y: f64, distance_m| ChangePoint {
+            position: Point3::new(0.0, y, 0.0),
+            normal: Vector3::x(),
+            distance_m,
+            detection_limit_m: Some(0.002),
+            spread_m: [Some(0.001); 2],
+            counts: [30; 2],
+        };
+        let truth = stones[0].displacement_at(&Point3::new(0.0, 1.2, 0.0));
+        let field = ChangeField {
+            points: vec![
+                point(1.2, Some(truth.x)),
+                point(2.0, None),
+                point(4.0, Some(1.0)),
+                point(5.0, Some(1.0)),
+                point(7.0, Some(1.0)),
+            ],
+        };
+        let owners = [Some(1), Some(2), Some(4), Some(5), None];
+        let score = score_change_against_truth(&field, &owners, &stones, &params);
+        assert_eq!((score.expected, score.estimated), (2, 1));
+        assert!(score.errors.out_of_plane.unwrap().rmse_m < 1e-15);
+        assert!((score.errors.along.unwrap().mean_m + truth.y).abs() < 1e-15);
     }
 
     #[test]

@@ -22,12 +22,13 @@ pub use detection::{Detection, LooseDetection};
 pub use evaluation::Evaluation;
 pub use external_truth::{
     Owner, TrueStone, TruthScore, owners_by_centroid, owners_by_labels, score_against_truth,
+    score_change_against_truth,
 };
 pub use instances::InstanceScore;
 pub use labels::{LabelConfusion, LabelScore};
 pub use matches::{MatchScore, score_matches};
 pub use motion_field::{MotionField, MotionFieldError};
 pub use moved_tiles::MovedTiles;
-pub use sample::{EvaluationParams, MotionSample, StoneOutcome};
+pub use sample::{EvaluationParams, EvaluationParamsError, MotionSample, StoneOutcome};
 pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};
 pub use statistics::{ErrorStatistics, quantile};

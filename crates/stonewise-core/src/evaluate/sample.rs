@@ -1,5 +1,6 @@
 //! One estimated motion beside the truth.
 
+use crate::change::ChangePoint;
 use crate::geometry::FaceFrame;
 use crate::id::StoneId;
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -32,6 +33,35 @@ impl Default for EvaluationParams {
             owner_reach_m: 0.1,
         }
     }
+}
+
+impl EvaluationParams {
+    /// Checks that every limit is usable.
+    pub fn check(&self) -> Result<(), EvaluationParamsError> {
+        let limits = [
+            ("outlier_m", self.outlier_m, f64::INFINITY),
+            ("still_m", self.still_m, f64::INFINITY),
+            ("min_visible_share", self.min_visible_share, 1.0),
+            ("owner_reach_m", self.owner_reach_m, f64::INFINITY),
+        ];
+        match limits
+            .iter()
+            .find(|(_, value, most)| !(*value >= 0.0 && value <= most))
+        {
+            Some((key, value, _)) => Err(EvaluationParamsError { key, value: *value }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A limit of the evaluation that cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key} is {value}, it must be a length in metres or a share from 0 to 1, not negative")]
+pub struct EvaluationParamsError {
+    /// Name of the parameter.
+    pub key: &'static str,
+    /// Its value.
+    pub value: f64,
 }
 
 /// What a run says about one stone, as far as the evaluation needs it.
@@ -107,6 +137,23 @@ impl MotionSample {
         })
     }
 
+    /// An M3C2 distance beside the truth at its core point; `None` where M3C2 has no distance.
+    ///
+    /// The displacement is distance times normal; the detection limit is M3C2's claim out of the plane, and in
+    /// the plane it claims nothing.
+    pub fn of_change(point: &ChangePoint, normal: &Vector3<f64>, truth: Vector3<f64>) -> Option<Self> {
+        Some(Self {
+            frame: FaceFrame::from_normal(normal),
+            estimated: point.displacement()?,
+            truth,
+            covariance: None,
+            half_width_m: [None, None, point.detection_limit_m],
+            detection_limit_m: point.detection_limit_m,
+            significant: point.detection_limit_m.map(|_| point.is_significant()),
+            loose: None,
+        })
+    }
+
     /// Estimate minus truth in (along, up, out), metres.
     pub fn error(&self) -> Vector3<f64> {
         self.frame.face_from_world() * (self.estimated - self.truth)
@@ -115,5 +162,25 @@ impl MotionSample {
     /// Truth in (along, up, out), metres.
     pub fn local_truth(&self) -> Vector3<f64> {
         self.frame.face_from_world() * self.truth
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn limits_that_cannot_work_are_named() {
+        assert_eq!(EvaluationParams::default().check(), Ok(()));
+        let share = EvaluationParams {
+            min_visible_share: 35.0,
+            ..EvaluationParams::default()
+        };
+        assert_eq!(share.check().unwrap_err().key, "min_visible_share");
+        let nan = EvaluationParams {
+            outlier_m: f64::NAN,
+            ..EvaluationParams::default()
+        };
+        assert_eq!(nan.check().unwrap_err().key, "outlier_m");
     }
 }

@@ -4,7 +4,6 @@ use crate::change::{ChangeField, ChangePoint};
 use crate::evaluate::{
     Calibration, Detection, ErrorStatistics, EvaluationParams, LooseDetection, MotionSample, StoneOutcome,
 };
-use crate::geometry::FaceFrame;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -87,18 +86,7 @@ pub fn score_change(
     let samples: Vec<_> = field
         .points
         .iter()
-        .filter_map(|p| {
-            Some(MotionSample {
-                frame: FaceFrame::from_normal(&face_normal(p)),
-                estimated: p.displacement()?,
-                truth: truth(&p.position),
-                covariance: None,
-                half_width_m: [None, None, p.detection_limit_m],
-                detection_limit_m: p.detection_limit_m,
-                significant: p.detection_limit_m.map(|_| p.is_significant()),
-                loose: None,
-            })
-        })
+        .filter_map(|p| MotionSample::of_change(p, &face_normal(p), truth(&p.position)))
         .collect();
     score_motions(&samples, field.points.len(), params)
 }
