@@ -36,7 +36,11 @@ struct Stretch {
 
 impl Facade {
     /// The facade of stones with these centroids and outward normals; any number, none included.
+    ///
+    /// Stones at places that are not finite are left out.
     pub fn new(stones: &[(Point3<f64>, Vector3<f64>)]) -> Self {
+        let finite = |s: &&(Point3<f64>, Vector3<f64>)| s.0.iter().chain(s.1.iter()).all(|v| v.is_finite());
+        let stones: &[_] = &stones.iter().filter(finite).copied().collect::<Vec<_>>();
         let origin = stones.first().map_or(Point3::origin(), |s| s.0);
         let mean: Vector3<f64> = stones.iter().map(|s| s.1).sum();
         let level = Vector3::new(mean.x, mean.y, 0.0);

@@ -1,12 +1,18 @@
 //! Result tables and the report, made from result files alone.
 
 mod change_points;
+mod comparison;
+mod draw;
 mod error;
 mod facade;
 mod outlines;
+mod page;
+mod report_file;
 mod result_set;
+mod statistics;
 mod stone_row;
 mod stone_table;
+mod summary;
 #[cfg(test)]
 mod testing;
 
@@ -14,6 +20,7 @@ pub use change_points::DistancePoint;
 pub use error::ReportError;
 pub use facade::Facade;
 pub use outlines::{OUTLINES_FILE, StoneOutline, write_outlines};
+pub use report_file::write_report;
 pub use result_set::ResultSet;
 pub use stone_row::{RowMotion, Status, StoneRow, detection_limit_m};
 pub use stone_table::{STONE_COLUMNS, read_stones, stone_table, write_stones, write_stones_named};

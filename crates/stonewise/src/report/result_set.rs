@@ -5,9 +5,11 @@ use super::outlines::{StoneOutline, read_outlines};
 use super::stone_table::read_stones;
 use super::{Facade, ReportError, StoneRow};
 use nalgebra::{Point2, Vector3};
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
+use stonewise_core::evaluate::Evaluation;
 
 /// The result files of one run, read back; photos and clouds are not needed.
 #[derive(Clone, Debug)]
@@ -19,7 +21,7 @@ pub struct ResultSet {
     /// `m3c2.csv`; empty where the file is missing.
     pub distances: Vec<DistancePoint>,
     /// `evaluation.json`, where truth is known.
-    pub evaluation: Option<Value>,
+    pub evaluation: Option<Evaluation>,
     /// `run.json`; null where the file is missing.
     pub run: Value,
     /// The unrolled wall.
@@ -86,7 +88,7 @@ fn facade_of(stones: &[StoneRow], outlines: &BTreeMap<u32, StoneOutline>) -> Fac
     Facade::new(&known)
 }
 
-fn read_json(path: &Path) -> Result<Option<Value>, ReportError> {
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, ReportError> {
     match std::fs::read(path) {
         Ok(text) => serde_json::from_slice(&text)
             .map(Some)

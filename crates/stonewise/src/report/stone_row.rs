@@ -48,8 +48,8 @@ pub struct RowMotion {
     /// Displacement against the neighbours, world.
     pub relative: Vector3<f64>,
     /// 95 % detection limit along the direction of the displacement, see [`detection_limit_m`].
-    pub lod95_m: f64,
-    /// Differs from zero at 95 %: exactly where the displacement is longer than `lod95_m`.
+    pub detection_limit_m: f64,
+    /// Differs from zero at 95 %: exactly where the displacement is longer than `detection_limit_m`.
     pub significant: bool,
     /// Moves unlike its neighbours, significantly.
     pub loose: bool,
@@ -178,15 +178,15 @@ impl StoneRow {
 impl RowMotion {
     fn new(motion: &StoneMotion, normal: &Vector3<f64>, registration_covariance: &Matrix3<f64>) -> Self {
         let covariance = motion.covariance.fixed_view::<3, 3>(0, 0) + registration_covariance;
-        let lod95_m = detection_limit_m(&motion.displacement, &covariance);
+        let detection_limit_m = detection_limit_m(&motion.displacement, &covariance);
         Self {
             displacement: motion.displacement,
             face: FaceFrame::from_normal(normal).face_from_world() * motion.displacement,
             rotation: motion.rotation,
             covariance,
             relative: motion.relative,
-            lod95_m,
-            significant: motion.displacement.norm() > lod95_m,
+            detection_limit_m,
+            significant: motion.displacement.norm() > detection_limit_m,
             loose: motion.loose,
             observability: motion.observability,
         }
@@ -280,7 +280,7 @@ mod tests {
         assert!((motion.face - Vector3::new(0.01, -0.02, 0.03)).norm() < 1e-12);
         assert!((motion.covariance - Matrix3::identity() * (0.005 * 0.005)).norm() < 1e-12);
         // Equal in all directions: sqrt(7.8147) sigma.
-        assert!((motion.lod95_m - 0.005 * 2.795_483).abs() < 1e-8);
+        assert!((motion.detection_limit_m - 0.005 * 2.795_483).abs() < 1e-8);
         assert!(motion.significant);
     }
 

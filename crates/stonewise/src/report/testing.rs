@@ -10,7 +10,6 @@ pub(super) fn rows() -> Vec<StoneRow> {
 }
 
 /// Their outlines: rectangles of 40 x 25 cm.
-#[allow(dead_code)]
 pub(super) fn outlines() -> Vec<StoneOutline> {
     let corner = |c: Point3<f64>, y: f64, z: f64| c + Vector3::new(0.0, 0.19 * y, 0.115 * z);
     let outline = |r: StoneRow| StoneOutline {
@@ -60,7 +59,7 @@ fn motion(stone_id: u32) -> RowMotion {
         rotation: Vector3::new(0.001, 0.0, 0.0),
         covariance,
         relative: displacement,
-        lod95_m: 0.000_5 * 2.795_483,
+        detection_limit_m: 0.000_5 * 2.795_483,
         significant: displacement.norm() > 0.000_5 * 2.795_483,
         loose: stone_id == 15,
         observability: 0.7,

@@ -1,0 +1,94 @@
+//! Stones against the M3C2 core points on them.
+
+use super::statistics::Sorted;
+use super::{ResultSet, StoneRow};
+use nalgebra::Point2;
+use std::collections::BTreeMap;
+
+/// Edge of the squares that stones are looked up in, metres.
+const SQUARE_M: f64 = 0.5;
+
+/// The same place in both methods.
+pub(crate) struct Comparison {
+    /// Out-of-plane displacement of each measured stone and the median M3C2 distance on it, metres.
+    pub out_of_plane: Vec<[f64; 2]>,
+    /// In-plane components (along, up) of the M3C2 displacement vectors, distance times normal, metres.
+    pub in_plane: Vec<[f64; 2]>,
+}
+
+/// Compares; empty without core points. A core point belongs to the stone whose outline holds it.
+pub(crate) fn compare(results: &ResultSet) -> Comparison {
+    let mut squares: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+    let rings: Vec<Vec<Point2<f64>>> = results.stones.iter().map(|s| results.unrolled(s)).collect();
+    let square = |p: &Point2<f64>| ((p.x / SQUARE_M).floor() as i64, (p.y / SQUARE_M).floor() as i64);
+    for (i, ring) in rings.iter().enumerate() {
+        let Some(low) = ring.iter().copied().reduce(|a, b| a.inf(&b)) else {
+            continue;
+        };
+        let Some(high) = ring.iter().copied().reduce(|a, b| a.sup(&b)) else {
+            continue;
+        };
+        let (from, to) = (square(&low), square(&high));
+        for x in from.0..=to.0 {
+            for y in from.1..=to.1 {
+                squares.entry((x, y)).or_default().push(i);
+            }
+        }
+    }
+    let mut on_stone: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    let mut in_plane = Vec::new();
+    for point in &results.distances {
+        let place = results.facade.place(&point.position);
+        let candidates = squares.get(&square(&place)).into_iter().flatten();
+        if let Some(&i) = candidates.into_iter().find(|&&i| contains(&rings[i], &place)) {
+            on_stone.entry(i).or_default().push(point.distance_m);
+        }
+        if let Some(normal) = point.normal {
+            let frame = results.facade.frame_at(&point.position);
+            let d = normal * point.distance_m;
+            in_plane.push([d.dot(&frame.along), d.dot(&frame.up)]);
+        }
+    }
+    let pair = |(i, distances): (usize, Vec<f64>)| {
+        let stone: &StoneRow = &results.stones[i];
+        Some([stone.motion.as_ref()?.face.z, Sorted::new(distances).median()?])
+    };
+    Comparison {
+        out_of_plane: on_stone.into_iter().filter_map(pair).collect(),
+        in_plane,
+    }
+}
+
+/// Whether a polygon holds a point (crossing number).
+fn contains(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
+    let crosses = |a: &Point2<f64>, b: &Point2<f64>| {
+        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    };
+    (0..ring.len())
+        .filter(|&i| crosses(&ring[i], &ring[(i + 1) % ring.len()]))
+        .count()
+        % 2
+        == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bay_is_outside() {
+        let p = Point2::new;
+        let ring = [
+            p(0.0, 0.0),
+            p(3.0, 0.0),
+            p(3.0, 2.0),
+            p(2.0, 2.0),
+            p(2.0, 1.0),
+            p(1.0, 1.0),
+            p(1.0, 2.0),
+            p(0.0, 2.0),
+        ];
+        assert!(contains(&ring, &p(0.5, 1.5)) && contains(&ring, &p(1.5, 0.5)));
+        assert!(!contains(&ring, &p(1.5, 1.5)) && !contains(&ring, &p(4.0, 0.5)));
+    }
+}

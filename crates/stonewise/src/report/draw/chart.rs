@@ -1,0 +1,135 @@
+//! Scatter plots and histograms.
+
+use super::axes::Axes;
+use super::text::{escape, number};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+/// Points of a chart with their class in the style sheet.
+pub(crate) struct Series<'a> {
+    pub class: &'a str,
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A square scatter plot with equal scales, millimetres; `cross` marks a known truth, `diagonal` the line y = x.
+pub(crate) fn scatter(
+    title: &str,
+    labels: [&str; 2],
+    series: &[Series],
+    limits_mm: [[f64; 2]; 2],
+    cross: Option<[f64; 2]>,
+    diagonal: bool,
+) -> String {
+    let axes = Axes {
+        x: limits_mm[0],
+        y: limits_mm[1],
+        area: [52.0, 8.0, 320.0, 320.0],
+    };
+    let mut out = format!(
+        r#"<svg role="img" aria-label="{}" viewBox="0 0 384 370">"#,
+        escape(title)
+    );
+    axes.draw(&mut out, labels[0], labels[1]);
+    if let Some(zero) = zero_lines(&axes) {
+        let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);
+    }
+    if diagonal {
+        let (low, high) = (axes.x[0].max(axes.y[0]), axes.x[1].min(axes.y[1]));
+        let [x0, y0, x1, y1] = [axes.px(low), axes.py(low), axes.px(high), axes.py(high)];
+        let _ = write!(
+            out,
+            r#"<path class="diagonal" d="M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}"/>"#
+        );
+    }
+    for s in series {
+        let _ = write!(
+            out,
+            r#"<path class="dots {}" d="{}"/>"#,
+            s.class,
+            dots(&s.points, &axes)
+        );
+    }
+    if let Some([x, y]) = cross {
+        let (x, y) = (axes.px(x), axes.py(y));
+        let d = format!("M{:.1} {y:.1}h18M{x:.1} {:.1}v18", x - 9.0, y - 9.0);
+        let _ = write!(
+            out,
+            r#"<path class="cross halo" d="{d}"/><path class="cross" d="{d}"/>"#
+        );
+    }
+    out.push_str("</svg>");
+    out
+}
+
+/// A histogram of values in millimetres between two limits; values beyond are counted in the end bars.
+pub(crate) fn histogram(title: &str, label: &str, values_mm: &[f64], limits_mm: [f64; 2]) -> String {
+    const BARS: usize = 40;
+    let span = limits_mm[1] - limits_mm[0];
+    let mut bars = [0usize; BARS];
+    for v in values_mm.iter().filter(|v| v.is_finite()) {
+        let place = (v - limits_mm[0]) / span * BARS as f64;
+        bars[(place.max(0.0) as usize).min(BARS - 1)] += 1;
+    }
+    let highest = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let axes = Axes {
+        x: limits_mm,
+        y: [0.0, highest * 1.08],
+        area: [52.0, 8.0, 320.0, 150.0],
+    };
+    let mut out = format!(
+        r#"<svg role="img" aria-label="{}" viewBox="0 0 384 200">"#,
+        escape(title)
+    );
+    axes.draw(&mut out, label, "stones");
+    let mut path = String::new();
+    for (i, n) in bars.iter().enumerate().filter(|(_, n)| **n > 0) {
+        let [a, b] = [i, i + 1].map(|i| axes.px(limits_mm[0] + span * i as f64 / BARS as f64));
+        let y = axes.py(*n as f64);
+        let _ = write!(
+            path,
+            "M{:.1} {:.1}V{y:.1}H{:.1}V{:.1}z",
+            a + 0.5,
+            axes.py(0.0),
+            b - 0.5,
+            axes.py(0.0)
+        );
+    }
+    let _ = write!(out, r#"<path class="bars" d="{path}"/>"#);
+    if let Some(zero) = zero_lines(&axes) {
+        let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);
+    }
+    out.push_str("</svg>");
+    out
+}
+
+/// Lines through zero where zero lies inside.
+fn zero_lines(axes: &Axes) -> Option<String> {
+    let [left, top, width, height] = axes.area;
+    let mut d = String::new();
+    if axes.x[0] < 0.0 && 0.0 < axes.x[1] {
+        let _ = write!(d, "M{:.1} {top}v{height}", axes.px(0.0));
+    }
+    if axes.y[0] < 0.0 && 0.0 < axes.y[1] {
+        let _ = write!(d, "M{left} {:.1}h{width}", axes.py(0.0));
+    }
+    (!d.is_empty()).then_some(d)
+}
+
+/// Points inside the axes as round dots, one to half a pixel.
+fn dots(points: &[[f64; 2]], axes: &Axes) -> String {
+    let mut seen = BTreeSet::new();
+    for [x, y] in points {
+        let inside = axes.x[0] <= *x && *x <= axes.x[1] && axes.y[0] <= *y && *y <= axes.y[1];
+        if inside {
+            seen.insert((
+                (axes.px(*x) * 2.0).round() as i64,
+                (axes.py(*y) * 2.0).round() as i64,
+            ));
+        }
+    }
+    let half = |v: i64| number(v as f64 / 2.0, usize::from(v % 2 != 0));
+    seen.into_iter().fold(String::new(), |mut d, (x, y)| {
+        let _ = write!(d, "M{} {}h0", half(x), half(y));
+        d
+    })
+}

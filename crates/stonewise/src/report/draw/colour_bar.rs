@@ -1,0 +1,105 @@
+//! Colour scales with their bar.
+
+use super::axes::ticks;
+use super::colour::{Rgb, diverging, sequential};
+use super::text::number;
+use std::fmt::Write;
+
+/// Steps of colour to either side of zero, or of a sequential scale.
+const STEPS: i32 = 24;
+
+/// From lengths to colours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Scale {
+    /// From minus to plus this length, metres.
+    Diverging(f64),
+    /// From zero to this length, metres.
+    Sequential(f64),
+}
+
+impl Scale {
+    fn limit_m(self) -> f64 {
+        match self {
+            Self::Diverging(limit) | Self::Sequential(limit) => limit,
+        }
+    }
+
+    /// Step of colour of a value; values beyond the scale have the end's.
+    pub(crate) fn step(self, value_m: f64) -> i32 {
+        let share = (value_m / self.limit_m() * f64::from(STEPS)).round();
+        match self {
+            Self::Diverging(_) => share.clamp(f64::from(-STEPS), f64::from(STEPS)) as i32,
+            Self::Sequential(_) => share.clamp(0.0, f64::from(STEPS)) as i32,
+        }
+    }
+
+    /// Colour of a step.
+    pub(crate) fn colour(self, step: i32) -> Rgb {
+        let share = f64::from(step) / f64::from(STEPS);
+        match self {
+            Self::Diverging(_) => diverging(share),
+            Self::Sequential(_) => sequential(share),
+        }
+    }
+
+    /// Whether a value lies beyond the scale.
+    pub(crate) fn exceeds(self, value_m: f64) -> bool {
+        value_m.abs() > self.limit_m()
+    }
+
+    /// An upright bar with ticks in millimetres; needs 55 pixels to the right.
+    pub(crate) fn draw_bar(self, out: &mut String, left: f64, top: f64, height: f64) {
+        let limit_mm = self.limit_m() * 1e3;
+        let (first, low) = match self {
+            Self::Diverging(_) => (-STEPS, -limit_mm),
+            Self::Sequential(_) => (0, 0.0),
+        };
+        let n = f64::from(STEPS - first + 1);
+        for step in first..=STEPS {
+            let y = top + height * (1.0 - f64::from(step - first + 1) / n);
+            let (colour, each) = (self.colour(step), height / n + 0.5);
+            let _ = write!(
+                out,
+                r#"<path fill="{colour}" d="M{left:.1} {y:.2}h12v{each:.2}h-12z"/>"#
+            );
+        }
+        let _ = write!(
+            out,
+            r#"<path class="frame" d="M{left:.1} {top:.1}h12v{height:.1}h-12z"/>"#
+        );
+        let (ticks, decimals) = ticks([low, limit_mm], ((height / 30.0) as usize).max(2));
+        for tick in ticks {
+            let y = top + height * (1.0 - (tick - low) / (limit_mm - low));
+            let label = number(tick, decimals);
+            let _ = write!(
+                out,
+                r#"<path class="frame" d="M{:.1} {y:.1}h4"/><text x="{:.1}" y="{:.1}">{label}</text>"#,
+                left + 12.0,
+                left + 19.0,
+                y + 4.0
+            );
+        }
+        let _ = write!(
+            out,
+            r#"<text class="label" x="{left:.1}" y="{:.1}">mm</text>"#,
+            top + height + 15.0
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_symmetric_and_end_at_the_limit() {
+        let scale = Scale::Diverging(0.02);
+        assert_eq!(
+            (scale.step(0.0), scale.step(0.01), scale.step(-0.5)),
+            (0, 12, -24)
+        );
+        assert_eq!(Scale::Sequential(0.02).step(-0.5), 0);
+        assert_eq!(scale.step(f64::NAN), 0);
+        assert!(scale.exceeds(-0.021) && !scale.exceeds(0.02));
+    }
+}

@@ -1,0 +1,63 @@
+//! The unrolled wall with M3C2 distances.
+
+use super::colour_bar::Scale;
+use super::stone_map::MapLayout;
+use crate::report::ResultSet;
+use crate::report::statistics::Sorted;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+/// Least edge of a square of the map, pixels.
+const MIN_CELL_PX: f64 = 2.0;
+
+/// Medians of the core points' distances in squares, as one SVG element; `None` without core points.
+///
+/// Faded squares: the median distance is below the median detection limit.
+pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale) -> Option<String> {
+    let [left, top, width, height] = layout.axes.area;
+    // About one core point a square where points are sparse.
+    let spacing = (width * height / results.distances.len().max(1) as f64).sqrt();
+    let cell = (1.2 * spacing).clamp(MIN_CELL_PX, 12.0);
+    let mut cells: BTreeMap<(i64, i64), (Vec<f64>, Vec<f64>)> = BTreeMap::new();
+    for point in &results.distances {
+        let place = results.facade.place(&point.position);
+        let (x, y) = (layout.axes.px(place.x) - left, layout.axes.py(place.y) - top);
+        if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
+            let entry = cells.entry(((y / cell) as i64, (x / cell) as i64)).or_default();
+            entry.0.push(point.distance_m);
+            entry.1.push(point.detection_limit_m);
+        }
+    }
+    if cells.is_empty() {
+        return None;
+    }
+    let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
+    for ((row, column), (distances, limits)) in cells {
+        let Some(distance) = Sorted::new(distances).median() else {
+            continue;
+        };
+        let shown = Sorted::new(limits).median().is_none_or(|l| distance.abs() > l);
+        let path = groups.entry((shown, scale.step(distance))).or_default();
+        let (x, y) = (left + column as f64 * cell, top + row as f64 * cell);
+        let _ = write!(
+            path,
+            "M{:.0} {:.0}h{s}v{s}h-{s}z",
+            x * 10.0,
+            y * 10.0,
+            s = (cell * 10.0).ceil()
+        );
+    }
+    let mut out = layout.open("M3C2 distance");
+    layout
+        .axes
+        .draw(&mut out, "along the wall (m)", "up the face (m)");
+    out.push_str(r#"<g transform="scale(.1)">"#);
+    for ((shown, step), path) in groups {
+        let class = if shown { "" } else { r#" class="faded""# };
+        let _ = write!(out, r#"<path{class} fill="{}" d="{path}"/>"#, scale.colour(step));
+    }
+    out.push_str("</g>");
+    layout.draw_bar(&mut out, scale);
+    out.push_str("</svg>");
+    Some(out)
+}

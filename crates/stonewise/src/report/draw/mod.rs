@@ -1,0 +1,17 @@
+//! Pictures of the report as SVG.
+//!
+//! Pictures take text colours from the page (`currentColor` and CSS classes), so that they follow light and dark.
+
+mod axes;
+mod chart;
+mod colour;
+mod colour_bar;
+mod distance_map;
+mod stone_map;
+mod text;
+
+pub(crate) use chart::{Series, histogram, scatter};
+pub(crate) use colour_bar::Scale;
+pub(crate) use distance_map::distance_map;
+pub(crate) use stone_map::{MapLayout, MapPicture, stone_map};
+pub(crate) use text::{count, escape, mm, mm_or_dash, number, percent};

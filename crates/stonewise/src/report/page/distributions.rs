@@ -1,0 +1,165 @@
+//! Histograms, in-plane scatter, stones against M3C2, and the datum check.
+
+use super::html::{figure, section, table};
+use super::maps::component_limit_m;
+use crate::report::ResultSet;
+use crate::report::comparison::compare;
+use crate::report::draw::{Series, count, histogram, mm_or_dash, scatter};
+use crate::report::statistics::Sorted;
+use crate::report::summary::Summary;
+
+const NAMES: [&str; 3] = ["along the wall", "up the face", "out of the wall"];
+
+/// Histograms and scatter plots. `truth_mm`: a known common in-plane translation.
+pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Option<[f64; 2]>) -> String {
+    let limit = component_limit_m(facts) * 1e3;
+    let mut grid = String::new();
+    for (name, component) in NAMES.iter().zip(&facts.components) {
+        let values: Vec<f64> = component.values().iter().map(|v| v * 1e3).collect();
+        let title = format!("Displacement {name}");
+        grid.push_str(&figure(
+            &title,
+            &histogram(&title, "mm", &values, [-limit, limit]),
+            "",
+        ));
+    }
+    let compared = compare(results);
+    let stones: Vec<[f64; 2]> = facts
+        .measured
+        .iter()
+        .map(|(_, m)| [m.face.x * 1e3, m.face.y * 1e3])
+        .collect();
+    let vectors: Vec<[f64; 2]> = compared.in_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
+    let limits = shared_limits(stones.iter().chain(&vectors).chain(&truth_mm));
+    let note = |n: usize, what: &str| {
+        let truth = if truth_mm.is_some() {
+            " Cross: the known motion."
+        } else {
+            ""
+        };
+        format!("{} {what}.{truth}", count(n))
+    };
+    let labels = ["along (mm)", "up (mm)"];
+    let plot = |title: &str, class, points: &Vec<[f64; 2]>| {
+        let series = [Series {
+            class,
+            points: points.clone(),
+        }];
+        scatter(title, labels, &series, limits, truth_mm, false)
+    };
+    grid.push_str(&figure(
+        "In-plane motion of the stones",
+        &plot("stones", "a", &stones),
+        &note(stones.len(), "stones"),
+    ));
+    if !vectors.is_empty() {
+        let text = note(vectors.len(), "core points; vector = distance times normal");
+        grid.push_str(&figure(
+            "In-plane part of M3C2",
+            &plot("M3C2", "b", &vectors),
+            &text,
+        ));
+    }
+    if !compared.out_of_plane.is_empty() {
+        let pairs: Vec<[f64; 2]> = compared.out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
+        let limits = shared_limits(&pairs);
+        let difference = Sorted::new(pairs.iter().map(|p| p[0] - p[1]));
+        let text = format!(
+            "{} stones; median difference {} mm, NMAD {} mm.",
+            count(pairs.len()),
+            mm_or_dash(difference.median().map(|v| v / 1e3)),
+            mm_or_dash(difference.nmad().map(|v| v / 1e3))
+        );
+        let series = [Series {
+            class: "a",
+            points: pairs,
+        }];
+        let picture = scatter(
+            "out of plane",
+            ["stone, out (mm)", "M3C2 (mm)"],
+            &series,
+            limits,
+            None,
+            true,
+        );
+        grid.push_str(&figure("Out of plane: stones against M3C2", &picture, &text));
+    }
+    section(
+        "distributions",
+        "Distributions",
+        &format!("<div class=\"charts\">{grid}</div>"),
+    )
+}
+
+/// Square limits that hold 99 % of the points, the same on both axes' lengths.
+fn shared_limits<'a>(points: impl IntoIterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
+    let points: Vec<[f64; 2]> = points.into_iter().copied().collect();
+    let range = |k: usize| {
+        let values = Sorted::new(points.iter().map(|p| p[k]));
+        [
+            values.quantile(0.005).unwrap_or(-1.0).min(0.0),
+            values.quantile(0.995).unwrap_or(1.0).max(0.0),
+        ]
+    };
+    let ranges = [range(0), range(1)];
+    let half = ranges.iter().map(|r| (r[1] - r[0]) / 2.0).fold(0.05, f64::max) * 1.15;
+    ranges.map(|r| [(r[0] + r[1]) / 2.0 - half, (r[0] + r[1]) / 2.0 + half])
+}
+
+/// What all stones have in common, and what stands still.
+pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
+    let still: Vec<_> = facts.measured.iter().filter(|(_, m)| !m.significant).collect();
+    let rows: Vec<Vec<String>> = (0..3)
+        .map(|k| {
+            let all = &facts.components[k];
+            let rest = Sorted::new(still.iter().map(|(_, m)| m.face[k]));
+            let cell = |v: Option<f64>| mm_or_dash(v);
+            vec![
+                NAMES[k].into(),
+                cell(all.median()),
+                cell(all.nmad()),
+                cell(rest.median()),
+                cell(rest.nmad()),
+            ]
+        })
+        .collect();
+    let head = [
+        "direction",
+        "all: median mm",
+        "all: NMAD mm",
+        "not significant: median mm",
+        "not significant: NMAD mm",
+    ];
+    let error = find_number(&results.run, "registration_error_m");
+    let entered = error.map_or(
+        "The error of the registration is not stated in run.json.".into(),
+        |e| {
+            format!(
+                "Registration error taken into account: {} mm.",
+                mm_or_dash(Some(e))
+            )
+        },
+    );
+    let body = format!(
+        "<p>Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
+         error of that registration; only stable points outside the wall can tell. Stones that did not move significantly should \
+         scatter around zero. {entered}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
+         deviation of normally distributed values. {} stones in all, {} not significant.</p>",
+        table(&head, &rows, 1),
+        count(facts.measured.len()),
+        count(still.len())
+    );
+    section("datum", "Datum check", &body)
+}
+
+/// The first number of this name anywhere in a document.
+fn find_number(value: &serde_json::Value, key: &str) -> Option<f64> {
+    match value {
+        serde_json::Value::Object(map) => map
+            .get(key)
+            .and_then(serde_json::Value::as_f64)
+            .or_else(|| map.values().find_map(|v| find_number(v, key))),
+        serde_json::Value::Array(items) => items.iter().find_map(|v| find_number(v, key)),
+        _ => None,
+    }
+}

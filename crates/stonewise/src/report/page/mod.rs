@@ -1,0 +1,128 @@
+//! The page: what it says, in order.
+
+mod audit;
+mod distributions;
+mod evaluation;
+mod html;
+mod maps;
+mod method;
+mod overview;
+
+use super::ResultSet;
+use super::draw::escape;
+use super::summary::Summary;
+use serde_json::Value;
+
+const STYLE: &str = include_str!("style.css");
+
+/// Sections in the order of the page.
+const SECTIONS: [(&str, &str); 8] = [
+    ("summary", "Summary"),
+    ("maps", "Maps"),
+    ("tables", "Stones"),
+    ("distributions", "Distributions"),
+    ("datum", "Datum"),
+    ("evaluation", "Known motion"),
+    ("method", "Method"),
+    ("audit", "Audit"),
+];
+
+/// The whole report as one HTML document. The same results give the same bytes.
+pub(super) fn page(results: &ResultSet) -> String {
+    let facts = Summary::new(results);
+    let mut body = String::new();
+    body.push_str(&overview::summary(results, &facts));
+    if !results.stones.is_empty() {
+        body.push_str(&maps::maps(results, &facts));
+        body.push_str(&overview::tables(results, &facts));
+    }
+    if !facts.measured.is_empty() {
+        body.push_str(&distributions::distributions(
+            results,
+            &facts,
+            known_translation_mm(results),
+        ));
+        body.push_str(&distributions::datum(results, &facts));
+    }
+    if let Some(evaluation) = &results.evaluation {
+        body.push_str(&evaluation::evaluation(evaluation));
+    }
+    body.push_str(&method::method());
+    body.push_str(&audit::audit(&results.run));
+    let title = title(&results.run);
+    let present = SECTIONS
+        .iter()
+        .filter(|(id, _)| body.contains(&format!("<section id=\"{id}\">")));
+    let links: String = present
+        .map(|(id, name)| format!("<a href=\"#{id}\">{name}</a>"))
+        .collect();
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: stone by stone</title>\n<style>\n{STYLE}</style></head>\n\
+         <body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
+         <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+         <path d=\"M0 0V60\" class=\"hatching\"/></pattern></defs></svg>\n\
+         <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
+         <main>\n{body}</main>\n</body></html>\n",
+        cover(&results.run)
+    )
+}
+
+fn title(run: &Value) -> String {
+    let project = run.get("project");
+    let name = project.and_then(|p| p.as_str().or_else(|| p.get("name").and_then(Value::as_str)));
+    escape(name.filter(|n| !n.is_empty()).unwrap_or("Survey"))
+}
+
+/// Epochs, version and time of the run, as far as run.json has them.
+fn cover(run: &Value) -> String {
+    let epochs = run
+        .get("epochs")
+        .and_then(Value::as_array)
+        .map_or(&[][..], Vec::as_slice);
+    let names: Vec<String> = epochs
+        .iter()
+        .filter_map(|e| e.as_str().or_else(|| e.get("name").and_then(Value::as_str)))
+        .map(escape)
+        .collect();
+    let mut facts = Vec::new();
+    if names.len() > 1 {
+        facts.push(format!("Epochs <b>{}</b>", names.join("</b> \u{2192} <b>")));
+    }
+    for (key, word) in [("finished", "finished"), ("version", "stonewise")] {
+        if let Some(text) = run.get(key).and_then(Value::as_str) {
+            facts.push(format!("{word} <b>{}</b>", escape(text)));
+        }
+    }
+    if facts.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
+    }
+}
+
+/// In-plane part of a known translation of the last epoch, millimetres, where run.json names one.
+fn known_translation_mm(results: &ResultSet) -> Option<[f64; 2]> {
+    let d = find_translation(&results.run)?;
+    let stone = results.stones.get(results.stones.len() / 2)?;
+    let frame = results.facade.frame_at(&stone.centroid);
+    Some([d.dot(&frame.along) * 1e3, d.dot(&frame.up) * 1e3])
+}
+
+fn find_translation(value: &Value) -> Option<nalgebra::Vector3<f64>> {
+    match value {
+        Value::Object(map) if map.get("kind").and_then(Value::as_str) == Some("translation") => {
+            let d: Vec<f64> = map
+                .get("d")?
+                .as_array()?
+                .iter()
+                .filter_map(Value::as_f64)
+                .collect();
+            (d.len() == 3).then(|| nalgebra::Vector3::from_column_slice(&d))
+        }
+        Value::Object(map) => map.values().find_map(find_translation),
+        Value::Array(items) => items.iter().find_map(find_translation),
+        _ => None,
+    }
+}

@@ -1,0 +1,262 @@
+//! The summary and the tables of stones.
+
+use super::html::{details, section, table};
+use crate::report::draw::{count, escape, mm, mm_or_dash, number, percent};
+use crate::report::statistics::Sorted;
+use crate::report::summary::{FALSE_ALARMS, Summary};
+use crate::report::{ResultSet, RowMotion, StoneRow};
+use std::fmt::Write;
+
+/// Rows of a table of single stones at most; the full list is in stones.csv.
+const MAX_ROWS: usize = 25;
+
+/// What moved, how many, where, how sure.
+pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
+    let mut out = tiles(facts);
+    out.push_str("<ul class=\"findings\">");
+    for sentence in sentences(results, facts) {
+        let _ = write!(out, "<li>{sentence}</li>");
+    }
+    out.push_str("</ul>");
+    section("summary", "Summary", &out)
+}
+
+fn tiles(facts: &Summary) -> String {
+    let tile =
+        |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
+    let share = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.stones));
+    let of_measured = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.measured.len()));
+    let largest = facts.significant.first().map(|(_, m)| m.displacement.norm());
+    format!(
+        "<div class=\"tiles\">{}{}{}{}{}</div>",
+        tile(
+            share(facts.measured.len()),
+            &format!("of {} stones measured", count(facts.stones))
+        ),
+        tile(
+            of_measured(facts.significant.len()),
+            "of these moved significantly"
+        ),
+        tile(count(facts.loose.len()), "move unlike their neighbours"),
+        tile(
+            format!("{} <small>mm</small>", mm_or_dash(facts.limits.median())),
+            "typical detection limit (95 %, median)"
+        ),
+        tile(
+            format!("{} <small>mm</small>", mm_or_dash(largest)),
+            "largest significant motion"
+        ),
+    )
+}
+
+fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
+    if facts.measured.is_empty() {
+        let lost = facts
+            .by_status
+            .iter()
+            .map(|(s, stones)| format!("{}: {}", escape(s.meaning()), count(stones.len())));
+        let reasons = lost.collect::<Vec<_>>().join("; ");
+        return vec![format!("<b>No stone was measured.</b> {reasons}")];
+    }
+    let mut out = vec![significance(facts)];
+    let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
+    out.push(format!(
+        "Common to all measured stones (median): <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
+         the wall. A common motion may also come from the registration of the epochs; see the datum check."
+    ));
+    if let Some([from, to]) = facts.region.filter(|_| facts.motion_is_proven()) {
+        out.push(format!(
+            "Nine tenths of the significant stones lie between {} and {} m along the wall and {} and {} m up the face.",
+            number(from.x, 1),
+            number(to.x, 1),
+            number(from.y, 1),
+            number(to.y, 1)
+        ));
+    }
+    if let Some((stone, motion)) = facts.significant.first() {
+        let place = results.facade.place(&stone.centroid);
+        out.push(format!(
+            "The largest significant motion is {} mm (detection limit {} mm), stone {} at {} m along, {} m up.",
+            mm(motion.displacement.norm()),
+            mm(motion.detection_limit_m),
+            stone.stone_id,
+            number(place.x, 2),
+            number(place.y, 2)
+        ));
+    }
+    out.push(match facts.loose.len() {
+        0 => "No stone moves unlike its neighbours beyond what the noise explains.".into(),
+        1 => "<b>One stone</b> moves unlike its neighbours; it is listed below.".into(),
+        n => format!(
+            "<b>{} stones</b> move unlike their neighbours; they are listed below.",
+            count(n)
+        ),
+    });
+    if facts.not_measured() > 0 {
+        out.push(format!(
+            "{} stones ({}) were not measured; the reasons are in the table of outcomes, the stones are hatched in the maps.",
+            count(facts.not_measured()),
+            percent(facts.not_measured(), facts.stones)
+        ));
+    }
+    out
+}
+
+fn significance(facts: &Summary) -> String {
+    let expected = count((FALSE_ALARMS * facts.measured.len() as f64).round() as usize);
+    let n = count(facts.significant.len());
+    let sure = format!(
+        "half of the stones would show a motion of {} mm, nine tenths one of {} mm",
+        mm_or_dash(facts.limits.median()),
+        mm_or_dash(facts.limits.quantile(0.9))
+    );
+    if facts.motion_is_proven() {
+        format!(
+            "<b>{n} stones moved significantly</b> at the 95 % level; chance alone would flag about {expected} if nothing had \
+             moved. How sure: {sure}."
+        )
+    } else {
+        format!(
+            "<b>No motion is proven.</b> {n} stones exceed their 95 % limit, and chance alone would flag about {expected}. How \
+             sure: {sure}."
+        )
+    }
+}
+
+/// Outcomes, largest motions, loose stones, stretches.
+pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
+    let mut out = String::from("<h3>Outcomes</h3>");
+    let rows: Vec<Vec<String>> = facts
+        .by_status
+        .iter()
+        .map(|(status, stones)| {
+            vec![
+                format!("<code>{status}</code>"),
+                escape(status.meaning()),
+                count(stones.len()),
+                percent(stones.len(), facts.stones),
+            ]
+        })
+        .collect();
+    out.push_str(&table(&["status", "meaning", "stones", "share"], &rows, 2));
+    if !facts.significant.is_empty() {
+        out.push_str("<h3>Largest significant motions</h3>");
+        out.push_str(&stone_rows(results, &facts.significant));
+    }
+    if !facts.loose.is_empty() {
+        out.push_str("<h3>Stones that move unlike their neighbours</h3>");
+        out.push_str(&stone_rows(results, &facts.loose));
+    }
+    out.push_str(&stretches(results, facts));
+    let lists: String = facts
+        .by_status
+        .iter()
+        .filter(|(s, _)| *s != crate::report::Status::Ok)
+        .map(id_list)
+        .collect();
+    if !lists.is_empty() {
+        out.push_str(&details("Stones that were not measured, by reason", &lists));
+    }
+    section("tables", "Stones", &out)
+}
+
+fn stone_rows(results: &ResultSet, stones: &[(&StoneRow, &RowMotion)]) -> String {
+    let head = [
+        "stone",
+        "along m",
+        "up m",
+        "d along mm",
+        "d up mm",
+        "d out mm",
+        "norm mm",
+        "LoD95 mm",
+        "unlike neighbours mm",
+        "rotation mrad",
+        "loose",
+    ];
+    let row = |(s, m): &(&StoneRow, &RowMotion)| {
+        let place = results.facade.place(&s.centroid);
+        vec![
+            format!("<a data-stone=\"{0}\">{0}</a>", s.stone_id),
+            number(place.x, 2),
+            number(place.y, 2),
+            mm(m.face.x),
+            mm(m.face.y),
+            mm(m.face.z),
+            mm(m.displacement.norm()),
+            mm(m.detection_limit_m),
+            mm(m.relative.norm()),
+            number(m.rotation.norm() * 1e3, 1),
+            if m.loose { "loose" } else { "" }.into(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = stones.iter().take(MAX_ROWS).map(row).collect();
+    let mut out = table(&head, &rows, 0);
+    if stones.len() > MAX_ROWS {
+        let _ = write!(
+            out,
+            "<p class=\"note\">{MAX_ROWS} of {}; all are in stones.csv.</p>",
+            count(stones.len())
+        );
+    }
+    out
+}
+
+/// Medians by stretch of the wall.
+fn stretches(results: &ResultSet, facts: &Summary) -> String {
+    let places = Sorted::new(
+        facts
+            .measured
+            .iter()
+            .map(|(s, _)| results.facade.place(&s.centroid).x),
+    );
+    let (Some(from), Some(to)) = (places.quantile(0.0), places.quantile(1.0)) else {
+        return String::new();
+    };
+    let n = (facts.measured.len() / 30).clamp(1, 10);
+    if n < 2 || to - from < 1e-6 {
+        return String::new();
+    }
+    let edge = |i: usize| from + (to - from) * i as f64 / n as f64;
+    let row = |i: usize| {
+        let inside = |s: &StoneRow| {
+            let x = results.facade.place(&s.centroid).x;
+            edge(i) <= x && (x < edge(i + 1) || i + 1 == n)
+        };
+        let part: Vec<_> = facts.measured.iter().filter(|(s, _)| inside(s)).collect();
+        let significant = part.iter().filter(|(_, m)| m.significant).count();
+        let median =
+            |of: fn(&RowMotion) -> f64| mm_or_dash(Sorted::new(part.iter().map(|(_, m)| of(m))).median());
+        vec![
+            format!("{} – {}", number(edge(i), 1), number(edge(i + 1), 1)),
+            count(part.len()),
+            percent(significant, part.len()),
+            median(|m| m.face.x),
+            median(|m| m.face.y),
+            median(|m| m.face.z),
+            median(|m| m.detection_limit_m),
+        ]
+    };
+    let head = [
+        "along the wall m",
+        "measured",
+        "significant",
+        "d along mm",
+        "d up mm",
+        "d out mm",
+        "LoD95 mm",
+    ];
+    format!(
+        "<h3>By stretch of the wall (medians)</h3>{}",
+        table(&head, &(0..n).map(row).collect::<Vec<_>>(), 1)
+    )
+}
+
+fn id_list((status, stones): &(crate::report::Status, Vec<&StoneRow>)) -> String {
+    let ids: Vec<String> = stones.iter().map(|s| s.stone_id.to_string()).collect();
+    format!(
+        "<h4><code>{status}</code>: {}</h4><p class=\"ids\">{}</p>",
+        escape(status.meaning()),
+        ids.join(", ")
+    )
+}

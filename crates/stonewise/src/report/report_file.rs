@@ -1,0 +1,161 @@
+//! The report file.
+
+use super::page::page;
+use super::{ReportError, ResultSet};
+use std::path::{Path, PathBuf};
+use stonewise_io::atomic::write_atomically;
+
+/// Makes `report/index.html` from the result files in `dir` alone and returns its path.
+///
+/// One self-contained file: no network, light and dark, printable. The same results give the same bytes.
+///
+/// # Errors
+/// `dir` has no stone table, a result file is damaged, or the report cannot be written.
+pub fn write_report(dir: &Path) -> Result<PathBuf, ReportError> {
+    let results = ResultSet::read(dir)?;
+    let folder = dir.join("report");
+    std::fs::create_dir_all(&folder).map_err(ReportError::io("making the folder", &folder))?;
+    let path = folder.join("index.html");
+    write_atomically(&path, |partial| std::fs::write(partial, page(&results)))
+        .map_err(ReportError::io("writing the report", &path))?;
+    Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::testing::{outlines, rows};
+    use crate::report::{StoneRow, write_outlines, write_stones};
+    use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
+
+    /// Result files with these rows and this run.json, and the report made of them.
+    fn report(rows: &[StoneRow], run: &str) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        write_stones(folder.path(), rows).unwrap();
+        write_outlines(folder.path(), &outlines()).unwrap();
+        std::fs::write(folder.path().join("run.json"), run).unwrap();
+        let points = "x,y,z,nx,ny,nz,m3c2_distance,m3c2_uncertainty\n100,200.4,50.25,1,0,0,0.004,0.001\n";
+        std::fs::write(folder.path().join("m3c2.csv"), points).unwrap();
+        let evaluation = Evaluation::new("a <known> motion", &EvaluationParams::default());
+        let evaluation = Evaluation {
+            stones: Some(score_motions(&[], 3, &EvaluationParams::default())),
+            ..evaluation
+        };
+        let json = serde_json::to_string(&evaluation).unwrap();
+        std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
+        let path = write_report(folder.path()).unwrap();
+        let html = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap(),
+            html,
+            "bytes differ"
+        );
+        html
+    }
+
+    /// Every opened element is closed, in order.
+    fn check_nesting(html: &str) {
+        let void = ["meta", "path", "rect", "i", "br"];
+        let mut open: Vec<&str> = Vec::new();
+        let body = &html[html.find("<body>").unwrap()..html.find("</html>").unwrap()];
+        for tag in body.split('<').skip(1) {
+            let name = tag
+                .trim_start_matches('/')
+                .split([' ', '>', '\n', '/'])
+                .next()
+                .unwrap();
+            if tag.starts_with('/') {
+                if !void.contains(&name) {
+                    assert_eq!(open.pop(), Some(name), "before </{tag}");
+                }
+            } else if !void.contains(&name) {
+                open.push(name);
+            }
+        }
+        assert!(open.is_empty(), "{open:?}");
+    }
+
+    #[test]
+    fn it_says_what_moved_and_shows_it() {
+        let html = report(
+            &rows(),
+            r#"{"project": "Test wall", "epochs": [{"name": "A"}, {"name": "B"}]}"#,
+        );
+        check_nesting(&html);
+        for id in [
+            "summary",
+            "maps",
+            "tables",
+            "distributions",
+            "datum",
+            "evaluation",
+            "method",
+            "audit",
+        ] {
+            assert!(html.contains(&format!("<section id=\"{id}\">")), "{id}");
+        }
+        // 20 of 24 measured, two of them moved: no more than chance may flag, so nothing is proven.
+        assert!(html.contains("<b>20 <small>83\u{a0}%</small></b><span>of 24 stones measured"));
+        assert!(html.contains("No motion is proven."));
+        assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
+        assert_eq!(
+            html.matches("<svg role=\"img\"").count(),
+            7 + 3 + 3,
+            "maps, histograms, scatter plots"
+        );
+        assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
+        assert!(
+            !html.contains("NaN") && !html.contains("inf"),
+            "a value that is no number"
+        );
+    }
+
+    #[test]
+    fn it_needs_no_network_and_names_from_files_are_harmless() {
+        let run = r#"{"project": {"name": "</title><script>alert(1)</script>"}, "<b>": ["\" onload=\"x"],
+            "warnings": [{"step": "label", "subject": "<script>.jpg", "message": "'&'", "skipped_input": true}]}"#;
+        let html = report(&rows(), run);
+        check_nesting(&html);
+        assert!(
+            !html.contains("<script>alert") && !html.contains("<script>.jpg") && !html.contains("<known>")
+        );
+        assert!(html.contains("&lt;script&gt;.jpg") && html.contains("left out"));
+        for door in ["http://", "https://", "src=", "@import", "url(//"] {
+            assert!(!html.contains(door), "{door}");
+        }
+    }
+
+    #[test]
+    fn a_run_without_matches_or_without_stones_has_a_report() {
+        let mut unmatched = rows();
+        for row in &mut unmatched {
+            (row.motion, row.status) = (None, crate::report::Status::UnmatchedUnseen);
+        }
+        let html = report(&unmatched, "{}");
+        check_nesting(&html);
+        assert!(html.contains("No stone was measured.") && html.contains("class=\"hatch\""));
+        check_nesting(&report(&[], "null"));
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_do_not_spoil_it() {
+        let mut odd = rows();
+        odd[0].centroid.x = f64::NAN;
+        odd[1].motion.as_mut().unwrap().face.x = f64::NAN;
+        odd[4].motion.as_mut().unwrap().detection_limit_m = f64::INFINITY;
+        odd[5].area_m2 = 0.0;
+        let html = report(&odd, "{}");
+        check_nesting(&html);
+        for word in ["NaN", "inf"] {
+            let at = html.find(word).unwrap_or(0);
+            assert_eq!(at, 0, "{}", &html[at.saturating_sub(200)..at + 20]);
+        }
+    }
+
+    #[test]
+    fn a_folder_without_results_says_what_to_give() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = write_report(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("stonewise run"), "{message}");
+    }
+}

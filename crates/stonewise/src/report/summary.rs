@@ -1,0 +1,93 @@
+//! The facts that the report states in words.
+
+use super::statistics::Sorted;
+use super::{ResultSet, RowMotion, Status, StoneRow};
+use nalgebra::Point2;
+
+/// Share of stones at rest that the 95 % test calls significant.
+pub(crate) const FALSE_ALARMS: f64 = 0.05;
+
+/// Counts and order statistics of one run.
+pub(crate) struct Summary<'a> {
+    pub stones: usize,
+    /// Stones of each status that occurs, in the order of [`Status::ALL`].
+    pub by_status: Vec<(Status, Vec<&'a StoneRow>)>,
+    /// Measured stones with their motion.
+    pub measured: Vec<(&'a StoneRow, &'a RowMotion)>,
+    /// Those that moved significantly, largest motion first.
+    pub significant: Vec<(&'a StoneRow, &'a RowMotion)>,
+    /// Those that move unlike their neighbours, largest relative motion first.
+    pub loose: Vec<(&'a StoneRow, &'a RowMotion)>,
+    /// Detection limits, metres.
+    pub limits: Sorted,
+    /// Components along, up, out of the measured stones, metres.
+    pub components: [Sorted; 3],
+    /// Where nine tenths of the significant stones lie: (along, up) from and to, metres.
+    pub region: Option<[Point2<f64>; 2]>,
+}
+
+impl<'a> Summary<'a> {
+    pub(crate) fn new(results: &'a ResultSet) -> Self {
+        let measured: Vec<_> = results
+            .stones
+            .iter()
+            .filter_map(|s| s.motion.as_ref().map(|m| (s, m)))
+            .collect();
+        let pick = |keep: fn(&RowMotion) -> bool, size: fn(&RowMotion) -> f64| {
+            let mut all: Vec<_> = measured.iter().copied().filter(|(_, m)| keep(m)).collect();
+            all.sort_by(|a, b| {
+                size(b.1)
+                    .total_cmp(&size(a.1))
+                    .then(a.0.stone_id.cmp(&b.0.stone_id))
+            });
+            all
+        };
+        let significant = pick(|m| m.significant, |m| m.displacement.norm());
+        let of_status = |status| {
+            results
+                .stones
+                .iter()
+                .filter(|s| s.status == status)
+                .collect::<Vec<_>>()
+        };
+        Self {
+            stones: results.stones.len(),
+            by_status: Status::ALL
+                .map(|s| (s, of_status(s)))
+                .into_iter()
+                .filter(|(_, s)| !s.is_empty())
+                .collect(),
+            region: region(results, &significant),
+            loose: pick(|m| m.loose, |m| m.relative.norm()),
+            limits: Sorted::new(measured.iter().map(|(_, m)| m.detection_limit_m)),
+            components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
+            significant,
+            measured,
+        }
+    }
+
+    /// Whether more stones moved significantly than the test's false alarms explain (three standard deviations).
+    pub(crate) fn motion_is_proven(&self) -> bool {
+        let n = self.measured.len() as f64;
+        let expected = FALSE_ALARMS * n;
+        self.significant.len() as f64 > expected + 3.0 * (expected * (1.0 - FALSE_ALARMS)).sqrt().max(1.0)
+    }
+
+    /// Number of stones without a motion.
+    pub(crate) fn not_measured(&self) -> usize {
+        self.stones - self.measured.len()
+    }
+}
+
+fn region(results: &ResultSet, significant: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {
+    let places: Vec<Point2<f64>> = significant
+        .iter()
+        .map(|(s, _)| results.facade.place(&s.centroid))
+        .collect();
+    let axis = |k: usize| Sorted::new(places.iter().map(|p| p[k]));
+    let (along, up) = (axis(0), axis(1));
+    Some([
+        Point2::new(along.quantile(0.05)?, up.quantile(0.05)?),
+        Point2::new(along.quantile(0.95)?, up.quantile(0.95)?),
+    ])
+}
