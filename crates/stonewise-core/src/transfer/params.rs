@@ -13,8 +13,9 @@ pub struct TransferParams {
     /// Side of the cells in which spacing, noise and incidence are estimated, metres. About one stone: large
     /// enough for a stable normal of the face, small enough to follow the scanner's uneven density.
     pub cell_m: f64,
-    /// Half width of a splat in units of the local point spacing. 1.5: about nine points of a randomly sampled
-    /// surface fall on every splat, so that one pixel in ten thousand stays open.
+    /// Half width of a splat in units of the local point spacing. 1: four points of a randomly sampled surface fall on
+    /// every splat, so that two pixels in a hundred stay open; wider ones let railings and leaves hide the wall
+    /// beside them, which costs more labels than open pixels let through.
     pub splat_spacings: f64,
     /// Depth tolerance in units of the local spacing on a face that looks at the camera; grows with the tangent of
     /// the incidence angle. 4: twice the width of a splat, the depth that the splat itself spans at 45 degrees.
@@ -25,9 +26,12 @@ pub struct TransferParams {
     /// A step in depth of more than this between a point and its pixel's neighbourhood marks a silhouette, metres.
     /// 0.15: more than the relief of rubble masonry, less than the distance of a railing to the wall.
     pub silhouette_step_m: f64,
-    /// Points this close to a silhouette do not vote, pixels of the photo. 2: covers poses that are off by half a
-    /// pixel to one pixel, and blurred mask borders.
+    /// Photos hardly count for points this close to a silhouette, pixels of the photo. 2: covers poses that are off by
+    /// half a pixel to one pixel, and blurred mask borders.
     pub silhouette_px: f64,
+    /// Weight of a photo for points at a silhouette. 0.05: such photos decide only where no photo sees better, behind
+    /// railings and shrubs.
+    pub silhouette_weight: f64,
     /// Steepest angle between line of sight and face normal at which a photo votes, radians. 1.4 (80 degrees): beyond,
     /// a mask border one pixel off moves by six pixels on the face.
     pub max_incidence_rad: f64,
@@ -61,11 +65,12 @@ impl Default for TransferParams {
         Self {
             depth_memory_mib: 1024,
             cell_m: 0.25,
-            splat_spacings: 1.5,
+            splat_spacings: 1.0,
             tolerance_spacings: 4.0,
             tolerance_noises: 4.0,
             silhouette_step_m: 0.15,
             silhouette_px: 2.0,
+            silhouette_weight: 0.05,
             max_incidence_rad: 1.4,
             sample_m: 0.01,
             min_iou: 0.3,

@@ -26,6 +26,8 @@ pub(super) struct SurfaceCells {
 const NEIGHBOURS: usize = 12;
 /// Samples per cell at most; the median of them is kept.
 const SAMPLES: usize = 5;
+/// A cell's spacing is at most this many times that around the usual point of the tile.
+const MAX_SPACINGS: f32 = 2.0;
 /// Neighbours farther away than this say nothing about a surface, metres.
 const MAX_NEIGHBOUR_M: f64 = 0.5;
 
@@ -40,10 +42,12 @@ impl SurfaceCells {
         let mut members: Vec<_> = members.into_iter().collect();
         members.sort_unstable_by_key(|(key, _)| *key);
         let index = GridIndex::new(&points, search_cell(&points, &members, cell_m));
-        let cells = members
+        let mut measured: Vec<LocalSurface> = members
             .par_iter()
-            .map(|(key, ids)| (*key, measure(&points, &index, ids, cell_m)))
+            .map(|(_, ids)| measure(&points, &index, ids, cell_m))
             .collect();
+        limit_spacing(&mut measured, &members);
+        let cells = members.iter().map(|m| m.0).zip(measured).collect();
         Self { cell_m, cells }
     }
 
@@ -55,6 +59,27 @@ impl SurfaceCells {
     /// Spacings of all cells, in no particular order.
     pub(super) fn spacings(&self) -> impl Iterator<Item = f32> {
         self.cells.values().map(|c| c.spacing_m)
+    }
+}
+
+/// Takes lone points (leaves, birds, mixed returns) for what they are: points without a surface around them, not the
+/// corners of a large one, which would hide what lies behind.
+fn limit_spacing(measured: &mut [LocalSurface], members: &[([i32; 3], Vec<u32>)]) {
+    let mut by_point: Vec<(f32, usize)> = measured
+        .iter()
+        .zip(members)
+        .map(|(surface, (_, ids))| (surface.spacing_m, ids.len()))
+        .collect();
+    by_point.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = by_point.iter().map(|c| c.1).sum::<usize>() / 2;
+    let mut passed = 0;
+    let usual = by_point.iter().find(|c| {
+        passed += c.1;
+        passed > half
+    });
+    let limit = usual.map_or(f32::INFINITY, |c| MAX_SPACINGS * c.0);
+    for surface in measured {
+        surface.spacing_m = surface.spacing_m.min(limit);
     }
 }
 

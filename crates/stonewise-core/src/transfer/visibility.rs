@@ -121,15 +121,19 @@ impl<'a> Observer<'a> {
         let [here, least, greatest] = self.depths[p].around(seen.pixel, self.params.silhouette_px)?;
         let depth = seen.depth_m;
         let step = self.params.silhouette_step_m + tolerance;
-        let hidden = depth > f64::from(here) + tolerance;
-        let beside_an_occluder = depth > f64::from(least) + step;
-        let on_an_edge = f64::from(greatest) > depth + step;
-        if hidden || beside_an_occluder || on_an_edge {
+        if depth > f64::from(here) + tolerance {
             return None;
         }
+        let beside_an_occluder = depth > f64::from(least) + step;
+        let on_an_edge = f64::from(greatest) > depth + step;
         // Precision of a border on the face: finer and less oblique photos know better where a stone ends. The
         // root keeps one close photo from outvoting the majority.
-        let weight = (cosine / view.gsd_m(depth)).sqrt() as f32;
+        let precision = (cosine / view.gsd_m(depth)).sqrt();
+        let weight = if beside_an_occluder || on_an_edge {
+            precision * self.params.silhouette_weight
+        } else {
+            precision
+        } as f32;
         Some(Sighting {
             photo,
             instance,
