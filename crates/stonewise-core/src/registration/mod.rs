@@ -1,1 +1,22 @@
-//! registration
+//! The motion of every matched stone, from its points in both epochs.
+//!
+//! [`adjust`] is the default: all stones together, as surveyors adjust a network.
+
+mod band;
+mod equations;
+mod field;
+mod graph;
+mod hyper;
+mod network;
+mod noise;
+mod outcome;
+mod pairs;
+mod params;
+mod patch;
+mod sparse;
+mod survey;
+
+pub use hyper::VarianceComponents;
+pub use network::{AdjustError, adjust};
+pub use pairs::{MemoryPairs, PairPoints, PairSource};
+pub use params::{Break, NetworkParams, NetworkReport};

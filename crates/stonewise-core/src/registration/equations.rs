@@ -1,0 +1,327 @@
+//! The normal equations of one stone's motion, from its own points of both epochs.
+//!
+//! Stone frame: origin at the epoch-1 centroid, axes (along, up, out) of the wall around it. Unknowns, nine:
+//! translation of the centroid (m), rotation vector (rad) and bending (1/m: second derivatives uu, uv, vv of an
+//! out-of-plane distortion; masonry does not bend, but a motion field prescribed for a survey may).
+
+use super::pairs::PairPoints;
+use super::patch::{Observation, PatchFit, PatchGrid, SurfaceNoise};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+
+/// Number of unknowns of a stone.
+pub(super) const UNKNOWNS: usize = 9;
+/// Motion of a stone in its own frame: translation, rotation, bending.
+pub(super) type Motion9 = SVector<f64, UNKNOWNS>;
+/// A matrix over [`Motion9`].
+pub(super) type Matrix9 = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+
+/// How the face is cut and how far points are believed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Layout {
+    /// Side of a cell of the surface grid.
+    pub cell_m: f64,
+    /// Longest side of a patch, in cells.
+    pub patch_cells: usize,
+    /// Residuals beyond this many sigmas lose weight.
+    pub outlier_sigmas: f64,
+}
+
+/// Points of both epochs in the stone's frame, the second unmoved.
+pub(super) struct LocalPair {
+    pub first: Vec<[f64; 3]>,
+    pub second: Vec<[f64; 3]>,
+}
+
+impl LocalPair {
+    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>) -> Self {
+        let local = |cloud: &crate::cloud::Cloud| {
+            let shift = cloud.origin() - pair.centroid;
+            (0..cloud.len())
+                .map(|i| (face_from_world * (cloud.local(i).coords + shift)).into())
+                .collect()
+        };
+        Self {
+            first: local(&pair.points_first),
+            second: local(&pair.points_second),
+        }
+    }
+}
+
+/// What a stone's points say about its motion at a given motion.
+#[derive(Clone, Debug)]
+pub(super) struct Equations {
+    /// Information matrix.
+    pub information: Matrix9,
+    /// Gradient of half the squared residuals; the step solves `information * step = -gradient`.
+    pub gradient: Motion9,
+    /// Share of the small cells of the smaller face that hold points of both epochs.
+    pub overlap: f64,
+    /// Per small cell seen by both: squared difference of the mean residuals over its expected variance.
+    pub differences: Vec<f64>,
+    /// Root mean square of the second epoch's residuals, metres.
+    pub rms_m: f64,
+    /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
+    pub scatter: [(f64, f64); 2],
+}
+
+/// Points in each epoch that a patch needs to say anything.
+const PATCH_POINTS: usize = 12;
+/// Side of the small cells in which the epochs are compared, in cells of the surface.
+const COMPARE_CELLS: f64 = 4.0;
+
+/// Normal equations at motion `x`. Cost: points, plus coefficients times patch width squared.
+pub(super) fn equations(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, layout: &Layout) -> Equations {
+    let motion = Moved::new(x);
+    let patches = cut(pair, &motion, layout);
+    let mut sum = Equations {
+        information: Matrix9::zeros(),
+        gradient: Motion9::zeros(),
+        overlap: patches.overlap,
+        differences: Vec::new(),
+        rms_m: 0.0,
+        scatter: [(0.0, 0.0); 2],
+    };
+    for patch in &patches.list {
+        add_patch(patch, &motion, noise, layout, &mut sum);
+    }
+    if sum.scatter[1].1 > 0.0 {
+        sum.rms_m = noise.sigma_m[1] * (sum.scatter[1].0 / sum.scatter[1].1).sqrt();
+    }
+    sum
+}
+
+/// A motion ready to be undone.
+pub(super) struct Moved {
+    translation: Vector3<f64>,
+    rotation: Rotation3<f64>,
+    bending: [f64; 3],
+}
+
+impl Moved {
+    pub fn new(x: &Motion9) -> Self {
+        Self {
+            translation: Vector3::new(x[0], x[1], x[2]),
+            rotation: Rotation3::new(Vector3::new(x[3], x[4], x[5])),
+            bending: [x[6], x[7], x[8]],
+        }
+    }
+
+    /// Where a point of the second epoch was in the first; bending is taken off its height.
+    pub fn undo(&self, q: &[f64; 3]) -> [f64; 3] {
+        let y = self
+            .rotation
+            .inverse_transform_vector(&(Vector3::from(*q) - self.translation));
+        let [uu, uv, vv] = self.bending;
+        [
+            y.x,
+            y.y,
+            y.z - 0.5 * (uu * y.x * y.x + 2.0 * uv * y.x * y.y + vv * y.y * y.y),
+        ]
+    }
+
+    /// Derivative of the residual of a point now at `p`, where the surface has these slopes.
+    fn jacobian(&self, p: &[f64; 3], slopes: [f64; 2]) -> [f64; UNKNOWNS] {
+        let [u, v, _] = *p;
+        let [uu, uv, vv] = self.bending;
+        let m = self.rotation
+            * Vector3::new(
+                -(slopes[0] + uu * u + uv * v),
+                -(slopes[1] + uv * u + vv * v),
+                1.0,
+            );
+        let arm = self.rotation * Vector3::new(u, v, p[2]);
+        let r = m.cross(&arm);
+        [
+            -m.x,
+            -m.y,
+            -m.z,
+            r.x,
+            r.y,
+            r.z,
+            -u * u / 2.0,
+            -u * v,
+            -v * v / 2.0,
+        ]
+    }
+}
+
+/// A piece of the face with the points of both epochs.
+pub(super) struct PatchPoints {
+    pub grid: PatchGrid,
+    pub epochs: [Vec<Observation>; 2],
+}
+
+pub(super) struct Patches {
+    pub list: Vec<PatchPoints>,
+    pub overlap: f64,
+}
+
+/// Cuts the face of the first epoch into patches and gives each its points.
+pub(super) fn cut(pair: &LocalPair, motion: &Moved, layout: &Layout) -> Patches {
+    let margin = 2.0 * layout.cell_m;
+    let mut low = [f64::INFINITY; 2];
+    let mut high = [f64::NEG_INFINITY; 2];
+    for p in &pair.first {
+        for a in 0..2 {
+            low[a] = low[a].min(p[a] - margin);
+            high[a] = high[a].max(p[a] + margin);
+        }
+    }
+    if pair.first.is_empty() {
+        return Patches {
+            list: Vec::new(),
+            overlap: 0.0,
+        };
+    }
+    let side = layout.patch_cells.max(4) as f64 * layout.cell_m;
+    let count = [0, 1].map(|a| ((high[a] - low[a]) / side).ceil().max(1.0) as usize);
+    let step = [0, 1].map(|a| (high[a] - low[a]) / count[a] as f64);
+    let mut epochs = vec![[Vec::new(), Vec::new()]; count[0] * count[1]];
+    let mut compare = Compare::new(low, high, COMPARE_CELLS * layout.cell_m);
+    let moved = pair.second.iter().map(|q| (1, motion.undo(q)));
+    for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
+        let at = [0, 1].map(|a| ((p[a] - low[a]) / step[a]).floor());
+        compare.count(epoch, &p);
+        if (0..2).all(|a| at[a] >= 0.0 && at[a] < count[a] as f64) {
+            epochs[at[1] as usize * count[0] + at[0] as usize][epoch].push(Observation {
+                position: p,
+                weight: 1.0,
+            });
+        }
+    }
+    let list = epochs
+        .into_iter()
+        .enumerate()
+        .filter(|(_, e)| e.iter().all(|o| o.len() >= PATCH_POINTS))
+        .map(|(k, epochs)| {
+            let corner = [
+                low[0] + (k % count[0]) as f64 * step[0],
+                low[1] + (k / count[0]) as f64 * step[1],
+            ];
+            let grid = PatchGrid::new(corner, [corner[0] + step[0], corner[1] + step[1]], layout.cell_m);
+            PatchPoints { grid, epochs }
+        })
+        .collect();
+    Patches {
+        list,
+        overlap: compare.overlap(),
+    }
+}
+
+fn add_patch(
+    patch: &PatchPoints,
+    motion: &Moved,
+    noise: &SurfaceNoise,
+    layout: &Layout,
+    sum: &mut Equations,
+) {
+    let mut epochs = patch.epochs.clone();
+    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
+        return;
+    };
+    let mut coupling = vec![[0.0; UNKNOWNS]; patch.grid.coefficient_count()];
+    let mut compare = Compare::new(patch.grid.low(), patch.grid.high(), COMPARE_CELLS * layout.cell_m);
+    for (epoch, observations) in epochs.iter().enumerate() {
+        let sigma = noise.sigma_m[epoch];
+        for o in observations {
+            let [u, v, z] = o.position;
+            let [h, hu, hv] = fit.surface(u, v);
+            let r = z - h;
+            compare.add(epoch, &o.position, r);
+            sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
+            sum.scatter[epoch].1 += 1.0;
+            if epoch == 1 {
+                let w = o.weight / (sigma * sigma);
+                let row = motion.jacobian(&o.position, [hu, hv]);
+                fit.scatter(u, v, w, &row, &mut coupling);
+                let j = Motion9::from(row);
+                sum.gradient += j * (w * r);
+                sum.information.syger(w, &j, &j, 1.0);
+            }
+        }
+    }
+    // The surface is unknown: what it absorbs is taken off the information (Schur complement).
+    fit.factor.forward(&mut coupling);
+    for row in &coupling {
+        let c = Motion9::from(*row);
+        sum.information.syger(-1.0, &c, &c, 1.0);
+    }
+    sum.information.fill_upper_triangle_with_lower_triangle();
+    sum.differences.extend(compare.differences(&noise.sigma_m));
+}
+
+/// Fits the surface; points far off it lose weight and it is fitted again.
+pub(super) fn robust_fit(
+    grid: PatchGrid,
+    epochs: &mut [Vec<Observation>; 2],
+    noise: &SurfaceNoise,
+    layout: &Layout,
+) -> Option<PatchFit> {
+    let mut fit = PatchFit::new(grid, [&epochs[0], &epochs[1]], noise)?;
+    for _ in 0..2 {
+        let mut changed = false;
+        for (observations, sigma) in epochs.iter_mut().zip(noise.sigma_m) {
+            let limit = layout.outlier_sigmas * sigma;
+            for o in observations {
+                let r = (o.position[2] - fit.surface(o.position[0], o.position[1])[0]).abs();
+                let weight = if r > limit { (limit / r).powi(2) } else { 1.0 };
+                changed |= (weight - o.weight).abs() > 0.05;
+                o.weight = weight;
+            }
+        }
+        if !changed {
+            break;
+        }
+        fit = PatchFit::new(grid, [&epochs[0], &epochs[1]], noise)?;
+    }
+    Some(fit)
+}
+
+/// Mean residuals of both epochs in small cells.
+struct Compare {
+    low: [f64; 2],
+    cell_m: f64,
+    counts: [usize; 2],
+    sums: Vec<[(f64, f64); 2]>,
+}
+
+impl Compare {
+    fn new(low: [f64; 2], high: [f64; 2], cell_m: f64) -> Self {
+        let counts = [0, 1].map(|a| ((high[a] - low[a]) / cell_m).ceil().max(1.0) as usize);
+        Self {
+            low,
+            cell_m,
+            counts,
+            sums: vec![[(0.0, 0.0); 2]; counts[0] * counts[1]],
+        }
+    }
+
+    fn add(&mut self, epoch: usize, p: &[f64; 3], residual: f64) {
+        let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.cell_m).floor());
+        if (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64) {
+            let cell = &mut self.sums[at[1] as usize * self.counts[0] + at[0] as usize][epoch];
+            cell.0 += residual;
+            cell.1 += 1.0;
+        }
+    }
+
+    fn count(&mut self, epoch: usize, p: &[f64; 3]) {
+        self.add(epoch, p, 0.0);
+    }
+
+    fn overlap(&self) -> f64 {
+        let held = |test: fn(&[(f64, f64); 2]) -> bool| self.sums.iter().filter(|c| test(c)).count() as f64;
+        let both = held(|c| c[0].1 > 0.0 && c[1].1 > 0.0);
+        both / held(|c| c[0].1 > 0.0).max(1.0)
+    }
+
+    fn differences<'a>(&'a self, sigma_m: &'a [f64; 2]) -> impl Iterator<Item = f64> + 'a {
+        self.sums
+            .iter()
+            .filter(|c| c.iter().all(|e| e.1 >= 3.0))
+            .map(|c| {
+                let d = c[1].0 / c[1].1 - c[0].0 / c[0].1;
+                d * d / (sigma_m[0].powi(2) / c[0].1 + sigma_m[1].powi(2) / c[1].1)
+            })
+    }
+}

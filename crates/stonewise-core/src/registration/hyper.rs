@@ -1,0 +1,80 @@
+//! The variance components of the network.
+
+use serde::{Deserialize, Serialize};
+
+/// How unlike neighbouring stones may move: standard deviations, estimated from the survey itself.
+///
+/// "In" are the two directions in the face, "out" the one across it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VarianceComponents {
+    /// Growth of the motion's gradient with distance, per square root metre: in the face, out of it.
+    pub drift: [f64; 2],
+    /// The motion's gradient itself, metre per metre: in the face, out of it.
+    pub strain: [f64; 2],
+    /// A stone's own translation beside the common field, metres: in the face, out of it.
+    pub own_m: [f64; 2],
+    /// A stone's own rotation beside that of the field, radians.
+    pub own_rad: f64,
+    /// Bending of a stone's face, 1/m.
+    pub bending_per_m: f64,
+}
+
+/// Number of components.
+pub(super) const COUNT: usize = 8;
+
+impl VarianceComponents {
+    /// A moderate start: neighbours may differ by about a millimetre.
+    pub(super) fn start() -> Self {
+        Self {
+            drift: [5e-3, 1e-2],
+            strain: [3e-3, 1e-2],
+            own_m: [5e-4, 5e-4],
+            own_rad: 2e-3,
+            bending_per_m: 0.01,
+        }
+    }
+
+    pub(super) fn to_log(self) -> [f64; COUNT] {
+        [
+            self.drift[0],
+            self.drift[1],
+            self.strain[0],
+            self.strain[1],
+            self.own_m[0],
+            self.own_m[1],
+            self.own_rad,
+            self.bending_per_m,
+        ]
+        .map(f64::ln)
+    }
+
+    pub(super) fn from_log(log: [f64; COUNT]) -> Self {
+        let v = log.map(f64::exp);
+        Self {
+            drift: [v[0], v[1]],
+            strain: [v[2], v[3]],
+            own_m: [v[4], v[5]],
+            own_rad: v[6],
+            bending_per_m: v[7],
+        }
+    }
+
+    /// Variances of a stone's own (translation, rotation, bending) in its frame.
+    pub(super) fn own_variances(&self) -> [f64; 9] {
+        let [i, o] = self.own_m;
+        let (r, b) = (self.own_rad, self.bending_per_m);
+        [i, i, o, r, r, r, b, b, b].map(|s| s * s)
+    }
+}
+
+/// Bounds of the logarithms: below, a component is as good as absent; above, neighbours say nothing.
+pub(super) const BOUNDS: [[f64; 2]; COUNT] = [
+    [1e-5, 0.3],
+    [1e-5, 0.3],
+    [1e-5, 0.05],
+    [1e-5, 0.1],
+    [2e-6, 6e-3],
+    [2e-6, 6e-3],
+    [1e-5, 1.5e-2],
+    [1e-4, 0.5],
+];

@@ -1,0 +1,197 @@
+//! From the adjusted network to one row per pair, with tests and uncertainties.
+
+use super::field::{Field, StoneTerm, motion_of_field, tie_strain};
+use super::network::Network;
+use super::params::{Break, NetworkParams, NetworkReport};
+use crate::geometry::Rigid3;
+use crate::stone::{MotionFailure, PairResult, StoneMotion};
+use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// A face whose epochs differ by this many times the expected variance shows two different surfaces.
+const DISAGREE: f64 = 6.0;
+/// A tie weaker than this is broken.
+const BROKEN: f64 = 0.1;
+
+/// Results of the last iteration.
+pub(super) fn report(
+    network: &Network,
+    last: Option<(Vec<StoneTerm>, Field)>,
+    params: &NetworkParams,
+    iterations: usize,
+    converged: bool,
+) -> NetworkReport {
+    let (terms, field) = match last {
+        Some((t, f)) => (t, Some(f)),
+        None => (Vec::new(), None),
+    };
+    let mut results = Vec::new();
+    let mut breaks = Vec::new();
+    if let Some(field) = &field {
+        let loose = loose_stones(network, &terms, field, params);
+        results = (0..terms.len())
+            .map(|i| result(network, i, &terms[i], field, loose[i], params))
+            .collect();
+        breaks = find_breaks(network, field);
+    }
+    let moved: Vec<Vector3<f64>> = results
+        .iter()
+        .filter_map(|r| {
+            r.motion
+                .as_ref()
+                .ok()
+                .filter(|m| !m.loose)
+                .map(|m| m.displacement)
+        })
+        .collect();
+    let n = moved.len().max(1) as f64;
+    let common_motion = moved.iter().sum::<Vector3<f64>>() / n;
+    let scatter: Matrix3<f64> = moved
+        .iter()
+        .map(|d| (d - common_motion) * (d - common_motion).transpose())
+        .sum();
+    NetworkReport {
+        loose: results
+            .iter()
+            .filter(|r| r.motion.as_ref().is_ok_and(|m| m.loose))
+            .count(),
+        results,
+        sigma_m: network.noise.sigma_m,
+        roughness_m: network.noise.tau_m,
+        cell_m: network.layout.cell_m,
+        correlation_factor: network.correlation_factor,
+        components: network.components,
+        common_motion,
+        common_covariance: scatter / (n * (n - 1.0).max(1.0)),
+        iterations,
+        converged,
+        breaks,
+    }
+}
+
+/// Tests each stone against its neighbours, with the false discovery rate controlled (Benjamini & Hochberg 1995).
+fn loose_stones(network: &Network, terms: &[StoneTerm], field: &Field, params: &NetworkParams) -> Vec<bool> {
+    let mut p_values: Vec<(f64, usize)> = (0..terms.len())
+        .filter_map(|i| {
+            let (misfit, freedom) = network.posterior(i, &terms[i], field).misfit;
+            let law = ChiSquared::new(freedom as f64).ok()?;
+            (freedom > 0 && network.survey.stones[i].usable).then(|| (1.0 - law.cdf(misfit), i))
+        })
+        .collect();
+    p_values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let tests = p_values.len() as f64;
+    let last = p_values
+        .iter()
+        .enumerate()
+        .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
+    let mut loose = vec![false; terms.len()];
+    for &(_, i) in p_values.iter().take(last.map_or(0, |k| k + 1)) {
+        loose[i] = true;
+    }
+    loose
+}
+
+fn result(
+    network: &Network,
+    i: usize,
+    term: &StoneTerm,
+    field: &Field,
+    loose: bool,
+    params: &NetworkParams,
+) -> PairResult {
+    let stone = &network.survey.stones[i];
+    let motion = judge(network, i, params).map_or_else(|| Ok(motion(network, i, term, field, loose)), Err);
+    PairResult {
+        first: stone.first,
+        second: stone.second,
+        motion,
+    }
+}
+
+/// Why a stone has no motion.
+fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFailure> {
+    let stone = &network.survey.stones[i];
+    let e = &network.equations[i];
+    if !stone.usable {
+        let [first, second] = stone.counts;
+        return Some(MotionFailure::TooFewPoints {
+            first,
+            second,
+            needed: params.min_points,
+        });
+    }
+    let cells = e.differences.len() as f64;
+    let misfit =
+        e.differences.iter().map(|d| d.min(100.0)).sum::<f64>() / (cells * network.correlation_factor);
+    if e.overlap < params.min_overlap || (cells >= 4.0 && misfit > DISAGREE) {
+        return Some(MotionFailure::Disagreement);
+    }
+    None
+}
+
+fn motion(network: &Network, i: usize, term: &StoneTerm, field: &Field, loose: bool) -> StoneMotion {
+    let node = &network.graph.nodes[i];
+    let world = node.face_from_world.transpose();
+    let posterior = network.posterior(i, term, field);
+    let x = network.motions[i];
+    let displacement = world * x.fixed_rows::<3>(0);
+    let rotation = world * x.fixed_rows::<3>(3);
+    let turned = UnitQuaternion::from_scaled_axis(rotation);
+    let arm = node.centroid.coords;
+    let mut covariance = Matrix6::zeros();
+    for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
+        let block = world * posterior.covariance.fixed_view::<3, 3>(r, c) * world.transpose();
+        covariance.fixed_view_mut::<3, 3>(r, c).copy_from(&block);
+    }
+    let prediction = &field.from_others[i];
+    let expected = world * (prediction.mean.fixed_rows::<3>(0) + network.common_in(i).fixed_rows::<3>(0));
+    let spread = world * prediction.covariance.fixed_view::<3, 3>(0, 0) * world.transpose();
+    StoneMotion {
+        second_from_first: Rigid3::from_parts(Translation3::from(arm + displacement - turned * arm), turned),
+        displacement,
+        rotation,
+        covariance,
+        relative: displacement - expected,
+        relative_covariance: covariance.fixed_view::<3, 3>(0, 0) + spread,
+        loose,
+        observability: observability(term),
+        rmse_m: network.equations[i].rms_m,
+    }
+}
+
+/// Smallest over largest eigenvalue of the displacement's information, rotation and bending free.
+fn observability(term: &StoneTerm) -> f64 {
+    let h = &term.information;
+    let rest = h.fixed_view::<6, 6>(3, 3).into_owned() + Matrix6::identity() * 1e-9;
+    let Some(factor) = rest.cholesky() else { return 0.0 };
+    let cross = h.fixed_view::<6, 3>(3, 0).into_owned();
+    let own = h.fixed_view::<3, 3>(0, 0) - cross.transpose() * factor.solve(&cross);
+    let values = own.symmetric_eigenvalues();
+    if values.max() > 0.0 {
+        (values.min().max(0.0) / values.max()).sqrt()
+    } else {
+        0.0
+    }
+}
+
+fn find_breaks(network: &Network, field: &Field) -> Vec<Break> {
+    let strain = tie_strain(&network.graph, field, &network.components);
+    network
+        .graph
+        .edges
+        .iter()
+        .enumerate()
+        .filter(|(e, _)| network.beliefs.tie[*e] < BROKEN && strain[*e] > 30.0)
+        .map(|(_, edge)| {
+            let motion = |i: usize| {
+                let a = motion_of_field(&network.graph.nodes[i].face_from_world) * field.state[i];
+                network.graph.nodes[i].face_from_world.transpose() * a.fixed_rows::<3>(0)
+            };
+            Break {
+                from: network.survey.stones[edge.low].first,
+                to: network.survey.stones[edge.high].first,
+                jump: motion(edge.high) - motion(edge.low),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,254 @@
+//! A patch of a stone's face as a latent cubic B-spline height field seen by both epochs.
+//!
+//! Heights h(u, v) over a regular grid of cells; the coefficients' second differences have prior variance
+//! `tau^2` (Lang & Brezger 2004, Bayesian P-splines). Points of both epochs observe the surface with noise
+//! `sigma`; the coefficients are eliminated, which leaves the normal equations of the motion alone.
+
+use super::band::{Band, BandFactor};
+
+/// Noise of the points and roughness of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct SurfaceNoise {
+    /// Standard deviation of a point along the normal, per epoch, metres.
+    pub sigma_m: [f64; 2],
+    /// Standard deviation of a second difference of the coefficients, metres.
+    pub tau_m: f64,
+}
+
+/// A point in the stone's frame, with the factor by which its weight is reduced as an outlier.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Observation {
+    pub position: [f64; 3],
+    pub weight: f64,
+}
+
+/// Where a patch lies and how its coefficients are numbered.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PatchGrid {
+    origin: [f64; 2],
+    cell_m: f64,
+    cells: [usize; 2],
+    /// Axis whose coefficients are contiguous: the shorter one, which keeps the band narrow.
+    short: usize,
+}
+
+/// Basis functions at a point: first coefficient along (short, long), values and derivatives per axis u, v.
+#[derive(Clone, Copy)]
+struct Basis {
+    at: [usize; 2],
+    value: [[f64; 4]; 2],
+    slope: [[f64; 4]; 2],
+}
+
+/// The surface that both epochs support, for given weights.
+pub(super) struct PatchFit {
+    pub grid: PatchGrid,
+    coefficients: Vec<[f64; 1]>,
+    pub factor: BandFactor,
+    prior_quadratic: f64,
+}
+
+impl PatchGrid {
+    pub fn new(low: [f64; 2], high: [f64; 2], cell_m: f64) -> Self {
+        let cells = [0, 1].map(|a| (((high[a] - low[a]) / cell_m).ceil() as usize).max(1));
+        let origin = [0, 1].map(|a| (low[a] + high[a] - cells[a] as f64 * cell_m) / 2.0);
+        Self {
+            origin,
+            cell_m,
+            cells,
+            short: usize::from(cells[1] < cells[0]),
+        }
+    }
+
+    /// Lower corner.
+    pub fn low(&self) -> [f64; 2] {
+        self.origin
+    }
+
+    /// Upper corner.
+    pub fn high(&self) -> [f64; 2] {
+        [0, 1].map(|a| self.origin[a] + self.cells[a] as f64 * self.cell_m)
+    }
+
+    fn counts(&self) -> [usize; 2] {
+        [self.cells[self.short] + 3, self.cells[1 - self.short] + 3]
+    }
+
+    pub fn coefficient_count(&self) -> usize {
+        let [short, long] = self.counts();
+        short * long
+    }
+
+    fn basis(&self, u: f64, v: f64) -> Basis {
+        let mut at = [0; 2];
+        let mut value = [[0.0; 4]; 2];
+        let mut slope = [[0.0; 4]; 2];
+        for (axis, x) in [u, v].into_iter().enumerate() {
+            let s = ((x - self.origin[axis]) / self.cell_m).clamp(0.0, self.cells[axis] as f64);
+            let cell = (s as usize).min(self.cells[axis] - 1);
+            let t = s - cell as f64;
+            let r = 1.0 - t;
+            value[axis] = [
+                r * r * r / 6.0,
+                (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
+                (3.0 * r * r * r - 6.0 * r * r + 4.0) / 6.0,
+                t * t * t / 6.0,
+            ];
+            slope[axis] = [
+                -r * r / 2.0,
+                (3.0 * t * t - 4.0 * t) / 2.0,
+                (4.0 * r - 3.0 * r * r) / 2.0,
+                t * t / 2.0,
+            ]
+            .map(|d| d / self.cell_m);
+            at[usize::from(axis != self.short)] = cell;
+        }
+        Basis { at, value, slope }
+    }
+
+    /// Number of the coefficient `long` and `short` steps from the first one that the point touches.
+    fn index(&self, basis: &Basis, long: usize, short: usize) -> usize {
+        (basis.at[1] + long) * (self.cells[self.short] + 3) + basis.at[0] + short
+    }
+
+    fn assemble(&self, epochs: [&[Observation]; 2], noise: &SurfaceNoise) -> (Band, Vec<[f64; 1]>) {
+        let [short, _] = self.counts();
+        let mut matrix = Band::zeros(self.coefficient_count(), 3 * short + 3);
+        let mut rhs = vec![[0.0]; self.coefficient_count()];
+        for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
+            for o in observations {
+                let basis = self.basis(o.position[0], o.position[1]);
+                let (bs, bl) = (basis.value[self.short], basis.value[1 - self.short]);
+                let weight = o.weight / (sigma * sigma);
+                for a in 0..4 {
+                    for b in 0..4 {
+                        let row = self.index(&basis, a, b);
+                        let w = weight * bl[a] * bs[b];
+                        rhs[row][0] += w * o.position[2];
+                        for c in 0..=a {
+                            let count = if c == a { b + 1 } else { 4 };
+                            let part = matrix.row_part(row, self.index(&basis, c, 0), count);
+                            let wc = w * bl[c];
+                            for (entry, s) in part.iter_mut().zip(bs) {
+                                *entry += wc * s;
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        self.each_difference(|taps| {
+            let scale = 1.0 / (noise.tau_m * noise.tau_m);
+            for &(i, ci) in taps {
+                for &(j, cj) in taps {
+                    if j <= i {
+                        matrix.add(i, j, scale * ci * cj);
+                    }
+                }
+            }
+        });
+        // Keeps a patch whose points lie on a line solvable; far below any observation's weight.
+        for i in 0..self.coefficient_count() {
+            matrix.add(i, i, 1e-8 / (noise.tau_m * noise.tau_m));
+        }
+        (matrix, rhs)
+    }
+
+    /// The prior's second differences: along each axis, and mixed (twice, as in a thin plate).
+    fn each_difference(&self, mut visit: impl FnMut(&[(usize, f64)])) {
+        let [short, long] = self.counts();
+        let mixed = std::f64::consts::SQRT_2;
+        for l in 0..long {
+            for s in 0..short {
+                let i = l * short + s;
+                if s >= 2 {
+                    visit(&[(i - 2, 1.0), (i - 1, -2.0), (i, 1.0)]);
+                }
+                if l >= 2 {
+                    visit(&[(i - 2 * short, 1.0), (i - short, -2.0), (i, 1.0)]);
+                }
+                if s >= 1 && l >= 1 {
+                    visit(&[
+                        (i - short - 1, mixed),
+                        (i - short, -mixed),
+                        (i - 1, -mixed),
+                        (i, mixed),
+                    ]);
+                }
+            }
+        }
+    }
+}
+
+impl PatchFit {
+    /// The posterior mean of the surface; `None` where the points do not determine one.
+    pub fn new(grid: PatchGrid, epochs: [&[Observation]; 2], noise: &SurfaceNoise) -> Option<Self> {
+        let (matrix, rhs) = grid.assemble(epochs, noise);
+        let factor = matrix.factor()?;
+        let mut coefficients = rhs;
+        factor.solve(&mut coefficients);
+        let mut prior_quadratic = 0.0;
+        grid.each_difference(|taps| {
+            let d: f64 = taps.iter().map(|&(i, c)| c * coefficients[i][0]).sum();
+            prior_quadratic += d * d;
+        });
+        prior_quadratic /= noise.tau_m * noise.tau_m;
+        Some(Self {
+            grid,
+            coefficients,
+            factor,
+            prior_quadratic,
+        })
+    }
+
+    /// Height and its slopes along u and v.
+    pub fn surface(&self, u: f64, v: f64) -> [f64; 3] {
+        let basis = self.grid.basis(u, v);
+        let (s, l) = (self.grid.short, 1 - self.grid.short);
+        let mut out = [0.0; 3];
+        for a in 0..4 {
+            for b in 0..4 {
+                let c = self.coefficients[self.grid.index(&basis, a, b)][0];
+                out[0] += c * basis.value[l][a] * basis.value[s][b];
+                out[1 + s] += c * basis.value[l][a] * basis.slope[s][b];
+                out[1 + l] += c * basis.slope[l][a] * basis.value[s][b];
+            }
+        }
+        out
+    }
+
+    /// Adds `weight * basis * row` to one right-hand side per column of the motion's Jacobian.
+    pub fn scatter<const N: usize>(
+        &self,
+        u: f64,
+        v: f64,
+        weight: f64,
+        row: &[f64; N],
+        into: &mut [[f64; N]],
+    ) {
+        let basis = self.grid.basis(u, v);
+        let (s, l) = (self.grid.short, 1 - self.grid.short);
+        for a in 0..4 {
+            for b in 0..4 {
+                let w = weight * basis.value[l][a] * basis.value[s][b];
+                let target = &mut into[self.grid.index(&basis, a, b)];
+                for c in 0..N {
+                    target[c] += w * row[c];
+                }
+            }
+        }
+    }
+
+    /// Minus twice the log marginal likelihood of the points, up to a constant.
+    pub fn deviance(&self, epochs: [&[Observation]; 2], noise: &SurfaceNoise) -> f64 {
+        let rank = self.grid.coefficient_count() as f64 - 3.0;
+        let mut sum = self.factor.log_det() + self.prior_quadratic + rank * 2.0 * noise.tau_m.ln();
+        for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
+            for o in observations {
+                let r = o.position[2] - self.surface(o.position[0], o.position[1])[0];
+                sum += o.weight * r * r / (sigma * sigma) + 2.0 * sigma.ln();
+            }
+        }
+        sum
+    }
+}
