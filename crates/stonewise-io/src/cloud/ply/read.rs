@@ -26,13 +26,7 @@ pub fn read<E: From<CloudError>>(
     let columns = Columns::find(vertex).ok_or_else(|| {
         CloudError::malformed(path, "the vertices of the ply header have no numbers x, y and z")
     })?;
-    let mut values = match header.encoding {
-        Encoding::Text => Values::Text(lines),
-        encoding => Values::Binary {
-            bytes: lines.into_bytes(),
-            big_endian: encoding == Encoding::BigEndian,
-        },
-    };
+    let mut values = Values::after_header(lines, header.encoding);
     let mut row = Vec::new();
     for element in before {
         for _ in 0..element.count {
@@ -52,14 +46,14 @@ pub fn read<E: From<CloudError>>(
 }
 
 /// Places of what is wanted among the properties of a vertex.
-struct Columns {
-    position: [usize; 3],
+pub(super) struct Columns {
+    pub(super) position: [usize; 3],
     color: Option<[(usize, Scalar); 3]>,
     intensity: Option<usize>,
 }
 
 impl Columns {
-    fn find(vertex: &Element) -> Option<Self> {
+    pub(super) fn find(vertex: &Element) -> Option<Self> {
         let find = |names: &[&str]| {
             let known = |name: &str| names.iter().any(|n| n.eq_ignore_ascii_case(name));
             let place = vertex.properties.iter().position(|p| known(&p.name))?;
@@ -106,7 +100,7 @@ fn to_16_bit(value: f64, scalar: Scalar) -> u16 {
 }
 
 /// The values of the elements, one row at a time.
-enum Values {
+pub(super) enum Values {
     Text(Lines),
     Binary {
         bytes: BufReader<File>,
@@ -115,12 +109,33 @@ enum Values {
 }
 
 impl Values {
+    pub(super) fn after_header(lines: Lines, encoding: Encoding) -> Self {
+        match encoding {
+            Encoding::Text => Self::Text(lines),
+            encoding => Self::Binary {
+                bytes: lines.into_bytes(),
+                big_endian: encoding == Encoding::BigEndian,
+            },
+        }
+    }
+
     /// Reads one value per property into `row` (the length, where it is a list); false at the end of the file.
     fn next(&mut self, path: &Path, element: &Element, row: &mut Vec<f64>) -> Result<bool, CloudError> {
+        self.next_with_items(path, element, row, &mut |_, _| {})
+    }
+
+    /// As `next`, and passes (place of the property, item) for every item of every list.
+    pub(super) fn next_with_items(
+        &mut self,
+        path: &Path,
+        element: &Element,
+        row: &mut Vec<f64>,
+        item: &mut dyn FnMut(usize, f64),
+    ) -> Result<bool, CloudError> {
         row.clear();
         match self {
-            Self::Text(lines) => next_line(lines, element, row),
-            Self::Binary { bytes, big_endian } => match next_binary(bytes, *big_endian, element, row) {
+            Self::Text(lines) => next_line(lines, element, row, item),
+            Self::Binary { bytes, big_endian } => match next_binary(bytes, *big_endian, element, row, item) {
                 Ok(()) => Ok(true),
                 Err(e) if e.kind() == std::io::ErrorKind::UnexpectedEof => Ok(false),
                 Err(e) => Err(CloudError::read(path, e)),
@@ -129,27 +144,39 @@ impl Values {
     }
 }
 
-fn next_line(lines: &mut Lines, element: &Element, row: &mut Vec<f64>) -> Result<bool, CloudError> {
+fn next_line(
+    lines: &mut Lines,
+    element: &Element,
+    row: &mut Vec<f64>,
+    item: &mut dyn FnMut(usize, f64),
+) -> Result<bool, CloudError> {
     let mut line = lines.next()?;
     while line == Some("") {
         line = lines.next()?;
     }
     let Some(line) = line else { return Ok(false) };
-    let parsed = parse_line(line, element, row);
+    let parsed = parse_line(line, element, row, item);
     parsed.map(|()| true).map_err(|reason| lines.error(reason))
 }
 
-fn parse_line(line: &str, element: &Element, row: &mut Vec<f64>) -> Result<(), String> {
+fn parse_line(
+    line: &str,
+    element: &Element,
+    row: &mut Vec<f64>,
+    item: &mut dyn FnMut(usize, f64),
+) -> Result<(), String> {
     let mut words = line.split_ascii_whitespace();
-    for property in &element.properties {
-        let short = || format!("the line ends before its property {:?}", property.name);
-        let word = words.next().ok_or_else(short)?;
-        let value: f64 = word
-            .parse()
-            .map_err(|_| format!("{word:?} is not a number (property {:?})", property.name))?;
+    for (place, property) in element.properties.iter().enumerate() {
+        let mut number = || {
+            let short = || format!("the line ends before its property {:?}", property.name);
+            let word = words.next().ok_or_else(short)?;
+            word.parse::<f64>()
+                .map_err(|_| format!("{word:?} is not a number (property {:?})", property.name))
+        };
+        let value = number()?;
         if let Kind::List { .. } = property.kind {
             for _ in 0..value as u64 {
-                words.next().ok_or_else(short)?;
+                item(place, number()?);
             }
         }
         row.push(value);
@@ -162,16 +189,15 @@ fn next_binary(
     big_endian: bool,
     element: &Element,
     row: &mut Vec<f64>,
+    item: &mut dyn FnMut(usize, f64),
 ) -> std::io::Result<()> {
-    for property in &element.properties {
+    for (place, property) in element.properties.iter().enumerate() {
         let value = match property.kind {
             Kind::One(scalar) => next_scalar(bytes, big_endian, scalar)?,
-            Kind::List { count, item } => {
+            Kind::List { count, item: scalar } => {
                 let length = next_scalar(bytes, big_endian, count)?;
-                let size = length as u64 * item.size() as u64;
-                let skipped = std::io::copy(&mut bytes.by_ref().take(size), &mut std::io::sink())?;
-                if skipped < size {
-                    return Err(std::io::ErrorKind::UnexpectedEof.into());
+                for _ in 0..length as u64 {
+                    item(place, next_scalar(bytes, big_endian, scalar)?);
                 }
                 length
             }
