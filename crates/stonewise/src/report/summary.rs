@@ -1,5 +1,6 @@
 //! The facts that the report states in words.
 
+use super::draw::number;
 use super::statistics::Sorted;
 use super::{ResultSet, RowMotion, Status, StoneRow};
 use nalgebra::Point2;
@@ -71,6 +72,12 @@ impl<'a> Summary<'a> {
         let n = self.measured.len() as f64;
         let expected = FALSE_ALARMS * n;
         self.significant.len() as f64 > expected + 3.0 * (expected * (1.0 - FALSE_ALARMS)).sqrt().max(1.0)
+    }
+
+    /// Millimetres for tables: one decimal, two where the typical detection limit is below 1 mm.
+    pub(crate) fn mm(&self, metres: f64) -> String {
+        let fine = self.limits.median().is_some_and(|l| l < 1e-3);
+        number(metres * 1e3, if fine { 2 } else { 1 })
     }
 
     /// Number of stones without a motion.

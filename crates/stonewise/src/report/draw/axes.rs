@@ -40,7 +40,7 @@ impl Axes {
                 bottom + 15.0
             );
         }
-        let (ticks, decimals) = self::ticks(self.y, (height / 38.0) as usize);
+        let (ticks, decimals) = self::ticks(self.y, ((height / 38.0) as usize).max(2));
         for tick in ticks {
             let y = self.py(tick);
             let label = number(tick, decimals);

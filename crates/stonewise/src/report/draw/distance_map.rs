@@ -38,20 +38,14 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
         };
         let shown = Sorted::new(limits).median().is_none_or(|l| distance.abs() > l);
         let path = groups.entry((shown, scale.step(distance))).or_default();
-        let (x, y) = (left + column as f64 * cell, top + row as f64 * cell);
-        let _ = write!(
-            path,
-            "M{:.0} {:.0}h{s}v{s}h-{s}z",
-            x * 10.0,
-            y * 10.0,
-            s = (cell * 10.0).ceil()
-        );
+        let edge = |start: f64, i: i64| ((start + i as f64 * cell) * 10.0).round() as i64;
+        let (x, y) = (edge(left, column), edge(top, row));
+        let (w, h) = (edge(left, column + 1) - x, edge(top, row + 1) - y);
+        let _ = write!(path, "M{x} {y}h{w}v{h}h-{w}z");
     }
     let mut out = layout.open("M3C2 distance");
-    layout
-        .axes
-        .draw(&mut out, "along the wall (m)", "up the face (m)");
-    out.push_str(r#"<g transform="scale(.1)">"#);
+    layout.draw_axes(&mut out);
+    out.push_str(r#"<g transform="scale(.1)" shape-rendering="crispEdges">"#);
     for ((shown, step), path) in groups {
         let class = if shown { "" } else { r#" class="faded""# };
         let _ = write!(out, r#"<path{class} fill="{}" d="{path}"/>"#, scale.colour(step));

@@ -3,7 +3,7 @@
 use super::axes::Axes;
 use super::colour_bar::Scale;
 use super::text::{escape, mm};
-use crate::report::statistics::nice_above;
+use crate::report::statistics::{Sorted, nice_above};
 use crate::report::{ResultSet, StoneRow};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,6 +26,8 @@ pub(crate) struct MapLayout<'a> {
     pub height: f64,
     /// One path a stone, tenths of a pixel.
     paths: Vec<String>,
+    /// Typical size of a stone, pixels.
+    stone_px: f64,
 }
 
 /// What a map shows.
@@ -74,6 +76,10 @@ impl<'a> MapLayout<'a> {
             area[2] + MARGIN[0] + MARGIN[2],
             area[3].max(60.0) + MARGIN[1] + MARGIN[3],
         );
+        let area_m2 = Sorted::new(results.stones.iter().map(|s| s.area_m2))
+            .median()
+            .unwrap_or(0.0);
+        let stone_px = area_m2.max(0.0).sqrt() * scale;
         let paths = rings.iter().map(|ring| path(ring, &axes)).collect();
         Self {
             results,
@@ -81,6 +87,7 @@ impl<'a> MapLayout<'a> {
             width,
             height,
             paths,
+            stone_px,
         }
     }
 
@@ -99,6 +106,16 @@ impl<'a> MapLayout<'a> {
         )
     }
 
+    /// Draws the axes; a long label does not fit beside a low wall.
+    pub(crate) fn draw_axes(&self, out: &mut String) {
+        let up = if self.axes.area[3] < 110.0 {
+            "up (m)"
+        } else {
+            "up the face (m)"
+        };
+        self.axes.draw(out, "along the wall (m)", up);
+    }
+
     /// Draws the colour bar to the right of the wall.
     pub(crate) fn draw_bar(&self, out: &mut String, scale: Scale) {
         scale.draw_bar(
@@ -113,9 +130,7 @@ impl<'a> MapLayout<'a> {
 /// The map as one SVG element.
 pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     let mut out = layout.open(picture.title);
-    layout
-        .axes
-        .draw(&mut out, "along the wall (m)", "up the face (m)");
+    layout.draw_axes(&mut out);
     out.push_str(r#"<g transform="scale(.1)">"#);
     // Stones of one colour are one path: fewer elements, smaller file.
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
@@ -150,7 +165,12 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
         );
     }
     if !loose.is_empty() {
-        let _ = write!(out, r#"<path class="loose" d="{loose}"/>"#);
+        // Small stones get thin outlines.
+        let width = (layout.stone_px * 0.8).clamp(4.0, 18.0);
+        let _ = write!(
+            out,
+            r#"<path class="loose" stroke-width="{width:.0}" d="{loose}"/>"#
+        );
     }
     out.push_str("</g>");
     if picture.arrows {
@@ -215,7 +235,7 @@ fn draw_arrows(layout: &MapLayout, out: &mut String) {
                 .then_some(arrow)
         })
         .collect();
-    let lengths = crate::report::statistics::Sorted::new(arrows.iter().map(|a| a.1[0].hypot(a.1[1])));
+    let lengths = Sorted::new(arrows.iter().map(|a| a.1[0].hypot(a.1[1])));
     let Some(longest) = lengths.quantile(0.98).filter(|l| *l > 0.0) else {
         return;
     };

@@ -30,7 +30,11 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
         .map(|(_, m)| [m.face.x * 1e3, m.face.y * 1e3])
         .collect();
     let vectors: Vec<[f64; 2]> = compared.in_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
-    let limits = shared_limits(stones.iter().chain(&vectors).chain(&truth_mm));
+    let limits = shared_limits(&[
+        &stones,
+        &vectors,
+        truth_mm.as_ref().map_or(&[], std::slice::from_ref),
+    ]);
     let note = |n: usize, what: &str| {
         let truth = if truth_mm.is_some() {
             " Cross: the known motion."
@@ -62,7 +66,7 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
     }
     if !compared.out_of_plane.is_empty() {
         let pairs: Vec<[f64; 2]> = compared.out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
-        let limits = shared_limits(&pairs);
+        let limits = shared_limits(&[&pairs]);
         let difference = Sorted::new(pairs.iter().map(|p| p[0] - p[1]));
         let text = format!(
             "{} stones; median difference {} mm, NMAD {} mm.",
@@ -91,18 +95,19 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
     )
 }
 
-/// Square limits that hold 99 % of the points, the same on both axes' lengths.
-fn shared_limits<'a>(points: impl IntoIterator<Item = &'a [f64; 2]>) -> [[f64; 2]; 2] {
-    let points: Vec<[f64; 2]> = points.into_iter().copied().collect();
+/// Limits that hold 98 % of every series and zero, with equal lengths on both axes.
+fn shared_limits(series: &[&[[f64; 2]]]) -> [[f64; 2]; 2] {
     let range = |k: usize| {
-        let values = Sorted::new(points.iter().map(|p| p[k]));
-        [
-            values.quantile(0.005).unwrap_or(-1.0).min(0.0),
-            values.quantile(0.995).unwrap_or(1.0).max(0.0),
-        ]
+        series.iter().fold([0.0f64, 0.0f64], |[low, high], points| {
+            let values = Sorted::new(points.iter().map(|p| p[k]));
+            [
+                low.min(values.quantile(0.01).unwrap_or(0.0)),
+                high.max(values.quantile(0.99).unwrap_or(0.0)),
+            ]
+        })
     };
     let ranges = [range(0), range(1)];
-    let half = ranges.iter().map(|r| (r[1] - r[0]) / 2.0).fold(0.05, f64::max) * 1.15;
+    let half = ranges.iter().map(|r| (r[1] - r[0]) / 2.0).fold(0.05, f64::max) * 1.2;
     ranges.map(|r| [(r[0] + r[1]) / 2.0 - half, (r[0] + r[1]) / 2.0 + half])
 }
 
@@ -113,7 +118,7 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         .map(|k| {
             let all = &facts.components[k];
             let rest = Sorted::new(still.iter().map(|(_, m)| m.face[k]));
-            let cell = |v: Option<f64>| mm_or_dash(v);
+            let cell = |v: Option<f64>| facts.mm(v.unwrap_or(f64::NAN));
             vec![
                 NAMES[k].into(),
                 cell(all.median()),
@@ -130,12 +135,12 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         "not significant: median mm",
         "not significant: NMAD mm",
     ];
-    let error = find_number(&results.run, "registration_error_m");
+    let error = find_number(&results.run, "epoch_error_m");
     let entered = error.map_or(
         "The error of the registration is not stated in run.json.".into(),
         |e| {
             format!(
-                "Registration error taken into account: {} mm.",
+                "Registration error taken into account: {} mm per axis and epoch.",
                 mm_or_dash(Some(e))
             )
         },

@@ -1,7 +1,7 @@
 //! Results against a known truth.
 
 use super::html::{details, section, table};
-use crate::report::draw::{count, escape, mm, mm_or_dash, number};
+use crate::report::draw::{count, escape, number};
 use std::fmt::Write;
 use stonewise_core::evaluate::{Directions, ErrorStatistics, Evaluation, MotionScore};
 
@@ -62,7 +62,7 @@ fn rmse_table(methods: &[(&str, &MotionScore)]) -> String {
     let cells = |score: &MotionScore, of: fn(&ErrorStatistics) -> f64| -> Vec<String> {
         DIRECTIONS[2..]
             .iter()
-            .map(|(_, pick)| mm_or_dash(pick(&score.errors).map(of)))
+            .map(|(_, pick)| mm(pick(&score.errors).map_or(f64::NAN, of)))
             .collect()
     };
     let row = |name: &str, score: &MotionScore, of: fn(&ErrorStatistics) -> f64| {
@@ -207,4 +207,9 @@ fn identities(evaluation: &Evaluation) -> String {
     } else {
         format!("<ul>{items}</ul>")
     }
+}
+
+/// Metres as millimetres with two decimals.
+fn mm(metres: f64) -> String {
+    number(metres * 1e3, 2)
 }

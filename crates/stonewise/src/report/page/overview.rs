@@ -141,11 +141,11 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
     out.push_str(&table(&["status", "meaning", "stones", "share"], &rows, 2));
     if !facts.significant.is_empty() {
         out.push_str("<h3>Largest significant motions</h3>");
-        out.push_str(&stone_rows(results, &facts.significant));
+        out.push_str(&stone_rows(results, facts, &facts.significant));
     }
     if !facts.loose.is_empty() {
         out.push_str("<h3>Stones that move unlike their neighbours</h3>");
-        out.push_str(&stone_rows(results, &facts.loose));
+        out.push_str(&stone_rows(results, facts, &facts.loose));
     }
     out.push_str(&stretches(results, facts));
     let lists: String = facts
@@ -160,7 +160,7 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
     section("tables", "Stones", &out)
 }
 
-fn stone_rows(results: &ResultSet, stones: &[(&StoneRow, &RowMotion)]) -> String {
+fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMotion)]) -> String {
     let head = [
         "stone",
         "along m",
@@ -180,12 +180,12 @@ fn stone_rows(results: &ResultSet, stones: &[(&StoneRow, &RowMotion)]) -> String
             format!("<a data-stone=\"{0}\">{0}</a>", s.stone_id),
             number(place.x, 2),
             number(place.y, 2),
-            mm(m.face.x),
-            mm(m.face.y),
-            mm(m.face.z),
-            mm(m.displacement.norm()),
-            mm(m.detection_limit_m),
-            mm(m.relative.norm()),
+            facts.mm(m.face.x),
+            facts.mm(m.face.y),
+            facts.mm(m.face.z),
+            facts.mm(m.displacement.norm()),
+            facts.mm(m.detection_limit_m),
+            facts.mm(m.relative.norm()),
             number(m.rotation.norm() * 1e3, 1),
             if m.loose { "loose" } else { "" }.into(),
         ]
@@ -225,8 +225,11 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         };
         let part: Vec<_> = facts.measured.iter().filter(|(s, _)| inside(s)).collect();
         let significant = part.iter().filter(|(_, m)| m.significant).count();
-        let median =
-            |of: fn(&RowMotion) -> f64| mm_or_dash(Sorted::new(part.iter().map(|(_, m)| of(m))).median());
+        let median = |of: fn(&RowMotion) -> f64| {
+            facts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
+                .median()
+                .unwrap_or(f64::NAN))
+        };
         vec![
             format!("{} – {}", number(edge(i), 1), number(edge(i + 1), 1)),
             count(part.len()),
