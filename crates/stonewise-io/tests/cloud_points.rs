@@ -1,0 +1,125 @@
+//! New LAZ files read back by another crate, and E57 files that only Rust writes here.
+
+use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
+use las::Reader;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
+use stonewise_io::cloud::{CloudError, ExtraColumn, cloud_info, read_cloud, write_points_laz};
+
+#[test]
+fn core_points_come_back_with_their_dimensions() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m3c2.laz");
+    let n = 120_000;
+    let point = |i: usize| Point3::new(4e5 + i as f64 * 0.001_234, 5e6 - i as f64 * 0.01, 90.123_456);
+    let points: Vec<_> = (0..n).map(point).collect();
+    let distance: Vec<f64> = (0..n).map(|i| i as f64 / 7.0).collect();
+    let spread: Vec<f32> = (0..n).map(|i| i as f32 / 3.0).collect();
+    let count: Vec<u32> = (0..n as u32).rev().collect();
+    let flag: Vec<u16> = (0..n).map(|i| (i % 2) as u16).collect();
+    let columns = [
+        ("m3c2_distance", ExtraColumn::F64(&distance)),
+        ("m3c2_std_dev1", ExtraColumn::F32(&spread)),
+        ("m3c2_count1", ExtraColumn::U32(&count)),
+        ("m3c2_significant", ExtraColumn::U16(&flag)),
+    ];
+    write_points_laz(&path, &points, &columns).unwrap();
+    let data = Reader::from_path(&path).unwrap().read_all().unwrap();
+    assert_eq!((data.len(), data.record_len()), (n, 30 + 18));
+    for (i, record) in data.raw_bytes().chunks(48).enumerate() {
+        assert_eq!(record[30..38], distance[i].to_le_bytes());
+        assert_eq!(record[38..42], spread[i].to_le_bytes());
+        assert_eq!(record[42..46], count[i].to_le_bytes());
+        assert_eq!(record[46..48], flag[i].to_le_bytes());
+    }
+    for (i, p) in data.points().enumerate().step_by(997) {
+        let p = p.unwrap();
+        assert!((Point3::new(p.x, p.y, p.z) - points[i]).amax() < 0.51e-6);
+    }
+    let bounds = cloud_info(&path).unwrap().bounds.unwrap();
+    assert!((bounds.max.y - 5e6).abs() < 1e-6 && (bounds.min.z - 90.123_456).abs() < 1e-6);
+    let first = std::fs::read(&path).unwrap();
+    write_points_laz(&path, &points, &columns).unwrap();
+    assert!(
+        std::fs::read(&path).unwrap() == first,
+        "the same points gave other bytes"
+    );
+    if let Ok(keep) = std::env::var("STONEWISE_KEEP_POINTS") {
+        std::fs::copy(&path, keep).unwrap();
+    }
+}
+
+#[test]
+fn no_points_and_far_points_can_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m3c2.laz");
+    write_points_laz(&path, &[], &[("d", ExtraColumn::F32(&[]))]).unwrap();
+    let info = cloud_info(&path).unwrap();
+    assert_eq!((info.records, info.bounds), (0, None));
+    assert_eq!(
+        read_cloud(&path, 10, |_| Ok::<(), CloudError>(()))
+            .unwrap()
+            .records,
+        0
+    );
+    let points = [Point3::new(-9e6, 0.0, 0.0), Point3::new(9e6, 1.0, 2.0)];
+    write_points_laz(&path, &points, &[]).unwrap();
+    read_cloud(&path, 10, |chunk| {
+        assert!((chunk.positions[1] - points[1]).amax() < 0.01);
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    assert!(write_points_laz(&path, &[Point3::new(1e300, 0.0, 0.0), points[0]], &[]).is_err());
+}
+
+#[test]
+fn spherical_coordinates_become_points_in_the_world() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.e57");
+    let rotation = UnitQuaternion::from_euler_angles(0.1, -0.2, 2.5);
+    let translation = Vector3::new(100.0, -50.0, 7.0);
+    let (range, azimuth, elevation) = (12.5, 0.75, -0.5);
+    let mut writer = E57Writer::from_file(&path, "file").unwrap();
+    let prototype = vec![
+        Record::SPHERICAL_RANGE_F64,
+        Record::SPHERICAL_AZIMUTH_F64,
+        Record::SPHERICAL_ELEVATION_F64,
+    ];
+    let mut scan = writer.add_pointcloud("scan", prototype).unwrap();
+    scan.set_transform(Some(Transform {
+        rotation: Quaternion {
+            w: rotation.w,
+            x: rotation.i,
+            y: rotation.j,
+            z: rotation.k,
+        },
+        translation: Translation {
+            x: translation.x,
+            y: translation.y,
+            z: translation.z,
+        },
+    }));
+    scan.add_point(vec![
+        RecordValue::Double(range),
+        RecordValue::Double(azimuth),
+        RecordValue::Double(elevation),
+    ])
+    .unwrap();
+    scan.finalize().unwrap();
+    writer.finalize().unwrap();
+
+    let local = Vector3::new(
+        f64::cos(elevation) * f64::cos(azimuth),
+        f64::cos(elevation) * f64::sin(azimuth),
+        f64::sin(elevation),
+    );
+    let expected = Point3::from(rotation * (local * range) + translation);
+    read_cloud(&path, 10, |chunk| {
+        assert!((chunk.positions[0] - expected).amax() < 1e-12);
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    assert_eq!(
+        cloud_info(&path).unwrap().scans[0].origin,
+        Some(translation.into())
+    );
+}
