@@ -107,7 +107,7 @@ fn every_truncation_of_a_binary_file_is_an_error() {
     )
     .unwrap();
     let bytes = std::fs::read(fixture("colmap_bin/images.bin")).unwrap();
-    for length in 0..bytes.len() {
+    for length in (0..bytes.len()).step_by(13) {
         std::fs::write(folder.path().join("images.bin"), &bytes[..length]).unwrap();
         let error = read_cameras(folder.path()).unwrap_err();
         assert!(error.to_string().contains("complete"), "{length}: {error}");
