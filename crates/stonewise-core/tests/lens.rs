@@ -1,4 +1,5 @@
 //! Camera models against OpenCV, the formulae of Metashape's manual, and themselves.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};

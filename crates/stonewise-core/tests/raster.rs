@@ -1,4 +1,10 @@
 //! Run-length masks, polygons, outlines and components against pycocotools, OpenCV and brute force.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "helpers of tests"
+)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -7,7 +7,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageReader};
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Cursor};
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{Raster, RgbImage};
 
@@ -22,6 +22,12 @@ pub enum ImageIoError {
         path: PathBuf,
         /// What the decoder said.
         source: ImageError,
+    },
+    /// A JPEG without its end.
+    #[error("the photo is cut off: copy it again from the camera: {}", path.display())]
+    Truncated {
+        /// File.
+        path: PathBuf,
     },
     /// The file cannot be written.
     #[error("cannot write the image: {source}: {}", path.display())]
@@ -38,13 +44,17 @@ pub enum ImageIoError {
 /// # Errors
 /// The file is missing, truncated or in another format.
 pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
-    let read = || -> Result<image::RgbImage, ImageError> {
-        Ok(ImageReader::open(path)?
-            .with_guessed_format()?
-            .decode()?
-            .into_rgb8())
+    let bytes = std::fs::read(path).map_err(|e| read_error(path, ImageError::IoError(e)))?;
+    if is_cut_off(&bytes) {
+        return Err(ImageIoError::Truncated {
+            path: path.to_owned(),
+        });
+    }
+    let decode = || -> Result<image::RgbImage, ImageError> {
+        let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+        Ok(reader.decode()?.into_rgb8())
     };
-    let decoded = read().map_err(|source| read_error(path, source))?;
+    let decoded = decode().map_err(|source| read_error(path, source))?;
     let (width, height) = decoded.dimensions();
     let pixels = decoded.pixels().map(|p| p.0).collect();
     Ok(Raster::from_vec(width, height, pixels).unwrap_or_else(|| Raster::filled(0, 0, [0; 3])))
@@ -92,6 +102,12 @@ pub fn write_jpeg(path: &Path, picture: &RgbImage, quality: u8) -> Result<(), Im
             ExtendedColorType::Rgb8,
         )
     })
+}
+
+/// Whether a JPEG lacks the end-of-image marker after its last scan; decoders paint the missing part grey without a word.
+fn is_cut_off(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    bytes.starts_with(&[0xff, 0xd8]) && last([0xff, 0xd9]) < last([0xff, 0xda])
 }
 
 /// Writes whole or not at all.

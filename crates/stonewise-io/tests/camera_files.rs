@@ -1,4 +1,5 @@
 //! Camera files of every format against pixels computed elsewhere, and back through the writers.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use serde_json::Value;
@@ -177,7 +178,7 @@ fn views(lenses: &[Distortion], skew_px: f64) -> Vec<View> {
             image: ImageId(i as u32),
             name: format!("left & right <{i}>.jpg"),
             camera: Camera {
-                focal_px: [2900.123_456_789_1, 2899.1],
+                focal_px: [2_900.123_456_789_1, 2899.1],
                 center_px: [2010.3, 1480.0 / 3.0],
                 skew_px,
                 distortion: lens.clone(),

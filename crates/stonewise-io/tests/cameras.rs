@@ -1,4 +1,10 @@
 //! Camera files of the sample surveys: every format must describe the same photos.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "helpers of tests"
+)]
 
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};

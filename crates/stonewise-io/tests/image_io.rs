@@ -1,4 +1,5 @@
 //! Photos written and read.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::image_io::{image_size, read_rgb, write_jpeg, write_png_rgb};
@@ -49,6 +50,17 @@ fn errors_name_the_file() {
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     check();
     assert_eq!(image_size(&path).unwrap(), (40, 30));
+    write_jpeg(&path, &picture(), 95).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for length in [
+        bytes.len() / 2,
+        bytes.len() * 3 / 4,
+        bytes.len() - 10,
+        bytes.len() - 2,
+    ] {
+        std::fs::write(&path, &bytes[..length]).unwrap();
+        check();
+    }
     let nowhere = folder.path().join("nowhere/out.png");
     assert!(
         write_png_rgb(&nowhere, &picture())

@@ -1,4 +1,5 @@
 //! Mask files that are odd, broken or made by our own writers.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

@@ -1,4 +1,5 @@
 //! Finding the photo of each camera.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Rigid3, View};

@@ -80,7 +80,7 @@ impl Brown {
             let ([fx, fy], [a, b, d]) = self.with_jacobian(x, y);
             let (ex, ey) = (fx - xd, fy - yd);
             let det = a * d - b * b;
-            if !(det.abs() > 1e-12) {
+            if det.is_nan() || det.abs() <= 1e-12 {
                 return None;
             }
             let (dx, dy) = ((d * ex - b * ey) / det, (a * ey - b * ex) / det);

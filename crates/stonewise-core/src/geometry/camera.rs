@@ -41,7 +41,7 @@ impl Camera {
     /// would seem to be inside it.
     #[inline]
     pub fn project_camera_point(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
-        if !(point.z > 0.0) {
+        if point.z.is_nan() || point.z <= 0.0 {
             return None;
         }
         let [x, y] = self.distortion.distort([point.x / point.z, point.y / point.z])?;

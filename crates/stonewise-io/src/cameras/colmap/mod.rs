@@ -12,6 +12,7 @@ pub use write::write_colmap;
 use super::{CameraError, CameraFile};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Rigid3, View};
 use stonewise_core::id::ImageId;
@@ -63,17 +64,19 @@ fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
     let mut file = CameraFile::default();
     for raw in raw_images {
         let bad = |problem: String| super::malformed(images, raw.place.clone(), problem);
-        if !converted.contains_key(&raw.camera_id) {
-            let camera = raw_cameras.get(&raw.camera_id).ok_or_else(|| {
-                bad(format!(
-                    "photo {} names camera {}, which {} does not list",
-                    raw.name,
-                    raw.camera_id,
-                    cameras.display()
-                ))
-            })?;
-            converted.insert(raw.camera_id, model::camera(camera, &raw.name, cameras)?);
-        }
+        let camera = match converted.entry(raw.camera_id) {
+            Entry::Occupied(known) => known.get().clone(),
+            Entry::Vacant(new) => {
+                let listed = raw_cameras.get(&raw.camera_id).ok_or_else(|| {
+                    let (photo, id) = (&raw.name, raw.camera_id);
+                    bad(format!(
+                        "photo {photo} names camera {id}, which {} does not list",
+                        cameras.display()
+                    ))
+                })?;
+                new.insert(model::camera(listed, &raw.name, cameras)?).clone()
+            }
+        };
         let [w, x, y, z] = raw.rotation_wxyz;
         let quaternion = Quaternion::new(w, x, y, z);
         if !((quaternion.norm() - 1.0).abs() < 0.1 && raw.translation.iter().all(|v| v.is_finite())) {
@@ -84,7 +87,7 @@ fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {
         }
         file.views.push(View {
             image: ImageId(file.views.len() as u32),
-            camera: converted[&raw.camera_id].clone(),
+            camera,
             cam_from_world: Rigid3::from_parts(
                 Translation3::from(raw.translation),
                 UnitQuaternion::from_quaternion(quaternion),

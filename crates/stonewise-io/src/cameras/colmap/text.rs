@@ -18,7 +18,7 @@ pub fn read_cameras(path: &Path) -> Result<BTreeMap<u32, RawCamera>, CameraError
         let width = word(&mut words, "width", &place, path)?;
         let height = word(&mut words, "height", &place, path)?;
         let mut params = Vec::new();
-        while let Some(value) = words.next() {
+        for value in words {
             params.push(word(&mut std::iter::once(value), "parameter", &place, path)?);
         }
         cameras.insert(
@@ -79,7 +79,7 @@ fn image(line: &str, place: String, path: &Path) -> Result<RawImage, CameraError
 /// A file without the lines of image points would lose every second photo: refuse it.
 fn check_points(line: &str, number: usize, path: &Path) -> Result<(), CameraError> {
     let mut words = line.split_whitespace();
-    let is_valid = words.clone().count() % 3 == 0 && words.all(|w| w.parse::<f64>().is_ok());
+    let is_valid = words.clone().count().is_multiple_of(3) && words.all(|w| w.parse::<f64>().is_ok());
     if is_valid {
         Ok(())
     } else {

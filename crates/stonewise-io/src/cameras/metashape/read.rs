@@ -209,7 +209,7 @@ impl Similarity {
         }
         if let Some(scale) = element.child("scale") {
             [similarity.scale] = parse_numbers::<1>(&scale.text, scale, path)?;
-            if !(similarity.scale > 0.0) {
+            if similarity.scale <= 0.0 {
                 return Err(malformed(path, scale.place(), "scale must be positive"));
             }
         }
