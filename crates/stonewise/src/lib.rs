@@ -1,3 +1,4 @@
 //! stonewise
 
 pub mod report;
+pub mod simulate;

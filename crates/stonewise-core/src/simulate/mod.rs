@@ -14,6 +14,7 @@ mod scene;
 mod surface;
 mod survey;
 mod tls;
+mod truth;
 mod uav;
 mod wall;
 
@@ -29,5 +30,6 @@ pub use scene::{Hit, Scene, Target};
 pub use surface::{HeightGrid, Surface};
 pub use survey::{EpochScans, SceneParams, World, simulate_scans};
 pub use tls::{TlsParams, scan_terrestrial};
+pub use truth::{StoneTruth, photo_counts, point_counts, seen_share, stone_truths};
 pub use uav::{UavParams, scan_airborne};
 pub use wall::{SimStone, Wall, WallParams};

@@ -22,8 +22,10 @@ pub struct SceneParams {
     /// What happened between the epochs; they add up.
     pub motions: Vec<WallMotion>,
     /// Terrestrial scanner; absent = no such cloud.
+    #[serde(default)]
     pub tls: Option<TlsParams>,
     /// Scanner under a drone; absent = no such cloud.
+    #[serde(default)]
     pub uav: Option<UavParams>,
     /// Seed of the motions and measurements; the wall and its surroundings have their own.
     pub seed: u64,

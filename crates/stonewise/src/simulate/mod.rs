@@ -1,0 +1,12 @@
+//! Simulated surveys as files, which enter through the same door as real ones.
+
+mod error;
+mod params;
+mod photos;
+mod project_file;
+mod truth;
+mod write;
+
+pub use error::SimulateError;
+pub use params::{MaskFiles, SurveyParams};
+pub use write::{SurveySummary, write_survey};

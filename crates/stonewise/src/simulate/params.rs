@@ -1,0 +1,191 @@
+//! Everything about a simulated survey.
+
+use crate::simulate::SimulateError;
+use serde::{Deserialize, Serialize};
+use stonewise_core::simulate::{PhotoParams, SceneParams, TlsParams, WallMotion, WallParams};
+
+/// How the true masks are given to the project.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskFiles {
+    /// As COCO json, one file an epoch.
+    Coco,
+    /// As a folder of 16-bit label PNGs an epoch.
+    Png,
+    /// Not at all: the project's own segmentation is to find the stones.
+    None,
+}
+
+/// Parameters of a simulated survey; equal parameters give equal files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SurveyParams {
+    /// Name of the structure.
+    pub name: String,
+    /// How masks reach the project.
+    pub masks: MaskFiles,
+    /// Quality of the photos' JPEG, 1 to 100; 92 as cameras write it.
+    pub jpeg_quality: u8,
+    /// Wall, surroundings, motion and scanners.
+    pub scene: SceneParams,
+    /// Camera and flight.
+    pub photos: PhotoParams,
+}
+
+impl Default for SurveyParams {
+    fn default() -> Self {
+        Self {
+            name: "Simulated dam".to_owned(),
+            masks: MaskFiles::Coco,
+            jpeg_quality: 92,
+            scene: SceneParams::default(),
+            photos: PhotoParams::default(),
+        }
+    }
+}
+
+impl SurveyParams {
+    /// The survey of `stonewise demo`: 3 x 2 m that settle, swell, and have two loose stones; small photos, so that it is
+    /// made in seconds.
+    pub fn demo() -> Self {
+        let wall = WallParams {
+            width_m: 3.0,
+            height_m: 2.0,
+            course_m: 0.24,
+            aspect: 1.5,
+            seed: 7,
+            ..WallParams::default()
+        };
+        let motions = vec![
+            WallMotion::Settlement {
+                from_m: -1.5,
+                to_m: 1.5,
+                depth_m: 0.008,
+            },
+            WallMotion::Bulge {
+                centre_m: [-0.3, 1.1],
+                depth_m: 0.03,
+                diameter_m: 1.8,
+            },
+            WallMotion::Loose {
+                share: 0.0,
+                at_least: 2,
+                shift_m: [0.012, 0.02],
+                rotation_rad: 0.02,
+            },
+        ];
+        Self {
+            name: "Demo wall".to_owned(),
+            scene: SceneParams {
+                wall,
+                motions,
+                tls: Some(TlsParams {
+                    spacing_m: 0.006,
+                    ..TlsParams::default()
+                }),
+                seed: 7,
+                ..SceneParams::default()
+            },
+            photos: PhotoParams {
+                columns: 2,
+                rows: 2,
+                width: 1024,
+                height: 768,
+                focal_px: 1500.0,
+                distance_m: 6.0,
+                ..PhotoParams::default()
+            },
+            ..Self::default()
+        }
+    }
+
+    /// Checks that every value is possible.
+    ///
+    /// # Errors
+    /// Names the first that is not.
+    pub fn check(&self) -> Result<(), SimulateError> {
+        let (wall, photos) = (&self.scene.wall, &self.photos);
+        let positive = [
+            ("scene.wall.width_m", wall.width_m),
+            ("scene.wall.height_m", wall.height_m),
+            ("scene.wall.course_m", wall.course_m),
+            ("scene.wall.aspect", wall.aspect),
+            (
+                "scene.tls.spacing_m",
+                self.scene.tls.as_ref().map_or(1.0, |t| t.spacing_m),
+            ),
+            (
+                "scene.tls.distance_m",
+                self.scene.tls.as_ref().map_or(1.0, |t| t.distance_m),
+            ),
+            (
+                "scene.uav.spacing_m",
+                self.scene.uav.as_ref().map_or(1.0, |t| t.spacing_m),
+            ),
+            (
+                "scene.uav.distance_m",
+                self.scene.uav.as_ref().map_or(1.0, |t| t.distance_m),
+            ),
+            ("photos.focal_px", photos.focal_px),
+            ("photos.distance_m", photos.distance_m),
+        ];
+        for (key, value) in positive {
+            require(
+                value.is_finite() && value > 0.0,
+                key,
+                value,
+                "a positive number is needed",
+            )?;
+        }
+        let shares = [
+            ("scene.wall.tall_share", wall.tall_share),
+            ("scene.wall.split_share", wall.split_share),
+            ("scene.wall.flat_share", wall.flat_share),
+        ];
+        for (key, value) in shares {
+            require((0.0..=1.0).contains(&value), key, value, "a share is 0 to 1")?;
+        }
+        let widths = wall.joint_width_m;
+        require(
+            0.0 <= widths[0] && widths[0] <= widths[1],
+            "scene.wall.joint_width_m",
+            format!("{widths:?}"),
+            "smallest before largest, neither negative",
+        )?;
+        let size = photos.width.min(photos.height);
+        require(
+            size >= 16,
+            "photos.width",
+            size,
+            "photos have at least 16 pixels a side",
+        )?;
+        require(
+            photos.columns * photos.rows >= 1,
+            "photos.columns",
+            photos.columns,
+            "at least one photo is needed",
+        )?;
+        require(
+            self.scene.tls.is_some() || self.scene.uav.is_some(),
+            "scene.tls",
+            "none",
+            "a survey needs a cloud from tls, uav or both",
+        )
+    }
+}
+
+fn require(
+    fine: bool,
+    key: &'static str,
+    value: impl ToString,
+    needed: &'static str,
+) -> Result<(), SimulateError> {
+    if fine {
+        return Ok(());
+    }
+    Err(SimulateError::Parameter {
+        key,
+        value: value.to_string(),
+        needed,
+    })
+}
