@@ -1,0 +1,126 @@
+//! Everything that can stop a run.
+
+use crate::report::ReportError;
+use std::path::{Path, PathBuf};
+use stonewise_core::change::SurveyError;
+use stonewise_core::progress::Interrupted;
+use stonewise_core::registration::AdjustError;
+use stonewise_core::transfer::TransferError;
+
+/// Why a run, or a step of it, could not be done.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The project file does not parse, or holds an impossible value.
+    #[error("{path}:{line}: {message}", path = .path.display())]
+    Project {
+        /// The project file.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What is wrong, and the fix.
+        message: String,
+    },
+    /// A file could not be read or written.
+    #[error("{action} failed: {source}: {path}", path = .path.display())]
+    Io {
+        /// What was tried.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: std::io::Error,
+    },
+    /// An input cannot be used.
+    #[error("{message}: {path}", path = .path.display())]
+    Input {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong, and the fix.
+        message: String,
+    },
+    /// The inputs are fine one by one and impossible together.
+    #[error("{0}")]
+    Survey(String),
+    /// A point cloud could not be read or written.
+    #[error(transparent)]
+    Cloud(#[from] stonewise_io::cloud::CloudError),
+    /// A table could not be read or written.
+    #[error(transparent)]
+    Table(#[from] stonewise_io::table::TableError),
+    /// A camera file could not be read.
+    #[error(transparent)]
+    Cameras(#[from] stonewise_io::cameras::CameraError),
+    /// Masks could not be read.
+    #[error(transparent)]
+    Masks(#[from] stonewise_io::masks::MaskError),
+    /// Labels could not be carried into a cloud.
+    #[error(transparent)]
+    Transfer(TransferError),
+    /// Stones could not be measured.
+    #[error("{0}")]
+    Registration(String),
+    /// Clouds could not be compared.
+    #[error(transparent)]
+    Compare(SurveyError),
+    /// Results could not be written or read.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// The user stopped the run.
+    #[error("interrupted; run the same command again to continue")]
+    Interrupted,
+}
+
+impl From<Interrupted> for Error {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
+}
+
+impl From<TransferError> for Error {
+    fn from(error: TransferError) -> Self {
+        match error {
+            TransferError::Interrupted(_) => Self::Interrupted,
+            error => Self::Transfer(error),
+        }
+    }
+}
+
+impl From<SurveyError> for Error {
+    fn from(error: SurveyError) -> Self {
+        match error {
+            SurveyError::Interrupted(_) => Self::Interrupted,
+            error => Self::Compare(error),
+        }
+    }
+}
+
+impl From<AdjustError<Error>> for Error {
+    fn from(error: AdjustError<Error>) -> Self {
+        match error {
+            AdjustError::Interrupted(_) => Self::Interrupted,
+            AdjustError::Source(error) => error,
+            error => Self::Registration(error.to_string()),
+        }
+    }
+}
+
+impl Error {
+    /// Turns a system error into one that names the file.
+    pub(crate) fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Self + 'a {
+        move |source| Self::Io {
+            action,
+            path: path.to_path_buf(),
+            source,
+        }
+    }
+}
+
+/// Result of everything in this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Writes a text file whole or not at all.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
+    stonewise_io::atomic::write_atomically(path, |partial| std::fs::write(partial, text))
+        .map_err(Error::io("writing", path))
+}

@@ -1,0 +1,38 @@
+//! M3C2 between two epochs of a project.
+
+use crate::error::{Error, Result};
+use crate::pipeline::context::Context;
+use crate::pipeline::label::read_json;
+use crate::pipeline::step::Key;
+use crate::pipeline::tiled::Tiled;
+use nalgebra::Point3;
+use stonewise_core::change::{ChangeField, OutwardReference, m3c2_survey};
+use stonewise_core::geometry::View;
+
+/// Compares two epochs along the normals of the first; `views` tell which side is outside.
+pub fn compare(context: &Context, epochs: [&Tiled; 2], number: usize, views: &[View]) -> Result<ChangeField> {
+    let params = &context.project.settings.m3c2;
+    let motions = epochs.map(|e| &e.tiles.motion);
+    let key = Key::new("m3c2", &(params, motions), &epochs.map(|e| e.step.key().as_str()));
+    let step = context.step(&format!("m3c2-{number}"), key, |step, _| {
+        let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
+        let mut field = ChangeField::default();
+        let outward = OutwardReference::Towards(&centres);
+        m3c2_survey(
+            &epochs[0].tiles,
+            &epochs[1].tiles,
+            &outward,
+            params,
+            context.progress,
+            |_, tile| {
+                field.points.extend(tile.points);
+                Ok(())
+            },
+        )?;
+        let path = step.file("field.json");
+        let text = serde_json::to_vec(&field).unwrap_or_default();
+        stonewise_io::atomic::write_atomically(&path, |partial| std::fs::write(partial, text))
+            .map_err(Error::io("writing", &path))
+    })?;
+    read_json(&step.file("field.json"))
+}

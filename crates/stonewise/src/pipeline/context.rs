@@ -1,0 +1,139 @@
+//! What every step needs: where to work, whom to tell, how to resume.
+
+use crate::error::{Error, Result, write_text};
+use crate::pipeline::step::{Key, StepDir, path_digest};
+use crate::project::Project;
+use crate::warnings::{Warning, Warnings};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+use stonewise_core::progress::Progress;
+
+/// Wall time and memory of one step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepTime {
+    /// Name of the step.
+    pub step: String,
+    /// Wall time, seconds; small where earlier results were taken.
+    pub seconds: f64,
+    /// Whether the results of an earlier run were taken.
+    pub resumed: bool,
+    /// Highest memory of the process so far, bytes; `None` where the system does not tell.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+/// One run of a project in a folder.
+pub struct Context<'a> {
+    /// The project.
+    pub project: &'a Project,
+    /// Where results go.
+    pub out: PathBuf,
+    /// Where steps keep their files.
+    pub work: PathBuf,
+    /// Whom to tell, and who may stop the run.
+    pub progress: &'a dyn Progress,
+    /// What went wrong without stopping the run.
+    pub warnings: Warnings,
+    times: Mutex<Vec<StepTime>>,
+    digests: Mutex<BTreeMap<PathBuf, String>>,
+}
+
+impl<'a> Context<'a> {
+    /// Makes the folders of a run.
+    pub fn new(project: &'a Project, out: &Path, progress: &'a dyn Progress) -> Result<Self> {
+        let work = out.join("work");
+        fs::create_dir_all(&work).map_err(Error::io("making the result folder", &work))?;
+        Ok(Self {
+            project,
+            out: out.to_path_buf(),
+            work,
+            progress,
+            warnings: Warnings::default(),
+            times: Mutex::default(),
+            digests: Mutex::default(),
+        })
+    }
+
+    /// Does a step, or takes the files and warnings that the same step left earlier.
+    pub fn step(
+        &self,
+        name: &str,
+        key: Key,
+        make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
+    ) -> Result<StepDir> {
+        self.progress.check()?;
+        let started = Instant::now();
+        let dir = StepDir::open(&self.work, name, key)?;
+        let resumed = dir.is_done();
+        let noted = dir.file("warnings.json");
+        let warnings = if resumed {
+            let text = fs::read_to_string(&noted).map_err(Error::io("reading", &noted))?;
+            serde_json::from_str::<Vec<Warning>>(&text).map_err(|e| Error::Input {
+                path: noted,
+                message: format!("not a list of warnings ({e}); remove its folder"),
+            })?
+        } else {
+            let warnings = Warnings::default();
+            make(&dir, &warnings)?;
+            let text = serde_json::to_string_pretty(&warnings.sorted()).unwrap_or_default();
+            write_text(&noted, &text)?;
+            dir.finish()?;
+            warnings.sorted()
+        };
+        warnings.into_iter().for_each(|w| self.warnings.push(w));
+        self.record(name, started, resumed);
+        Ok(dir)
+    }
+
+    /// Does a piece of work that keeps nothing between runs, and notes its time.
+    pub fn timed<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        self.progress.check()?;
+        let started = Instant::now();
+        let result = work()?;
+        self.record(name, started, false);
+        Ok(result)
+    }
+
+    /// Digest of an input file or folder, read once a run.
+    pub fn digest(&self, path: &Path) -> Result<String> {
+        let mut known = self.digests.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(digest) = known.get(path) {
+            return Ok(digest.clone());
+        }
+        let digest = path_digest(path)?;
+        known.insert(path.to_path_buf(), digest.clone());
+        Ok(digest)
+    }
+
+    /// Times of all steps so far, in order.
+    pub fn times(&self) -> Vec<StepTime> {
+        self.times.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn record(&self, step: &str, started: Instant, resumed: bool) {
+        let time = StepTime {
+            step: step.to_owned(),
+            seconds: started.elapsed().as_secs_f64(),
+            resumed,
+            peak_memory_bytes: peak_memory_bytes(),
+        };
+        self.times
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(time);
+    }
+}
+
+/// Highest resident memory of this process, where Linux tells it.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    line.split_whitespace()
+        .nth(1)?
+        .parse::<u64>()
+        .ok()
+        .map(|kib| kib * 1024)
+}

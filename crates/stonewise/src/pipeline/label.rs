@@ -1,0 +1,147 @@
+//! An epoch's points with the stone of each.
+
+use crate::error::{Error, Result, write_text};
+use crate::pipeline::context::Context;
+use crate::pipeline::photos::Segmented;
+use crate::pipeline::step::{Key, StepDir};
+use crate::pipeline::tiled::Tiled;
+use crate::pipeline::tiles::DiskTiles;
+use serde::Deserialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+use stonewise_core::cloud::TileSource;
+use stonewise_core::stone::Stone;
+use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
+use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// A labelled epoch: its points (moved, where the project says so), their labels, its stones.
+pub struct Labelled {
+    /// Points.
+    pub tiled: Tiled,
+    /// Stones, ascending by id.
+    pub stones: Vec<Stone>,
+    /// Which instances make up each stone, and what was decided about them.
+    pub transfer: Transfer,
+    /// Key of everything above.
+    pub key: Key,
+    store: DiskLabels,
+}
+
+impl Labelled {
+    /// Labels of a tile's points.
+    pub fn labels(&self, tile: usize) -> Result<TileLabels> {
+        self.store.read(tile)
+    }
+}
+
+/// Carries the photos' labels into the points of an epoch; then moves the points, where the project says so.
+pub fn label(context: &Context, number: usize, tiled: Tiled, photos: &Segmented) -> Result<Labelled> {
+    let params = &context.project.settings.transfer;
+    let tiles = &tiled.tiles.surveyed;
+    let key = Key::new(
+        "label",
+        params,
+        &[tiled.step.key().as_str(), photos.step.key().as_str()],
+    );
+    let step = context.step(&format!("label-{number}"), key, |step, _| {
+        let mut store = DiskLabels::new(step.path(), tiles);
+        let mask = |image| photos.labels(image).map(Some);
+        let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
+        write_text(
+            &step.file("transfer.json"),
+            &serde_json::to_string(&transfer).unwrap_or_default(),
+        )
+    })?;
+    let transfer = read_json(&step.file("transfer.json"))?;
+    let store = DiskLabels::new(step.path(), tiles);
+    tabulate(context, number, photos, tiled, transfer, store, &step)
+}
+
+fn tabulate(
+    context: &Context,
+    number: usize,
+    photos: &Segmented,
+    tiled: Tiled,
+    transfer: Transfer,
+    store: DiskLabels,
+    labelled: &StepDir,
+) -> Result<Labelled> {
+    let params = &context.project.settings.stones;
+    let key = Key::new(
+        "stones",
+        &(params, &tiled.tiles.motion),
+        &[labelled.key().as_str()],
+    );
+    let step = context.step(&format!("stones-{number}"), key, |step, _| {
+        let stones = build_stones(
+            &tiled.tiles,
+            &store,
+            &photos.views,
+            &transfer.stones,
+            params,
+            context.progress,
+        )?;
+        write_text(
+            &step.file("stones.json"),
+            &serde_json::to_string(&stones).unwrap_or_default(),
+        )
+    })?;
+    let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
+    if stones.is_empty() {
+        return Err(Error::Survey(format!(
+            "no stone of epoch {:?} got any points: do its cameras and clouds share one frame?",
+            context.project.epochs[number - 1].name
+        )));
+    }
+    Ok(Labelled {
+        tiled,
+        stones,
+        transfer,
+        key: step.key().clone(),
+        store,
+    })
+}
+
+/// Reads what an earlier step wrote.
+pub(crate) fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
+    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    serde_json::from_str(&text).map_err(|e| Error::Input {
+        path: path.to_path_buf(),
+        message: format!("damaged ({e}); remove its folder"),
+    })
+}
+
+/// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
+struct DiskLabels {
+    files: Vec<PathBuf>,
+}
+
+impl DiskLabels {
+    fn new(dir: &Path, tiles: &DiskTiles) -> Self {
+        let file = |tile| dir.join(format!("{}.parquet", tiles.name(tile)));
+        Self {
+            files: (0..tiles.tile_count()).map(file).collect(),
+        }
+    }
+}
+
+impl LabelStore for DiskLabels {
+    type Error = Error;
+
+    fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<()> {
+        let mut table = Table::new();
+        table.push("stone", labels.stone.clone())?;
+        table.push("confidence", labels.confidence.clone())?;
+        table.push("seen", labels.seen.clone())?;
+        Ok(write_parquet(&self.files[tile], &table)?)
+    }
+
+    fn read(&self, tile: usize) -> Result<TileLabels> {
+        let table = read_columns(&self.files[tile], &["stone", "confidence", "seen"])?;
+        Ok(TileLabels {
+            stone: table.required("stone")?.to_vec(),
+            confidence: table.required("confidence")?.to_vec(),
+            seen: table.required("seen")?.to_vec(),
+        })
+    }
+}

@@ -1,0 +1,99 @@
+//! The same stones in two epochs.
+
+use crate::error::{Error, Result, write_text};
+use crate::pipeline::context::Context;
+use crate::pipeline::label::{Labelled, read_json};
+use crate::pipeline::step::Key;
+use nalgebra::Point3;
+use std::collections::HashSet;
+use stonewise_core::cloud::TileSource;
+use stonewise_core::id::StoneId;
+use stonewise_core::matching::{MatchReport, Surroundings, match_stones};
+use stonewise_core::stone::MatchOutcome;
+
+/// Edge of the cells in which the second epoch's coverage is noted, metres: about half a stone.
+const COVERAGE_CELL_M: f64 = 0.1;
+
+/// Matches of two epochs.
+pub struct Matched {
+    /// What became of every stone.
+    pub report: MatchReport,
+    /// Key of the step.
+    pub key: Key,
+}
+
+impl Matched {
+    /// Matched stones, ascending by stone of the first epoch.
+    pub fn pairs(&self) -> Vec<(StoneId, StoneId)> {
+        let partner = |(first, outcome): &(StoneId, MatchOutcome)| match outcome {
+            MatchOutcome::Matched { second } => Some((*first, *second)),
+            MatchOutcome::Unmatched(_) => None,
+        };
+        self.report.outcomes.iter().filter_map(partner).collect()
+    }
+}
+
+/// Finds the stones of the first epoch in the second.
+pub fn find_partners(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+    number: usize,
+) -> Result<Matched> {
+    let params = &context.project.settings.matching;
+    let key = Key::new("match", params, &[first.key.as_str(), second.key.as_str()]);
+    let step = context.step(&format!("match-{number}"), key, |step, _| {
+        let covered = coverage(context, second)?;
+        let sees = |p: &Point3<f64>| neighbourhood(cell_of(p)).any(|cell| covered.contains(&cell));
+        let surroundings = Surroundings {
+            covered: &sees,
+            overlap: None,
+        };
+        let report = match_stones(&first.stones, &second.stones, &surroundings, params);
+        write_text(
+            &step.file("matches.json"),
+            &serde_json::to_string(&report).unwrap_or_default(),
+        )
+    })?;
+    let matched = Matched {
+        report: read_json(&step.file("matches.json"))?,
+        key: step.key().clone(),
+    };
+    if matched.pairs().is_empty() {
+        let names = [0, number - 1].map(|e| context.project.epochs[e].name.clone());
+        return Err(Error::Survey(format!(
+            "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both epochs show the same wall, \
+             in one frame?",
+            names[0],
+            names[1],
+            first.stones.len(),
+            second.stones.len()
+        )));
+    }
+    Ok(matched)
+}
+
+type Cell = [i64; 3];
+
+/// Cells that hold points which a photo of the epoch sees.
+fn coverage(context: &Context, epoch: &Labelled) -> Result<HashSet<Cell>> {
+    let mut covered = HashSet::new();
+    for tile in 0..epoch.tiled.tiles.tile_count() {
+        context.progress.check()?;
+        let (cloud, labels) = (epoch.tiled.tiles.load(tile)?, epoch.labels(tile)?);
+        covered.extend(
+            (0..cloud.len())
+                .filter(|&i| labels.seen[i])
+                .map(|i| cell_of(&cloud.world(i))),
+        );
+    }
+    Ok(covered)
+}
+
+fn cell_of(p: &Point3<f64>) -> Cell {
+    [0, 1, 2].map(|axis| (p[axis] / COVERAGE_CELL_M).floor() as i64)
+}
+
+fn neighbourhood(cell: Cell) -> impl Iterator<Item = Cell> {
+    (0..27i64).map(move |i| [cell[0] + i % 3 - 1, cell[1] + i / 3 % 3 - 1, cell[2] + i / 9 - 1])
+}

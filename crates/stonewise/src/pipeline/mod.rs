@@ -1,0 +1,22 @@
+//! The steps of the method, with their files, and the run that strings them together.
+
+mod clouds_out;
+mod compare;
+mod context;
+mod epoch_tiles;
+mod label;
+mod matching;
+mod pairs;
+mod photos;
+mod registration;
+mod run;
+mod run_record;
+mod score;
+mod series;
+mod spill;
+mod step;
+mod tables;
+mod tiled;
+mod tiles;
+
+pub use run::{Summary, Until, run};

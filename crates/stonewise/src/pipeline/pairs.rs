@@ -1,0 +1,186 @@
+//! Points of matched stones, gathered from the tiles of two epochs into batches of neighbours on disk.
+
+use crate::error::{Error, Result};
+use crate::pipeline::label::Labelled;
+use crate::pipeline::spill::{Spill, SpillBins};
+use crate::pipeline::step::StepDir;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::id::StoneId;
+use stonewise_core::progress::Progress;
+use stonewise_core::registration::{PairPoints, PairSource};
+use stonewise_core::stone::Stone;
+use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// Stones in a batch: at 20,000 points an epoch, 30 MB.
+const BATCH: usize = 64;
+/// Edge of the cells by which stones are sorted into neighbourhoods, metres.
+const NEIGHBOURHOOD_M: f64 = 4.0;
+
+/// Matched pairs whose points lie in one file a batch.
+pub struct DiskPairs {
+    dir: PathBuf,
+    batches: Vec<Vec<(Stone, Stone)>>,
+}
+
+impl DiskPairs {
+    /// Gathers the points of the matched stones of two epochs into the step's folder.
+    pub fn gather(
+        first: &Labelled,
+        second: &Labelled,
+        matches: &[(StoneId, StoneId)],
+        step: &StepDir,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let pairs = Self {
+            dir: step.path().to_path_buf(),
+            batches: batches(first, second, matches),
+        };
+        let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
+        pairs.spill(first, 0, &mut spill, progress)?;
+        pairs.spill(second, 1, &mut spill, progress)?;
+        let bins = spill.finish()?;
+        (0..pairs.batches.len())
+            .into_par_iter()
+            .try_for_each(|b| write_batch(&bins, b, &pairs.file(b)))?;
+        Ok(pairs)
+    }
+
+    /// The stones of all pairs, batch by batch.
+    pub fn stones(&self) -> impl Iterator<Item = &(Stone, Stone)> {
+        self.batches.iter().flatten()
+    }
+
+    fn file(&self, batch: usize) -> PathBuf {
+        self.dir.join(format!("pairs-{batch:05}.parquet"))
+    }
+
+    /// Sends every point of a matched stone to its batch, relative to the stone's centroid in the first epoch.
+    fn spill(
+        &self,
+        epoch: &Labelled,
+        which: u16,
+        spill: &mut Spill<u32>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let mut places = BTreeMap::new();
+        for (batch, pairs) in self.batches.iter().enumerate() {
+            for (slot, pair) in pairs.iter().enumerate() {
+                let stone = if which == 0 { pair.0.id } else { pair.1.id };
+                places.insert(stone.0, (batch as u32, slot as u16, pair.0.centroid));
+            }
+        }
+        progress.begin("gather stones", epoch.tiled.tiles.tile_count() as u64);
+        for tile in 0..epoch.tiled.tiles.tile_count() {
+            progress.check()?;
+            let labels = epoch.labels(tile)?;
+            if labels.stone.iter().any(|s| places.contains_key(s)) {
+                let cloud = epoch.tiled.tiles.load(tile)?;
+                for (i, stone) in labels.stone.iter().enumerate() {
+                    if let Some((batch, slot, centre)) = places.get(stone) {
+                        let offset = (cloud.world(i) - centre).cast::<f32>();
+                        spill.push(*batch, &encode(*slot, which, [offset.x, offset.y, offset.z]))?;
+                    }
+                }
+            }
+            progress.advance(1);
+        }
+        Ok(())
+    }
+}
+
+impl PairSource for DiskPairs {
+    type Error = Error;
+
+    fn batch_count(&self) -> usize {
+        self.batches.len()
+    }
+
+    fn load(&self, batch: usize) -> Result<Vec<PairPoints>> {
+        let pairs = &self.batches[batch];
+        let table = read_columns(&self.file(batch), &["slot", "epoch", "x", "y", "z"])?;
+        let (slot, epoch) = (table.required::<u32>("slot")?, table.required::<u32>("epoch")?);
+        let (x, y, z) = (
+            table.required::<f32>("x")?,
+            table.required::<f32>("y")?,
+            table.required::<f32>("z")?,
+        );
+        let mut offsets = vec![[Vec::new(), Vec::new()]; pairs.len()];
+        for i in 0..slot.len() {
+            offsets[slot[i] as usize][epoch[i] as usize].push([x[i], y[i], z[i]]);
+        }
+        let loaded = pairs
+            .iter()
+            .zip(offsets)
+            .map(|((a, b), [first, second])| PairPoints {
+                first: a.id,
+                second: b.id,
+                centroid: a.centroid,
+                centroid_second: b.centroid,
+                normal: a.normal,
+                points_first: Cloud::new(a.centroid, first),
+                points_second: Cloud::new(a.centroid, second),
+            });
+        Ok(loaded.collect())
+    }
+}
+
+/// Pairs in batches of neighbours: sorted by the cell of the first centroid, then by stone.
+fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<Vec<(Stone, Stone)>> {
+    let by_id = |epoch: &Labelled| {
+        epoch
+            .stones
+            .iter()
+            .map(|s| (s.id, s.clone()))
+            .collect::<BTreeMap<_, _>>()
+    };
+    let (ones, twos) = (by_id(first), by_id(second));
+    let mut pairs: Vec<(Stone, Stone)> = matches
+        .iter()
+        .filter_map(|(a, b)| Some((ones.get(a)?.clone(), twos.get(b)?.clone())))
+        .collect();
+    let cell = |stone: &Stone| [0, 1, 2].map(|a| (stone.centroid[a] / NEIGHBOURHOOD_M).floor() as i64);
+    pairs.sort_by_key(|(a, _)| (cell(a), a.id));
+    pairs.chunks(BATCH).map(<[_]>::to_vec).collect()
+}
+
+const RECORD: usize = 16;
+
+fn encode(slot: u16, epoch: u16, offset: [f32; 3]) -> [u8; RECORD] {
+    let mut record = [0; RECORD];
+    record[..2].copy_from_slice(&slot.to_le_bytes());
+    record[2..4].copy_from_slice(&epoch.to_le_bytes());
+    for axis in 0..3 {
+        record[4 + 4 * axis..8 + 4 * axis].copy_from_slice(&offset[axis].to_le_bytes());
+    }
+    record
+}
+
+fn write_batch(bins: &SpillBins<u32>, batch: usize, path: &std::path::Path) -> Result<()> {
+    let bytes = if bins.keys().contains(&(batch as u32)) {
+        bins.read(&(batch as u32))?
+    } else {
+        Vec::new()
+    };
+    let records = bytes.chunks_exact(RECORD);
+    let short = |r: &[u8], at: usize| u32::from(u16::from_le_bytes([r[at], r[at + 1]]));
+    let real = |r: &[u8], at: usize| f32::from_le_bytes([r[at], r[at + 1], r[at + 2], r[at + 3]]);
+    let mut table = Table::new();
+    table.push("slot", records.clone().map(|r| short(r, 0)).collect::<Vec<u32>>())?;
+    table.push(
+        "epoch",
+        records.clone().map(|r| short(r, 2)).collect::<Vec<u32>>(),
+    )?;
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        table.push(
+            name,
+            records
+                .clone()
+                .map(|r| real(r, 4 + 4 * axis))
+                .collect::<Vec<f32>>(),
+        )?;
+    }
+    Ok(write_parquet(path, &table)?)
+}

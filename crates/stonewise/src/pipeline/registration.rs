@@ -1,0 +1,68 @@
+//! The motion of every matched stone.
+
+use crate::error::{Result, write_text};
+use crate::pipeline::context::Context;
+use crate::pipeline::label::{Labelled, read_json};
+use crate::pipeline::matching::Matched;
+use crate::pipeline::pairs::DiskPairs;
+use crate::pipeline::step::Key;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use stonewise_core::registration::{NetworkReport, adjust};
+use stonewise_core::stone::PairResult;
+
+/// Motions of a pair of epochs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Registered {
+    /// One result per matched stone, ascending by stone of the first epoch.
+    pub results: Vec<PairResult>,
+    /// What the estimator says about itself: noise, datum, breaks.
+    pub summary: serde_json::Value,
+}
+
+/// Measures the motion of every matched stone.
+pub fn register(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+    matched: &Matched,
+    number: usize,
+) -> Result<Registered> {
+    let params = &context.project.settings.registration;
+    let key = Key::new(
+        "register",
+        params,
+        &[first.key.as_str(), second.key.as_str(), matched.key.as_str()],
+    );
+    let step = context.step(&format!("register-{number}"), key, |step, _| {
+        let pairs = DiskPairs::gather(first, second, &matched.pairs(), step, context.progress)?;
+        let registered = of_network(adjust(&pairs, &params.network, context.progress)?);
+        write_text(
+            &step.file("motions.json"),
+            &serde_json::to_string(&registered).unwrap_or_default(),
+        )
+    })?;
+    read_json(&step.file("motions.json"))
+}
+
+fn of_network(mut report: NetworkReport) -> Registered {
+    report.results.sort_by_key(|r| r.first);
+    let summary = json!({
+        "estimator": "network",
+        "noise_m": report.sigma_m,
+        "roughness_m": report.roughness_m,
+        "surface_cell_m": report.cell_m,
+        "correlation_factor": report.correlation_factor,
+        "variance_components": report.components,
+        "common_motion_m": report.common_motion,
+        "common_motion_covariance_m2": report.common_covariance,
+        "iterations": report.iterations,
+        "converged": report.converged,
+        "loose": report.loose,
+        "breaks": report.breaks,
+    });
+    Registered {
+        results: report.results,
+        summary,
+    }
+}

@@ -1,0 +1,48 @@
+//! Points of an epoch, ready to be worked on tile by tile.
+
+use crate::error::{Error, Result};
+use crate::pipeline::context::Context;
+use crate::pipeline::epoch_tiles::EpochTiles;
+use crate::pipeline::step::{Key, StepDir};
+use crate::pipeline::tiles::{DiskTiles, ingest};
+use stonewise_core::cloud::TileSource;
+
+/// The tiles of an epoch and the step that made them.
+pub struct Tiled {
+    /// Folder and key of the tiles as surveyed.
+    pub step: StepDir,
+    /// The tiles, moved where the project says so.
+    pub tiles: EpochTiles,
+}
+
+/// Cuts the clouds of an epoch into tiles.
+pub fn tile_epoch(context: &Context, number: usize) -> Result<Tiled> {
+    let epoch = &context.project.epochs[number - 1];
+    let digests = epoch
+        .clouds
+        .iter()
+        .map(|c| context.digest(c))
+        .collect::<Result<Vec<_>>>()?;
+    let inputs: Vec<&str> = digests.iter().map(String::as_str).collect();
+    let size_m = context.project.settings.tiles.size_m;
+    let key = Key::new("ingest", &context.project.settings.tiles, &inputs);
+    let step = context.step(&format!("ingest-{number}"), key, |step, warnings| {
+        let invalid = ingest(&epoch.clouds, size_m, step, context.progress)?;
+        if invalid > 0 {
+            let message = format!("{invalid} points without finite coordinates are left out");
+            warnings.notice("ingest", epoch.name.clone(), message);
+        }
+        Ok(())
+    })?;
+    let tiles = EpochTiles {
+        surveyed: DiskTiles::open(step.path())?,
+        motion: epoch.motion.clone(),
+    };
+    if tiles.tile_count() == 0 {
+        return Err(Error::Survey(format!(
+            "the clouds of epoch {:?} hold no points",
+            epoch.name
+        )));
+    }
+    Ok(Tiled { step, tiles })
+}

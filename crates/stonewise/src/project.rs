@@ -1,0 +1,252 @@
+//! The project file: which surveys, and every parameter of every step.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use stonewise_core::change::M3c2Params;
+use stonewise_core::evaluate::{EvaluationParams, MotionField};
+use stonewise_core::matching::MatchParams;
+use stonewise_core::registration::NetworkParams;
+use stonewise_core::transfer::{StoneParams, TransferParams};
+use toml::Spanned;
+
+/// A checked project: paths exist, values are possible.
+#[derive(Clone, Debug)]
+pub struct Project {
+    /// The project file itself.
+    pub path: PathBuf,
+    /// Name of the structure.
+    pub name: String,
+    /// The surveys, in time order; two at least.
+    pub epochs: Vec<Epoch>,
+    /// Parameters of all steps.
+    pub settings: Settings,
+}
+
+/// One survey.
+#[derive(Clone, Debug)]
+pub struct Epoch {
+    /// Name, as reports show it.
+    pub name: String,
+    /// Point clouds, all in one frame.
+    pub clouds: Vec<PathBuf>,
+    /// Folder of the photos.
+    pub images: PathBuf,
+    /// Camera file or COLMAP folder.
+    pub cameras: PathBuf,
+    /// COCO json or folder of label PNGs.
+    pub masks: Option<PathBuf>,
+    /// Known motion of the points, applied after labelling.
+    pub motion: Option<MotionField>,
+}
+
+/// Parameters of all steps, one table each in the project file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// How clouds are cut.
+    pub tiles: TileParams,
+    /// Photo labels to points.
+    pub transfer: TransferParams,
+    /// The table of stones.
+    pub stones: StoneParams,
+    /// Stones across epochs.
+    pub matching: MatchParams,
+    /// One motion per stone.
+    pub registration: RegistrationParams,
+    /// Comparison along normals.
+    pub m3c2: M3c2Params,
+    /// Scoring against a known motion.
+    pub evaluation: EvaluationParams,
+}
+
+/// How clouds are cut into tiles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TileParams {
+    /// Edge of a tile, metres. 4 m keeps offsets exact to a micrometre and a dense tile under 20 MB.
+    pub size_m: f64,
+}
+
+impl Default for TileParams {
+    fn default() -> Self {
+        Self { size_m: 4.0 }
+    }
+}
+
+/// Which estimator measures the stones, and its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegistrationParams {
+    /// Standard deviation of the epochs' common registration, per axis, metres; it enters absolute uncertainty.
+    pub epoch_error_m: f64,
+    /// Parameters of the network adjustment.
+    pub network: NetworkParams,
+}
+
+impl Default for RegistrationParams {
+    fn default() -> Self {
+        Self {
+            epoch_error_m: 0.0,
+            network: NetworkParams::default(),
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawProject {
+    project: RawHeader,
+    epochs: Vec<RawEpoch>,
+    #[serde(default)]
+    tiles: TileParams,
+    #[serde(default)]
+    transfer: TransferParams,
+    #[serde(default)]
+    stones: StoneParams,
+    #[serde(default)]
+    matching: MatchParams,
+    #[serde(default)]
+    registration: RegistrationParams,
+    #[serde(default)]
+    m3c2: M3c2Params,
+    #[serde(default)]
+    evaluation: EvaluationParams,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawHeader {
+    name: Spanned<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEpoch {
+    name: Spanned<String>,
+    clouds: Spanned<Vec<Spanned<PathBuf>>>,
+    images: Spanned<PathBuf>,
+    cameras: Spanned<PathBuf>,
+    masks: Option<Spanned<PathBuf>>,
+    motion: Option<MotionField>,
+}
+
+impl Project {
+    /// Reads and checks a project file.
+    ///
+    /// Errors name the line: a key that is not known, a file that does not exist, a value that cannot be.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(Error::io("reading the project file", path))?;
+        let source = Source { path, text: &text };
+        let raw: RawProject = toml::from_str(&text)
+            .map_err(|e| source.error(e.span().unwrap_or(0..0), e.message().trim().replace('\n', "; ")))?;
+        if raw.epochs.len() < 2 {
+            let at = text.find("[[epochs]]").unwrap_or(0);
+            return Err(source.error(at..at, "two [[epochs]] at least are needed, in time order"));
+        }
+        let settings = Settings {
+            tiles: raw.tiles,
+            transfer: raw.transfer,
+            stones: raw.stones,
+            matching: raw.matching,
+            registration: raw.registration,
+            m3c2: raw.m3c2,
+            evaluation: raw.evaluation,
+        };
+        source.check_settings(&settings)?;
+        let epochs = raw
+            .epochs
+            .into_iter()
+            .map(|e| source.epoch(e))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            name: raw.project.name.into_inner(),
+            epochs,
+            settings,
+        })
+    }
+}
+
+/// The text of a project file, to point into.
+struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl Source<'_> {
+    fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        let line = self.text.get(..span.start).unwrap_or("").matches('\n').count() + 1;
+        Error::Project {
+            path: self.path.to_path_buf(),
+            line,
+            message: message.into(),
+        }
+    }
+
+    fn epoch(&self, raw: RawEpoch) -> Result<Epoch> {
+        if raw.clouds.get_ref().is_empty() {
+            return Err(self.error(raw.clouds.span(), "an epoch needs one cloud at least"));
+        }
+        if raw.name.get_ref().trim().is_empty() {
+            return Err(self.error(raw.name.span(), "an epoch needs a name"));
+        }
+        let clouds = raw.clouds.into_inner();
+        Ok(Epoch {
+            name: raw.name.into_inner(),
+            clouds: clouds
+                .into_iter()
+                .map(|c| self.existing(c))
+                .collect::<Result<_>>()?,
+            images: self.existing(raw.images)?,
+            cameras: self.existing(raw.cameras)?,
+            masks: raw.masks.map(|m| self.existing(m)).transpose()?,
+            motion: raw.motion,
+        })
+    }
+
+    /// The path relative to the project file, which must exist.
+    fn existing(&self, raw: Spanned<PathBuf>) -> Result<PathBuf> {
+        let path = self.path.parent().unwrap_or(Path::new("")).join(raw.get_ref());
+        if path.exists() {
+            return Ok(path);
+        }
+        Err(self.error(
+            raw.span(),
+            format!(
+                "no such file or folder: {} (paths are relative to the project file)",
+                path.display()
+            ),
+        ))
+    }
+
+    /// Ranges that the types do not carry.
+    fn check_settings(&self, settings: &Settings) -> Result<()> {
+        let checks = [
+            (
+                "size_m",
+                settings.tiles.size_m,
+                settings.tiles.size_m >= 0.5,
+                "at least 0.5 m",
+            ),
+            (
+                "epoch_error_m",
+                settings.registration.epoch_error_m,
+                settings.registration.epoch_error_m >= 0.0,
+                "0 or more",
+            ),
+        ];
+        for (key, value, possible, range) in checks {
+            if !possible || !value.is_finite() {
+                let at = self.text.find(key).unwrap_or(0);
+                return Err(self.error(
+                    at..at,
+                    format!("{key} = {value} is not possible: it must be {range}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}
