@@ -57,4 +57,3 @@ pub struct InitArgs {
     /// Folder with one folder per epoch, in time order by name.
     pub dir: PathBuf,
 }
-

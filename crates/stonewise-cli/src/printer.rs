@@ -31,7 +31,13 @@ impl Printer {
             note("Ctrl-C cannot be caught here; it will stop at once");
         }
         let terminal = std::io::stderr().is_terminal();
-        Self { bar: Mutex::new(ProgressBar::hidden()), quiet, terminal, cancelled, started: Instant::now() }
+        Self {
+            bar: Mutex::new(ProgressBar::hidden()),
+            quiet,
+            terminal,
+            cancelled,
+            started: Instant::now(),
+        }
     }
 
     /// One line of the log.
@@ -59,12 +65,16 @@ impl Progress for Printer {
         let mut bar = self.bar();
         bar.finish_and_clear();
         if !self.terminal {
-            note(&format!("[{:7.1} s] {what}", self.started.elapsed().as_secs_f64()));
+            note(&format!(
+                "[{:7.1} s] {what}",
+                self.started.elapsed().as_secs_f64()
+            ));
             return;
         }
         let style = ProgressStyle::with_template("{msg:28} {bar:30} {percent:>3} % {eta:>5}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
-        *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8)).with_style(style);
+        *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8))
+            .with_style(style);
         bar.set_message(what.to_owned());
     }
 

@@ -50,7 +50,11 @@ fn tiled(points: &[Point3<f64>], numbers: &[u32]) -> Tiled {
         tiles: MemoryTiles::new(cells.iter().map(|(key, ids)| cloud(key, ids))),
         numbers: cells
             .values()
-            .map(|ids| ids.iter().map(|&i| numbers.get(i).copied().unwrap_or(0)).collect())
+            .map(|ids| {
+                ids.iter()
+                    .map(|&i| numbers.get(i).copied().unwrap_or(0))
+                    .collect()
+            })
             .collect(),
     }
 }
@@ -69,7 +73,10 @@ fn positions(path: &Path) -> Vec<Point3<f64>> {
 fn true_stones(path: &Path) -> Vec<u32> {
     let data = las::Reader::from_path(path).unwrap().read_all().unwrap();
     let number = |record: &[u8]| u32::from_le_bytes(record[record.len() - 6..][..4].try_into().unwrap());
-    data.raw_bytes().chunks_exact(data.record_len()).map(number).collect()
+    data.raw_bytes()
+        .chunks_exact(data.record_len())
+        .map(number)
+        .collect()
 }
 
 struct Labelled {
@@ -117,7 +124,9 @@ fn label_dam(survey: &Path, epoch: usize, sensor: &str) -> Labelled {
     let points = positions(&epoch_dir.join(format!("cloud_{sensor}.laz")));
     let truth = true_stones(&survey.join(format!("truth/epoch{epoch}_cloud_{sensor}_truth.laz")));
     assert_eq!(points.len(), truth.len());
-    let views = read_cameras(&epoch_dir.join("cameras_metashape.xml")).unwrap().views;
+    let views = read_cameras(&epoch_dir.join("cameras_metashape.xml"))
+        .unwrap()
+        .views;
     let masks = MaskSource::open(&survey.join(format!("truth/masks/epoch{epoch}_coco.json"))).unwrap();
     label(tiled(&points, &truth), &views, |image| {
         let view = views.iter().find(|v| v.image == image).unwrap();
@@ -151,7 +160,11 @@ impl Labelled {
         for tile in 0..self.tiled.tiles.tile_count() {
             let cloud = self.tiled.tiles.load(tile).unwrap();
             let seen = &self.labels.tiles[tile].seen;
-            cells.extend((0..cloud.len()).filter(|&i| seen[i]).map(|i| cell(&cloud.world(i))));
+            cells.extend(
+                (0..cloud.len())
+                    .filter(|&i| seen[i])
+                    .map(|i| cell(&cloud.world(i))),
+            );
         }
         cells
     }
@@ -167,7 +180,12 @@ fn matched(first: &Labelled, second: &Labelled) -> MatchReport {
         covered: &|p| seen.contains(&cell(p)),
         overlap: None,
     };
-    match_stones(&first.stones, &second.stones, &surroundings, &MatchParams::default())
+    match_stones(
+        &first.stones,
+        &second.stones,
+        &surroundings,
+        &MatchParams::default(),
+    )
 }
 
 /// Stones that count: measured in both epochs to 35 % of their face, not cut by the section's end.
@@ -176,7 +194,11 @@ fn countable(survey: &Path, sensor: &str) -> BTreeSet<u32> {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| names.iter().position(|n| *n == name).unwrap();
-    let (id, edge, seen) = (column("stone_id"), column("edge"), column(&format!("vis_{sensor}")));
+    let (id, edge, seen) = (
+        column("stone_id"),
+        column("edge"),
+        column(&format!("vis_{sensor}")),
+    );
     lines
         .map(|line| line.split(',').collect::<Vec<_>>())
         .filter(|row| row[edge] == "0" && row[seen].parse::<f64>().unwrap() >= 0.35)
@@ -191,7 +213,11 @@ struct Pairs {
 }
 
 fn judge(report: &MatchReport, first: &BTreeMap<u32, u32>, second: &BTreeMap<u32, u32>) -> Pairs {
-    let mut pairs = Pairs { right: BTreeSet::new(), wrong: 0, total: 0 };
+    let mut pairs = Pairs {
+        right: BTreeSet::new(),
+        wrong: 0,
+        total: 0,
+    };
     let mut reasons: BTreeMap<String, usize> = BTreeMap::new();
     for (StoneId(a), outcome) in &report.outcomes {
         let MatchOutcome::Matched { second: StoneId(b) } = outcome else {
@@ -241,7 +267,12 @@ fn dam_points_carry_their_stones_and_the_stones_match() {
             let report = matched(&epochs[0], &epochs[1]);
             let pairs = judge(&report, &epochs[0].owners(), &epochs[1].owners());
             let found = pairs.right.intersection(&counted).count();
-            println!("  matched {found} of {} countable, {} wrong of {}", counted.len(), pairs.wrong, pairs.total);
+            println!(
+                "  matched {found} of {} countable, {} wrong of {}",
+                counted.len(),
+                pairs.wrong,
+                pairs.total
+            );
             let missing: Vec<_> = counted.difference(&pairs.right).collect();
             println!("  missing {missing:?}");
         }

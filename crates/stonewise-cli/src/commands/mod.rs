@@ -20,7 +20,9 @@ pub enum Outcome {
 /// Runs the command that was asked for.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global()?;
     }
     match args.command {
         Command::Run(args) => run::run(&args, Until::Reported, printer),

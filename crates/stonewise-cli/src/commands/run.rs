@@ -17,7 +17,11 @@ pub fn run(args: &ProjectArgs, until: Until, printer: &Printer) -> Result<Outcom
     if until == Until::Reported {
         printer.log(&format!("results: {}", args.out.display()));
     }
-    Ok(if summary.skipped_inputs() { Outcome::SkippedInputs } else { Outcome::Done })
+    Ok(if summary.skipped_inputs() {
+        Outcome::SkippedInputs
+    } else {
+        Outcome::Done
+    })
 }
 
 /// Says in a few lines what came out.
@@ -28,7 +32,12 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     }
     for (epoch, rows) in project.epochs.iter().skip(1).zip(&summary.rows) {
         if !rows.is_empty() {
-            printer.log(&format!("{} against {}: {}", epoch.name, project.epochs[0].name, counts(rows)));
+            printer.log(&format!(
+                "{} against {}: {}",
+                epoch.name,
+                project.epochs[0].name,
+                counts(rows)
+            ));
         }
     }
 }

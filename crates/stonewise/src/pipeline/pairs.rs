@@ -48,11 +48,6 @@ impl DiskPairs {
         Ok(pairs)
     }
 
-    /// The stones of all pairs, batch by batch.
-    pub fn stones(&self) -> impl Iterator<Item = &(Stone, Stone)> {
-        self.batches.iter().flatten()
-    }
-
     fn file(&self, batch: usize) -> PathBuf {
         self.dir.join(format!("pairs-{batch:05}.parquet"))
     }

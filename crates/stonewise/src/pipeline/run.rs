@@ -14,7 +14,7 @@ use crate::pipeline::series::write_series;
 use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_json, write_stone_outlines};
 use crate::pipeline::tiled::{Tiled, tile_epoch};
 use crate::project::Project;
-use crate::report::{StoneRow, write_stones_named};
+use crate::report::{StoneRow, write_report, write_stones_named};
 use crate::warnings::Warning;
 use serde_json::json;
 use std::path::Path;
@@ -106,6 +106,7 @@ pub fn run(project: &Project, out: &Path, until: Until, progress: &dyn Progress)
     }
     write_series(&context, &pairs)?;
     write_run_record(&context, &photos, &labelled)?;
+    context.timed("report", || Ok(write_report(&context.out)?))?;
     Ok(summary(&context, pairs))
 }
 

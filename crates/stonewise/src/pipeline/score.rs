@@ -59,7 +59,7 @@ fn outcome(stone: &Stone, row: &StoneRow) -> StoneOutcome {
         normal: stone.normal,
         displacement: motion.map(|m| m.displacement),
         covariance: motion.map(|m| m.covariance),
-        detection_limit_m: motion.map(|m| m.lod95_m),
+        detection_limit_m: motion.map(|m| m.detection_limit_m),
         significant: motion.map(|m| m.significant),
         loose: motion.map(|m| m.loose),
     }

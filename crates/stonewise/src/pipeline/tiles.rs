@@ -68,11 +68,6 @@ impl DiskTiles {
         self.tiles.iter().map(|t| t.points).sum()
     }
 
-    /// Number of points in a tile.
-    pub fn points_in(&self, tile: usize) -> u64 {
-        self.tiles[tile].points
-    }
-
     /// File-name stem of a tile, for files that go beside it.
     pub fn name(&self, tile: usize) -> &str {
         &self.tiles[tile].name
