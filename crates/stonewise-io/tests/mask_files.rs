@@ -100,7 +100,7 @@ fn only_stones_count_and_extra_keys_are_kept() {
     stone["score"] = json!(0.25);
     stone["stone_id"] = json!(42);
     let mut unknown = annotation(2, &[rectangle(6.0, 0.0, 5.0, 5.0)]);
-    unknown["stone_id"] = json!(0);
+    unknown["stone_id"] = json!(-1);
     let mut joint = annotation(3, &[rectangle(12.0, 0.0, 5.0, 5.0)]);
     joint["category_id"] = json!(2);
     let photo = labels(&coco(&[stone, unknown, joint])).unwrap();

@@ -42,7 +42,7 @@ impl Distortion {
             Self::None => Some([x, y]),
             Self::Brown(brown) => brown.distort([x, y]),
             Self::Fisheye(brown) => {
-                let r = x.hypot(y);
+                let r = (x * x + y * y).sqrt();
                 let scale = if r > 1e-9 { r.atan() / r } else { 1.0 };
                 brown.distort([x * scale, y * scale])
             }

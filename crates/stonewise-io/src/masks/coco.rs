@@ -48,7 +48,9 @@ struct RawAnnotation {
     #[serde(default)]
     iscrowd: u8,
     score: Option<f64>,
-    stone_id: Option<u64>,
+    /// Any number; only positive whole ones name a stone.
+    #[serde(default)]
+    stone_id: serde_json::Value,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -169,7 +171,7 @@ impl CocoMasks {
                 instances.push(InstanceInfo {
                     id,
                     score: annotation.score.unwrap_or(1.0),
-                    stone_ref: annotation.stone_id.filter(|&stone| stone != 0),
+                    stone_ref: annotation.stone_id.as_u64().filter(|&stone| stone != 0),
                 });
             } else if masks.iter().any(|mask| mask.1 == id) {
                 warnings.push(format!(

@@ -4,6 +4,8 @@
 //! translation, scale), which newer versions write in the component that a camera belongs to. Camera model: Metashape
 //! Professional user manual, appendix "Camera models".
 
+mod frame;
+mod numbers;
 mod read;
 mod sensor;
 mod write;

@@ -2,7 +2,7 @@
 
 use super::super::xml::Element;
 use super::super::{CameraError, malformed};
-use super::read::{child_number, parse_numbers};
+use super::numbers::{child_number, parse_numbers};
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion};
 
