@@ -15,12 +15,19 @@ pub struct MeshIndex {
     edge_normals: Vec<[Vector3<f64>; 3]>,
     /// Normals of the faces at each vertex, weighted with their angles there.
     vertex_normals: Vec<Vector3<f64>>,
+    /// A sphere around each triangle, which tells cheaply that a triangle is too far.
+    spheres: Vec<Sphere>,
     origin: Point3<f64>,
     cell_m: f64,
     dims: [usize; 3],
     /// Start of each cell in `members`; one more entry than cells.
     starts: Vec<u32>,
     members: Vec<u32>,
+}
+
+struct Sphere {
+    centre: Point3<f64>,
+    radius_m: f64,
 }
 
 /// More cells than this are never made; the cell grows instead.
@@ -39,10 +46,7 @@ pub fn c2m(mesh: &MeshIndex, points: &[Point3<f64>], max_m: f64) -> Vec<Option<f
 impl MeshIndex {
     /// Prepares a mesh. Cost: triangles x the cells that each one's box touches.
     pub fn new(mesh: TriangleMesh) -> Self {
-        let bounds = Bounds::of(mesh.vertices().iter().copied()).unwrap_or(Bounds {
-            min: Point3::origin(),
-            max: Point3::origin(),
-        });
+        let bounds = mesh.bounds();
         let extent = bounds.max - bounds.min;
         let count = |cell: f64| extent.iter().map(|e| (e / cell).floor() + 1.0).product::<f64>();
         let mut cell_m = typical_size(&mesh);
@@ -50,8 +54,12 @@ impl MeshIndex {
             cell_m *= 1.26;
         }
         let (face_normals, edge_normals, vertex_normals) = normals(&mesh);
+        let spheres = (0..mesh.triangles().len())
+            .map(|t| sphere(&mesh.corners(t)))
+            .collect();
         let mut index = Self {
             mesh,
+            spheres,
             face_normals,
             edge_normals,
             vertex_normals,
@@ -66,8 +74,8 @@ impl MeshIndex {
     }
 
     /// Box around the mesh.
-    pub fn bounds(&self) -> Option<Bounds> {
-        Bounds::of(self.mesh.vertices().iter().copied())
+    pub fn bounds(&self) -> Bounds {
+        self.mesh.bounds()
     }
 
     /// Signed distance of a point, metres; `None` beyond `max_m`.
@@ -85,28 +93,72 @@ impl MeshIndex {
         Some(offset.norm().copysign(offset.dot(&normal)))
     }
 
+    /// Visits the cells in shells around the point until what is left is further than what was found.
     fn nearest(&self, p: &Point3<f64>, max_m: f64) -> Option<(usize, Point3<f64>, Feature)> {
-        let mut radius = self.cell_m.min(max_m);
-        loop {
-            let mut best: Option<(f64, usize, Point3<f64>, Feature)> = None;
-            self.visit_box(p, radius, |triangle| {
+        let place = (p - self.origin) / self.cell_m;
+        let cell = [0, 1, 2].map(|a| place[a].floor() as i64);
+        let first = (0..3)
+            .map(|a| (-cell[a]).max(cell[a] - self.dims[a] as i64 + 1))
+            .fold(0, i64::max);
+        let to_border = (0..3)
+            .map(|a| (place[a] - place[a].floor()).min(1.0 - (place[a] - place[a].floor())))
+            .fold(1.0, f64::min);
+        let mut best: Option<(usize, Point3<f64>, Feature)> = None;
+        let mut best_d2 = max_m * max_m;
+        let mut shell = first;
+        // Nothing outside of the shells before this one is nearer than their border.
+        let before = |shell: i64| ((shell - 1) as f64 + to_border) * self.cell_m;
+        while shell == 0 || before(shell).powi(2) <= best_d2 {
+            let touched = self.visit_shell(cell, shell, |triangle| {
+                let sphere = &self.spheres[triangle];
+                let reach = best_d2.sqrt() + sphere.radius_m;
+                if (p - sphere.centre).norm_squared() > reach * reach {
+                    return;
+                }
                 let (q, feature) = nearest_on_triangle(p, &self.mesh.corners(triangle));
                 let d2 = (q - p).norm_squared();
-                let better = best
-                    .as_ref()
-                    .is_none_or(|(b, t, ..)| d2.total_cmp(b).then(triangle.cmp(t)).is_lt());
-                if d2 <= radius * radius && better {
-                    best = Some((d2, triangle, q, feature));
+                let wins = match &best {
+                    None => d2 <= best_d2,
+                    Some((other, ..)) => d2.total_cmp(&best_d2).then(triangle.cmp(other)).is_lt(),
+                };
+                if wins {
+                    best_d2 = d2;
+                    best = Some((triangle, q, feature));
                 }
             });
-            if let Some((_, triangle, q, feature)) = best {
-                return Some((triangle, q, feature));
+            if !touched {
+                break;
             }
-            if radius >= max_m {
-                return None;
-            }
-            radius = (2.0 * radius).min(max_m);
+            shell += 1;
         }
+        best
+    }
+
+    /// Visits the triangles of all cells that are `shell` cells away from `cell`; false where no such cell exists
+    /// any more.
+    fn visit_shell(&self, cell: [i64; 3], shell: i64, mut visit: impl FnMut(usize)) -> bool {
+        let range = |a: usize| {
+            let low = (cell[a] - shell).max(0);
+            let high = (cell[a] + shell).min(self.dims[a] as i64 - 1);
+            low..=high
+        };
+        let on_shell = |a: usize, i: i64| (i - cell[a]).abs() == shell;
+        for k in range(2) {
+            for j in range(1) {
+                let row = (k as usize * self.dims[1] + j as usize) * self.dims[0];
+                let mut visit_cell = |i: i64| {
+                    let at = row + i as usize;
+                    let members = &self.members[self.starts[at] as usize..self.starts[at + 1] as usize];
+                    members.iter().for_each(|&t| visit(t as usize));
+                };
+                if on_shell(2, k) || on_shell(1, j) {
+                    range(0).for_each(&mut visit_cell);
+                } else {
+                    range(0).filter(|&i| on_shell(0, i)).for_each(&mut visit_cell);
+                }
+            }
+        }
+        (0..3).any(|a| cell[a] - shell > 0 || cell[a] + shell < self.dims[a] as i64 - 1)
     }
 
     fn sort_triangles(&mut self) {
@@ -138,15 +190,6 @@ impl MeshIndex {
         self.members = members;
     }
 
-    fn visit_box(&self, p: &Point3<f64>, radius: f64, mut visit: impl FnMut(usize)) {
-        let reach = Vector3::repeat(radius);
-        for cell in self.cells_of_box(&(p - reach), &(p + reach)) {
-            for &triangle in &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize] {
-                visit(triangle as usize);
-            }
-        }
-    }
-
     /// Cells that a box touches, ascending; none where it lies outside the grid.
     fn cells_of_box(&self, low: &Point3<f64>, high: &Point3<f64>) -> impl Iterator<Item = usize> + use<> {
         let dims = self.dims;
@@ -165,6 +208,12 @@ impl MeshIndex {
                 .flat_map(move |j| x.clone().map(move |i| (k * dims[1] + j) * dims[0] + i))
         })
     }
+}
+
+fn sphere(corners: &[Point3<f64>; 3]) -> Sphere {
+    let centre = Point3::from((corners[0].coords + corners[1].coords + corners[2].coords) / 3.0);
+    let radius_m = corners.iter().map(|c| (c - centre).norm()).fold(0.0, f64::max);
+    Sphere { centre, radius_m }
 }
 
 /// Mean of the triangles' longest edges, metres.
@@ -299,13 +348,16 @@ mod tests {
 
     #[test]
     fn meshes_that_cannot_work_are_refused() {
-        let corners = vec![
+        let mut corners = vec![
             Point3::origin(),
             Point3::new(1.0, 0.0, 0.0),
             Point3::new(2.0, 0.0, 0.0),
         ];
         let missing = TriangleMesh::new(corners.clone(), vec![[0, 1, 3]]).unwrap_err();
         assert!(missing.to_string().contains("vertex 3"));
+        let no_area = TriangleMesh::new(corners.clone(), vec![[0, 1, 2]]);
+        assert_eq!(no_area, Err(MeshError::NoFaces));
+        corners[2].y = f64::INFINITY;
         assert_eq!(
             TriangleMesh::new(corners, vec![[0, 1, 2]]),
             Err(MeshError::NoFaces)

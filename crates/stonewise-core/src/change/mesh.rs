@@ -1,5 +1,6 @@
 //! Triangle meshes.
 
+use crate::geometry::Bounds;
 use nalgebra::Point3;
 
 /// A mesh of triangles whose corners run counterclockwise seen from outside.
@@ -31,7 +32,7 @@ pub enum MeshError {
 impl TriangleMesh {
     /// A mesh from vertices, metres, world frame, and triangles of vertex indices.
     ///
-    /// Triangles without an area are left out. Larger polygons must be cut into triangles before.
+    /// Triangles without a finite area are left out. Larger polygons must be cut into triangles before.
     pub fn new(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (face, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {
@@ -44,7 +45,8 @@ impl TriangleMesh {
         }
         let has_area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| vertices[v as usize]);
-            (b - a).cross(&(c - a)).norm() > 0.0
+            let area = (b - a).cross(&(c - a)).norm();
+            area > 0.0 && area.is_finite()
         };
         let triangles: Vec<_> = triangles.into_iter().filter(has_area).collect();
         if triangles.is_empty() {
@@ -56,6 +58,15 @@ impl TriangleMesh {
     /// Corners of a triangle.
     pub fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
+    }
+
+    /// Box around all triangles.
+    pub fn bounds(&self) -> Bounds {
+        let corners = (0..self.triangles.len()).flat_map(|t| self.corners(t));
+        Bounds::of(corners).unwrap_or(Bounds {
+            min: Point3::origin(),
+            max: Point3::origin(),
+        })
     }
 
     /// All vertices.
