@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use stonewise_core::id::StoneId;
 use stonewise_io::cloud::{
-    CloudError, CloudFormat, LabelColumns, PointChunk, PointLabel, ReadSummary, cloud_info, read_cloud,
-    write_labelled,
+    CloudError, CloudFormat, LabelColumns, PointChunk, PointLabel, PointMotion, ReadSummary, cloud_info,
+    read_cloud, write_labelled,
 };
 
 const POINTS: u64 = 120;
@@ -284,5 +285,41 @@ fn a_labelled_copy_of_other_formats_keeps_order_color_and_intensity() {
         if let Some(intensities) = before.intensities.filter(|_| !name.ends_with("e57")) {
             assert_eq!(after.intensities.unwrap(), intensities, "{name}");
         }
+    }
+}
+
+#[test]
+fn labels_and_motions_stand_behind_each_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("labelled.laz");
+    let input = fixture("las14_format7_extra.laz");
+    write_labelled(&input, &out, LabelColumns::StoneAndMotion, |chunk| {
+        let label = |index: &u64| PointLabel {
+            stone: (index % 3 != 0).then_some(StoneId(*index as u32)),
+            motion: (index % 3 == 2).then_some(PointMotion {
+                displacement_m: Vector3::new(*index as f32, 0.02, -0.05),
+                significant: index % 2 == 0,
+            }),
+        };
+        Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
+    })
+    .unwrap();
+    let data = las::Reader::from_path(&out).unwrap().read_all().unwrap();
+    for (i, record) in data.raw_bytes().chunks(data.record_len()).enumerate() {
+        // 36 bytes of format 7, 4 + 12 of the input's own dimensions.
+        let own = &record[52..];
+        let stone = if i % 3 == 0 { 0 } else { i as u32 };
+        assert_eq!(own[..4], stone.to_le_bytes());
+        let [dx, dy, dz] = [4, 8, 12].map(|at| f32::from_le_bytes(own[at..at + 4].try_into().unwrap()));
+        if i % 3 == 2 {
+            assert_eq!([dx, dy, dz], [i as f32, 0.02, -0.05]);
+        } else {
+            assert!(dx.is_nan() && dy.is_nan() && dz.is_nan());
+        }
+        assert_eq!(own[16..], u16::from(i % 3 == 2 && i % 2 == 0).to_le_bytes());
+    }
+    if let Some(folder) = std::env::var_os("STONEWISE_KEEP").map(PathBuf::from) {
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::copy(&out, folder.join("labelled.laz")).unwrap();
     }
 }

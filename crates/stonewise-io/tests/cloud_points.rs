@@ -1,9 +1,19 @@
 //! New LAZ files read back by another crate, and E57 files that only Rust writes here.
 
+use std::path::{Path, PathBuf};
+
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use stonewise_io::cloud::{CloudError, ExtraColumn, cloud_info, read_cloud, write_points_laz};
+
+/// Keeps a file for `testdata/clouds/check_written.py`, where asked to.
+fn keep(path: &Path) {
+    if let Some(folder) = std::env::var_os("STONEWISE_KEEP").map(PathBuf::from) {
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::copy(path, folder.join(path.file_name().unwrap())).unwrap();
+    }
+}
 
 #[test]
 fn core_points_come_back_with_their_dimensions() {
@@ -43,9 +53,7 @@ fn core_points_come_back_with_their_dimensions() {
         std::fs::read(&path).unwrap() == first,
         "the same points gave other bytes"
     );
-    if let Ok(keep) = std::env::var("STONEWISE_KEEP_POINTS") {
-        std::fs::copy(&path, keep).unwrap();
-    }
+    keep(&path);
 }
 
 #[test]

@@ -222,6 +222,11 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("t.parquet");
         write_parquet(&path, &example()).unwrap();
+        if let Some(folder) = std::env::var_os("STONEWISE_KEEP") {
+            // For testdata/clouds/check_written.py.
+            std::fs::create_dir_all(&folder).unwrap();
+            std::fs::copy(&path, Path::new(&folder).join("table.parquet")).unwrap();
+        }
         let back = read_parquet(&path).unwrap();
         assert_eq!(format!("{back:?}"), format!("{:?}", example()));
         let part = read_columns(&path, &["id", "x"]).unwrap();
@@ -262,6 +267,12 @@ mod tests {
         for length in (0..whole.len()).step_by(37) {
             std::fs::write(&path, &whole[..length]).unwrap();
             assert!(read_parquet(&path).is_err(), "cut to {length} bytes");
+        }
+        for place in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[place] ^= [0xff, 0x80, 0x01][place % 3];
+            std::fs::write(&path, &bytes).unwrap();
+            let _ = read_parquet(&path);
         }
     }
 }
