@@ -3,18 +3,12 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 
-use super::las::{
-    DESCRIPTOR_BYTES, Export, ExtraType, LazWriter, copy_labelled, describe, export_header, transforms_for,
-};
+use super::export::export_labelled;
+use super::las::{DESCRIPTOR_BYTES, ExtraType, copy_labelled, describe};
 use super::whole::write_whole;
-use super::{CloudError, CloudFormat, PointChunk, ReadSummary, read_cloud};
-
-/// Step of the coordinates of files that were not LAS before, metres.
-const SCALE_M: f64 = 1e-4;
-const CHUNK_POINTS: usize = 400_000;
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary};
 
 /// What is known about one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,7 +48,7 @@ pub enum LabelColumns {
 /// `label` gives one label per point of a chunk. An unknown motion is NaN, not zero: it must not look like rest.
 ///
 /// # Errors
-/// As [`read_cloud`], or what `label` returns, or the file cannot be written; `output` then stays as it was.
+/// As [`read_cloud`](super::read_cloud), or what `label` returns, or the file cannot be written; `output` then stays as it was.
 pub fn write_labelled<E: From<CloudError>>(
     input: &Path,
     output: &Path,
@@ -127,83 +121,4 @@ impl LabelColumns {
         let reason = format!("{} labels for {} points", labels.len(), chunk.len());
         Err(CloudError::unwritable(name, reason))
     }
-}
-
-/// What must be known of a cloud before its first point is written.
-#[derive(Default)]
-struct Survey {
-    bounds: Option<Bounds>,
-    has_color: bool,
-    max_intensity: f32,
-}
-
-impl Survey {
-    fn of(input: &Path) -> Result<Self, CloudError> {
-        let mut survey = Self::default();
-        read_cloud(input, CHUNK_POINTS, |chunk| {
-            if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
-                survey.bounds = Some(survey.bounds.map_or(new, |b| b.union(&new)));
-            }
-            survey.has_color |= chunk.colors.is_some();
-            let intensities = chunk.intensities.iter().flatten();
-            survey.max_intensity = intensities.fold(survey.max_intensity, |max, i| max.max(*i));
-            Ok::<(), CloudError>(())
-        })?;
-        Ok(survey)
-    }
-
-    /// Intensities up to 1 are stretched to 16 bits; others are cut to them.
-    fn intensity(&self, value: f32) -> u16 {
-        let factor = if self.max_intensity <= 1.0 { 65535.0 } else { 1.0 };
-        (value * factor).round() as u16
-    }
-}
-
-fn export_labelled<E: From<CloudError>>(
-    input: &Path,
-    partial: &Path,
-    name: &Path,
-    columns: LabelColumns,
-    fill: Fill<'_, E>,
-) -> Result<ReadSummary, E> {
-    let survey = Survey::of(input)?;
-    let origin = nalgebra::Point3::origin();
-    let bounds = survey.bounds.unwrap_or(Bounds {
-        min: origin,
-        max: origin,
-    });
-    let transforms = transforms_for(&bounds, SCALE_M)
-        .ok_or_else(|| CloudError::unwritable(name, format!("too large for LAS: {bounds:?}")))?;
-    let header = export_header(
-        survey.has_color,
-        transforms,
-        columns.size(),
-        columns.descriptors(),
-    );
-    let mut writer = LazWriter::create(partial, name, header)?;
-    let summary = read_cloud(input, CHUNK_POINTS, |chunk| {
-        let labels = fill(chunk)?;
-        columns.check(name, chunk, &labels)?;
-        let mut out = Vec::new();
-        for (i, label) in labels.iter().enumerate() {
-            let own = |colors: &Vec<[u16; 3]>| colors[i];
-            let record = Export {
-                position: chunk.positions[i],
-                intensity: chunk
-                    .intensities
-                    .as_ref()
-                    .map_or(0, |all| survey.intensity(all[i])),
-                color: survey
-                    .has_color
-                    .then(|| chunk.colors.as_ref().map(own).unwrap_or_default()),
-                source: chunk.scan.map_or(0, |scan| (scan + 1) as u16),
-            };
-            record.append(&transforms, &mut out);
-            columns.append(label, &mut out);
-        }
-        writer.write(out)?;
-        Ok::<(), E>(())
-    })?;
-    writer.finish()?;
-    Ok(summary)
 }

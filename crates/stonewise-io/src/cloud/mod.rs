@@ -3,6 +3,7 @@
 mod chunk;
 mod e57_file;
 mod error;
+mod export;
 mod format;
 mod guard;
 mod info;

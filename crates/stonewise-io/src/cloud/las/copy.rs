@@ -55,7 +55,7 @@ impl RecordCopy {
         let mut kept = extra_bytes::existing(records, format.extra_bytes);
         kept.retain(|dimension| !columns.names().any(|n| n.as_bytes() == dimension.name()));
         let base = usize::from(format.len() - format.extra_bytes);
-        let mut copied = vec![0..base];
+        let mut copied: Vec<Range<usize>> = std::iter::once(0..base).collect();
         for dimension in &kept {
             let bytes = base + dimension.bytes.start..base + dimension.bytes.end;
             match copied.last_mut() {

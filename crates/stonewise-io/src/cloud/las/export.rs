@@ -50,6 +50,18 @@ pub fn export_header(
     builder
 }
 
+/// The record that holds a coordinate system as WKT.
+pub fn wkt_record(text: &str) -> las::Vlr {
+    let mut data = text.as_bytes().to_vec();
+    data.push(0);
+    las::Vlr {
+        user_id: "LASF_Projection".to_owned(),
+        record_id: 2112,
+        description: "WKT Information".to_owned(),
+        data,
+    }
+}
+
 /// The standard part of a point record.
 pub struct Export {
     pub position: Point3<f64>,

@@ -8,7 +8,7 @@ mod read;
 mod writer;
 
 pub(super) use copy::copy_labelled;
-pub(super) use export::{Export, export_header, transforms_for};
+pub(super) use export::{Export, export_header, transforms_for, wkt_record};
 pub(super) use extra_bytes::{DESCRIPTOR_BYTES, ExtraType, describe};
 pub(super) use layout::Layout;
 pub(super) use read::read;

@@ -1,0 +1,112 @@
+//! Clouds that were not LAS before, written as LAS with labels.
+
+use std::path::Path;
+
+use las::{Transform, Vector};
+use nalgebra::Point3;
+use stonewise_core::geometry::Bounds;
+
+use super::label::{Fill, LabelColumns, PointLabel};
+use super::las::{Export, LazWriter, export_header, transforms_for, wkt_record};
+use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, read_cloud};
+
+/// Step of the coordinates, metres.
+const SCALE_M: f64 = 1e-4;
+const CHUNK_POINTS: usize = 400_000;
+
+/// Writes the points of a file with labels, in two passes over it: LAS needs the box around all points first.
+pub(super) fn export_labelled<E: From<CloudError>>(
+    input: &Path,
+    partial: &Path,
+    name: &Path,
+    columns: LabelColumns,
+    fill: Fill<'_, E>,
+) -> Result<ReadSummary, E> {
+    let survey = Survey::of(input)?;
+    let transforms = transforms_for(&survey.bounds, SCALE_M)
+        .ok_or_else(|| CloudError::unwritable(name, format!("too large for LAS: {:?}", survey.bounds)))?;
+    let mut header = export_header(
+        survey.has_color,
+        transforms,
+        columns.size(),
+        columns.descriptors(),
+    );
+    header.vlrs.extend(survey.crs.as_deref().map(wkt_record));
+    let mut writer = LazWriter::create(partial, name, header)?;
+    let summary = read_cloud(input, CHUNK_POINTS, |chunk| {
+        let labels = fill(chunk)?;
+        columns.check(name, chunk, &labels)?;
+        writer.write(survey.records(chunk, &labels, columns, &transforms))?;
+        Ok::<(), E>(())
+    })?;
+    writer.finish()?;
+    Ok(summary)
+}
+
+/// What must be known of a cloud before its first point is written.
+struct Survey {
+    bounds: Bounds,
+    has_color: bool,
+    max_intensity: f32,
+    /// WKT.
+    crs: Option<String>,
+}
+
+impl Survey {
+    fn of(input: &Path) -> Result<Self, CloudError> {
+        let mut bounds: Option<Bounds> = None;
+        let (mut has_color, mut max_intensity) = (false, 0f32);
+        read_cloud(input, CHUNK_POINTS, |chunk| {
+            if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
+                bounds = Some(bounds.map_or(new, |b| b.union(&new)));
+            }
+            has_color |= chunk.colors.is_some();
+            let intensities = chunk.intensities.iter().flatten();
+            max_intensity = intensities.fold(max_intensity, |max, i| max.max(*i));
+            Ok::<(), CloudError>(())
+        })?;
+        let crs = match CloudFormat::of(input)? {
+            CloudFormat::E57 => e57_file::scans(input)?.1,
+            _ => None,
+        };
+        let origin = Point3::origin();
+        Ok(Self {
+            bounds: bounds.unwrap_or(Bounds {
+                min: origin,
+                max: origin,
+            }),
+            has_color,
+            max_intensity,
+            crs: crs.filter(|text| text.contains('[')),
+        })
+    }
+
+    /// Intensities up to 1 are stretched to 16 bits; others are cut to them.
+    fn intensity(&self, value: f32) -> u16 {
+        let factor = if self.max_intensity <= 1.0 { 65535.0 } else { 1.0 };
+        (value * factor).round() as u16
+    }
+
+    fn records(
+        &self,
+        chunk: &PointChunk,
+        labels: &[PointLabel],
+        columns: LabelColumns,
+        transforms: &Vector<Transform>,
+    ) -> Vec<u8> {
+        let mut out = Vec::new();
+        for (i, label) in labels.iter().enumerate() {
+            let intensity = chunk.intensities.as_ref().map(|all| self.intensity(all[i]));
+            let color = chunk.colors.as_ref().map(|all| all[i]);
+            let record = Export {
+                position: chunk.positions[i],
+                intensity: intensity.unwrap_or(0),
+                color: self.has_color.then_some(color.unwrap_or_default()),
+                source: chunk.scan.map_or(0, |scan| (scan + 1) as u16),
+            };
+            record.append(transforms, &mut out);
+            columns.append(label, &mut out);
+        }
+        out
+    }
+}
