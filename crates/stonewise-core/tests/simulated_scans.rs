@@ -109,6 +109,34 @@ fn range_noise_and_its_growth_with_incidence_are_as_stated() {
 }
 
 #[test]
+fn a_drone_adds_its_own_noise_and_an_error_per_strip() {
+    let mut uav = UavParams {
+        datum_m: 0.0,
+        ..UavParams::default()
+    };
+    uav.beam.exit_radius_m = 0.0;
+    uav.beam.divergence_rad = 0.0;
+    let params = SceneParams {
+        uav: Some(uav.clone()),
+        ..small(3)
+    };
+    let scan = World::new(&params).scan(&params, 0).uav.unwrap();
+    for strip in 0..uav.strips as u16 {
+        let errors: Vec<Vector3<f64>> = (0..scan.len())
+            .filter(|&i| scan.station[i] == strip && scan.cos_incidence[i] > 0.8)
+            .map(|i| scan.cloud.world(i) - exact(&scan, i))
+            .collect();
+        let n = errors.len() as f64;
+        let mean = errors.iter().sum::<Vector3<f64>>() / n;
+        // The gradient noise that drives the drift stays under 4 standard deviations.
+        assert!(mean.norm() > 1e-4 && mean.amax() < 4.0 * uav.drift_m, "{mean:?}");
+        let spread = (errors.iter().map(|e| (e - mean).norm_squared()).sum::<f64>() / n).sqrt();
+        // Along the beam 11 mm, up to 1/sqrt(0.8) more at an angle; across it 0.1 mrad at 12 m, twice.
+        assert!((0.0108..0.0126).contains(&spread), "{spread}");
+    }
+}
+
+#[test]
 fn points_lie_at_the_stated_distance() {
     let params = SceneParams {
         surroundings: nothing_around(),

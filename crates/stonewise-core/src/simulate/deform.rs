@@ -197,3 +197,87 @@ fn choose(from: &[usize], count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
         .map(|_| pool.swap_remove(rng.random_range(0..pool.len())))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::FacePoint;
+    use crate::simulate::wall::WallParams;
+    use nalgebra::Point3;
+
+    fn wall() -> Wall {
+        Wall::new(&WallParams {
+            plan_radius_m: 50.0,
+            ..WallParams::default()
+        })
+    }
+
+    #[test]
+    fn stones_follow_a_bulge_to_second_order() {
+        let wall = wall();
+        let (depth_m, diameter_m) = (0.05, 2.25);
+        let bulge = WallMotion::Bulge {
+            centre_m: [0.2, 1.4],
+            depth_m,
+            diameter_m,
+        };
+        // Largest second derivative of depth cos^2(pi r / diameter).
+        let curvature = depth_m * 2.0 * (PI / diameter_m).powi(2);
+        for (stone, motion) in wall.stones.iter().zip(move_stones(&wall, &[bulge], 1)) {
+            let size = 0.08;
+            for (da, du) in [(0.0, 0.0), (size, 0.0), (-size, 0.0), (0.0, size), (0.0, -size)] {
+                let (a, u) = (stone.middle[0] + da, stone.middle[1] + du);
+                let p = wall.face.world_of(&FacePoint { a, u, n: 0.0 });
+                let r = (a - 0.2).hypot(u - 1.4);
+                let size = if r < diameter_m / 2.0 {
+                    depth_m * (PI * r / diameter_m).cos().powi(2)
+                } else {
+                    0.0
+                };
+                let error = motion.second_from_first * p - p - wall.face.frame(a).out * size;
+                let allowed = 0.5 * curvature * (da * da + du * du)
+                    + 3e-4 * f64::from(u8::from(da != 0.0 || du != 0.0));
+                assert!(error.norm() <= allowed + 1e-9, "{} above {allowed}", error.norm());
+            }
+        }
+    }
+
+    #[test]
+    fn causes_add_up_and_leave_the_other_side_of_a_crack_alone() {
+        let wall = wall();
+        let motions = [
+            WallMotion::Translation {
+                d_m: [0.0, 0.02, 0.05],
+            },
+            WallMotion::Crack {
+                along_m: 0.0,
+                slope: 0.0,
+                d_m: [0.0, 0.01, 0.0],
+            },
+            WallMotion::Loose {
+                share: 0.03,
+                at_least: 1,
+                shift_m: [0.005, 0.03],
+                rotation_rad: 0.03,
+            },
+        ];
+        let moved = move_stones(&wall, &motions, 5);
+        let loose = moved.iter().filter(|m| m.loose).count();
+        let whole = wall.stones.iter().filter(|s| !s.edge).count();
+        assert_eq!(loose, (0.03 * whole as f64).round() as usize);
+        for (stone, motion) in wall.stones.iter().zip(&moved) {
+            let middle = Point3::from(stone.world_from_stone.translation.vector);
+            let d = motion.second_from_first * middle - middle;
+            let mut expected = Vector3::new(0.0, 0.02, 0.05);
+            if stone.middle[0] >= 0.0 {
+                expected += wall.face.frame(stone.middle[0]).up * 0.01;
+            }
+            let own = (d - expected).norm();
+            if motion.loose {
+                assert!((0.004..0.031).contains(&own), "{own}");
+            } else {
+                assert!(own < 1e-12 && motion.second_from_first.rotation.angle() < 1e-9);
+            }
+        }
+    }
+}

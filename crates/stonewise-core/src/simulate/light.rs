@@ -137,3 +137,27 @@ fn sliding_mean(
     }
     means
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn box_means_agree_with_sums_by_hand() {
+        let size = [7, 5];
+        let values: Vec<f32> = (0..35).map(|k| ((k * 13) % 17) as f32).collect();
+        let means = box_mean(&values, size, 2);
+        for y in 0..5usize {
+            for x in 0..7usize {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for j in y.saturating_sub(2)..(y + 3).min(5) {
+                    for i in x.saturating_sub(2)..(x + 3).min(7) {
+                        sum += values[j * 7 + i];
+                        count += 1.0;
+                    }
+                }
+                assert!((means[y * 7 + x] - sum / count).abs() < 1e-4);
+            }
+        }
+    }
+}

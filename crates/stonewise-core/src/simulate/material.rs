@@ -119,14 +119,14 @@ impl Painter {
         // Streaks that run down from joints and from the crown.
         let streak = self
             .stain
-            .octaves(a / 0.07 + 0.4 * self.stain.at(a / 0.3, u / 0.4), u / 1.3, 3, 0.6);
+            .octaves(a / 0.11 + 0.5 * self.stain.at(a / 0.3, u / 0.4), u / 1.1, 3, 0.55);
         let broad = self.stain.octaves(a / 0.8, u / 1.1, 2, 0.5);
         let dirt =
             (0.30 + 1.1 * broad + (0.25 + broad).max(0.0) * 0.9 * streak + 0.3 * near_joint).clamp(0.0, 1.0);
         colour = mix(colour, DIRT, 0.62 * dirt * dirt);
         let chalk =
-            (self.stain.octaves(a / 0.05 - 30.0, u / 0.7, 3, 0.6) + 1.0 * broad - 0.45).clamp(0.0, 0.4);
-        colour = mix(colour, [0.5, 0.48, 0.44], 0.9 * chalk);
+            (self.stain.octaves(a / 0.09 - 30.0, u / 0.6, 3, 0.5) + 1.0 * broad - 0.45).clamp(0.0, 0.4);
+        colour = mix(colour, [0.5, 0.48, 0.44], 0.65 * chalk);
         let lichen =
             self.moss.octaves(a / 0.022, u / 0.022, 2, 0.6) + 0.5 * self.moss.at(a / 0.4, u / 0.4 + 9.0);
         colour = mix(colour, LICHEN, ((lichen - 0.58) * 6.0).clamp(0.0, 0.6));

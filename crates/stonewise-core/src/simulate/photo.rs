@@ -85,6 +85,9 @@ pub fn plan_views(scene: &Scene, params: &PhotoParams, epoch: usize, seed: u64) 
     let w = scene.window();
     let face = &scene.wall().face;
     let (wide, high, foot) = (w[1] - w[0], w[3] - w[2].max(0.0), w[2].max(0.0));
+    // Half of the width of the wall that a photo shows.
+    let seen = 0.5 * params.distance_m * f64::from(params.width) / params.focal_px;
+    let aspect = f64::from(params.height) / f64::from(params.width);
     let mut views = Vec::new();
     for row in 0..params.rows {
         for column in 0..params.columns {
@@ -98,11 +101,12 @@ pub fn plan_views(scene: &Scene, params: &PhotoParams, epoch: usize, seed: u64) 
                 u: u + stray(),
                 n: params.distance_m + stray(),
             });
-            let aim_a = a.clamp(w[0] + 0.30 * wide.min(6.0), w[1] - 0.30 * wide.min(6.0));
-            let aim_u = foot + high * (0.35 + 0.25 * share(row, params.rows));
+            // The picture stays on the section; a section smaller than the picture stays in its middle.
+            let aim_a = within(a, [w[0], w[1]], 0.75 * seen);
+            let aim_u = within(u, [foot, w[3]], 0.75 * seen * aspect);
             let at = face.world_of(&FacePoint {
-                a: aim_a + 0.3 * stray(),
-                u: aim_u + 0.3 * stray(),
+                a: aim_a + 0.15 * stray(),
+                u: aim_u + 0.15 * stray(),
                 n: 0.0,
             });
             let roll = 0.01 * normal(&mut rng);
@@ -324,6 +328,15 @@ fn camera(params: &PhotoParams) -> Camera {
         ],
         skew_px: 0.0,
         distortion: Distortion::brown([k1, k2, k3, 0.0], [0.0; 3], params.tangential),
+    }
+}
+
+/// The value, moved to at least `margin` from both ends, or to the middle where there is no such place.
+fn within(value: f64, ends: [f64; 2], margin: f64) -> f64 {
+    if ends[1] - ends[0] <= 2.0 * margin {
+        0.5 * (ends[0] + ends[1])
+    } else {
+        value.clamp(ends[0] + margin, ends[1] - margin)
     }
 }
 

@@ -122,7 +122,8 @@ impl Path {
         // Standard deviation of the noise is 0.3.
         let error = datum
             + Vector3::from_fn(|axis, _| {
-                params.drift_m / 0.3 * self.drift[axis].at(a / params.drift_length_m, 0.37 * self.u)
+                let along_strip = a / params.drift_length_m + 40.0 * self.drift[axis].uniform(0);
+                params.drift_m / 0.3 * self.drift[axis].at(along_strip, 0.5)
             });
         let (low, high) = (w[2] - params.margin_m, w[3] + params.margin_m);
         (0..=((high - low) / step) as usize)

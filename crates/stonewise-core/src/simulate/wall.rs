@@ -124,7 +124,7 @@ const FACET_M: f64 = 0.016;
 pub(super) const HIDDEN_M: f64 = -0.12;
 
 impl Wall {
-    /// Lays a wall. Cost: about 10 microseconds a stone.
+    /// Lays a wall. Cost: about a millisecond a stone, on all cores.
     pub fn new(params: &WallParams) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
         let outlines = lay_stones(params, &mut rng);
@@ -315,5 +315,53 @@ impl Shape {
         let x = ((distance + r) / r).min(0.97);
         let drop = r * (1.0 - (1.0 - x * x).sqrt());
         drop + 4.0 * (distance - (0.97 * r - r)).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stones_fill_the_wall_and_no_place_belongs_to_two() {
+        let wall = Wall::new(&WallParams {
+            width_m: 3.0,
+            height_m: 2.0,
+            ..WallParams::default()
+        });
+        let [a0, a1, u0, u1] = wall.extent();
+        let (mut covered, mut all) = (0, 0);
+        for k in 0..4000 {
+            let a = a0 + (a1 - a0) * (f64::from(k % 80) + 0.5) / 80.0;
+            let u = u0 + (u1 - u0) * (f64::from(k / 80) + 0.5) / 50.0;
+            let owners = (0..wall.stones.len())
+                .filter(|&i| wall.outline_distance(i, a, u) < 0.0)
+                .count();
+            assert!(owners <= 1, "{owners} stones at {a}, {u}");
+            covered += owners;
+            all += 1;
+        }
+        let share = covered as f64 / f64::from(all);
+        assert!((0.72..0.95).contains(&share), "{share}");
+        let area: f64 = wall.stones.iter().map(|s| s.area_m2).sum();
+        assert!((area / (share * 3.0 * 2.25) - 1.0).abs() < 0.03, "{area}");
+        assert!(
+            wall.stones
+                .iter()
+                .enumerate()
+                .all(|(i, s)| s.id.0 as usize == i + 1)
+        );
+    }
+
+    #[test]
+    fn mortar_is_recessed_as_asked() {
+        let params = WallParams::default();
+        let wall = Wall::new(&params);
+        let heights: Vec<f64> = (0..2000)
+            .map(|k| wall.mortar_height(0.013 * f64::from(k % 150) - 1.0, 0.017 * f64::from(k / 150)))
+            .collect();
+        let mean = heights.iter().sum::<f64>() / heights.len() as f64;
+        assert!((-0.025..-0.015).contains(&mean), "{mean}");
+        assert!(heights.iter().all(|h| (-0.035..-0.005).contains(h)));
     }
 }
