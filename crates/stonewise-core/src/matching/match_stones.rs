@@ -151,7 +151,7 @@ fn try_one(
         overlap.is_some_and(|o| o >= params.min_overlap)
     };
     let mutual = || back.nearest(&candidate.centroid, 1).first().map(|n| n.0) == Some(i);
-    let outcome = if distance_m > params.max_offset_sizes * stone.area_m2.sqrt() {
+    let outcome = if distance_m > params.max_offset_sizes * stone.area_m2.max(candidate.area_m2).sqrt() {
         Err(absent())
     } else if quality.area_ratio < params.min_area_ratio {
         Err(UnmatchedReason::AreaMismatch)

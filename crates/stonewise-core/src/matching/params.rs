@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 pub struct MatchParams {
     /// Largest ratio of the distances to the nearest and the second nearest centroid. 0.4: the paper's Equation 2.
     pub max_ratio: f64,
-    /// Least ratio of the smaller to the larger face area. 0.6: a stone of 20 pixels across whose mask is one pixel too
-    /// wide has 0.8, one with a corner hidden in one epoch 0.7, two merged stones 0.5. The paper's 0.95 loses most
-    /// stones with masks that are not exact.
+    /// Least ratio of the smaller to the larger face area. 0.5: a stone of 20 pixels across whose mask is one pixel too
+    /// wide has 0.8, one with a part hidden in one epoch 0.6; two equal stones that a mask merges have 0.5, but their
+    /// common centroid lies between them. The paper's 0.95 loses most stones with masks that are not exact.
     pub min_area_ratio: f64,
-    /// Largest distance of a match after the local shift, in units of the square root of the area. 0.5: the centroid
+    /// Largest distance of a match after the local shift, in units of the square root of the larger area. 0.5: the centroid
     /// stays within the stone.
     pub max_offset_sizes: f64,
     /// Largest common motion that is looked for, metres; 0 for none. 1: several stones.
@@ -31,7 +31,7 @@ impl Default for MatchParams {
     fn default() -> Self {
         Self {
             max_ratio: 0.4,
-            min_area_ratio: 0.6,
+            min_area_ratio: 0.5,
             max_offset_sizes: 0.5,
             max_shift_m: 1.0,
             shift_neighbours: 16,

@@ -3,6 +3,7 @@
 use super::TransferParams;
 use super::atoms::Atom;
 use super::overlap::Overlaps;
+use super::visibility::Sighting;
 use super::vote::{Ballot, Electorate};
 use std::collections::BTreeMap;
 
@@ -36,7 +37,7 @@ pub(super) fn decide<'a>(
         }
     }
     let mut decisions = BTreeMap::new();
-    let mut electorate = Electorate::new(overlaps, ballots, params.missed_weight);
+    let mut electorate = Electorate::new(overlaps, ballots);
     for _ in 0..MAX_ROUNDS {
         let tables = Tables::count(&electorate, overlaps, atoms);
         let changes = changes(&electorate, &tables, params);
@@ -52,7 +53,7 @@ pub(super) fn decide<'a>(
             };
             decisions.insert(i, decision);
         }
-        electorate = Electorate::new(overlaps, ballots, params.missed_weight);
+        electorate = Electorate::new(overlaps, ballots);
     }
     (electorate, decisions)
 }
@@ -65,6 +66,9 @@ struct Tables {
     area: Vec<u32>,
     /// Area won by a stone where a photo sees it, keyed (stone, photo).
     seen: BTreeMap<(u32, u32), u32>,
+    /// Votes for each stone, and of photos that show background where others show it and do not show it elsewhere:
+    /// weight times area.
+    support: BTreeMap<u32, [f64; 2]>,
     photo: Vec<u32>,
 }
 
@@ -74,9 +78,11 @@ impl Tables {
             won: vec![BTreeMap::new(); overlaps.instances.len()],
             area: overlaps.instances.iter().map(|i| i.area).collect(),
             seen: BTreeMap::new(),
+            support: BTreeMap::new(),
             photo: overlaps.instances.iter().map(|i| i.photo).collect(),
         };
         for atom in atoms {
+            tables.count_support(electorate, overlaps, atom);
             let Some(stone) = electorate.count(&atom.sightings).and_then(|v| v.stone) else {
                 continue;
             };
@@ -88,6 +94,37 @@ impl Tables {
             }
         }
         tables
+    }
+
+    fn count_support(&mut self, electorate: &Electorate, overlaps: &Overlaps, atom: &Atom) {
+        let weight = |s: &Sighting| f64::from(s.weight) * f64::from(atom.area);
+        let mut votes: BTreeMap<u32, f64> = BTreeMap::new();
+        for s in &atom.sightings {
+            let ballot = overlaps
+                .find(s.photo, s.instance)
+                .map(|i| &electorate.ballots()[i as usize]);
+            if let Some(Ballot::One(stone)) = ballot {
+                *votes.entry(*stone).or_default() += weight(s);
+            }
+        }
+        for (stone, votes) in votes {
+            let missed: f64 = atom
+                .sightings
+                .iter()
+                .filter(|s| s.instance == 0 && !electorate.shows(stone, s.photo))
+                .map(weight)
+                .sum();
+            let entry = self.support.entry(stone).or_default();
+            entry[0] += votes;
+            entry[1] += missed;
+        }
+    }
+
+    /// Share of the votes about a stone as a whole that are for it, those of photos that miss it counted at
+    /// `missed_weight`.
+    fn acceptance(&self, stone: u32, missed_weight: f64) -> f64 {
+        let [votes, missed] = self.support.get(&stone).copied().unwrap_or_default();
+        votes / (votes + missed_weight * missed).max(f64::MIN_POSITIVE)
     }
 
     fn share(&self, instance: u32, stone: u32) -> f64 {
@@ -155,7 +192,8 @@ fn changes(electorate: &Electorate, tables: &Tables, params: &TransferParams) ->
         .filter_map(|(i, stone)| {
             let (won, all) = balance[&stone];
             let share = won as f64 / all.max(1) as f64;
-            (share < params.min_won_share).then_some((i, Decision::Outvoted(share)))
+            let lost = share < params.min_won_share || tables.acceptance(stone, params.missed_weight) < 0.5;
+            lost.then_some((i, Decision::Outvoted(share)))
         })
         .collect()
 }

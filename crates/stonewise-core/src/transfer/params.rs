@@ -44,11 +44,13 @@ pub struct TransferParams {
     /// Share of an instance's area that another stone must win to count as one of the stones it merges. 0.15:
     /// border effects of one pixel stay below on stones of 20 pixels and more.
     pub merged_share: f64,
-    /// Share of a stone's area that its photos must win against all others to keep it. 0.35: a stone that one photo
-    /// shows and two others do not is gone, one that is half hidden is not.
+    /// Share of a stone's area that its photos must win against other stones to keep it. 0.35: a stone of which the
+    /// majority shows little else is gone, one that a neighbour overlaps is not.
     pub min_won_share: f64,
-    /// Weight of a background vote where that photo shows no part of the stone at all. 0.6: segmentation misses
-    /// stones (recall 0.72 in the paper) far more often than it invents them (precision 0.92).
+    /// Weight, against a stone as a whole, of a photo that sees its place and shows no part of it. 0.25: a stone that one
+    /// photo shows and four do not is kept. Segmentation misses stones (recall 0.72 in the paper), the same ones in
+    /// many photos, far more often than it invents them (precision 0.92); a false stone finds no partner in the other
+    /// epoch, a missed one is lost.
     pub missed_weight: f64,
     /// Parts of a stone that are separated by more than about this are islands, metres. 0.04: wider than gaps in a
     /// cloud, narrower than a stone.
@@ -76,7 +78,7 @@ impl Default for TransferParams {
             min_iou: 0.3,
             merged_share: 0.15,
             min_won_share: 0.35,
-            missed_weight: 0.6,
+            missed_weight: 0.25,
             island_link_m: 0.04,
             island_share: 0.2,
             min_points: 30,

@@ -30,11 +30,10 @@ pub(super) struct Electorate<'a> {
     ballots: Vec<Ballot>,
     /// (stone, photo) where the photo shows a part of the stone.
     shown: HashSet<(u32, u32)>,
-    missed_weight: f64,
 }
 
 impl<'a> Electorate<'a> {
-    pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>, missed_weight: f64) -> Self {
+    pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>) -> Self {
         let mut shown = HashSet::new();
         for (instance, ballot) in overlaps.instances.iter().zip(&ballots) {
             let stones: &[u32] = match ballot {
@@ -48,7 +47,6 @@ impl<'a> Electorate<'a> {
             overlaps,
             ballots,
             shown,
-            missed_weight,
         }
     }
 
@@ -56,11 +54,16 @@ impl<'a> Electorate<'a> {
         &self.ballots
     }
 
+    /// Whether a photo shows a part of the stone.
+    pub(super) fn shows(&self, stone: u32, photo: u32) -> bool {
+        self.shown.contains(&(stone, photo))
+    }
+
     /// Counts the votes at a point; `None` where no photo votes.
     ///
-    /// A photo that shows background where others show a stone that it does not have at all counts less than one
-    /// that has the stone but ends it elsewhere. Between a stone and background a tie goes to the stone, between
-    /// stones to the lower index.
+    /// Background counts against a stone only in photos that show the stone elsewhere: they know where it ends. A photo
+    /// that does not show the stone at all has had its say when the stone as a whole was accepted, and only lowers the
+    /// share. Between a stone and background a tie goes to the stone, between stones to the lower index.
     pub(super) fn count(&self, sightings: &[Sighting]) -> Option<Verdict> {
         let mut tally: Vec<(u32, f64)> = Vec::with_capacity(4);
         let mut total = 0.0;
@@ -98,10 +101,8 @@ impl<'a> Electorate<'a> {
         let against: f64 = sightings
             .iter()
             .filter(|s| self.overlaps.find(s.photo, s.instance).is_none())
-            .map(|s| {
-                let shown = self.shown.contains(&(stone, s.photo));
-                f64::from(s.weight) * if shown { 1.0 } else { self.missed_weight }
-            })
+            .filter(|s| self.shows(stone, s.photo))
+            .map(|s| f64::from(s.weight))
             .sum();
         Some(if votes >= against {
             Verdict {
