@@ -9,7 +9,9 @@ use stonewise_core::cloud::{Cloud, MemoryTiles, TileSource};
 use stonewise_core::evaluate::LabelConfusion;
 use stonewise_core::geometry::View;
 use stonewise_core::id::{ImageId, StoneId};
-use stonewise_core::matching::{MatchParams, MatchReport, Surroundings, match_stones};
+use stonewise_core::matching::{
+    Footprints, MatchParams, MatchReport, Surroundings, footprint_overlap, match_stones,
+};
 use stonewise_core::progress::Silent;
 use stonewise_core::stone::{MatchOutcome, Stone};
 use stonewise_core::transfer::{
@@ -69,10 +71,18 @@ fn positions(path: &Path) -> Vec<Point3<f64>> {
     points
 }
 
-/// True stone of every point of a simulated cloud: the first, 32 bits, of six bytes of extra dimensions.
+/// Marks points of things that are not the wall: ground, building, railing, shrubs.
+const OCCLUDER: u32 = 1 << 31;
+
+/// True stone of every point of a simulated cloud, or [`OCCLUDER`]; the extra dimensions are the stone in 32 bits, the
+/// material in 8 (0 is masonry) and a flag.
 fn true_stones(path: &Path) -> Vec<u32> {
     let data = las::Reader::from_path(path).unwrap().read_all().unwrap();
-    let number = |record: &[u8]| u32::from_le_bytes(record[record.len() - 6..][..4].try_into().unwrap());
+    let number = |record: &[u8]| {
+        let extra = &record[record.len() - 6..];
+        let stone = u32::from_le_bytes(extra[..4].try_into().unwrap());
+        if extra[4] == 0 { stone } else { OCCLUDER }
+    };
     data.raw_bytes()
         .chunks_exact(data.record_len())
         .map(number)
@@ -138,10 +148,24 @@ fn label_dam(survey: &Path, epoch: usize, sensor: &str) -> Labelled {
 impl Labelled {
     fn confusion(&self) -> LabelConfusion {
         let mut confusion = LabelConfusion::default();
-        for (labels, truth) in self.labels.tiles.iter().zip(&self.tiled.numbers) {
-            confusion.extend(&labels.stone, truth);
+        for (&stone, &truth) in self.points() {
+            if truth != OCCLUDER {
+                confusion.add(stone, truth);
+            }
         }
         confusion
+    }
+
+    /// Points on occluders, and those of them that carry a stone.
+    fn occluders(&self) -> [usize; 2] {
+        let on: Vec<u32> = self.points().filter(|p| *p.1 == OCCLUDER).map(|p| *p.0).collect();
+        [on.len(), on.iter().filter(|s| **s != 0).count()]
+    }
+
+    /// Label and truth of every point.
+    fn points(&self) -> impl Iterator<Item = (&u32, &u32)> {
+        let labels = self.labels.tiles.iter().flat_map(|t| &t.stone);
+        labels.zip(self.tiled.numbers.iter().flatten())
     }
 
     /// True stone that most points of each stone belong to.
@@ -152,6 +176,17 @@ impl Labelled {
             *entry = (*entry).max((n, t));
         }
         best.into_iter().map(|(p, (_, t))| (p, t)).collect()
+    }
+
+    fn footprints(&self) -> Footprints {
+        let mut footprints = Footprints::new();
+        for (tile, labels) in self.labels.tiles.iter().enumerate() {
+            let cloud = self.tiled.tiles.load(tile).unwrap();
+            for (i, &stone) in labels.stone.iter().enumerate().filter(|s| *s.1 != 0) {
+                footprints.add(StoneId(stone), &cloud.world(i));
+            }
+        }
+        footprints
     }
 
     /// Whether a labelled or background point lies near a place.
@@ -176,9 +211,11 @@ fn cell(p: &Point3<f64>) -> [i64; 3] {
 
 fn matched(first: &Labelled, second: &Labelled) -> MatchReport {
     let seen = second.seen_cells();
+    let (footprints_1, footprints_2) = (first.footprints(), second.footprints());
+    let overlap = footprint_overlap(&footprints_1, &footprints_2);
     let surroundings = Surroundings {
         covered: &|p| seen.contains(&cell(p)),
-        overlap: None,
+        overlap: Some(&overlap),
     };
     match_stones(
         &first.stones,
@@ -263,6 +300,11 @@ fn dam_points_carry_their_stones_and_the_stones_match() {
                 );
                 let worst: Vec<_> = score.per_stone.iter().filter(|s| *s.1 < 0.8).collect();
                 println!("  under 80 %: {worst:.2?}");
+                let [occluders, labelled] = epoch.occluders();
+                println!("  {labelled} of {occluders} points on occluders carry a stone");
+                assert!(score.right_share.unwrap() >= 0.95);
+                assert!(share(score.wrong) <= 0.002);
+                assert!(labelled * 100 <= occluders);
             }
             let report = matched(&epochs[0], &epochs[1]);
             let pairs = judge(&report, &epochs[0].owners(), &epochs[1].owners());
@@ -275,6 +317,82 @@ fn dam_points_carry_their_stones_and_the_stones_match() {
             );
             let missing: Vec<_> = counted.difference(&pairs.right).collect();
             println!("  missing {missing:?}");
+            assert!(found * 100 >= 95 * counted.len() && pairs.wrong * 100 <= pairs.total);
         }
     }
+}
+
+/// The reference stone of every instance of a photo, and its label image.
+type Photo = (BTreeMap<u32, u64>, stonewise_core::raster::LabelImage);
+
+#[test]
+fn fountain_stones_are_found_and_matched() {
+    let Some(data) = data() else { return };
+    let source = MaskSource::open(&data.join("masks_real/fountain/instances.json")).unwrap();
+    let epochs = [1, 2].map(|epoch| {
+        println!("fountain epoch {epoch}");
+        let folder = data.join(format!("fountain/epoch{epoch}"));
+        let views = read_cameras(&folder.join("cameras.xml")).unwrap().views;
+        let mut references: BTreeMap<(ImageId, u32), u64> = BTreeMap::new();
+        let points = positions(&folder.join("cloud.laz"));
+        let labelled = label(tiled(&points, &[]), &views, |image| {
+            let view = views.iter().find(|v| v.image == image).unwrap();
+            let name = format!("epoch{epoch}/images/{}", view.name);
+            let photo = source.labels_for(&name, view.camera.width, view.camera.height)?;
+            let Some(photo) = photo else { return Ok(None) };
+            for instance in &photo.instances {
+                references.insert((image, instance.id), instance.stone_ref.unwrap_or(0));
+            }
+            Ok(Some(photo.labels))
+        });
+        let owners = reference_owners(&labelled.transfer, &references);
+        (labelled, owners)
+    });
+    let report = matched(&epochs[0].0, &epochs[1].0);
+    let pairs = judge(&report, &epochs[0].1, &epochs[1].1);
+    println!(
+        "  right {} of 210, {} wrong of {}, {} outcomes",
+        pairs.right.len(),
+        pairs.wrong,
+        pairs.total,
+        report.outcomes.len()
+    );
+    let both: BTreeSet<u32> = [0, 1]
+        .map(|e| epochs[e].1.values().copied().collect::<BTreeSet<u32>>())
+        .into_iter()
+        .reduce(|a, b| &a & &b)
+        .unwrap();
+    println!(
+        "  in both epochs {}; not matched {:?}",
+        both.len(),
+        &both - &pairs.right
+    );
+    assert!(pairs.right.len() >= 185 && pairs.wrong * 100 <= pairs.total);
+}
+
+/// The reference stone of each stone: the one most of its instances stand for, where any stands for one.
+fn reference_owners(transfer: &Transfer, references: &BTreeMap<(ImageId, u32), u64>) -> BTreeMap<u32, u32> {
+    let mut owners = BTreeMap::new();
+    let mut clean = BTreeMap::<u32, usize>::new();
+    for stone in &transfer.stones {
+        let mut votes: BTreeMap<u64, usize> = BTreeMap::new();
+        for (image, instance) in &stone.instances {
+            let reference = references[&(*image, instance.0)];
+            if reference != 0 {
+                *votes.entry(reference).or_default() += 1;
+            }
+        }
+        let Some((&reference, _)) = votes.iter().max_by_key(|v| v.1) else {
+            continue;
+        };
+        owners.insert(stone.stone.0, reference as u32);
+        *clean.entry(reference as u32).or_default() += if votes.len() == 1 { 1 } else { 100 };
+    }
+    let single = clean.values().filter(|c| **c == 1).count();
+    println!(
+        "  {} reference stones found, {single} as one clean stone",
+        clean.len()
+    );
+    assert!(single >= 190);
+    owners
 }

@@ -8,17 +8,21 @@ use crate::id::StoneId;
 use crate::stone::{MatchOutcome, Stone, UnmatchedReason};
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
-/// Area of both outlines over the area of either, 0..1, after the first stone is moved by the shift; `None` where it
-/// cannot be told.
+/// Overlap of two stones, 0..1, after the first is moved by the shift; `None` where it cannot be told, as by
+/// [`footprint_overlap`](super::footprint_overlap).
 pub type Overlap<'a> = dyn Fn(&Stone, &Stone, &Vector3<f64>) -> Option<f64> + Sync + 'a;
+
+/// Nearest stones of the second epoch whose overlap is asked for.
+const OVERLAP_CANDIDATES: usize = 5;
 
 /// What the caller knows beside the two tables of stones.
 #[derive(Clone, Copy)]
 pub struct Surroundings<'a> {
     /// Whether the second epoch has points, and photos that see them, at a place.
     pub covered: &'a (dyn Fn(&Point3<f64>) -> bool + Sync),
-    /// Overlap of outlines: decides where centroids alone are ambiguous.
+    /// Overlap of the stones' surfaces: pairs stones that centroids and areas leave alone.
     pub overlap: Option<&'a Overlap<'a>>,
 }
 
@@ -56,7 +60,8 @@ pub struct MatchReport {
 ///
 /// A stone's partner is the nearest centroid to where the local shift expects it, if that is much nearer than the second
 /// nearest (ratio test, Equation 2 of the paper, after Lowe 2004), the faces are about equally large, and each is the
-/// other's nearest. No stone is used twice. The result does not depend on the order of the tables.
+/// other's nearest. Of the stones that are left, those whose surfaces overlap are paired, best first, where the caller
+/// can tell the overlap. No stone is used twice. The result does not depend on the order of the tables.
 /// Cost: a few nearest-neighbour searches a stone for each of about a dozen trial shifts.
 pub fn match_stones(
     first: &[Stone],
@@ -75,20 +80,12 @@ pub fn match_stones(
     let places = predict(&first, &field.shifts);
     let back = Centroids::at(&first, &places);
     let trials: Vec<Trial> = (0..first.len())
-        .map(|i| {
-            try_one(
-                i,
-                &places[i],
-                &field.shifts[i],
-                &a,
-                &b,
-                &back,
-                surroundings,
-                params,
-            )
-        })
+        .map(|i| try_one(i, &places[i], &a, &b, &back, surroundings, params))
         .collect();
-    let outcomes = one_to_one(&first, &second, &trials);
+    let mut outcomes = one_to_one(&first, &second, &trials);
+    if let Some(overlap) = surroundings.overlap {
+        pair_by_overlap(&mut outcomes, &a, &b, &places, &field.shifts, overlap, params);
+    }
     let mut used: Vec<StoneId> = outcomes.iter().filter_map(|o| partner(&o.1)).collect();
     used.sort_unstable();
     MatchReport {
@@ -110,11 +107,9 @@ struct Trial {
     quality: Option<MatchQuality>,
 }
 
-#[allow(clippy::too_many_arguments)] // one stone with its surroundings
 fn try_one(
     i: usize,
     place: &Point3<f64>,
-    shift: &Vector3<f64>,
     first: &Centroids,
     second: &Centroids,
     back: &Centroids,
@@ -146,16 +141,12 @@ fn try_one(
             .map_or(0.0, |n| distance_m / n.1.max(f64::MIN_POSITIVE)),
         area_ratio: area_ratio(stone, candidate),
     };
-    let overlaps = || {
-        let overlap = surroundings.overlap.and_then(|o| o(stone, candidate, shift));
-        overlap.is_some_and(|o| o >= params.min_overlap)
-    };
     let mutual = || back.nearest(&candidate.centroid, 1).first().map(|n| n.0) == Some(i);
     let outcome = if distance_m > params.max_offset_sizes * stone.area_m2.max(candidate.area_m2).sqrt() {
         Err(absent())
     } else if quality.area_ratio < params.min_area_ratio {
         Err(UnmatchedReason::AreaMismatch)
-    } else if (quality.ratio >= params.max_ratio && !overlaps()) || (params.mutual && !mutual()) {
+    } else if quality.ratio >= params.max_ratio || (params.mutual && !mutual()) {
         Err(UnmatchedReason::Ambiguous)
     } else {
         Ok(j)
@@ -192,6 +183,35 @@ fn one_to_one(first: &[Stone], second: &[Stone], trials: &[Trial]) -> Vec<(Stone
             (stone.id, outcome)
         })
         .collect()
+}
+
+/// Pairs stones that are left over where their surfaces overlap, the best overlap first.
+fn pair_by_overlap(
+    outcomes: &mut [(StoneId, MatchOutcome)],
+    first: &Centroids,
+    second: &Centroids,
+    places: &[Point3<f64>],
+    shifts: &[Vector3<f64>],
+    overlap: &Overlap,
+    params: &MatchParams,
+) {
+    let mut used: BTreeSet<StoneId> = outcomes.iter().filter_map(|o| partner(&o.1)).collect();
+    let mut found: Vec<(f64, usize, usize)> = Vec::new();
+    for i in (0..outcomes.len()).filter(|&i| partner(&outcomes[i].1).is_none()) {
+        for (j, _) in second.nearest(&places[i], OVERLAP_CANDIDATES) {
+            let value = overlap(&first.stones[i], &second.stones[j], &shifts[i]);
+            if let Some(value) = value.filter(|v| *v >= params.min_overlap) {
+                found.push((value, i, j));
+            }
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+    for (_, i, j) in found {
+        let second = second.stones[j].id;
+        if partner(&outcomes[i].1).is_none() && used.insert(second) {
+            outcomes[i].1 = MatchOutcome::Matched { second };
+        }
+    }
 }
 
 fn partner(outcome: &MatchOutcome) -> Option<StoneId> {

@@ -5,9 +5,11 @@
 
 mod centroids;
 mod field;
+mod footprints;
 mod match_stones;
 mod params;
 mod shift;
 
+pub use footprints::{Footprints, footprint_overlap};
 pub use match_stones::{MatchQuality, MatchReport, Overlap, Surroundings, match_stones};
 pub use params::MatchParams;

@@ -37,7 +37,7 @@ pub(super) fn decide<'a>(
         }
     }
     let mut decisions = BTreeMap::new();
-    let mut electorate = Electorate::new(overlaps, ballots);
+    let mut electorate = Electorate::new(overlaps, ballots, params.border_weight);
     for _ in 0..MAX_ROUNDS {
         let tables = Tables::count(&electorate, overlaps, atoms);
         let changes = changes(&electorate, &tables, params);
@@ -53,7 +53,7 @@ pub(super) fn decide<'a>(
             };
             decisions.insert(i, decision);
         }
-        electorate = Electorate::new(overlaps, ballots);
+        electorate = Electorate::new(overlaps, ballots, params.border_weight);
     }
     (electorate, decisions)
 }

@@ -52,6 +52,9 @@ pub struct TransferParams {
     /// many photos, far more often than it invents them (precision 0.92); a false stone finds no partner in the other
     /// epoch, a missed one is lost.
     pub missed_weight: f64,
+    /// Weight of a background vote of a photo that shows the stone elsewhere. 0.8: where two photos of nearly equal
+    /// weight disagree about a part of a stone, the part is kept, as masks leave out more than they add.
+    pub border_weight: f64,
     /// Parts of a stone that are separated by more than about this are islands, metres. 0.04: wider than gaps in a
     /// cloud, narrower than a stone.
     pub island_link_m: f64,
@@ -79,6 +82,7 @@ impl Default for TransferParams {
             merged_share: 0.15,
             min_won_share: 0.35,
             missed_weight: 0.25,
+            border_weight: 0.8,
             island_link_m: 0.04,
             island_share: 0.2,
             min_points: 30,

@@ -30,10 +30,11 @@ pub(super) struct Electorate<'a> {
     ballots: Vec<Ballot>,
     /// (stone, photo) where the photo shows a part of the stone.
     shown: HashSet<(u32, u32)>,
+    border_weight: f64,
 }
 
 impl<'a> Electorate<'a> {
-    pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>) -> Self {
+    pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>, border_weight: f64) -> Self {
         let mut shown = HashSet::new();
         for (instance, ballot) in overlaps.instances.iter().zip(&ballots) {
             let stones: &[u32] = match ballot {
@@ -47,6 +48,7 @@ impl<'a> Electorate<'a> {
             overlaps,
             ballots,
             shown,
+            border_weight,
         }
     }
 
@@ -102,7 +104,7 @@ impl<'a> Electorate<'a> {
             .iter()
             .filter(|s| self.overlaps.find(s.photo, s.instance).is_none())
             .filter(|s| self.shows(stone, s.photo))
-            .map(|s| f64::from(s.weight))
+            .map(|s| f64::from(s.weight) * self.border_weight)
             .sum();
         Some(if votes >= against {
             Verdict {
