@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use std::collections::HashSet;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::id::StoneId;
-use stonewise_core::matching::{MatchReport, Surroundings, match_stones};
+use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::stone::MatchOutcome;
 
 /// Edge of the cells in which the second epoch's coverage is noted, metres: about half a stone.
@@ -43,11 +43,13 @@ pub fn find_partners(
     let params = &context.project.settings.matching;
     let key = Key::new("match", params, &[first.key.as_str(), second.key.as_str()]);
     let step = context.step(&format!("match-{number}"), key, |step, _| {
-        let covered = coverage(context, second)?;
+        let (_, footprints) = survey(context, first)?;
+        let (covered, footprints_2) = survey(context, second)?;
+        let overlap = footprint_overlap(&footprints, &footprints_2);
         let sees = |p: &Point3<f64>| neighbourhood(cell_of(p)).any(|cell| covered.contains(&cell));
         let surroundings = Surroundings {
             covered: &sees,
-            overlap: None,
+            overlap: Some(&overlap),
         };
         let report = match_stones(&first.stones, &second.stones, &surroundings, params);
         write_text(
@@ -75,19 +77,22 @@ pub fn find_partners(
 
 type Cell = [i64; 3];
 
-/// Cells that hold points which a photo of the epoch sees.
-fn coverage(context: &Context, epoch: &Labelled) -> Result<HashSet<Cell>> {
+/// Cells that hold points which a photo of the epoch sees, and where its stones lie.
+fn survey(context: &Context, epoch: &Labelled) -> Result<(HashSet<Cell>, Footprints)> {
     let mut covered = HashSet::new();
+    let mut footprints = Footprints::new();
     for tile in 0..epoch.tiled.tiles.tile_count() {
         context.progress.check()?;
         let (cloud, labels) = (epoch.tiled.tiles.load(tile)?, epoch.labels(tile)?);
-        covered.extend(
-            (0..cloud.len())
-                .filter(|&i| labels.seen[i])
-                .map(|i| cell_of(&cloud.world(i))),
-        );
+        for i in (0..cloud.len()).filter(|&i| labels.seen[i]) {
+            let place = cloud.world(i);
+            covered.insert(cell_of(&place));
+            if labels.stone[i] != 0 {
+                footprints.add(StoneId(labels.stone[i]), &place);
+            }
+        }
     }
-    Ok(covered)
+    Ok((covered, footprints))
 }
 
 fn cell_of(p: &Point3<f64>) -> Cell {
