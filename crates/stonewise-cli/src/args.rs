@@ -24,9 +24,15 @@ pub enum Command {
     /// Do everything: from clouds and photos to results and a report; resumes after an interruption.
     #[command(after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/")]
     Run(ProjectArgs),
+    /// Make a small survey with known motion, and measure it.
+    #[command(after_help = "Example:\n  stonewise demo --out demo")]
+    Demo(DemoArgs),
     /// Write a project file from the surveys found in a folder.
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
+    /// Make two disjoint halves of one epoch, to test the method against a known motion.
+    #[command(after_help = "Example:\n  stonewise split survey/stonewise.toml --seed 1 --out halves/")]
+    Split(SplitArgs),
     /// Bring the masks of every photo into one label image.
     #[command(after_help = "Example:\n  stonewise segment survey/stonewise.toml --out results/")]
     Segment(ProjectArgs),
@@ -39,6 +45,30 @@ pub enum Command {
     /// Measure the motion of every matched stone.
     #[command(after_help = "Example:\n  stonewise register survey/stonewise.toml --out results/")]
     Register(ProjectArgs),
+    /// Compare clouds along their normals (Lague et al. 2013).
+    #[command(
+        after_help = "Examples:\n  stonewise m3c2 survey/stonewise.toml --out results/\n  \
+        stonewise m3c2 before.laz after.laz --out results/ --params m3c2_params.txt"
+    )]
+    M3c2(CompareArgs),
+    /// Distance from each point of the second cloud to the nearest of the first.
+    #[command(after_help = "Example:\n  stonewise c2c before.laz after.laz --out results/")]
+    C2c(CompareArgs),
+    /// Distance from each point of a cloud to a mesh.
+    #[command(after_help = "Example:\n  stonewise c2m mesh.ply cloud.laz --out results/")]
+    C2m(CompareArgs),
+    /// Score results against truth.
+    #[command(after_help = "Example:\n  stonewise evaluate results/ --truth truth/stones.csv")]
+    Evaluate(EvaluateArgs),
+    /// Write the report of a finished run again, from its result files alone.
+    #[command(after_help = "Example:\n  stonewise report results/")]
+    Report(ReportArgs),
+    /// Make a simulated survey with truth.
+    #[command(after_help = "Example:\n  stonewise simulate --seed 7 --out survey/")]
+    Simulate(SimulateArgs),
+    /// Say what is in a cloud, a camera file, a mask file or a project.
+    #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
+    Info(InfoArgs),
 }
 
 /// A project and a folder for its results.
@@ -51,9 +81,92 @@ pub struct ProjectArgs {
     pub out: PathBuf,
 }
 
+/// Arguments of `demo`.
+#[derive(Debug, ClapArgs)]
+pub struct DemoArgs {
+    /// Folder of the survey and the results; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Another seed makes another wall.
+    #[arg(long, default_value_t = 7)]
+    pub seed: u64,
+}
+
 /// Arguments of `init`.
 #[derive(Debug, ClapArgs)]
 pub struct InitArgs {
     /// Folder with one folder per epoch, in time order by name.
     pub dir: PathBuf,
+}
+
+/// Arguments of `split`.
+#[derive(Debug, ClapArgs)]
+pub struct SplitArgs {
+    /// The project file.
+    pub project: PathBuf,
+    /// Which points and photos go to which half.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Name of the epoch to split; the first when absent.
+    #[arg(long, value_name = "NAME")]
+    pub epoch: Option<String>,
+    /// Folder of the new project; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// Arguments of `m3c2`, `c2c` and `c2m`.
+#[derive(Debug, ClapArgs)]
+pub struct CompareArgs {
+    /// A project file, or the reference (cloud, or PLY mesh for c2m) and the compared cloud.
+    #[arg(num_args = 1..=2, required = true, value_name = "INPUT")]
+    pub inputs: Vec<PathBuf>,
+    /// Folder of the results; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// CloudCompare's M3C2 parameter file (m3c2 of two clouds only).
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Farther points get no distance, metres (c2c and c2m).
+    #[arg(long, value_name = "M", default_value_t = 1.0)]
+    pub max_distance: f64,
+}
+
+/// Arguments of `evaluate`.
+#[derive(Debug, ClapArgs)]
+pub struct EvaluateArgs {
+    /// Folder of a finished run.
+    pub results: PathBuf,
+    /// Truth table: one row a stone, with stone_id, cx, cy, cz, dx, dy, dz.
+    #[arg(long, value_name = "FILE")]
+    pub truth: PathBuf,
+}
+
+/// Arguments of `report`.
+#[derive(Debug, ClapArgs)]
+pub struct ReportArgs {
+    /// Folder of a finished run.
+    pub results: PathBuf,
+}
+
+/// Arguments of `simulate`.
+#[derive(Debug, ClapArgs)]
+pub struct SimulateArgs {
+    /// Folder of the survey; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Parameters of the simulation (TOML, every key optional); the defaults are written to simulation.toml in the folder.
+    #[arg(long, value_name = "FILE")]
+    pub params: Option<PathBuf>,
+    /// Another seed makes another wall; overrides the file.
+    #[arg(long)]
+    pub seed: Option<u64>,
+}
+
+/// Arguments of `info`.
+#[derive(Debug, ClapArgs)]
+pub struct InfoArgs {
+    /// Files or folders.
+    #[arg(required = true)]
+    pub paths: Vec<PathBuf>,
 }

@@ -6,10 +6,14 @@ mod pipeline;
 mod project;
 pub mod report;
 pub mod simulate;
+mod split;
+mod truth;
 mod warnings;
 
 pub use error::{Error, Result};
 pub use init::init;
-pub use pipeline::{Summary, Until, run};
+pub use pipeline::{Comparison, Summary, Until, compare_clouds, run};
 pub use project::{Epoch, Project, RegistrationParams, Settings, TileParams};
+pub use split::split;
+pub use truth::evaluate_truth;
 pub use warnings::Warning;

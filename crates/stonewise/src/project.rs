@@ -138,13 +138,25 @@ impl Project {
     ///
     /// Errors name the line: a key that is not known, a file that does not exist, a value that cannot be.
     pub fn read(path: &Path) -> Result<Self> {
+        Self::read_with(path, 2)
+    }
+
+    /// The same for a project that may have a single epoch, which is to be split.
+    pub fn read_for_split(path: &Path) -> Result<Self> {
+        Self::read_with(path, 1)
+    }
+
+    fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
         let text = fs::read_to_string(path).map_err(Error::io("reading the project file", path))?;
         let source = Source { path, text: &text };
         let raw: RawProject = toml::from_str(&text)
             .map_err(|e| source.error(e.span().unwrap_or(0..0), e.message().trim().replace('\n', "; ")))?;
-        if raw.epochs.len() < 2 {
+        if raw.epochs.len() < least_epochs {
             let at = text.find("[[epochs]]").unwrap_or(0);
-            return Err(source.error(at..at, "two [[epochs]] at least are needed, in time order"));
+            return Err(source.error(
+                at..at,
+                format!("{least_epochs} [[epochs]] at least are needed, in time order"),
+            ));
         }
         let settings = Settings {
             tiles: raw.tiles,
@@ -167,6 +179,29 @@ impl Project {
             epochs,
             settings,
         })
+    }
+}
+
+impl Project {
+    /// Two clouds without photos, for comparisons of clouds alone.
+    pub fn of_clouds(before: &Path, after: &Path, m3c2: M3c2Params) -> Self {
+        let epoch = |name: &str, cloud: &Path| Epoch {
+            name: name.to_owned(),
+            clouds: vec![cloud.to_path_buf()],
+            images: PathBuf::new(),
+            cameras: PathBuf::new(),
+            masks: None,
+            motion: None,
+        };
+        Self {
+            path: before.to_path_buf(),
+            name: "clouds".to_owned(),
+            epochs: vec![epoch("before", before), epoch("after", after)],
+            settings: Settings {
+                m3c2,
+                ..Settings::default()
+            },
+        }
     }
 }
 

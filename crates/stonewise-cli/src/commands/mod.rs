@@ -1,7 +1,13 @@
 //! One file per subcommand: parse, call the library, print.
 
+mod compare;
+mod evaluate;
+mod info;
 mod init;
+mod report;
 mod run;
+mod simulate;
+mod split;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
@@ -30,6 +36,15 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Label(args) => run::run(&args, Until::Labelled, printer),
         Command::Match(args) => run::run(&args, Until::Matched, printer),
         Command::Register(args) => run::run(&args, Until::Registered, printer),
+        Command::M3c2(args) => compare::m3c2(&args, printer),
+        Command::C2c(args) => compare::c2c(&args, printer),
+        Command::C2m(args) => compare::c2m(&args, printer),
+        Command::Evaluate(args) => evaluate::evaluate(&args, printer),
+        Command::Report(args) => report::report(&args, printer),
+        Command::Demo(args) => simulate::demo(&args, printer),
+        Command::Simulate(args) => simulate::simulate(&args, printer),
+        Command::Split(args) => split::split(&args, printer),
         Command::Init(args) => init::init(&args),
+        Command::Info(args) => info::info(&args),
     }
 }

@@ -95,7 +95,7 @@ impl Survey {
         transforms: &Vector<Transform>,
     ) -> Vec<u8> {
         let mut out = Vec::new();
-        for (i, label) in labels.iter().enumerate() {
+        for (i, label) in labels.iter().enumerate().filter(|(_, l)| !l.dropped) {
             let intensity = chunk.intensities.as_ref().map(|all| self.intensity(all[i]));
             let color = chunk.colors.as_ref().map(|all| all[i]);
             let record = Export {

@@ -17,6 +17,8 @@ pub struct PointLabel {
     pub stone: Option<StoneId>,
     /// How the stone moved at this point, where that is known.
     pub motion: Option<PointMotion>,
+    /// The point is left out of the copy.
+    pub dropped: bool,
 }
 
 /// Movement of a point from the first epoch to the second.
@@ -31,6 +33,8 @@ pub struct PointMotion {
 /// Dimensions that are added to each point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LabelColumns {
+    /// None: a plain copy.
+    Nothing,
     /// `stone_id` (u32, 0 for no stone).
     Stone,
     /// `stone_id`; `dx`, `dy`, `dz` (f32, metres, NaN where no motion is known) and `significant` (u16, 0 or 1).
@@ -62,6 +66,27 @@ pub fn write_labelled<E: From<CloudError>>(
     })
 }
 
+/// Copies the points that `keep` wants, by the index of their record, to a LAZ file; see [`write_labelled`].
+///
+/// # Errors
+/// As [`write_labelled`], or what `keep` returns.
+pub fn select_points<E: From<CloudError>>(
+    input: &Path,
+    output: &Path,
+    mut keep: impl FnMut(u64) -> Result<bool, E>,
+) -> Result<ReadSummary, E> {
+    write_labelled(input, output, LabelColumns::Nothing, |chunk| {
+        let label = |&index: &u64| {
+            let dropped = !keep(index)?;
+            Ok(PointLabel {
+                dropped,
+                ..PointLabel::default()
+            })
+        };
+        chunk.indices.iter().map(label).collect()
+    })
+}
+
 /// Gives the labels of a chunk.
 pub(super) type Fill<'a, E> = &'a mut dyn FnMut(&PointChunk) -> Result<Vec<PointLabel>, E>;
 
@@ -75,6 +100,7 @@ impl LabelColumns {
             ("significant", ExtraType::U16, "1: beyond the detection limit"),
         ];
         match self {
+            Self::Nothing => &[],
             Self::Stone => &ALL[..1],
             Self::StoneAndMotion => &ALL,
         }
@@ -96,6 +122,9 @@ impl LabelColumns {
     }
 
     pub(super) fn append(self, label: &PointLabel, out: &mut Vec<u8>) {
+        if self == Self::Nothing {
+            return;
+        }
         out.extend(label.stone.map_or(0, |s| s.0).to_le_bytes());
         if self == Self::Stone {
             return;
@@ -120,5 +149,36 @@ impl LabelColumns {
         }
         let reason = format!("{} labels for {} points", labels.len(), chunk.len());
         Err(CloudError::unwritable(name, reason))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_selections_share_out_all_points_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let text = (0..1000)
+            .map(|i| format!("{i}.25 {} 7\n", i % 13))
+            .collect::<String>();
+        let input = folder.path().join("all.xyz");
+        std::fs::write(&input, text).unwrap();
+        let halves = [0, 1].map(|half| {
+            let output = folder.path().join(format!("{half}.laz"));
+            select_points(&input, &output, |index| {
+                Ok::<_, CloudError>(index % 3 % 2 == half)
+            })
+            .unwrap();
+            let mut x = Vec::new();
+            read_cloud(&output, 100, |c| {
+                x.extend(c.positions.iter().map(|p| p.x.round() as u64));
+                Ok::<(), CloudError>(())
+            })
+            .unwrap();
+            x
+        });
+        let expected = [0u64, 1].map(|half| (0..1000u64).filter(|i| i % 3 % 2 == half).collect::<Vec<_>>());
+        assert_eq!(halves, expected);
     }
 }

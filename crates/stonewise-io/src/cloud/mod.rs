@@ -20,7 +20,7 @@ pub use chunk::{PointChunk, ReadSummary};
 pub use error::CloudError;
 pub use format::CloudFormat;
 pub use info::{CloudInfo, Scan, cloud_info};
-pub use label::{LabelColumns, PointLabel, PointMotion, write_labelled};
+pub use label::{LabelColumns, PointLabel, PointMotion, select_points, write_labelled};
 pub use ply::read_mesh;
 pub use points::{ExtraColumn, write_points_laz};
 pub use read::read_cloud;

@@ -51,6 +51,7 @@ pub fn write_clouds(
                     PointLabel {
                         stone: stone.map(StoneId),
                         motion: stone.and_then(|s| motions.get(&s).copied()),
+                        dropped: false,
                     }
                 };
                 Ok::<_, Error>(chunk.indices.iter().map(label).collect())

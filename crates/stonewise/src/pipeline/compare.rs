@@ -5,23 +5,24 @@ use crate::pipeline::context::Context;
 use crate::pipeline::label::read_json;
 use crate::pipeline::step::Key;
 use crate::pipeline::tiled::Tiled;
-use nalgebra::Point3;
 use stonewise_core::change::{ChangeField, OutwardReference, m3c2_survey};
-use stonewise_core::geometry::View;
 
-/// Compares two epochs along the normals of the first; `views` tell which side is outside.
-pub fn compare(context: &Context, epochs: [&Tiled; 2], number: usize, views: &[View]) -> Result<ChangeField> {
+/// Compares two epochs along the normals of the first.
+pub fn compare(
+    context: &Context,
+    epochs: [&Tiled; 2],
+    number: usize,
+    outward: &OutwardReference,
+) -> Result<ChangeField> {
     let params = &context.project.settings.m3c2;
     let motions = epochs.map(|e| &e.tiles.motion);
     let key = Key::new("m3c2", &(params, motions), &epochs.map(|e| e.step.key().as_str()));
     let step = context.step(&format!("m3c2-{number}"), key, |step, _| {
-        let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
         let mut field = ChangeField::default();
-        let outward = OutwardReference::Towards(&centres);
         m3c2_survey(
             &epochs[0].tiles,
             &epochs[1].tiles,
-            &outward,
+            outward,
             params,
             context.progress,
             |_, tile| {

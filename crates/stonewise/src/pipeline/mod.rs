@@ -1,5 +1,6 @@
 //! The steps of the method, with their files, and the run that strings them together.
 
+mod clouds_only;
 mod clouds_out;
 mod compare;
 mod context;
@@ -19,4 +20,5 @@ mod tables;
 mod tiled;
 mod tiles;
 
+pub use clouds_only::{Comparison, compare_clouds};
 pub use run::{Summary, Until, run};

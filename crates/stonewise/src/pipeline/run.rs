@@ -16,10 +16,12 @@ use crate::pipeline::tiled::{Tiled, tile_epoch};
 use crate::project::Project;
 use crate::report::{StoneRow, write_report, write_stones_named};
 use crate::warnings::Warning;
+use nalgebra::Point3;
 use serde_json::json;
 use std::path::Path;
+use stonewise_core::change::OutwardReference;
 use stonewise_core::cloud::TileSource;
-use stonewise_core::geometry::Bounds;
+use stonewise_core::geometry::{Bounds, View};
 use stonewise_core::progress::Progress;
 
 /// How far to go.
@@ -144,7 +146,9 @@ fn measure(
     if until == Until::Registered {
         return Ok(rows);
     }
-    let change = compare(context, [&first.tiled, &second.tiled], number, &photos[0].views)?;
+    let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
+    let outward = OutwardReference::Towards(&centres);
+    let change = compare(context, [&first.tiled, &second.tiled], number, &outward)?;
     context.timed("write m3c2", || {
         write_change(&context.out, &named("m3c2"), &change)
     })?;

@@ -2,11 +2,11 @@
 
 use crate::pipeline::context::Context;
 use crate::report::StoneRow;
+use crate::truth::outcome;
 use nalgebra::{Point3, Vector3};
 use stonewise_core::change::{ChangeField, ChangePoint};
 use stonewise_core::cloud::GridIndex;
 use stonewise_core::evaluate::{Evaluation, StoneOutcome, score_change, score_stones};
-use stonewise_core::id::StoneId;
 use stonewise_core::stone::Stone;
 
 /// Scores stones and M3C2 of epoch `number` against its known motion; `None` where the project knows none.
@@ -38,7 +38,7 @@ pub fn evaluate(
     let outcomes: Vec<StoneOutcome> = stones
         .iter()
         .zip(rows)
-        .map(|(stone, row)| outcome(stone, row))
+        .map(|(stone, row)| outcome(row, stone.normal))
         .collect();
     evaluation.stones = Some(score_stones(&outcomes, truth, params));
     let index = GridIndex::new(&stones.iter().map(|s| s.centroid).collect::<Vec<_>>(), 0.5);
@@ -49,18 +49,4 @@ pub fn evaluate(
     };
     evaluation.m3c2 = Some(score_change(change, truth, face, params));
     Some(evaluation)
-}
-
-fn outcome(stone: &Stone, row: &StoneRow) -> StoneOutcome {
-    let motion = row.motion.as_ref();
-    StoneOutcome {
-        stone: StoneId(row.stone_id),
-        centroid: stone.centroid,
-        normal: stone.normal,
-        displacement: motion.map(|m| m.displacement),
-        covariance: motion.map(|m| m.covariance),
-        detection_limit_m: motion.map(|m| m.detection_limit_m),
-        significant: motion.map(|m| m.significant),
-        loose: motion.map(|m| m.loose),
-    }
 }

@@ -84,11 +84,14 @@ impl RecordCopy {
         let mut out = Vec::with_capacity(data.len() * (copied + usize::from(self.columns.size())));
         let mut next = chunk.indices.iter().zip(labels).peekable();
         for (index, record) in (first..).zip(data.raw_bytes().chunks_exact(length)) {
+            let own = next.next_if(|(i, _)| **i == index);
+            let label = own.map_or(PointLabel::default(), |(_, label)| *label);
+            if label.dropped {
+                continue;
+            }
             for bytes in &self.copied {
                 out.extend_from_slice(&record[bytes.clone()]);
             }
-            let own = next.next_if(|(i, _)| **i == index);
-            let label = own.map_or(PointLabel::default(), |(_, label)| *label);
             self.columns.append(&label, &mut out);
         }
         out
@@ -112,9 +115,10 @@ fn builder(layout: &Layout, record: &RecordCopy) -> Builder {
         record.user_id = plain(&record.user_id, 16);
         record.description = plain(&record.description, 32);
     }
-    builder
-        .vlrs
-        .push(extra_bytes::description_record(record.descriptors()));
+    let descriptors = record.descriptors();
+    if !descriptors.is_empty() {
+        builder.vlrs.push(extra_bytes::description_record(descriptors));
+    }
     builder
 }
 

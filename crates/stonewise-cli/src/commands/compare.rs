@@ -1,0 +1,66 @@
+//! `m3c2`, `c2c` and `c2m`: clouds without stones.
+
+use crate::args::CompareArgs;
+use crate::commands::Outcome;
+use crate::printer::Printer;
+use anyhow::{Context, Result, bail};
+use std::path::Path;
+use stonewise::{Comparison, Project, compare_clouds};
+use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
+
+/// M3C2 of a project or of two clouds.
+pub fn m3c2(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+    let params = args.params.as_deref().map(cloudcompare_params).transpose()?;
+    if args.inputs.len() == 2 && params.is_none() {
+        printer.log("normals point upwards (no cameras tell the outside); parameters are the defaults");
+    }
+    let mut project = project(args, params.clone().unwrap_or_default())?;
+    if let Some(params) = params {
+        project.settings.m3c2 = params;
+    }
+    compare(&project, Comparison::M3c2, args, printer)
+}
+
+/// C2C of a project or of two clouds.
+pub fn c2c(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+    let what = Comparison::C2c {
+        max_m: args.max_distance,
+    };
+    compare(&project(args, M3c2Params::default())?, what, args, printer)
+}
+
+/// C2M of a mesh and a cloud.
+pub fn c2m(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+    let [mesh, cloud] = args.inputs.as_slice() else {
+        bail!("c2m needs a mesh and a cloud: stonewise c2m mesh.ply cloud.laz --out DIR");
+    };
+    let project = Project::of_clouds(mesh, cloud, M3c2Params::default());
+    compare(
+        &project,
+        Comparison::C2m {
+            mesh,
+            max_m: args.max_distance,
+        },
+        args,
+        printer,
+    )
+}
+
+fn compare(project: &Project, what: Comparison, args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+    compare_clouds(project, what, &args.out, printer)?;
+    printer.log(&format!("results: {}", args.out.display()));
+    Ok(Outcome::Done)
+}
+
+fn project(args: &CompareArgs, params: M3c2Params) -> Result<Project> {
+    match args.inputs.as_slice() {
+        [project] => Ok(Project::read(project)?),
+        [before, after] => Ok(Project::of_clouds(before, after, params)),
+        _ => bail!("one project file or two clouds are needed"),
+    }
+}
+
+fn cloudcompare_params(path: &Path) -> Result<M3c2Params> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
+    params_from_cloudcompare(&text).with_context(|| path.display().to_string())
+}

@@ -1,0 +1,41 @@
+//! `evaluate`.
+
+use crate::args::EvaluateArgs;
+use crate::commands::Outcome;
+use crate::printer::Printer;
+use anyhow::Result;
+use std::io::Write;
+use std::path::Path;
+use stonewise::evaluate_truth;
+use stonewise_core::evaluate::EvaluationParams;
+
+/// Scores a finished run; the evaluation goes to stdout as JSON.
+pub fn evaluate(args: &EvaluateArgs, printer: &Printer) -> Result<Outcome> {
+    let evaluation = evaluate_truth(&args.results, &args.truth, &EvaluationParams::default())?;
+    printer.finish();
+    writeln!(
+        std::io::stdout(),
+        "{}",
+        serde_json::to_string_pretty(&evaluation)?
+    )?;
+    Ok(Outcome::Done)
+}
+
+/// Scores a finished run and says the main figures in a line.
+pub fn score(results: &Path, truth: &Path, printer: &Printer) -> Result<()> {
+    let evaluation = evaluate_truth(results, truth, &EvaluationParams::default())?;
+    if let Some(score) = &evaluation.external {
+        let rmse = |s: &Option<stonewise_core::evaluate::ErrorStatistics>| {
+            s.as_ref()
+                .map_or("-".to_owned(), |s| format!("{:.2} mm", 1e3 * s.rmse_m))
+        };
+        printer.log(&format!(
+            "against the truth: {} of {} stones measured, RMSE in-plane (2D) {}, out-of-plane {}",
+            score.found,
+            score.countable,
+            rmse(&score.motions.errors.in_plane_2d),
+            rmse(&score.motions.errors.out_of_plane),
+        ));
+    }
+    Ok(())
+}

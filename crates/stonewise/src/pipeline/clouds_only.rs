@@ -1,0 +1,121 @@
+//! Comparing clouds without stones: M3C2, C2C and C2M as commands of their own.
+
+use crate::error::{Error, Result};
+use crate::pipeline::compare::compare;
+use crate::pipeline::context::Context;
+use crate::pipeline::tables::write_change;
+use crate::pipeline::tiled::{Tiled, tile_epoch};
+use crate::project::Project;
+use nalgebra::{Point3, Vector3};
+use std::path::Path;
+use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
+use stonewise_core::geometry::View;
+use stonewise_core::progress::Progress;
+use stonewise_io::cameras::read_cameras;
+use stonewise_io::cloud::{ExtraColumn, read_mesh, write_points_laz};
+
+/// What to compare with what.
+#[derive(Clone, Copy, Debug)]
+pub enum Comparison<'a> {
+    /// Epochs along the normals of the first: `m3c2.laz`, `m3c2.csv`.
+    M3c2,
+    /// Each point of the second epoch with the nearest of the first: `c2c.laz` with `c2c_distance`.
+    C2c {
+        /// Farther points have no distance, metres.
+        max_m: f64,
+    },
+    /// Each point of the second epoch with a mesh: `c2m.laz` with `c2m_distance`, positive on the side of the faces' normals.
+    C2m {
+        /// The mesh, PLY.
+        mesh: &'a Path,
+        /// Farther points have no distance, metres.
+        max_m: f64,
+    },
+}
+
+/// Compares the first two epochs of a project in the folder `out`; neither photos nor masks are needed.
+///
+/// M3C2's normals point at the cameras of the first epoch where it has any, else upwards.
+pub fn compare_clouds(
+    project: &Project,
+    what: Comparison,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let context = Context::new(project, out, progress)?;
+    let second = tile_epoch(&context, 2)?;
+    match what {
+        Comparison::M3c2 => {
+            let views = views_of(project)?;
+            let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
+            let outward = match centres.as_slice() {
+                [] => OutwardReference::Direction(Vector3::z()),
+                centres => OutwardReference::Towards(centres),
+            };
+            let change = compare(&context, [&tile_epoch(&context, 1)?, &second], 2, &outward)?;
+            write_change(out, "m3c2", &change)
+        }
+        Comparison::C2c { max_m } => {
+            let first = tile_epoch(&context, 1)?;
+            let distances =
+                Distances::collect(|sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink))?;
+            distances.write(&out.join("c2c.laz"), "c2c_distance")
+        }
+        Comparison::C2m { mesh, max_m } => distances_to_mesh(&second, mesh, max_m, out, progress),
+    }
+}
+
+fn distances_to_mesh(
+    cloud: &Tiled,
+    mesh: &Path,
+    max_m: f64,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let index = MeshIndex::new(read_mesh(mesh)?);
+    let distances = Distances::collect(|sink| c2m_survey(&index, &cloud.tiles, max_m, progress, sink))?;
+    distances.write(&out.join("c2m.laz"), "c2m_distance")
+}
+
+fn views_of(project: &Project) -> Result<Vec<View>> {
+    match project.epochs.first() {
+        Some(epoch) if !epoch.cameras.as_os_str().is_empty() => Ok(read_cameras(&epoch.cameras)?.views),
+        _ => Ok(Vec::new()),
+    }
+}
+
+/// Points with their distances.
+#[derive(Default)]
+struct Distances {
+    points: Vec<Point3<f64>>,
+    distances: Vec<f64>,
+}
+
+type Sink<'a> =
+    &'a mut dyn FnMut(usize, &[Point3<f64>], Vec<Option<f64>>) -> std::result::Result<(), SinkError>;
+
+impl Distances {
+    fn collect(measure: impl FnOnce(Sink) -> std::result::Result<(), SurveyError>) -> Result<Self> {
+        let mut all = Self::default();
+        measure(&mut |_, points, distances| {
+            all.points.extend_from_slice(points);
+            all.distances
+                .extend(distances.into_iter().map(|d| d.unwrap_or(f64::NAN)));
+            Ok(())
+        })?;
+        if all.distances.iter().all(|d| d.is_nan()) {
+            return Err(Error::Survey(
+                "no point lies near enough to the reference: are both in one frame?".into(),
+            ));
+        }
+        Ok(all)
+    }
+
+    fn write(&self, path: &Path, name: &str) -> Result<()> {
+        Ok(write_points_laz(
+            path,
+            &self.points,
+            &[(name, ExtraColumn::F64(&self.distances))],
+        )?)
+    }
+}

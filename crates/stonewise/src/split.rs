@@ -1,0 +1,124 @@
+//! Two disjoint halves of one epoch, for testing the method against a known motion.
+
+use crate::error::{Error, Result, write_text};
+use crate::init::quoted;
+use crate::project::{Epoch, Project};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use stonewise_core::progress::Progress;
+use stonewise_io::cameras::{find_photos, read_cameras};
+use stonewise_io::cloud::{cloud_info, select_points};
+
+/// Divides the points and the photos of an epoch at random into two halves, and writes them as a project of two epochs.
+///
+/// Every point goes to one half by the toss of a coin; the photos are shuffled and dealt in turn, so that the halves differ by
+/// one photo at most. The camera file and the masks are used where they are. Same seed, same halves. Returns the new
+/// project file, which is written last.
+///
+/// Source: the experiment of the paper, section 4.
+pub fn split(
+    project: &Project,
+    epoch: &Epoch,
+    seed: u64,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<PathBuf> {
+    let photos = shuffled_photos(epoch, seed)?;
+    if photos.len() < 2 {
+        let message = format!(
+            "{} posed photo in it; two at least are needed to split an epoch",
+            photos.len()
+        );
+        return Err(Error::Input {
+            path: epoch.images.clone(),
+            message,
+        });
+    }
+    let mut text = format!(
+        "[project]\nname = {}\n",
+        quoted(&format!("{}, {} split", project.name, epoch.name))
+    );
+    for half in 0..2usize {
+        let folder = out.join(format!("half{}", half + 1));
+        let images = folder.join("images");
+        fs::create_dir_all(&images).map_err(Error::io("making a folder", &images))?;
+        for photo in photos.iter().skip(half).step_by(2) {
+            progress.check()?;
+            let copy = images.join(photo.file_name().unwrap_or_default());
+            fs::copy(photo, &copy).map_err(Error::io("copying a photo to", &copy))?;
+        }
+        let mut clouds = Vec::new();
+        for (number, cloud) in epoch.clouds.iter().enumerate() {
+            let name = format!("half{}/cloud_{}.laz", half + 1, number + 1);
+            progress.begin(&format!("split {}", cloud.display()), cloud_info(cloud)?.records);
+            let salt = seed ^ (number as u64) << 32;
+            select_points(cloud, &out.join(&name), |index| {
+                progress.advance(1);
+                progress.check()?;
+                Ok::<bool, Error>((mix(index ^ mix(salt)) & 1) as usize == half)
+            })?;
+            clouds.push(quoted(&name));
+        }
+        let _ = write!(
+            text,
+            "\n[[epochs]]\nname = \"half {}\"\nclouds = [{}]\nimages = \"half{}/images\"\ncameras = {}\n",
+            half + 1,
+            clouds.join(", "),
+            half + 1,
+            absolute(&epoch.cameras)?
+        );
+        if let Some(masks) = &epoch.masks {
+            let _ = writeln!(text, "masks = {}", absolute(masks)?);
+        }
+    }
+    text.push_str(
+        "# motion = { kind = \"translation\", d = [0.0, 0.02, 0.05] }   # moves the points of half 2 after labelling\n",
+    );
+    let path = out.join("stonewise.toml");
+    write_text(&path, &text)?;
+    Ok(path)
+}
+
+/// Posed photos of the epoch in an order that the seed decides.
+fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PathBuf>> {
+    let photos = find_photos(&epoch.images, &read_cameras(&epoch.cameras)?)?;
+    let mut posed: Vec<PathBuf> = photos.paths.into_iter().flatten().collect();
+    posed.sort();
+    let mut keyed: Vec<(u64, PathBuf)> = posed
+        .into_iter()
+        .enumerate()
+        .map(|(i, path)| (mix(i as u64 ^ mix(!seed)), path))
+        .collect();
+    keyed.sort();
+    Ok(keyed.into_iter().map(|(_, path)| path).collect())
+}
+
+fn absolute(path: &Path) -> Result<String> {
+    let path = path.canonicalize().map_err(Error::io("finding", path))?;
+    Ok(quoted(&path.to_string_lossy()))
+}
+
+/// SplitMix64 (Steele, Lea & Flood 2014): a well-mixed number from a counter.
+fn mix(counter: u64) -> u64 {
+    let mut z = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mix;
+
+    #[test]
+    fn a_coin_is_fair_and_neighbours_are_independent() {
+        let heads = (0..100_000u64).filter(|&i| mix(i) & 1 == 0).count();
+        let same = (0..100_000u64).filter(|&i| mix(i) & 1 == mix(i + 1) & 1).count();
+        // Five standard deviations of a binomial count of 100,000.
+        assert!(
+            heads.abs_diff(50_000) < 800 && same.abs_diff(50_000) < 800,
+            "{heads} {same}"
+        );
+    }
+}

@@ -1,0 +1,99 @@
+//! Results of a run against a table of true stones.
+
+use crate::error::{Error, Result, write_text};
+use crate::report::{ResultSet, StoneRow};
+use nalgebra::{Point3, Vector3};
+use std::fs;
+use std::path::Path;
+use stonewise_core::evaluate::{
+    Evaluation, EvaluationParams, StoneOutcome, TrueStone, owners_by_centroid, score_against_truth,
+};
+use stonewise_core::id::StoneId;
+
+/// Columns that a table of true stones must have.
+const NEEDED: [&str; 11] = [
+    "stone_id", "cx", "cy", "cz", "dx", "dy", "dz", "rx", "ry", "rz", "loose",
+];
+
+/// Scores the stones of a finished run against true stones, and writes `evaluation_truth.json` beside its results.
+///
+/// `truth`: CSV with the columns `stone_id, cx, cy, cz` (centroid in epoch 1), `dx, dy, dz`, `rx, ry, rz`, `loose`, and, where
+/// known, `nx, ny, nz` (face normal), `edge` and `vis_tls` or `vis_uav` or `visible` (share of the face that both epochs
+/// measured). A row of the results belongs to the true stone whose centroid is nearest.
+pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -> Result<Evaluation> {
+    let set = ResultSet::read(results)?;
+    let stones = read_truth(truth)?;
+    let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
+    let outcomes: Vec<StoneOutcome> = set.stones.iter().map(|row| outcome(row, normal(row))).collect();
+    let centroids: Vec<Point3<f64>> = outcomes.iter().map(|o| o.centroid).collect();
+    let owners = owners_by_centroid(&centroids, &stones, params);
+    let mut evaluation = Evaluation::new(truth.display().to_string(), params);
+    evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
+    let text = serde_json::to_string_pretty(&evaluation).unwrap_or_default();
+    write_text(&results.join("evaluation_truth.json"), &(text + "\n"))?;
+    Ok(evaluation)
+}
+
+/// A row as the evaluation takes it.
+pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>) -> StoneOutcome {
+    let motion = row.motion.as_ref();
+    StoneOutcome {
+        stone: StoneId(row.stone_id),
+        centroid: row.centroid,
+        normal,
+        displacement: motion.map(|m| m.displacement),
+        covariance: motion.map(|m| m.covariance),
+        detection_limit_m: motion.map(|m| m.detection_limit_m),
+        significant: motion.map(|m| m.significant),
+        loose: motion.map(|m| m.loose),
+    }
+}
+
+fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
+    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    let bad = |message: String| Error::Input {
+        path: path.to_path_buf(),
+        message,
+    };
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| !line.trim().is_empty());
+    let names: Vec<&str> = lines
+        .next()
+        .map_or_else(Vec::new, |(_, l)| l.split(',').map(str::trim).collect());
+    let find = |name: &str| names.iter().position(|n| *n == name);
+    if let Some(missing) = NEEDED.iter().find(|n| find(n).is_none()) {
+        return Err(bad(format!("no column {missing:?} in the table of true stones")));
+    }
+    let visible = ["visible", "vis_tls", "vis_uav"].iter().find_map(|n| find(n));
+    lines
+        .map(|(number, line)| {
+            let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+            let at = |column: usize| {
+                let cell = cells.get(column).copied().unwrap_or("");
+                cell.parse::<f64>().map_err(|_| {
+                    bad(format!(
+                        "line {}: {cell:?} in column {} is no number",
+                        number + 1,
+                        names[column]
+                    ))
+                })
+            };
+            let value = |name: &str, absent: f64| find(name).map_or(Ok(absent), at);
+            let vector = |x, y, z, absent| {
+                Ok::<_, Error>(Vector3::new(value(x, absent)?, value(y, 0.0)?, value(z, 0.0)?))
+            };
+            Ok(TrueStone {
+                stone_id: value("stone_id", 0.0)? as u32,
+                centroid: vector("cx", "cy", "cz", 0.0)?.into(),
+                normal: vector("nx", "ny", "nz", 1.0)?,
+                displacement: vector("dx", "dy", "dz", 0.0)?,
+                rotation: vector("rx", "ry", "rz", 0.0)?,
+                loose: value("loose", 0.0)? != 0.0,
+                edge: value("edge", 0.0)? != 0.0,
+                visible_share: visible.map_or(Ok(1.0), at)?,
+            })
+        })
+        .collect()
+}
