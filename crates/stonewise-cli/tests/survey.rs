@@ -123,13 +123,25 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
     assert_eq!(fs::read(out.path().join("epoch1/cloud_tls.laz")).unwrap(), cloud);
     let run_json: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.path().join("run.json")).unwrap()).unwrap();
-    let step = |name: &str| run_json["steps"].as_array().unwrap().iter().find(|s| s["step"] == name).unwrap().clone();
+    let step = |name: &str| {
+        run_json["steps"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|s| s["step"] == name)
+            .unwrap()
+            .clone()
+    };
     assert_eq!(step("label-1")["resumed"], true);
     assert_eq!(step("register-2")["resumed"], false);
 
     let alone = tempfile::tempdir().unwrap();
     assert_eq!(run(survey(), alone.path(), &["--threads", "1"]).0, 0);
-    assert_eq!(fs::read(alone.path().join("stones.csv")).unwrap(), stones, "threads change the result");
+    assert_eq!(
+        fs::read(alone.path().join("stones.csv")).unwrap(),
+        stones,
+        "threads change the result"
+    );
 }
 
 #[test]
@@ -155,8 +167,13 @@ fn a_known_motion_is_found_again_and_scored() {
     let stones = errors["in_plane_per_axis"]["rmse_m"].as_f64().unwrap();
     // The wall moved 2 cm and 5 cm; half a millimetre is the figure asked for on terrestrial scans.
     assert!(stones < 5e-4, "{stones} m");
-    let m3c2 = evaluation["m3c2"]["errors"]["in_plane_per_axis"]["rmse_m"].as_f64().unwrap();
-    assert!(m3c2 > 0.02, "M3C2 cannot see this motion, yet misses it by {m3c2} m only");
+    let m3c2 = evaluation["m3c2"]["errors"]["in_plane_per_axis"]["rmse_m"]
+        .as_f64()
+        .unwrap();
+    assert!(
+        m3c2 > 0.02,
+        "M3C2 cannot see this motion, yet misses it by {m3c2} m only"
+    );
 }
 
 #[test]
@@ -165,7 +182,11 @@ fn wrong_usage_and_wrong_project_files_say_where() {
     let dir = tempfile::tempdir().unwrap();
     let project = dir.path().join("stonewise.toml");
     let cases = [
-        ("[project]\nname = \"a\"\n[[epochs]]\nname = \"1\"\ncloud = []\n", ":5: ", "unknown field `cloud`"),
+        (
+            "[project]\nname = \"a\"\n[[epochs]]\nname = \"1\"\ncloud = []\n",
+            ":5: ",
+            "unknown field `cloud`",
+        ),
         ("[project]\nname = \"a\"\nepochs = []\n", ":3: ", "epochs"),
         (
             "[project]\nname = \"a\"\n[[epochs]]\nname = \"1\"\nclouds = [\"x.laz\"]\nimages = \"i\"\ncameras = \"c\"\n\
@@ -198,7 +219,13 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         ),
         (
             "a camera file without cameras",
-            |dir| fs::write(dir.join("epoch1/cameras_metashape.xml"), "<document><chunk/></document>").unwrap(),
+            |dir| {
+                fs::write(
+                    dir.join("epoch1/cameras_metashape.xml"),
+                    "<document><chunk/></document>",
+                )
+                .unwrap()
+            },
             1,
             "cameras_metashape.xml",
         ),
@@ -253,7 +280,11 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         if expected == 1 {
             assert!(!out.path().join("stones.csv").exists(), "{what} left a result");
         }
-        assert!(partial_files(out.path()).is_empty(), "{what} left {:?}", partial_files(out.path()));
+        assert!(
+            partial_files(out.path()).is_empty(),
+            "{what} left {:?}",
+            partial_files(out.path())
+        );
     }
 }
 
@@ -281,7 +312,11 @@ fn init_writes_a_project_that_runs_need_no_change_in() {
     fs::remove_file(survey.path().join("stonewise.toml")).unwrap();
     stonewise().arg("init").arg(survey.path()).assert().success();
     let text = fs::read_to_string(survey.path().join("stonewise.toml")).unwrap();
-    for expected in ["epoch1/cloud_tls.laz", "images = \"epoch2/images\"", "cameras = \"epoch1/cameras_metashape.xml\""] {
+    for expected in [
+        "epoch1/cloud_tls.laz",
+        "images = \"epoch2/images\"",
+        "cameras = \"epoch1/cameras_metashape.xml\"",
+    ] {
         assert!(text.contains(expected), "{expected} is not in\n{text}");
     }
     stonewise().arg("init").arg(survey.path()).assert().code(1);
@@ -295,7 +330,13 @@ fn clouds_alone_can_be_compared() {
     let out = tempfile::tempdir().unwrap();
     let clouds = [1, 2].map(|e| survey().join(format!("epoch{e}/cloud_tls.laz")));
     for command in ["m3c2", "c2c"] {
-        stonewise().arg(command).args(&clouds).arg("--out").arg(out.path()).assert().success();
+        stonewise()
+            .arg(command)
+            .args(&clouds)
+            .arg("--out")
+            .arg(out.path())
+            .assert()
+            .success();
         assert!(out.path().join(format!("{command}.laz")).exists());
     }
 }

@@ -155,6 +155,7 @@ impl LabelColumns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::read_cloud;
 
     #[test]
     fn two_selections_share_out_all_points_in_order() {
