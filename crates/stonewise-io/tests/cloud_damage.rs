@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
 use stonewise_io::cloud::{
-    CloudError, ExtraColumn, LabelColumns, PointLabel, ReadSummary, cloud_info, read_cloud, write_labelled,
-    write_points_laz,
+    CloudError, ExtraColumn, LabelColumns, PointChunk, PointLabel, ReadSummary, cloud_info, read_cloud,
+    write_labelled, write_points_laz,
 };
 
 fn fixture(name: &str) -> PathBuf {
@@ -61,18 +61,24 @@ fn a_file_that_is_cut_off_is_an_error() {
     }
 }
 
+fn no_labels(chunk: &PointChunk) -> Result<Vec<PointLabel>, CloudError> {
+    Ok(vec![PointLabel::default(); chunk.len()])
+}
+
 #[test]
 fn damaged_bytes_do_no_harm() {
     let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.laz");
     for name in BINARY {
         let whole = fs::read(fixture(name)).unwrap();
         let path = folder.path().join(name);
-        // Half of the header, where the sizes are, and some of the rest.
-        for place in (0..400).step_by(2).chain((400..whole.len()).step_by(61)) {
+        // A third of the header, where the sizes are, and some of the rest.
+        for place in (0..400).step_by(3).chain((400..whole.len()).step_by(67)) {
             let mut bytes = whole.clone();
             bytes[place] ^= [0xff, 0x80, 0x01][place % 3];
             fs::write(&path, &bytes).unwrap();
             let _ = read(&path);
+            let _ = write_labelled(&path, &out, LabelColumns::Stone, no_labels);
         }
     }
 }
@@ -220,13 +226,10 @@ fn a_failed_copy_leaves_the_earlier_file_and_no_other() {
     let cut = folder.path().join("cut.laz");
     let whole = fs::read(fixture("las14_format7_extra.laz")).unwrap();
     fs::write(&cut, &whole[..whole.len() / 2]).unwrap();
-    let labels = |chunk: &stonewise_io::cloud::PointChunk| {
-        Ok::<_, CloudError>(vec![PointLabel::default(); chunk.len()])
-    };
-    let error = write_labelled(&cut, &out, LabelColumns::Stone, labels).unwrap_err();
+    let error = write_labelled(&cut, &out, LabelColumns::Stone, no_labels).unwrap_err();
     assert!(error.to_string().contains("cut.laz is cut off"), "{error}");
     let missing = folder.path().join("none").join("out.laz");
-    let error = write_labelled(&fixture("plain.xyz"), &missing, LabelColumns::Stone, labels);
+    let error = write_labelled(&fixture("plain.xyz"), &missing, LabelColumns::Stone, no_labels);
     assert!(error.unwrap_err().to_string().starts_with("cannot write "));
 
     assert_eq!(fs::read_to_string(&out).unwrap(), "earlier");

@@ -27,7 +27,7 @@ fn survey(name: &str) -> Option<PathBuf> {
 fn counts_and_bounds_agree_with_the_headers() {
     for (name, count) in [
         ("fountain/epoch1/cloud.laz", 2_748_762),
-        ("fountain/epoch2/cloud.laz", 2_464_565),
+        ("dam_small/split/epoch1/cloud_uav.laz", 89_914),
     ] {
         let Some(path) = survey(name) else { return };
         let info = cloud_info(&path).unwrap();
@@ -52,7 +52,7 @@ fn counts_and_bounds_agree_with_the_headers() {
 
 #[test]
 fn a_labelled_copy_keeps_every_attribute() {
-    let Some(path) = survey("fountain/epoch1/cloud.laz") else {
+    let Some(path) = survey("dam_small/split/epoch1/cloud_uav.laz") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

@@ -9,6 +9,7 @@ use laz::ParLasZipCompressor;
 
 use super::layout::las_error;
 use crate::cloud::CloudError;
+use crate::cloud::guard::guarded_write;
 
 /// A LAZ file that is being written, compressed by all threads.
 ///
@@ -48,16 +49,19 @@ impl LazWriter {
             .build_from_bytes(records)
             .map_err(|e| unwritable(&self.name, e))?;
         self.header.add_point_data(&points);
-        self.compressor
-            .compress_many(points.raw_bytes())
-            .map_err(|e| CloudError::write(&self.name, e))
+        let Self { name, compressor, .. } = self;
+        guarded_write(name, || {
+            let written = compressor.compress_many(points.raw_bytes());
+            written.map_err(|e| CloudError::write(name, e))
+        })
     }
 
     /// Writes what comes after the points, and the final header.
     pub fn finish(mut self) -> Result<(), CloudError> {
-        self.compressor
-            .done()
-            .map_err(|e| unwritable(&self.name, e.into()))?;
+        guarded_write(&self.name, || {
+            let done = self.compressor.done();
+            done.map_err(|e| unwritable(&self.name, e.into()))
+        })?;
         let mut file = self.compressor.into_inner();
         write_end(&mut file, self.header).map_err(|e| unwritable(&self.name, e))?;
         file.flush().map_err(|e| CloudError::write(&self.name, e))
