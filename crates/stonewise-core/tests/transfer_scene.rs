@@ -1,5 +1,7 @@
 //! Transfer of labels on a small scene whose answer is known: a wall of rectangular stones, and boxes in front.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // helpers of tests
+
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};

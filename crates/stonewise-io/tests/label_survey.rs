@@ -1,5 +1,7 @@
 //! Labels and matches on the sample surveys, where they are at hand.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // helpers of tests
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,7 +14,7 @@ use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{
     Footprints, MatchParams, MatchReport, Surroundings, footprint_overlap, match_stones,
 };
-use stonewise_core::progress::Silent;
+use stonewise_core::progress::Progress;
 use stonewise_core::stone::{MatchOutcome, Stone};
 use stonewise_core::transfer::{
     MemoryLabels, StoneParams, Transfer, TransferParams, build_stones, transfer_labels,
@@ -89,6 +91,19 @@ fn true_stones(path: &Path) -> Vec<u32> {
         .collect()
 }
 
+/// Prints when each step began.
+struct Stopwatch(Instant);
+
+impl Progress for Stopwatch {
+    fn begin(&self, what: &str, total: u64) {
+        println!("    {:>7.2} s  {what} ({total})", self.0.elapsed().as_secs_f64());
+    }
+    fn advance(&self, _units: u64) {}
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
 struct Labelled {
     tiled: Tiled,
     labels: MemoryLabels,
@@ -102,9 +117,10 @@ fn label(
     mask: impl FnMut(ImageId) -> Result<Option<stonewise_core::raster::LabelImage>, MaskError>,
 ) -> Labelled {
     let start = Instant::now();
+    let watch = Stopwatch(start);
     let mut labels = MemoryLabels::default();
     let params = TransferParams::default();
-    let transfer = transfer_labels(&tiled.tiles, views, mask, &mut labels, &params, &Silent).unwrap();
+    let transfer = transfer_labels(&tiled.tiles, views, mask, &mut labels, &params, &watch).unwrap();
     let voted = start.elapsed();
     let stones = build_stones(
         &tiled.tiles,
@@ -112,7 +128,7 @@ fn label(
         views,
         &transfer.stones,
         &StoneParams::default(),
-        &Silent,
+        &watch,
     )
     .unwrap();
     println!(

@@ -10,11 +10,11 @@ const VOXEL_M: f64 = 0.03;
 /// Stones that meet in fewer voxels than this have not been compared.
 const MIN_CELLS: usize = 4;
 
-type Voxel = [i64; 3];
+type Voxel = [i32; 3];
 
 /// The voxels that the points of each stone of an epoch occupy.
 ///
-/// Memory: about 40 bytes a voxel; 5,000 m^2 of stones take some 300 MB.
+/// Memory: about 100 bytes a voxel; 5,000 m^2 of stones take some 0.6 GB.
 #[derive(Default)]
 pub struct Footprints {
     /// Points of a stone in a voxel, with their sum about the voxel's corner; a voxel may hold several stones.
@@ -107,11 +107,11 @@ pub fn footprint_overlap<'a>(
 }
 
 fn voxel_of(p: &Point3<f64>) -> Voxel {
-    [0, 1, 2].map(|a| (p[a] / VOXEL_M).floor() as i64)
+    [0, 1, 2].map(|a| (p[a] / VOXEL_M).floor() as i32)
 }
 
 fn corner(voxel: Voxel) -> Point3<f64> {
-    Point3::from(voxel.map(|c| c as f64 * VOXEL_M))
+    Point3::from(voxel.map(|c| f64::from(c) * VOXEL_M))
 }
 
 #[cfg(test)]

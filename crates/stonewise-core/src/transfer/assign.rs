@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Solved block by block: pairs under `min_iou` could never be accepted and are no edges, so the blocks are a few
 /// instances large on a wall of any size. Cost: cubic in the instances of a block.
 pub(super) fn assign(overlaps: &Overlaps, min_iou: f64) -> Vec<(u32, u32)> {
-    let mut edges: BTreeMap<(u32, u32), Vec<(u32, u32, f64)>> = BTreeMap::new();
+    let mut edges: BTreeMap<(u32, u32), Vec<Edge>> = BTreeMap::new();
     for &(i, j) in overlaps.common.keys() {
         let [common, union] = overlaps.intersection_union(i, j);
         let iou = f64::from(common) / f64::from(union);
