@@ -4,6 +4,8 @@ pub mod atomic;
 pub mod cameras;
 pub mod cloud;
 pub mod image_io;
+pub mod layers;
 pub mod masks;
+pub mod mesh_ply;
 mod photo_name;
 pub mod table;

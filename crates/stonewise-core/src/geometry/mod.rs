@@ -9,6 +9,7 @@ mod face_frame;
 mod outline;
 mod plane;
 mod rotation;
+mod triangulate;
 mod view;
 
 pub use bounds::Bounds;
@@ -18,6 +19,7 @@ pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};
 pub use plane::Plane;
+pub use triangulate::triangulate;
 pub use rotation::nearest_rotation;
 pub use view::{Projection, View};
 

@@ -1,6 +1,7 @@
 //! What can stop a report.
 
 use std::path::PathBuf;
+use stonewise_io::layers::LayerError;
 use stonewise_io::table::TableError;
 
 /// Why result files could not be written or read, or a report made of them.
@@ -10,6 +11,9 @@ pub enum ReportError {
     /// A table could not be read or written.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// Layers could not be written.
+    #[error(transparent)]
+    Layers(#[from] LayerError),
     /// A file could not be read or written.
     #[error("{action} failed: {source}: {path}", path = .path.display())]
     Io {

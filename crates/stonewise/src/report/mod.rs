@@ -1,10 +1,13 @@
 //! Result tables and the report, made from result files alone.
 
 mod change_points;
+mod column_notes;
 mod comparison;
 mod draw;
 mod error;
 mod facade;
+mod layer_style;
+mod layers;
 mod outlines;
 mod page;
 mod report_file;
@@ -19,6 +22,7 @@ mod testing;
 pub use change_points::DistancePoint;
 pub use error::ReportError;
 pub use facade::Facade;
+pub use layers::write_layers;
 pub use outlines::{OUTLINES_FILE, StoneOutline, write_outlines};
 pub use report_file::write_report;
 pub use result_set::ResultSet;

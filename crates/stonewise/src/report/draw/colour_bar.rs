@@ -3,6 +3,8 @@
 use super::axes::ticks;
 use super::colour::{Rgb, diverging, sequential};
 use super::text::number;
+use crate::report::statistics::{Sorted, nice_above};
+use crate::report::summary::Summary;
 use std::fmt::Write;
 
 /// Steps of colour to either side of zero, or of a sequential scale.
@@ -21,6 +23,14 @@ impl Scale {
     fn limit_m(self) -> f64 {
         match self {
             Self::Diverging(limit) | Self::Sequential(limit) => limit,
+        }
+    }
+
+    /// Lowest and highest length of the scale, metres.
+    pub(crate) fn range_m(self) -> (f64, f64) {
+        match self {
+            Self::Diverging(limit) => (-limit, limit),
+            Self::Sequential(limit) => (0.0, limit),
         }
     }
 
@@ -85,6 +95,23 @@ impl Scale {
             top + height + 15.0
         );
     }
+}
+
+/// A round length that 98 % of the values do not exceed, metres.
+pub(crate) fn nice_scale_m(values: impl IntoIterator<Item = f64>) -> f64 {
+    nice_above(Sorted::new(values).quantile(0.98).unwrap_or(0.0) * 1e3) / 1e3
+}
+
+/// End of the scale that components share: covers 98 % of them, and the typical detection limit; metres.
+pub(crate) fn component_limit_m(facts: &Summary) -> f64 {
+    let components = facts.components.iter().flat_map(|c| c.values()).map(|v| v.abs());
+    nice_scale_m(components).max(nice_above(facts.limits.median().unwrap_or(0.0) * 1e3) / 1e3)
+}
+
+/// Colours of both kinds of scale, from the lowest to the highest step.
+pub(crate) fn colours() -> [Vec<String>; 2] {
+    let all = |scale: Scale, first: i32| (first..=STEPS).map(|s| scale.colour(s).to_string()).collect();
+    [all(Scale::Diverging(1.0), -STEPS), all(Scale::Sequential(1.0), 0)]
 }
 
 #[cfg(test)]

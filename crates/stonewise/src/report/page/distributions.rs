@@ -1,10 +1,9 @@
 //! Histograms, in-plane scatter, stones against M3C2, and the datum check.
 
 use super::html::{figure, section, table};
-use super::maps::component_limit_m;
 use crate::report::ResultSet;
 use crate::report::comparison::compare;
-use crate::report::draw::{Series, count, histogram, mm_or_dash, scatter};
+use crate::report::draw::{Series, component_limit_m, count, histogram, mm_or_dash, scatter};
 use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
 

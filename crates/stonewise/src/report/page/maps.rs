@@ -1,8 +1,10 @@
 //! The maps.
 
+use super::explorer::explorer;
 use super::html::{figure, section};
-use crate::report::draw::{MapLayout, MapPicture, Scale, distance_map, mm, stone_map};
-use crate::report::statistics::{Sorted, nice_above};
+use crate::report::draw::{
+    MapLayout, MapPicture, Scale, component_limit_m, distance_map, mm, nice_scale_m, stone_map,
+};
 use crate::report::summary::Summary;
 use crate::report::{ResultSet, StoneRow};
 
@@ -61,7 +63,8 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary) -> String {
     };
     let body = format!(
         "<p>The wall seen from the front, unrolled. Components share one scale; millimetres, second epoch minus first.{note}</p>\
-         {LEGEND}<div class=\"maps{wide}\">{grid}</div>"
+         {}{LEGEND}<div class=\"maps{wide}\">{grid}</div>",
+        explorer()
     );
     section("maps", "Maps", &body)
 }
@@ -95,7 +98,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         "Length of the motion, with in-plane arrows",
         "Arrows: in-plane part of significant motions, thinned where they would touch.",
         &norm,
-        scale_m(norms),
+        nice_scale_m(norms),
         true,
         true,
         false,
@@ -104,7 +107,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         "Motion against the neighbours",
         "Length of the difference to what the neighbours predict.",
         &relative,
-        scale_m(relatives),
+        nice_scale_m(relatives),
         false,
         false,
         true,
@@ -117,21 +120,10 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         "Detection limit (LoD95)",
         &note,
         &limit,
-        scale_m(limits),
+        nice_scale_m(limits),
         false,
         false,
         false,
     ));
     out
-}
-
-/// A round length that 98 % of the values do not exceed, metres.
-fn scale_m(values: impl IntoIterator<Item = f64>) -> f64 {
-    nice_above(Sorted::new(values).quantile(0.98).unwrap_or(0.0) * 1e3) / 1e3
-}
-
-/// End of the shared scale: covers 98 % of the components, and the typical detection limit.
-pub(super) fn component_limit_m(facts: &Summary) -> f64 {
-    let components = facts.components.iter().flat_map(|c| c.values()).map(|v| v.abs());
-    scale_m(components).max(nice_above(facts.limits.median().unwrap_or(0.0) * 1e3) / 1e3)
 }

@@ -3,13 +3,14 @@
 mod audit;
 mod distributions;
 mod evaluation;
+mod explorer;
 mod html;
 mod maps;
 mod method;
 mod overview;
 
 use super::ResultSet;
-use super::draw::escape;
+use super::draw::{component_limit_m, escape};
 use super::summary::Summary;
 use serde_json::Value;
 
@@ -64,8 +65,13 @@ pub(super) fn page(results: &ResultSet) -> String {
          <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V60\" class=\"hatching\"/></pattern></defs></svg>\n\
          <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
-         <main>\n{body}</main>\n</body></html>\n",
-        cover(&results.run)
+         <main>\n{body}</main>\n{}</body></html>\n",
+        cover(&results.run),
+        if results.stones.is_empty() {
+            String::new()
+        } else {
+            explorer::script(results, &facts, component_limit_m(&facts))
+        }
     )
 }
 

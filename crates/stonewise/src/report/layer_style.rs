@@ -1,0 +1,108 @@
+//! Styles of layers for QGIS.
+
+use super::draw::{Scale, escape};
+use std::fmt::Write;
+use stonewise_io::layers::LayerStyle;
+
+/// Classes of a scale in the legend, odd so that one holds zero.
+const CLASSES: i32 = 9;
+
+/// Polygons coloured by a column in metres, legend in millimetres; grey hatch where the column is empty.
+///
+/// `fade`: stones whose motion is not significant are pale.
+pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) -> LayerStyle {
+    let (mut rules, mut symbols) = (String::new(), String::new());
+    let mut add = |filter: &str, label: &str, fill: &str, alpha: f64| {
+        let key = symbols.matches("<symbol ").count();
+        let (filter, label) = (escape(filter), escape(label));
+        let _ = write!(
+            rules,
+            r#"<rule key="r{key}" symbol="{key}" filter="{filter}" label="{label}"/>"#
+        );
+        let _ = write!(
+            symbols,
+            r#"<symbol type="fill" name="{key}" alpha="{alpha}" clip_to_extent="1" force_rhr="0">{fill}</symbol>"#
+        );
+    };
+    let (low, high) = scale.range_m();
+    let edge = |i: i32| low + (high - low) * f64::from(i) / f64::from(CLASSES);
+    for class in 0..CLASSES {
+        let (from, to) = (edge(class), edge(class + 1));
+        let range = match class {
+            0 => format!("\"{column}\" < {to}"),
+            c if c == CLASSES - 1 => format!("\"{column}\" >= {from}"),
+            _ => format!("\"{column}\" >= {from} AND \"{column}\" < {to}"),
+        };
+        let [r, g, b] = scale.colour(scale.step((from + to) / 2.0)).0;
+        let fill = simple_fill(&format!("{r},{g},{b},255"), "solid");
+        let label = format!("{:.1} to {:.1} mm", from * 1e3, to * 1e3);
+        if fade {
+            add(&format!("{range} AND \"significant\" = 1"), &label, &fill, 1.0);
+            add(
+                &format!("{range} AND \"significant\" = 0"),
+                &format!("{label}, not significant"),
+                &fill,
+                0.3,
+            );
+        } else {
+            add(&range, &label, &fill, 1.0);
+        }
+    }
+    add(
+        &format!("\"{column}\" IS NULL"),
+        "not measured",
+        &simple_fill("150,148,142,255", "b_diagonal"),
+        1.0,
+    );
+    let qml = format!(
+        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n\
+         <qgis version=\"3.22\" styleCategories=\"Symbology\">\
+         <renderer-v2 type=\"RuleRenderer\" symbollevels=\"0\" forceraster=\"0\" enableorderby=\"0\">\
+         <rules key=\"root\">{rules}</rules><symbols>{symbols}</symbols></renderer-v2>\
+         <layerGeometryType>2</layerGeometryType></qgis>"
+    );
+    LayerStyle {
+        name: name.into(),
+        description: format!("stones by {column}"),
+        qml,
+    }
+}
+
+fn simple_fill(colour: &str, pattern: &str) -> String {
+    let options = [
+        ("color", colour),
+        ("style", pattern),
+        ("outline_color", "90,88,84,255"),
+        ("outline_style", "solid"),
+        ("outline_width", "0.1"),
+        ("outline_width_unit", "MM"),
+    ];
+    let list: String = options.iter().fold(String::new(), |mut out, (name, value)| {
+        let _ = write!(out, r#"<Option type="QString" name="{name}" value="{value}"/>"#);
+        out
+    });
+    format!(
+        r#"<layer class="SimpleFill" enabled="1" locked="0" pass="0"><Option type="Map">{list}</Option></layer>"#
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_value_falls_into_exactly_one_rule() {
+        let style = stone_style("Out", "d_out", Scale::Diverging(0.05), true);
+        assert_eq!(style.qml.matches("<rule key=\"r").count(), 2 * 9 + 1);
+        assert_eq!(style.qml.matches("<symbol type").count(), 2 * 9 + 1);
+        assert!(style.qml.contains("&quot;d_out&quot; &lt; "));
+        assert!(style.qml.contains("IS NULL"));
+        assert_eq!(
+            stone_style("LoD", "lod95", Scale::Sequential(0.01), false)
+                .qml
+                .matches("<rule key=\"r")
+                .count(),
+            10
+        );
+    }
+}

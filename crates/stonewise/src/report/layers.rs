@@ -1,0 +1,306 @@
+//! Results as layers for the tools that engineers already use.
+
+use super::column_notes::column_notes;
+use super::draw::{Scale, component_limit_m, nice_scale_m};
+use super::layer_style::stone_style;
+use super::stone_table::stone_table;
+use super::summary::Summary;
+use super::{ReportError, ResultSet, RowMotion, StoneRow};
+use nalgebra::{Point2, Point3};
+use serde_json::Value;
+use std::path::Path;
+use stonewise_core::geometry::{FaceFrame, triangulate};
+use stonewise_io::atomic::write_atomically;
+use stonewise_io::layers::{Crs, Geometry, Layer, LayerStyle, write_geojson, write_geopackage};
+use stonewise_io::mesh_ply::{ColouredMesh, write_coloured_mesh};
+use stonewise_io::table::{Table, TableError};
+
+/// Makes `stones.gpkg`, `stones.geojson`, `stones.ply` and `stones.csv-metadata.json` from the result files in `dir`.
+///
+/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), and their displacements as
+/// exaggerated lines in both (`displacements`, `displacements_facade`), each with styles for QGIS. The PLY is a mesh
+/// of the stones' faces, coloured by the out-of-plane displacement, with all components as scalars. The sidecar names
+/// the unit and meaning of every column of stones.csv (W3C CSV on the Web).
+///
+/// # Errors
+/// `dir` has no stone table, a result file is damaged, or a file cannot be written.
+pub fn write_layers(dir: &Path) -> Result<(), ReportError> {
+    let results = ResultSet::read(dir)?;
+    let facts = Summary::new(&results);
+    let layers = layers(&results, &facts)?;
+    let stamp = results
+        .run
+        .get("finished")
+        .and_then(Value::as_str)
+        .unwrap_or("1970-01-01T00:00:00.000Z");
+    write_geopackage(&dir.join("stones.gpkg"), &layers, stamp)?;
+    if let Some(world) = layers.first() {
+        write_geojson(&dir.join("stones.geojson"), world)?;
+    }
+    let mesh = dir.join("stones.ply");
+    write_coloured_mesh(&mesh, &face_mesh(&results, &facts))
+        .map_err(ReportError::io("writing the mesh", &mesh))?;
+    let notes = dir.join("stones.csv-metadata.json");
+    write_atomically(&notes, |partial| std::fs::write(partial, column_notes()))
+        .map_err(ReportError::io("writing the notes on columns", &notes))
+}
+
+/// The layers of the GeoPackage; the first is that of the world frame.
+fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError> {
+    let rows: Vec<StoneRow> = results.stones.clone();
+    let styles = styles(facts);
+    let crs = crs(&results.run);
+    let world = |s: &StoneRow| {
+        results
+            .outlines
+            .get(&s.stone_id)
+            .map_or(Vec::new(), |o| o.ring.clone())
+    };
+    let flat = |p: Point2<f64>| Point3::new(p.x, p.y, 0.0);
+    let facade = |s: &StoneRow| results.unrolled(s).into_iter().map(flat).collect();
+    let polygons = |name: &str, title: &str, geometry, crs, vertices| {
+        Ok::<_, TableError>(Layer {
+            name: name.into(),
+            title: title.into(),
+            description: "one feature per stone of the first epoch; columns as in stones.csv, metres".into(),
+            geometry,
+            crs,
+            attributes: stone_table(&rows)?,
+            vertices,
+            styles: styles.clone(),
+        })
+    };
+    let factor = exaggeration(results, facts);
+    let moved: Vec<(&StoneRow, &RowMotion)> = facts
+        .measured
+        .iter()
+        .copied()
+        .filter(|(s, m)| {
+            s.centroid
+                .iter()
+                .chain(m.displacement.iter())
+                .all(|v| v.is_finite())
+        })
+        .collect();
+    let arrow = |(s, m): &(&StoneRow, &RowMotion)| vec![s.centroid, s.centroid + m.displacement * factor];
+    let unrolled_arrow = |(s, m): &(&StoneRow, &RowMotion)| {
+        let from = results.facade.place(&s.centroid);
+        vec![flat(from), flat(from + m.face.xy() * factor)]
+    };
+    let lines = |name: &str, title: &str, geometry, crs, vertices| {
+        Ok::<_, TableError>(Layer {
+            name: name.into(),
+            title: title.into(),
+            description: format!("displacements of the measured stones, {factor} times exaggerated"),
+            geometry,
+            crs,
+            attributes: motion_table(&moved, factor)?,
+            vertices,
+            styles: Vec::new(),
+        })
+    };
+    Ok(vec![
+        polygons(
+            "stones",
+            "Stones",
+            Geometry::PolygonZ,
+            crs.clone(),
+            results.stones.iter().map(world).collect(),
+        )?,
+        polygons(
+            "stones_facade",
+            "Stones, unrolled (along, up)",
+            Geometry::Polygon,
+            None,
+            results.stones.iter().map(facade).collect(),
+        )?,
+        lines(
+            "displacements",
+            "Displacements",
+            Geometry::LineStringZ,
+            crs,
+            moved.iter().map(arrow).collect(),
+        )?,
+        lines(
+            "displacements_facade",
+            "Displacements, unrolled",
+            Geometry::LineString,
+            None,
+            moved.iter().map(unrolled_arrow).collect(),
+        )?,
+    ])
+}
+
+fn styles(facts: &Summary) -> Vec<LayerStyle> {
+    let shared = Scale::Diverging(component_limit_m(facts));
+    let limit = Scale::Sequential(nice_scale_m(facts.limits.values().iter().copied()));
+    vec![
+        stone_style("Out of the wall", "d_out", shared, true),
+        stone_style("Along the wall", "d_along", shared, true),
+        stone_style("Up the face", "d_up", shared, true),
+        stone_style("Detection limit", "lod95", limit, false),
+    ]
+}
+
+fn motion_table(moved: &[(&StoneRow, &RowMotion)], factor: f64) -> Result<Table, TableError> {
+    let mut table = Table::new();
+    let real = |of: fn(&RowMotion) -> f64| moved.iter().map(|(_, m)| of(m)).collect::<Vec<f64>>();
+    table.push(
+        "stone_id",
+        moved.iter().map(|(s, _)| s.stone_id).collect::<Vec<u32>>(),
+    )?;
+    table.push("d_along", real(|m| m.face.x))?;
+    table.push("d_up", real(|m| m.face.y))?;
+    table.push("d_out", real(|m| m.face.z))?;
+    table.push("norm", real(|m| m.displacement.norm()))?;
+    table.push("lod95", real(|m| m.detection_limit_m))?;
+    table.push(
+        "significant",
+        moved
+            .iter()
+            .map(|(_, m)| u8::from(m.significant))
+            .collect::<Vec<u8>>(),
+    )?;
+    table.push("exaggeration", vec![factor; moved.len()])?;
+    Ok(table)
+}
+
+/// How much longer lines are drawn: large motions reach about two stones far; 1, 2 or 5 times a power of ten.
+fn exaggeration(results: &ResultSet, facts: &Summary) -> f64 {
+    let sorted = |values: &mut dyn Iterator<Item = f64>| super::statistics::Sorted::new(values);
+    let size = sorted(&mut results.stones.iter().map(|s| s.area_m2.max(0.0).sqrt()))
+        .median()
+        .unwrap_or(0.0);
+    let motion = sorted(&mut facts.measured.iter().map(|(_, m)| m.displacement.norm()))
+        .quantile(0.98)
+        .unwrap_or(0.0);
+    let wanted = 2.0 * size / motion;
+    if !wanted.is_finite() || wanted <= 1.0 {
+        return 1.0;
+    }
+    let power = 10f64.powf(wanted.log10().floor());
+    [5.0, 2.0, 1.0]
+        .into_iter()
+        .map(|s| s * power)
+        .find(|v| *v <= wanted)
+        .unwrap_or(1.0)
+}
+
+/// The reference system that run.json names as `crs: {epsg, name, wkt}`; `None` for a local frame.
+fn crs(run: &Value) -> Option<Crs> {
+    let crs = run.get("crs")?;
+    let text = |key: &str| crs.get(key).and_then(Value::as_str).map(str::to_owned);
+    let epsg = i32::try_from(crs.get("epsg")?.as_i64()?).ok()?;
+    Some(Crs {
+        epsg,
+        name: text("name")?,
+        wkt: text("wkt")?,
+    })
+}
+
+/// Faces of all stones as triangles, coloured by the out-of-plane displacement; grey where it was not measured.
+fn face_mesh(results: &ResultSet, facts: &Summary) -> ColouredMesh {
+    let scale = Scale::Diverging(component_limit_m(facts));
+    let names = ["stone_id", "d_along", "d_up", "d_out", "norm", "lod95"];
+    let mut mesh = ColouredMesh {
+        scalars: names.map(|n| (n.to_owned(), Vec::new())).to_vec(),
+        ..ColouredMesh::default()
+    };
+    for stone in &results.stones {
+        let Some(outline) = results.outlines.get(&stone.stone_id) else {
+            continue;
+        };
+        let frame = FaceFrame::from_normal(&outline.normal);
+        let flat: Vec<Point2<f64>> = outline
+            .ring
+            .iter()
+            .map(|p| p - outline.ring[0])
+            .map(|d| Point2::new(d.dot(&frame.along), d.dot(&frame.up)))
+            .collect();
+        let first = mesh.vertices.len() as u32;
+        mesh.triangles
+            .extend(triangulate(&flat).iter().map(|t| t.map(|i| first + i as u32)));
+        mesh.vertices.extend(&outline.ring);
+        let motion = stone.motion.as_ref();
+        let colour = motion.map_or([150; 3], |m| scale.colour(scale.step(m.face.z)).0);
+        mesh.colours.extend(outline.ring.iter().map(|_| colour));
+        let of = |pick: fn(&RowMotion) -> f64| motion.map_or(f64::NAN, pick) as f32;
+        let values = [
+            stone.stone_id as f32,
+            of(|m| m.face.x),
+            of(|m| m.face.y),
+            of(|m| m.face.z),
+            of(|m| m.displacement.norm()),
+            of(|m| m.detection_limit_m),
+        ];
+        for ((_, column), value) in mesh.scalars.iter_mut().zip(values) {
+            column.extend(outline.ring.iter().map(|_| value));
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::testing::{outlines, rows};
+    use crate::report::{write_outlines, write_stones};
+
+    fn folder(rows: &[StoneRow]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        write_stones(folder.path(), rows).unwrap();
+        write_outlines(folder.path(), &outlines()).unwrap();
+        folder
+    }
+
+    #[test]
+    fn all_layers_are_written_again_with_the_same_bytes() {
+        let folder = folder(&rows());
+        let names = [
+            "stones.gpkg",
+            "stones.geojson",
+            "stones.ply",
+            "stones.csv-metadata.json",
+        ];
+        let bytes = || {
+            write_layers(folder.path()).unwrap();
+            names.map(|n| std::fs::read(folder.path().join(n)).unwrap())
+        };
+        let first = bytes();
+        assert!(first == bytes(), "bytes differ");
+        let json: Value = serde_json::from_slice(&first[1]).unwrap();
+        assert_eq!(json["features"].as_array().unwrap().len(), 24);
+        assert_eq!(json["features"][2]["properties"]["status"], "unmatched_lost");
+        assert_eq!(json["features"][2]["properties"]["d_out"], Value::Null);
+        let notes: Value = serde_json::from_slice(&first[3]).unwrap();
+        assert_eq!(notes["tableSchema"]["columns"].as_array().unwrap().len(), 33);
+    }
+
+    #[test]
+    fn lines_point_along_the_exaggerated_displacement() {
+        let folder = folder(&rows());
+        let results = ResultSet::read(folder.path()).unwrap();
+        let facts = Summary::new(&results);
+        let layers = layers(&results, &facts).unwrap();
+        assert_eq!(
+            layers.iter().map(|l| l.vertices.len()).collect::<Vec<_>>(),
+            [24, 24, 20, 20]
+        );
+        let factor = exaggeration(&results, &facts);
+        assert!(factor >= 10.0);
+        // Stone 8 is the sixth measured one; it moved by (3, 20, -1) mm on a face that looks along x.
+        let line = &layers[2].vertices[5];
+        let d = (line[1] - line[0]) / factor;
+        assert!((d - nalgebra::Vector3::new(0.003, 0.02, -0.001)).norm() < 1e-9);
+        let flat = &layers[3].vertices[5];
+        assert!(((flat[1] - flat[0]) / factor - nalgebra::Vector3::new(0.02, -0.001, 0.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_run_without_stones_or_motions_has_layers_too() {
+        write_layers(folder(&[]).path()).unwrap();
+        let mut unmatched = rows();
+        unmatched.iter_mut().for_each(|r| r.motion = None);
+        write_layers(folder(&unmatched).path()).unwrap();
+    }
+}
