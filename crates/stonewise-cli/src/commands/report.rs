@@ -5,12 +5,13 @@ use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::Result;
 
-/// Writes the report again, from result files alone.
+/// Writes the report and the layers again, from result files alone.
 pub fn report(args: &ReportArgs, printer: &Printer) -> Result<Outcome> {
     stonewise::report::write_report(&args.results)?;
+    stonewise::report::write_layers(&args.results)?;
+    let results = args.results.display();
     printer.log(&format!(
-        "wrote {}",
-        args.results.join("report/index.html").display()
+        "wrote {results}/report/index.html, stones.gpkg, stones.geojson and stones.ply"
     ));
     Ok(Outcome::Done)
 }

@@ -14,7 +14,7 @@ use crate::pipeline::series::write_series;
 use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_json, write_stone_outlines};
 use crate::pipeline::tiled::{Tiled, tile_epoch};
 use crate::project::Project;
-use crate::report::{StoneRow, write_report, write_stones_named};
+use crate::report::{StoneRow, write_layers, write_report, write_stones_named};
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use serde_json::json;
@@ -109,6 +109,7 @@ pub fn run(project: &Project, out: &Path, until: Until, progress: &dyn Progress)
     write_series(&context, &pairs)?;
     write_run_record(&context, &photos, &labelled)?;
     context.timed("report", || Ok(write_report(&context.out)?))?;
+    context.timed("layers", || Ok(write_layers(&context.out)?))?;
     Ok(summary(&context, pairs))
 }
 
