@@ -3,9 +3,7 @@
 use crate::simulate::SimulateError;
 use std::path::Path;
 use stonewise_core::raster::LabelImage;
-use stonewise_core::simulate::{
-    EpochScans, Scan, StoneTruth, World, photo_counts, point_counts, seen_share, stone_truths,
-};
+use stonewise_core::simulate::{EpochScans, Scan, StoneTruth, World, photo_counts, point_counts, seen_share};
 use stonewise_io::table::{Table, TableError, write_csv};
 
 /// What was measured of each stone in one epoch, in the wall's order.
@@ -37,11 +35,6 @@ pub fn count_seen(
         uav: of(&scans.uav),
         images: photo_counts(labels, stones, SHOWN_PIXELS),
     }
-}
-
-/// The truth of all stones.
-pub fn truths(world: &World) -> Vec<StoneTruth> {
-    stone_truths(world)
 }
 
 /// Writes truth/stones.csv, one row a stone.

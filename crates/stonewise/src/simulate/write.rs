@@ -2,12 +2,12 @@
 
 use crate::simulate::photos::write_photos;
 use crate::simulate::project_file::project_text;
-use crate::simulate::truth::{count_seen, truths, write_stone_table};
+use crate::simulate::truth::{count_seen, write_stone_table};
 use crate::simulate::{SimulateError, SurveyParams};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
-use stonewise_core::simulate::{EpochScans, Scan, World};
+use stonewise_core::simulate::{EpochScans, Scan, World, stone_truths};
 use stonewise_io::atomic::write_atomically;
 use stonewise_io::cloud::{ExtraColumn, write_points_laz};
 
@@ -49,7 +49,7 @@ pub fn write_survey(
     let photos = (params.photos.columns * params.photos.rows) as usize;
     progress.begin("simulate", 2 * (2 + photos as u64));
     let world = World::new(&params.scene);
-    let truths = truths(&world);
+    let truths = stone_truths(&world);
     let (mut seen, mut points) = (Vec::new(), 0);
     for epoch in 0..2 {
         progress.check()?;
