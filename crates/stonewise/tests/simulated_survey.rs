@@ -55,6 +55,7 @@ fn tiny() -> SurveyParams {
     }
 }
 
+#[allow(clippy::unwrap_used, reason = "a test may fail here")]
 fn files(folder: &Path, found: &mut BTreeMap<String, Vec<u8>>, root: &Path) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

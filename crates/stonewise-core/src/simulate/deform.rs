@@ -179,7 +179,7 @@ fn loosen(
     let axis = Vector3::from_fn(|_, _| normal(rng)).normalize();
     let turn = axis * (rotation_rad * rng.random::<f64>());
     let own = about_middle(stone, shift, turn);
-    motion.second_from_first = motion.second_from_first * own;
+    motion.second_from_first *= own;
     motion.loose = true;
 }
 

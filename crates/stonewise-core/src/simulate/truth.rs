@@ -155,8 +155,11 @@ fn cell(at: [f64; 2]) -> [i32; 2] {
     at.map(|v| (v / CELL_M).floor() as i32)
 }
 
-/// Points of each stone's face on a square raster, in the world and in the stone's frame.
-fn face_samples(scene: &Scene) -> BTreeMap<u32, Vec<(Point3<f64>, [f64; 2])>> {
+/// A point of a stone's face, in the world and in the stone's frame.
+type FaceSample = (Point3<f64>, [f64; 2]);
+
+/// Points of each stone's face on a square raster.
+fn face_samples(scene: &Scene) -> BTreeMap<u32, Vec<FaceSample>> {
     use rayon::prelude::*;
     let w = scene.window();
     let steps = [0, 2].map(|i| ((w[i + 1] - w[i]) / STEP_M) as usize);
