@@ -302,6 +302,7 @@ fn labels_and_motions_stand_behind_each_record() {
                 displacement_m: Vector3::new(index as f32, 0.02, -0.05),
                 significant: index.is_multiple_of(2),
             }),
+            ..PointLabel::default()
         };
         Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
     })

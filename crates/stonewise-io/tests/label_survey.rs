@@ -339,8 +339,6 @@ fn dam_points_carry_their_stones_and_the_stones_match() {
 }
 
 /// The reference stone of every instance of a photo, and its label image.
-type Photo = (BTreeMap<u32, u64>, stonewise_core::raster::LabelImage);
-
 #[test]
 fn fountain_stones_are_found_and_matched() {
     let Some(data) = data() else { return };
