@@ -43,6 +43,9 @@ mod tests {
         };
         let json = serde_json::to_string(&evaluation).unwrap();
         std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
+        let decisions = "event,photo,instance\nmerged_instance,<script>.jpg,4\nmerged_instance,b.jpg,5\n";
+        std::fs::write(folder.path().join("audit_epoch1.csv"), decisions).unwrap();
+        std::fs::write(folder.path().join("registration.json"), r#"{"converged": false}"#).unwrap();
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(&path).unwrap();
         assert_eq!(
@@ -103,6 +106,8 @@ mod tests {
             7 + 3 + 3,
             "maps, histograms, scatter plots"
         );
+        assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
+        assert!(html.contains("before it settled"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         assert!(
             !html.contains("NaN") && !html.contains("inf"),

@@ -24,6 +24,10 @@ pub struct ResultSet {
     pub evaluation: Option<Evaluation>,
     /// `run.json`; null where the file is missing.
     pub run: Value,
+    /// `registration.json`; null where the file is missing.
+    pub registration: Value,
+    /// Decisions about mask instances, by epoch and kind, from `audit_epochN.csv`.
+    pub decisions: Vec<BTreeMap<String, usize>>,
     /// The unrolled wall.
     pub facade: Facade,
 }
@@ -48,6 +52,8 @@ impl ResultSet {
             distances: read_distance_points(dir)?,
             evaluation: read_json(&dir.join("evaluation.json"))?,
             run: read_json(&dir.join("run.json"))?.unwrap_or(Value::Null),
+            registration: read_json(&dir.join("registration.json"))?.unwrap_or(Value::Null),
+            decisions: read_decisions(dir)?,
         })
     }
 
@@ -98,5 +104,28 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, ReportError>
             }),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(ReportError::io("reading results", path)(e)),
+    }
+}
+
+/// Rows of `audit_epoch1.csv`, `audit_epoch2.csv`, ... counted by their first cell, the kind of decision.
+fn read_decisions(dir: &Path) -> Result<Vec<BTreeMap<String, usize>>, ReportError> {
+    let mut epochs = Vec::new();
+    loop {
+        let path = dir.join(format!("audit_epoch{}.csv", epochs.len() + 1));
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(epochs),
+            Err(e) => return Err(ReportError::io("reading results", path)(e)),
+        };
+        let mut kinds = BTreeMap::new();
+        for kind in text
+            .lines()
+            .skip(1)
+            .filter_map(|l| l.split(',').next())
+            .filter(|k| !k.is_empty())
+        {
+            *kinds.entry(kind.to_owned()).or_insert(0) += 1;
+        }
+        epochs.push(kinds);
     }
 }

@@ -4,7 +4,7 @@ use super::colour_bar::Scale;
 use super::stone_map::MapLayout;
 use crate::report::ResultSet;
 use crate::report::statistics::Sorted;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 /// Least edge of a square of the map, pixels.
@@ -54,4 +54,42 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
     layout.draw_bar(&mut out, scale);
     out.push_str("</svg>");
     Some(out)
+}
+
+/// Gives empty squares between filled ones the median of their neighbours: core points on a grid of their own leave
+/// rows of squares empty. A square needs five filled neighbours of its eight.
+fn fill_gaps(squares: &mut BTreeMap<(i64, i64), [f64; 2]>) {
+    let around = |(row, column): (i64, i64)| {
+        (-1..=1)
+            .flat_map(move |r| (-1..=1).map(move |c| (row + r, column + c)))
+            .filter(move |p| *p != (row, column))
+    };
+    let candidates: BTreeSet<(i64, i64)> = squares
+        .keys()
+        .flat_map(|p| around(*p))
+        .filter(|p| !squares.contains_key(p))
+        .collect();
+    let fill = |place: (i64, i64)| {
+        let known: Vec<[f64; 2]> = around(place).filter_map(|p| squares.get(&p).copied()).collect();
+        let median = |k: usize| Sorted::new(known.iter().map(|v| v[k])).median();
+        (known.len() >= 5).then_some((place, [median(0)?, median(1)?]))
+    };
+    let filled: Vec<_> = candidates.into_iter().filter_map(fill).collect();
+    squares.extend(filled);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_is_filled_and_the_border_is_not() {
+        let mut squares: BTreeMap<(i64, i64), [f64; 2]> = (0..9)
+            .filter(|i| *i != 4)
+            .map(|i| ((i / 3, i % 3), [i as f64, 0.5]))
+            .collect();
+        fill_gaps(&mut squares);
+        assert_eq!(squares.len(), 9);
+        assert_eq!(squares[&(1, 1)], [4.0, 0.5]);
+    }
 }

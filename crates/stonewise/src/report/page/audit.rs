@@ -1,24 +1,32 @@
 //! Where the numbers come from: warnings, parameters, digests, times.
 
 use super::html::{details, section, table};
+use crate::report::ResultSet;
 use crate::report::draw::{count, escape, number};
 use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// Everything in run.json, warnings first.
-pub(super) fn audit(run: &Value) -> String {
+/// Decisions about masks, the adjustment, and everything in run.json, warnings first.
+pub(super) fn audit(results: &ResultSet) -> String {
+    let mut more = decisions(&results.decisions);
+    if results.registration.is_object() {
+        more.push_str(&details(
+            "Adjustment of the motions (registration.json)",
+            &tree(&results.registration),
+        ));
+    }
+    let run = &results.run;
     let Value::Object(entries) = run else {
-        return section(
-            "audit",
-            "Audit",
-            "<p>There is no run.json beside the results.</p>",
-        );
+        let body = format!("<p>There is no run.json beside the results.</p>{more}");
+        return section("audit", "Audit", &body);
     };
     let mut out = warnings(
         run.get("warnings")
             .and_then(Value::as_array)
             .map_or(&[], Vec::as_slice),
     );
+    out.push_str(&more);
     for (key, value) in entries.iter().filter(|(k, _)| *k != "warnings") {
         match value {
             Value::Object(_) | Value::Array(_) => out.push_str(&details(&words(key), &tree(value))),
@@ -33,6 +41,26 @@ pub(super) fn audit(run: &Value) -> String {
         }
     }
     section("audit", "Audit", &out)
+}
+
+/// How many mask instances were merged, split, dropped, by epoch.
+fn decisions(epochs: &[BTreeMap<String, usize>]) -> String {
+    let kinds: BTreeSet<&String> = epochs.iter().flat_map(BTreeMap::keys).collect();
+    if kinds.is_empty() {
+        return String::new();
+    }
+    let mut head = vec!["decision of the majority of the photos".to_owned()];
+    head.extend((1..=epochs.len()).map(|e| format!("epoch {e}")));
+    let row = |kind: &&String| {
+        let mut row = vec![escape(&words(kind))];
+        row.extend(epochs.iter().map(|e| count(e.get(*kind).copied().unwrap_or(0))));
+        row
+    };
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    format!(
+        "<h3>Decisions about mask instances</h3>{}<p class=\"note\">One row each in audit_epoch1.csv, audit_epoch2.csv.</p>",
+        table(&head, &kinds.iter().map(row).collect::<Vec<_>>(), 1)
+    )
 }
 
 fn warnings(warnings: &[Value]) -> String {

@@ -49,7 +49,7 @@ pub(super) fn page(results: &ResultSet) -> String {
         body.push_str(&evaluation::evaluation(evaluation));
     }
     body.push_str(&method::method());
-    body.push_str(&audit::audit(&results.run));
+    body.push_str(&audit::audit(results));
     let title = title(&results.run);
     let present = SECTIONS
         .iter()

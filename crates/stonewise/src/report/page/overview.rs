@@ -5,6 +5,7 @@ use crate::report::draw::{count, escape, mm, mm_or_dash, number, percent};
 use crate::report::statistics::Sorted;
 use crate::report::summary::{FALSE_ALARMS, Summary};
 use crate::report::{ResultSet, RowMotion, StoneRow};
+use serde_json::Value;
 use std::fmt::Write;
 
 /// Rows of a table of single stones at most; the full list is in stones.csv.
@@ -83,6 +84,12 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
             number(place.x, 2),
             number(place.y, 2)
         ));
+    }
+    if results.registration.get("converged").and_then(Value::as_bool) == Some(false) {
+        out.push(
+            "<b>The joint adjustment reached its limit of iterations before it settled</b>; see the audit."
+                .into(),
+        );
     }
     out.push(match facts.loose.len() {
         0 => "No stone moves unlike its neighbours beyond what the noise explains.".into(),
