@@ -7,16 +7,15 @@ use stonewise_core::simulate::{
 };
 
 fn small(seed: u64) -> SceneParams {
-    SceneParams {
+    let params = SceneParams {
         wall: WallParams {
             width_m: 1.8,
             height_m: 1.4,
-            seed,
             ..WallParams::default()
         },
-        seed,
         ..SceneParams::default()
-    }
+    };
+    params.seeded(seed)
 }
 
 fn nothing_around() -> SurroundingsParams {

@@ -44,6 +44,16 @@ impl Default for SceneParams {
     }
 }
 
+impl SceneParams {
+    /// The same kind of survey with another wall, other surroundings, motions and noise.
+    pub fn seeded(mut self, seed: u64) -> Self {
+        self.seed = seed;
+        self.wall.seed = seed;
+        self.surroundings.seed = seed;
+        self
+    }
+}
+
 /// The wall of a survey with its true motions; scenes of both epochs come from it.
 pub struct World {
     /// The wall in the first epoch.
