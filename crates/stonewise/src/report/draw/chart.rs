@@ -51,7 +51,8 @@ pub(crate) fn scatter(
     }
     if let Some([x, y]) = cross {
         let (x, y) = (axes.px(x), axes.py(y));
-        let d = format!("M{:.1} {y:.1}h18M{x:.1} {:.1}v18", x - 9.0, y - 9.0);
+        // Open in the middle, so that points on the truth stay visible.
+        let d = format!("M{:.1} {y:.1}h8m10 0h8M{x:.1} {:.1}v8m0 10v8", x - 13.0, y - 13.0);
         let _ = write!(
             out,
             r#"<path class="cross halo" d="{d}"/><path class="cross" d="{d}"/>"#

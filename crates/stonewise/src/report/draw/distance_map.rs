@@ -31,12 +31,16 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
     if cells.is_empty() {
         return None;
     }
+    let mut medians: BTreeMap<(i64, i64), [f64; 2]> = BTreeMap::new();
+    for (place, (distances, limits)) in cells {
+        if let Some(distance) = Sorted::new(distances).median() {
+            medians.insert(place, [distance, Sorted::new(limits).median().unwrap_or(0.0)]);
+        }
+    }
+    fill_gaps(&mut medians);
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
-    for ((row, column), (distances, limits)) in cells {
-        let Some(distance) = Sorted::new(distances).median() else {
-            continue;
-        };
-        let shown = Sorted::new(limits).median().is_none_or(|l| distance.abs() > l);
+    for ((row, column), [distance, limit]) in medians {
+        let shown = distance.abs() > limit;
         let path = groups.entry((shown, scale.step(distance))).or_default();
         let edge = |start: f64, i: i64| ((start + i as f64 * cell) * 10.0).round() as i64;
         let (x, y) = (edge(left, column), edge(top, row));

@@ -3,7 +3,7 @@
 use super::html::{figure, section, table};
 use crate::report::ResultSet;
 use crate::report::comparison::compare;
-use crate::report::draw::{Series, component_limit_m, count, histogram, mm_or_dash, scatter};
+use crate::report::draw::{Series, count, histogram, mm_or_dash, scatter};
 use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
 
@@ -11,14 +11,13 @@ const NAMES: [&str; 3] = ["along the wall", "up the face", "out of the wall"];
 
 /// Histograms and scatter plots. `truth_mm`: a known common in-plane translation.
 pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Option<[f64; 2]>) -> String {
-    let limit = component_limit_m(facts) * 1e3;
     let mut grid = String::new();
     for (name, component) in NAMES.iter().zip(&facts.components) {
         let values: Vec<f64> = component.values().iter().map(|v| v * 1e3).collect();
         let title = format!("Displacement {name}");
         grid.push_str(&figure(
             &title,
-            &histogram(&title, "mm", &values, [-limit, limit]),
+            &histogram(&title, "mm", &values, own_limits_mm(component)),
             "",
         ));
     }
@@ -29,11 +28,7 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
         .map(|(_, m)| [m.face.x * 1e3, m.face.y * 1e3])
         .collect();
     let vectors: Vec<[f64; 2]> = compared.in_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
-    let limits = shared_limits(&[
-        &stones,
-        &vectors,
-        truth_mm.as_ref().map_or(&[], std::slice::from_ref),
-    ]);
+    let limits = shared_limits(&[&stones, &vectors, truth_mm.as_slice()]);
     let note = |n: usize, what: &str| {
         let truth = if truth_mm.is_some() {
             " Cross: the known motion."
@@ -92,6 +87,16 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
         "Distributions",
         &format!("<div class=\"charts\">{grid}</div>"),
     )
+}
+
+/// Limits of a histogram: 98 % of the values and a margin, millimetres; values beyond are counted in the end bars.
+fn own_limits_mm(values: &Sorted) -> [f64; 2] {
+    let (low, high) = (
+        values.quantile(0.01).unwrap_or(0.0) * 1e3,
+        values.quantile(0.99).unwrap_or(0.0) * 1e3,
+    );
+    let margin = (0.15 * (high - low)).max(0.02);
+    [low - margin, high + margin]
 }
 
 /// Limits that hold 98 % of every series and zero, with equal lengths on both axes.
