@@ -1,6 +1,7 @@
 //! Surveys made up from scratch, with truth: walls, motions, scanners and cameras.
 
 mod deform;
+mod drift;
 mod face;
 mod layout;
 mod lens;
