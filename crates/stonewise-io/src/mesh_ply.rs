@@ -38,11 +38,18 @@ pub fn write_coloured_mesh(path: &Path, mesh: &ColouredMesh) -> io::Result<()> {
         let mut out = BufWriter::new(File::create(partial)?);
         write!(out, "ply\nformat binary_little_endian 1.0\nelement vertex {n}\n")?;
         write!(out, "property double x\nproperty double y\nproperty double z\n")?;
-        write!(out, "property uchar red\nproperty uchar green\nproperty uchar blue\n")?;
+        write!(
+            out,
+            "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+        )?;
         for (name, _) in &mesh.scalars {
             writeln!(out, "property float scalar_{name}")?;
         }
-        write!(out, "element face {}\nproperty list uchar uint vertex_indices\nend_header\n", mesh.triangles.len())?;
+        write!(
+            out,
+            "element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+            mesh.triangles.len()
+        )?;
         for i in 0..n {
             for v in mesh.vertices[i].iter() {
                 out.write_all(&v.to_le_bytes())?;

@@ -65,6 +65,7 @@ fn a_labelled_copy_keeps_every_attribute() {
                 displacement_m: Vector3::new(index as f32, 0.02, -0.05),
                 significant: index.is_multiple_of(2),
             }),
+            ..PointLabel::default()
         };
         Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
     })

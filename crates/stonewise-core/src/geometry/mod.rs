@@ -19,8 +19,8 @@ pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};
 pub use plane::Plane;
-pub use triangulate::triangulate;
 pub use rotation::nearest_rotation;
+pub use triangulate::triangulate;
 pub use view::{Projection, View};
 
 /// A rigid motion in metres: `p_b = b_from_a * p_a`.

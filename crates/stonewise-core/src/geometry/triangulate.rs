@@ -35,7 +35,10 @@ mod tests {
     fn check(ring: &[Point2<f64>]) {
         let triangles = triangulate(ring);
         assert_eq!(triangles.len(), ring.len() - 2);
-        let areas: Vec<f64> = triangles.iter().map(|t| signed_area(&t.map(|i| ring[i]))).collect();
+        let areas: Vec<f64> = triangles
+            .iter()
+            .map(|t| signed_area(&t.map(|i| ring[i])))
+            .collect();
         assert!(areas.iter().all(|a| *a > 0.0));
         assert!((areas.iter().sum::<f64>() / signed_area(ring) - 1.0).abs() < 1e-9);
     }
@@ -58,6 +61,9 @@ mod tests {
     fn few_vertices_have_no_triangles_and_a_bow_tie_ends() {
         let p = Point2::new;
         assert!(triangulate(&[p(0.0, 0.0), p(1.0, 0.0)]).is_empty());
-        assert_eq!(triangulate(&[p(0.0, 0.0), p(1.0, 1.0), p(1.0, 0.0), p(0.0, 1.0)]).len(), 2);
+        assert_eq!(
+            triangulate(&[p(0.0, 0.0), p(1.0, 1.0), p(1.0, 0.0), p(0.0, 1.0)]).len(),
+            2
+        );
     }
 }

@@ -20,7 +20,11 @@ pub fn write_geojson(path: &Path, layer: &Layer) -> Result<(), LayerError> {
     check(layer)?;
     write_atomically(path, |partial| {
         let mut out = BufWriter::new(File::create(partial)?);
-        writeln!(out, "{{\"type\":\"FeatureCollection\",\"name\":{},\"features\":[", json!(layer.name))?;
+        writeln!(
+            out,
+            "{{\"type\":\"FeatureCollection\",\"name\":{},\"features\":[",
+            json!(layer.name)
+        )?;
         for row in 0..layer.vertices.len() {
             let end = if row + 1 < layer.vertices.len() { "," } else { "" };
             writeln!(out, "{}{end}", feature(layer, row))?;
@@ -50,7 +54,12 @@ fn geometry(layer: &Layer, row: usize) -> Value {
         return Value::Null;
     }
     let axes = if layer.geometry.has_z() { 3 } else { 2 };
-    let place = |p: &nalgebra::Point3<f64>| p.iter().take(axes).map(|v| (v * 1e4).round() / 1e4).collect::<Vec<_>>();
+    let place = |p: &nalgebra::Point3<f64>| {
+        p.iter()
+            .take(axes)
+            .map(|v| (v * 1e4).round() / 1e4)
+            .collect::<Vec<_>>()
+    };
     let mut line: Vec<Vec<f64>> = vertices.iter().map(place).collect();
     match layer.geometry {
         Geometry::LineString | Geometry::LineStringZ => json!({ "type": "LineString", "coordinates": line }),
@@ -79,16 +88,23 @@ mod tests {
             geometry: Geometry::Polygon,
             crs: None,
             attributes,
-            vertices: vec![vec![p(0.0, 0.0, 9.0), p(1.0, 0.0, 9.0), p(1.0, 1.000_04, 9.0)], vec![]],
+            vertices: vec![
+                vec![p(0.0, 0.0, 9.0), p(1.0, 0.0, 9.0), p(1.0, 1.000_04, 9.0)],
+                vec![],
+            ],
             styles: Vec::new(),
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.geojson");
         write_geojson(&path, &layer).unwrap();
         let value: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-        let expected = json!({"type": "Polygon", "coordinates": [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]]]});
+        let expected =
+            json!({"type": "Polygon", "coordinates": [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]]]});
         assert_eq!(value["features"][0]["geometry"], expected);
         assert_eq!(value["features"][0]["properties"]["d_out"], json!(0.25));
-        assert_eq!(value["features"][1], json!({"type": "Feature", "geometry": null, "properties": {"d_out": null}}));
+        assert_eq!(
+            value["features"][1],
+            json!({"type": "Feature", "geometry": null, "properties": {"d_out": null}})
+        );
     }
 }
