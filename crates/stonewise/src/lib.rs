@@ -2,6 +2,7 @@
 
 mod error;
 mod init;
+mod limits;
 mod pipeline;
 mod project;
 pub mod report;

@@ -1,6 +1,7 @@
 //! The project file: which surveys, and every parameter of every step.
 
 use crate::error::{Error, Result};
+use crate::limits::impossible;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::ops::Range;
@@ -257,31 +258,12 @@ impl Source<'_> {
         ))
     }
 
-    /// Ranges that the types do not carry.
+    /// Values that the types do not exclude.
     fn check_settings(&self, settings: &Settings) -> Result<()> {
-        let checks = [
-            (
-                "size_m",
-                settings.tiles.size_m,
-                settings.tiles.size_m >= 0.5,
-                "at least 0.5 m",
-            ),
-            (
-                "epoch_error_m",
-                settings.registration.epoch_error_m,
-                settings.registration.epoch_error_m >= 0.0,
-                "0 or more",
-            ),
-        ];
-        for (key, value, possible, range) in checks {
-            if !possible || !value.is_finite() {
-                let at = self.text.find(key).unwrap_or(0);
-                return Err(self.error(
-                    at..at,
-                    format!("{key} = {value} is not possible: it must be {range}"),
-                ));
-            }
-        }
-        Ok(())
+        let Some((key, message)) = impossible(settings) else {
+            return Ok(());
+        };
+        let at = self.text.find(&key).unwrap_or(0);
+        Err(self.error(at..at, message))
     }
 }

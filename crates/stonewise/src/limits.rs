@@ -1,0 +1,101 @@
+//! Which values parameters can have.
+
+use crate::project::Settings;
+use serde_json::Value;
+
+/// Parameters that zero makes useless: sizes, radii, counts, steps.
+const POSITIVE: [&str; 15] = [
+    "size_m",
+    "cell_m",
+    "sample_m",
+    "splat_spacings",
+    "depth_memory_mib",
+    "face_radius_m",
+    "cell_spacings",
+    "min_cell_m",
+    "patch_cells",
+    "max_step_m",
+    "tolerance_m",
+    "max_iterations",
+    "max_ratio",
+    "buffer_m",
+    "outlier_sigmas",
+];
+/// Parameters that are shares or rates without saying so in their names.
+const SHARES: [&str; 4] = ["min_iou", "min_area_ratio", "false_discovery_rate", "min_overlap"];
+
+/// The first parameter whose value is impossible: its key, and what it must be.
+pub fn impossible(settings: &Settings) -> Option<(String, String)> {
+    let all = serde_json::to_value(settings).ok()?;
+    let mut open: Vec<(&str, &Value)> = vec![("", &all)];
+    while let Some((key, value)) = open.pop() {
+        match value {
+            Value::Object(map) => open.extend(map.iter().rev().map(|(k, v)| (k.as_str(), v))),
+            Value::Number(number) => {
+                let number = number.as_f64().unwrap_or(f64::NAN);
+                let is_share = key.ends_with("_share") || SHARES.contains(&key);
+                let wanted = if POSITIVE.contains(&key) && number <= 0.0 {
+                    "it must be above 0"
+                } else if number < 0.0 {
+                    "it must not be negative"
+                } else if is_share && number > 1.0 {
+                    "it is a share, 0 to 1"
+                } else {
+                    continue;
+                };
+                return Some((
+                    key.to_owned(),
+                    format!("{key} = {number} is not possible: {wanted}"),
+                ));
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_possible_and_senseless_values_are_named() {
+        assert_eq!(impossible(&Settings::default()), None);
+        let mut settings = Settings::default();
+        settings.tiles.size_m = 0.0;
+        assert_eq!(impossible(&settings).unwrap().0, "size_m");
+        let mut settings = Settings::default();
+        settings.transfer.island_share = 1.5;
+        assert!(impossible(&settings).unwrap().1.contains("0 to 1"));
+        let mut settings = Settings::default();
+        settings.registration.epoch_error_m = -0.001;
+        assert_eq!(impossible(&settings).unwrap().0, "epoch_error_m");
+    }
+
+    #[test]
+    fn every_parameter_is_documented() {
+        let docs = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/project-file.md");
+        let text = std::fs::read_to_string(docs).unwrap();
+        let settings = serde_json::to_value(Settings::default()).unwrap();
+        let mut open = vec![settings];
+        let mut keys = 0;
+        while let Some(Value::Object(map)) = open.pop() {
+            for (key, value) in map {
+                if value.is_object() {
+                    assert!(
+                        text.contains(&format!("{key}]`")),
+                        "section {key} is not documented"
+                    );
+                    open.push(value);
+                } else {
+                    assert!(
+                        text.contains(&format!("| `{key}` | `{value}` |")),
+                        "{key} = {value} is not documented so"
+                    );
+                    keys += 1;
+                }
+            }
+        }
+        assert!(keys > 30, "only {keys} parameters found: the search is broken");
+    }
+}
