@@ -18,26 +18,25 @@ pub struct DistancePoint {
     pub detection_limit_m: f64,
 }
 
-/// Reads `m3c2.csv` from `dir`, columns by name, rows without a distance left out; empty where there is no such file.
+/// Reads an `m3c2.csv`, columns by name, rows without a distance left out; empty where there is no such file.
 ///
 /// # Errors
 /// The file cannot be read, lacks a column or holds something that is no number.
-pub(super) fn read_distance_points(dir: &Path) -> Result<Vec<DistancePoint>, ReportError> {
-    let path = dir.join("m3c2.csv");
-    let file = match std::fs::File::open(&path) {
+pub(super) fn read_distance_points(path: &Path) -> Result<Vec<DistancePoint>, ReportError> {
+    let file = match std::fs::File::open(path) {
         Ok(file) => file,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(e) => return Err(ReportError::io("reading the distances", &path)(e)),
+        Err(e) => return Err(ReportError::io("reading the distances", path)(e)),
     };
     let content = |message: String| ReportError::Content {
-        path: path.clone(),
+        path: path.into(),
         message,
     };
     let mut lines = BufReader::new(file).lines();
     let header = lines
         .next()
         .transpose()
-        .map_err(ReportError::io("reading the distances", &path))?
+        .map_err(ReportError::io("reading the distances", path))?
         .unwrap_or_default();
     let names: Vec<&str> = header.trim().split(',').collect();
     let find = |wanted: &[&str]| {
@@ -55,7 +54,7 @@ pub(super) fn read_distance_points(dir: &Path) -> Result<Vec<DistancePoint>, Rep
     ];
     let mut points = Vec::new();
     for (number, line) in lines.enumerate() {
-        let line = line.map_err(ReportError::io("reading the distances", &path))?;
+        let line = line.map_err(ReportError::io("reading the distances", path))?;
         let cells: Vec<&str> = line.trim().split(',').collect();
         let value = |column: usize| match cells.get(column) {
             None | Some(&"") => Ok(f64::NAN),
@@ -88,10 +87,14 @@ mod tests {
     #[test]
     fn columns_are_found_by_name_and_empty_distances_left_out() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(read_distance_points(folder.path()).unwrap().is_empty());
+        assert!(
+            read_distance_points(&folder.path().join("m3c2.csv"))
+                .unwrap()
+                .is_empty()
+        );
         let csv = "x,y,z,m3c2_uncertainty,m3c2_distance\n1,2,3,0.001,-0.02\n1,2,3,,\n1,2,3,NaN,nan\n";
         std::fs::write(folder.path().join("m3c2.csv"), csv).unwrap();
-        let points = read_distance_points(folder.path()).unwrap();
+        let points = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
         assert_eq!(points.len(), 1);
         assert_eq!(
             (
@@ -111,7 +114,9 @@ mod tests {
             "x,y,z,m3c2_distance,m3c2_uncertainty\n1,2,up,0,0\n",
         )
         .unwrap();
-        let message = read_distance_points(folder.path()).unwrap_err().to_string();
+        let message = read_distance_points(&folder.path().join("m3c2.csv"))
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("line 2") && message.contains("up"), "{message}");
     }
 }

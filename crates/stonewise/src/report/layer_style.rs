@@ -54,13 +54,7 @@ pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) ->
         &simple_fill("150,148,142,255", "b_diagonal"),
         1.0,
     );
-    let qml = format!(
-        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n\
-         <qgis version=\"3.22\" styleCategories=\"Symbology\">\
-         <renderer-v2 type=\"RuleRenderer\" symbollevels=\"0\" forceraster=\"0\" enableorderby=\"0\">\
-         <rules key=\"root\">{rules}</rules><symbols>{symbols}</symbols></renderer-v2>\
-         <layerGeometryType>2</layerGeometryType></qgis>"
-    );
+    let qml = document(&rules, &symbols, 2);
     LayerStyle {
         name: name.into(),
         description: format!("stones by {column}"),
@@ -68,22 +62,67 @@ pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) ->
     }
 }
 
+/// Lines as arrows; pale where the motion is not significant.
+pub(super) fn arrow_style() -> LayerStyle {
+    let symbol = |name: usize, alpha: f64| {
+        format!(
+            "<symbol type=\"line\" name=\"{name}\" alpha=\"{alpha}\" clip_to_extent=\"1\" force_rhr=\"0\">\
+             <layer class=\"ArrowLine\" enabled=\"1\" locked=\"0\" pass=\"0\">{}\
+             <symbol type=\"fill\" name=\"@{name}@0\" alpha=\"1\" clip_to_extent=\"1\" force_rhr=\"0\">{}</symbol></layer></symbol>",
+            options(&[
+                ("arrow_width", "0.25"),
+                ("arrow_start_width", "0.25"),
+                ("arrow_width_unit", "MM"),
+                ("head_length", "1.2"),
+                ("head_thickness", "0.8"),
+                ("is_curved", "0"),
+                ("is_repeated", "0"),
+            ]),
+            simple_fill("30,34,40,255", "solid")
+        )
+    };
+    let rule = |key: usize, value: u8, label: &str| {
+        let filter = escape(&format!("\"significant\" = {value}"));
+        format!("<rule key=\"r{key}\" symbol=\"{key}\" filter=\"{filter}\" label=\"{label}\"/>")
+    };
+    let rules = rule(0, 1, "significant") + &rule(1, 0, "not significant");
+    let qml = document(&rules, &(symbol(0, 1.0) + &symbol(1, 0.3)), 1);
+    LayerStyle {
+        name: "Arrows".into(),
+        description: "exaggerated displacements".into(),
+        qml,
+    }
+}
+
+/// A style of rules; `kind` is QGIS's number of the geometry: 1 lines, 2 polygons.
+fn document(rules: &str, symbols: &str, kind: u8) -> String {
+    format!(
+        "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>\n\
+         <qgis version=\"3.22\" styleCategories=\"Symbology\">\
+         <renderer-v2 type=\"RuleRenderer\" symbollevels=\"0\" forceraster=\"0\" enableorderby=\"0\">\
+         <rules key=\"root\">{rules}</rules><symbols>{symbols}</symbols></renderer-v2>\
+         <layerGeometryType>{kind}</layerGeometryType></qgis>"
+    )
+}
+
 fn simple_fill(colour: &str, pattern: &str) -> String {
-    let options = [
+    let list = options(&[
         ("color", colour),
         ("style", pattern),
         ("outline_color", "90,88,84,255"),
         ("outline_style", "solid"),
         ("outline_width", "0.1"),
         ("outline_width_unit", "MM"),
-    ];
+    ]);
+    format!(r#"<layer class="SimpleFill" enabled="1" locked="0" pass="0">{list}</layer>"#)
+}
+
+fn options(options: &[(&str, &str)]) -> String {
     let list: String = options.iter().fold(String::new(), |mut out, (name, value)| {
         let _ = write!(out, r#"<Option type="QString" name="{name}" value="{value}"/>"#);
         out
     });
-    format!(
-        r#"<layer class="SimpleFill" enabled="1" locked="0" pass="0"><Option type="Map">{list}</Option></layer>"#
-    )
+    format!(r#"<Option type="Map">{list}</Option>"#)
 }
 
 #[cfg(test)]

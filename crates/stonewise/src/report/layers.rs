@@ -2,7 +2,7 @@
 
 use super::column_notes::column_notes;
 use super::draw::{Scale, component_limit_m, nice_scale_m};
-use super::layer_style::stone_style;
+use super::layer_style::{arrow_style, stone_style};
 use super::stone_table::stone_table;
 use super::summary::Summary;
 use super::{ReportError, ResultSet, RowMotion, StoneRow};
@@ -20,14 +20,19 @@ use stonewise_io::table::{Table, TableError};
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), and their displacements as
 /// exaggerated lines in both (`displacements`, `displacements_facade`), each with styles for QGIS. The PLY is a mesh
 /// of the stones' faces, coloured by the out-of-plane displacement, with all components as scalars. The sidecar names
-/// the unit and meaning of every column of stones.csv (W3C CSV on the Web).
+/// the unit and meaning of every column of stones.csv (W3C CSV on the Web). With more than two epochs, the GeoPackage
+/// has the layers of the third against the first as `stones_2` and so on; the other files are of the second epoch.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or a file cannot be written.
 pub fn write_layers(dir: &Path) -> Result<(), ReportError> {
     let results = ResultSet::read(dir)?;
     let facts = Summary::new(&results);
-    let layers = layers(&results, &facts)?;
+    let mut layers = layers(&results, &facts)?;
+    for pair in 2..=results.pairs {
+        let later = ResultSet::read_pair(dir, pair)?;
+        layers.extend(self::layers(&later, &Summary::new(&later))?);
+    }
     let stamp = results
         .run
         .get("finished")
@@ -58,10 +63,24 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
     };
     let flat = |p: Point2<f64>| Point3::new(p.x, p.y, 0.0);
     let facade = |s: &StoneRow| results.unrolled(s).into_iter().map(flat).collect();
+    let numbered = |name: &str| {
+        if results.pair == 1 {
+            name.to_owned()
+        } else {
+            format!("{name}_{}", results.pair)
+        }
+    };
+    let titled = |title: &str| {
+        if results.pair == 1 {
+            title.to_owned()
+        } else {
+            format!("{title}, epoch {}", results.pair + 1)
+        }
+    };
     let polygons = |name: &str, title: &str, geometry, crs, vertices| {
         Ok::<_, TableError>(Layer {
-            name: name.into(),
-            title: title.into(),
+            name: numbered(name),
+            title: titled(title),
             description: "one feature per stone of the first epoch; columns as in stones.csv, metres".into(),
             geometry,
             crs,
@@ -89,14 +108,14 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
     };
     let lines = |name: &str, title: &str, geometry, crs, vertices| {
         Ok::<_, TableError>(Layer {
-            name: name.into(),
-            title: title.into(),
+            name: numbered(name),
+            title: titled(title),
             description: format!("displacements of the measured stones, {factor} times exaggerated"),
             geometry,
             crs,
             attributes: motion_table(&moved, factor)?,
             vertices,
-            styles: Vec::new(),
+            styles: vec![arrow_style()],
         })
     };
     Ok(vec![
@@ -294,6 +313,28 @@ mod tests {
         assert!((d - nalgebra::Vector3::new(0.003, 0.02, -0.001)).norm() < 1e-9);
         let flat = &layers[3].vertices[5];
         assert!(((flat[1] - flat[0]) / factor - nalgebra::Vector3::new(0.02, -0.001, 0.0)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn further_epochs_are_further_layers() {
+        let folder = folder(&rows());
+        crate::report::write_stones_named(folder.path(), "stones_2", &rows()).unwrap();
+        let later = ResultSet::read_pair(folder.path(), 2).unwrap();
+        let names: Vec<String> = layers(&later, &Summary::new(&later))
+            .unwrap()
+            .into_iter()
+            .map(|l| l.name)
+            .collect();
+        assert_eq!(
+            names,
+            [
+                "stones_2",
+                "stones_facade_2",
+                "displacements_2",
+                "displacements_facade_2"
+            ]
+        );
+        write_layers(folder.path()).unwrap();
     }
 
     #[test]

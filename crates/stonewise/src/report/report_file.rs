@@ -1,13 +1,15 @@
 //! The report file.
 
-use super::page::page;
+use super::page::{page, page_name};
 use super::{ReportError, ResultSet};
 use std::path::{Path, PathBuf};
 use stonewise_io::atomic::write_atomically;
 
 /// Makes `report/index.html` from the result files in `dir` alone and returns its path.
 ///
-/// One self-contained file: no network, light and dark, printable. The same results give the same bytes.
+/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of the third
+/// against the first is `report/epoch_3.html`, and so on; each links to the others. The same results give the same
+/// bytes.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or the report cannot be written.
@@ -15,17 +17,23 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, ReportError> {
     let results = ResultSet::read(dir)?;
     let folder = dir.join("report");
     std::fs::create_dir_all(&folder).map_err(ReportError::io("making the folder", &folder))?;
-    let path = folder.join("index.html");
-    write_atomically(&path, |partial| std::fs::write(partial, page(&results)))
-        .map_err(ReportError::io("writing the report", &path))?;
-    Ok(path)
+    let write = |results: &ResultSet| {
+        let path = folder.join(page_name(results.pair));
+        write_atomically(&path, |partial| std::fs::write(partial, page(results)))
+            .map_err(ReportError::io("writing the report", &path))?;
+        Ok(path)
+    };
+    for pair in 2..=results.pairs {
+        write(&ResultSet::read_pair(dir, pair)?)?;
+    }
+    write(&results)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::report::testing::{outlines, rows};
-    use crate::report::{StoneRow, write_outlines, write_stones};
+    use crate::report::{StoneRow, write_outlines, write_stones, write_stones_named};
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
 
     /// Result files with these rows and this run.json, and the report made of them.
@@ -156,6 +164,20 @@ mod tests {
             let at = html.find(word).unwrap_or(0);
             assert_eq!(at, 0, "{}", &html[at.saturating_sub(200)..at + 20]);
         }
+    }
+
+    #[test]
+    fn every_later_epoch_has_its_report_and_links_to_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        write_stones(folder.path(), &rows()).unwrap();
+        write_stones_named(folder.path(), "stones_2", &rows()[..20]).unwrap();
+        let run = r#"{"epochs": [{"name": "A"}, {"name": "B"}, {"name": "<C>"}]}"#;
+        std::fs::write(folder.path().join("run.json"), run).unwrap();
+        write_report(folder.path()).unwrap();
+        let page = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+        assert!(page("index.html").contains("of 24 stones") && page("epoch_3.html").contains("of 20 stones"));
+        assert!(page("index.html").contains("<a href=\"epoch_3.html\">A \u{2192} &lt;C&gt;</a>"));
+        assert!(page("epoch_3.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
     }
 
     #[test]

@@ -11,10 +11,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::evaluate::Evaluation;
 
-/// The result files of one run, read back; photos and clouds are not needed.
+/// The result files of one pair of epochs, read back; photos and clouds are not needed.
 #[derive(Clone, Debug)]
 pub struct ResultSet {
-    /// Rows of `stones.parquet`, by stone id.
+    /// Which later epoch is compared with the first: 1 for the second epoch, 2 for the third.
+    pub pair: usize,
+    /// Number of pairs in the folder.
+    pub pairs: usize,
+    /// Rows of `stones.parquet` (of the second pair `stones_2.parquet`, and so on), by stone id.
     pub stones: Vec<StoneRow>,
     /// `outlines.json`, by stone id; empty where the file is missing.
     pub outlines: BTreeMap<u32, StoneOutline>,
@@ -33,12 +37,20 @@ pub struct ResultSet {
 }
 
 impl ResultSet {
-    /// Reads the results in `dir`.
+    /// Reads the results of the second epoch against the first, or of the only two epochs, in `dir`.
     ///
     /// # Errors
     /// There is no stone table, or a file is damaged.
     pub fn read(dir: &Path) -> Result<Self, ReportError> {
-        let path = dir.join("stones.parquet");
+        Self::read_pair(dir, 1)
+    }
+
+    /// Reads the results of one pair of epochs in `dir`; see `pair`.
+    ///
+    /// # Errors
+    /// There is no stone table of this pair, or a file is damaged.
+    pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, ReportError> {
+        let path = dir.join(of_pair("stones", pair, "parquet"));
         if !path.exists() {
             return Err(ReportError::NoResults(dir.into()));
         }
@@ -49,10 +61,14 @@ impl ResultSet {
             facade: facade_of(&stones, &outlines),
             stones,
             outlines,
-            distances: read_distance_points(dir)?,
-            evaluation: read_json(&dir.join("evaluation.json"))?,
+            pair,
+            pairs: (1..)
+                .take_while(|p| dir.join(of_pair("stones", *p, "parquet")).exists())
+                .count(),
+            distances: read_distance_points(&dir.join(of_pair("m3c2", pair, "csv")))?,
+            evaluation: read_json(&dir.join(of_pair("evaluation", pair, "json")))?,
             run: read_json(&dir.join("run.json"))?.unwrap_or(Value::Null),
-            registration: read_json(&dir.join("registration.json"))?.unwrap_or(Value::Null),
+            registration: read_json(&dir.join(of_pair("registration", pair, "json")))?.unwrap_or(Value::Null),
             decisions: read_decisions(dir)?,
         })
     }
@@ -77,6 +93,14 @@ impl ResultSet {
                 ]
             }
         }
+    }
+}
+
+/// Name of a result file: `stones.csv` for the first pair of epochs, `stones_2.csv` for the second.
+fn of_pair(stem: &str, pair: usize, extension: &str) -> String {
+    match pair {
+        1 => format!("{stem}.{extension}"),
+        _ => format!("{stem}_{pair}.{extension}"),
     }
 }
 

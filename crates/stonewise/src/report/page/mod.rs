@@ -28,6 +28,15 @@ const SECTIONS: [(&str, &str); 8] = [
     ("audit", "Audit"),
 ];
 
+/// File of the report on one pair of epochs.
+pub(super) fn page_name(pair: usize) -> String {
+    if pair == 1 {
+        "index.html".into()
+    } else {
+        format!("epoch_{}.html", pair + 1)
+    }
+}
+
 /// The whole report as one HTML document. The same results give the same bytes.
 pub(super) fn page(results: &ResultSet) -> String {
     let facts = Summary::new(results);
@@ -66,7 +75,7 @@ pub(super) fn page(results: &ResultSet) -> String {
          <path d=\"M0 0V60\" class=\"hatching\"/></pattern></defs></svg>\n\
          <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
          <main>\n{body}</main>\n{}</body></html>\n",
-        cover(&results.run),
+        cover(results),
         if results.stones.is_empty() {
             String::new()
         } else {
@@ -81,26 +90,32 @@ fn title(run: &Value) -> String {
     escape(name.filter(|n| !n.is_empty()).unwrap_or("Survey"))
 }
 
-/// Epochs, version and time of the run, as far as run.json has them.
-fn cover(run: &Value) -> String {
-    let epochs = run
-        .get("epochs")
-        .and_then(Value::as_array)
-        .map_or(&[][..], Vec::as_slice);
-    let names: Vec<String> = epochs
-        .iter()
-        .filter_map(|e| e.as_str().or_else(|| e.get("name").and_then(Value::as_str)))
-        .map(escape)
+/// Names of the first and of the compared epoch, as far as run.json has them.
+fn epochs(run: &Value, pair: usize) -> Option<String> {
+    let name = |i: usize| {
+        let epoch = run.get("epochs")?.get(i)?;
+        epoch.as_str().or_else(|| epoch.get("name")?.as_str()).map(escape)
+    };
+    Some(format!("{} \u{2192} {}", name(0)?, name(pair)?))
+}
+
+/// Epochs, version and time of the run, and the way to the reports on other epochs.
+fn cover(results: &ResultSet) -> String {
+    let run = &results.run;
+    let mut facts: Vec<String> = epochs(run, results.pair)
+        .map(|e| format!("Epochs <b>{e}</b>"))
+        .into_iter()
         .collect();
-    let mut facts = Vec::new();
-    if names.len() > 1 {
-        facts.push(format!("Epochs <b>{}</b>", names.join("</b> \u{2192} <b>")));
-    }
     for (key, word) in [("finished", "finished"), ("version", "stonewise")] {
         if let Some(text) = run.get(key).and_then(Value::as_str) {
             facts.push(format!("{word} <b>{}</b>", escape(text)));
         }
     }
+    let others = (1..=results.pairs).filter(|p| *p != results.pair);
+    facts.extend(others.map(|pair| {
+        let name = epochs(run, pair).unwrap_or_else(|| format!("epoch {}", pair + 1));
+        format!("<a href=\"{}\">{name}</a>", page_name(pair))
+    }));
     if facts.is_empty() {
         String::new()
     } else {
@@ -108,27 +123,20 @@ fn cover(run: &Value) -> String {
     }
 }
 
-/// In-plane part of a known translation of the last epoch, millimetres, where run.json names one.
+/// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.
 fn known_translation_mm(results: &ResultSet) -> Option<[f64; 2]> {
-    let d = find_translation(&results.run)?;
+    let motion = results.run.get("epochs")?.get(results.pair)?.get("motion")?;
+    if motion.get("kind")?.as_str()? != "translation" {
+        return None;
+    }
+    let d: Vec<f64> = motion
+        .get("d")?
+        .as_array()?
+        .iter()
+        .filter_map(Value::as_f64)
+        .collect();
+    let d = (d.len() == 3).then(|| nalgebra::Vector3::from_column_slice(&d))?;
     let stone = results.stones.get(results.stones.len() / 2)?;
     let frame = results.facade.frame_at(&stone.centroid);
     Some([d.dot(&frame.along) * 1e3, d.dot(&frame.up) * 1e3])
-}
-
-fn find_translation(value: &Value) -> Option<nalgebra::Vector3<f64>> {
-    match value {
-        Value::Object(map) if map.get("kind").and_then(Value::as_str) == Some("translation") => {
-            let d: Vec<f64> = map
-                .get("d")?
-                .as_array()?
-                .iter()
-                .filter_map(Value::as_f64)
-                .collect();
-            (d.len() == 3).then(|| nalgebra::Vector3::from_column_slice(&d))
-        }
-        Value::Object(map) => map.values().find_map(find_translation),
-        Value::Array(items) => items.iter().find_map(find_translation),
-        _ => None,
-    }
 }
