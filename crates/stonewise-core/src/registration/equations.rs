@@ -54,10 +54,14 @@ pub(super) struct Equations {
     pub information: Matrix9,
     /// Gradient of half the squared residuals; the step solves `information * step = -gradient`.
     pub gradient: Motion9,
+    /// Minus twice the log likelihood of the points, one per point taken off; points outside count nothing.
+    pub deviance: f64,
     /// Share of the small cells of the smaller face that hold points of both epochs.
     pub overlap: f64,
     /// Per small cell seen by both: squared difference of the mean residuals over its expected variance.
     pub differences: Vec<f64>,
+    /// The same for quarters of the patches.
+    pub coarse_differences: Vec<f64>,
     /// Root mean square of the second epoch's residuals, metres.
     pub rms_m: f64,
     /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
@@ -76,8 +80,10 @@ pub(super) fn equations(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, lay
     let mut sum = Equations {
         information: Matrix9::zeros(),
         gradient: Motion9::zeros(),
+        deviance: 0.0,
         overlap: patches.overlap,
         differences: Vec::new(),
+        coarse_differences: Vec::new(),
         rms_m: 0.0,
         scatter: [(0.0, 0.0); 2],
     };
@@ -221,6 +227,8 @@ fn add_patch(
     };
     let mut coupling = vec![[0.0; UNKNOWNS]; patch.grid.coefficient_count()];
     let mut compare = Compare::new(patch.grid.low(), patch.grid.high(), COMPARE_CELLS * layout.cell_m);
+    let half = 0.5 * (0..2).map(|a| patch.grid.high()[a] - patch.grid.low()[a]).fold(0.0, f64::max);
+    let mut coarse = Compare::new(patch.grid.low(), patch.grid.high(), half);
     for (epoch, observations) in epochs.iter().enumerate() {
         let sigma = noise.sigma_m[epoch];
         for o in observations {
@@ -228,8 +236,10 @@ fn add_patch(
             let [h, hu, hv] = fit.surface(u, v);
             let r = z - h;
             compare.add(epoch, &o.position, r);
+            coarse.add(epoch, &o.position, r);
             sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
             sum.scatter[epoch].1 += 1.0;
+            sum.deviance += o.weight * r * r / (sigma * sigma);
             if epoch == 1 {
                 let w = o.weight / (sigma * sigma);
                 let row = motion.jacobian(&o.position, [hu, hv]);
@@ -240,6 +250,7 @@ fn add_patch(
             }
         }
     }
+    sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
     // The surface is unknown: what it absorbs is taken off the information (Schur complement).
     fit.factor.forward(&mut coupling);
     for row in &coupling {
@@ -248,6 +259,7 @@ fn add_patch(
     }
     sum.information.fill_upper_triangle_with_lower_triangle();
     sum.differences.extend(compare.differences(&noise.sigma_m));
+    sum.coarse_differences.extend(coarse.differences(&noise.sigma_m));
 }
 
 /// Fits the surface; points far off it lose weight and it is fitted again.

@@ -18,6 +18,15 @@ use rayon::prelude::*;
 pub(super) struct StoneTerm {
     pub information: Matrix9,
     pub vector: Motion9,
+    /// Log likelihood of the points at motion zero, by the same quadratic.
+    pub constant: f64,
+}
+
+impl StoneTerm {
+    /// Of a stone without points.
+    pub fn nothing() -> Self {
+        Self { information: Matrix9::zeros(), vector: Motion9::zeros(), constant: 0.0 }
+    }
 }
 
 /// Beliefs that make the adjustment robust.
@@ -58,10 +67,12 @@ pub(super) struct Field {
 pub(super) struct Posterior {
     pub mean: Motion9,
     pub covariance: Matrix9,
-    /// Log probability of the stone's points against no information.
+    /// Log probability of the stone's points.
     pub log_evidence: f64,
     /// Squared standardised difference between the stone's points and the prediction, and its degrees of freedom.
     pub misfit: (f64, usize),
+    /// How many unknowns the stone's own points determine, 0 to 9.
+    pub determined: f64,
 }
 
 /// Prior standard deviation of a displacement about the common motion, metres.
@@ -163,7 +174,8 @@ pub(super) fn posterior(term: &StoneTerm, prediction: &Prediction, own: &[f64; 9
     let eigen = (0.5 * (gain + gain.transpose())).symmetric_eigen();
     let mut step = Motion9::zeros();
     let mut covariance = Matrix9::zeros();
-    let (mut log_evidence, mut misfit, mut freedom) = (0.0, 0.0, 0);
+    let at_mean = term.vector.dot(&mean) - 0.5 * mean.dot(&(term.information * mean));
+    let (mut log_evidence, mut misfit, mut freedom) = (term.constant + at_mean, 0.0, 0);
     for k in 0..9 {
         let g = eigen.eigenvalues[k].max(0.0);
         let direction = eigen.eigenvectors.column(k).into_owned();
@@ -181,6 +193,7 @@ pub(super) fn posterior(term: &StoneTerm, prediction: &Prediction, own: &[f64; 9
         covariance: root * covariance * root.transpose(),
         log_evidence,
         misfit: (misfit, freedom),
+        determined: eigen.eigenvalues.iter().map(|g| g.max(0.0) / (1.0 + g.max(0.0))).sum(),
     }
 }
 
@@ -195,42 +208,77 @@ pub(super) fn loose_variances(components: &VarianceComponents, loose: &LoosePrio
 }
 
 /// Probability of each stone to move with the field, given all others.
+///
+/// A loose stone's likelihood is taken at its own optimum where that is followed.
 pub(super) fn tight_probability(
     terms: &[StoneTerm],
+    free: &[Option<StoneTerm>],
     field: &Field,
     components: &VarianceComponents,
     loose: &LoosePrior,
 ) -> Vec<f64> {
     let own = components.own_variances();
-    let free = loose_variances(components, loose);
-    terms
-        .par_iter()
-        .zip(&field.from_others)
-        .map(|(term, prediction)| {
-            let tight = posterior(term, prediction, &own).log_evidence + (1.0 - loose.share).ln();
-            let loose = posterior(term, prediction, &free).log_evidence + loose.share.ln();
+    let wide = loose_variances(components, loose);
+    (0..terms.len())
+        .into_par_iter()
+        .map(|i| {
+            let prediction = &field.from_others[i];
+            let tight = posterior(&terms[i], prediction, &own).log_evidence + (1.0 - loose.share).ln();
+            let free = free[i].as_ref().unwrap_or(&terms[i]);
+            let loose = posterior(free, prediction, &wide).log_evidence + loose.share.ln();
             1.0 / (1.0 + (loose - tight).exp())
         })
         .collect()
 }
 
-/// Expected squared standardised strain of each tie (nine components), as if it were whole.
-pub(super) fn tie_strain(graph: &Graph, field: &Field, components: &VarianceComponents) -> Vec<f64> {
+/// Expected squared standardised strain of each tie as if it were whole: six components in the face, three out.
+pub(super) fn tie_strain(graph: &Graph, field: &Field, components: &VarianceComponents) -> Vec<[f64; 2]> {
+    const NO_TIE: f64 = 1e9;
+    let [inside, outside] = components.drift;
+    let parts = [[inside, NO_TIE], [NO_TIE, outside]].map(|drift| VarianceComponents { drift, ..*components });
     graph
         .edges
         .par_iter()
         .enumerate()
         .map(|(e, edge)| {
-            let blocks = tie_blocks(edge, components);
-            let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
-            let mean = (low.transpose() * blocks[0] * low + high.transpose() * blocks[2] * high)[0]
-                + 2.0 * (high.transpose() * blocks[1] * low)[0];
-            let spread = (blocks[0] * field.inverse.diagonal[edge.low]).trace()
-                + (blocks[2] * field.inverse.diagonal[edge.high]).trace()
-                + 2.0 * (blocks[1].transpose() * field.inverse.edges[e]).trace();
-            (mean + spread).max(0.0)
+            parts.map(|part| {
+                let blocks = tie_blocks(edge, &part);
+                let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
+                let mean = (low.transpose() * blocks[0] * low + high.transpose() * blocks[2] * high)[0]
+                    + 2.0 * (high.transpose() * blocks[1] * low)[0];
+                let spread = (blocks[0] * field.inverse.diagonal[edge.low]).trace()
+                    + (blocks[2] * field.inverse.diagonal[edge.high]).trace()
+                    + 2.0 * (blocks[1].transpose() * field.inverse.edges[e]).trace();
+                (mean + spread).max(0.0)
+            })
         })
         .collect()
+}
+
+/// Weights of the ties and the drift that goes with them: one step of expectation maximisation for a
+/// multivariate t law with `freedom` degrees of freedom (Liu, Rubin & Wu 1998, parameter-expanded).
+pub(super) fn learn_ties(
+    graph: &Graph,
+    field: &Field,
+    components: &mut VarianceComponents,
+    beliefs: &mut Beliefs,
+    freedom: f64,
+) {
+    let strain = tie_strain(graph, field, components);
+    // Ties outnumber stones: each holds a share of the field's nine freedoms, six of them in the face.
+    let share = graph.nodes.len() as f64 / strain.len().max(1) as f64;
+    let mut sums = [0.0; 3];
+    for (weight, s) in beliefs.tie.iter_mut().zip(&strain) {
+        *weight = (freedom + 9.0 * share) / (freedom + s[0] + s[1]);
+        sums[0] += *weight * s[0] / (6.0 * share);
+        sums[1] += *weight * s[1] / (3.0 * share);
+        sums[2] += *weight;
+    }
+    if sums[2] > 0.0 {
+        for k in 0..2 {
+            components.drift[k] = (components.drift[k] * (sums[k] / sums[2]).sqrt()).clamp(BOUNDS[k][0], BOUNDS[k][1]);
+        }
+    }
 }
 
 /// Variance components under which the stones' normal equations are most likely, field integrated out.
@@ -251,7 +299,7 @@ pub(super) fn estimate_components(
             loose,
             beliefs,
         )
-        .unwrap_or(f64::MAX / 1e6)
+        .map_or(f64::MAX / 1e6, |d| d + VarianceComponents::from_log(*log).penalty())
     };
     let clamp = |log: [f64; COUNT]| -> [f64; COUNT] {
         std::array::from_fn(|k| log[k].clamp(BOUNDS[k][0].ln(), BOUNDS[k][1].ln()))

@@ -35,6 +35,8 @@ pub(super) struct Graph {
 pub(super) struct Place {
     pub centroid: Point3<f64>,
     pub normal: Vector3<f64>,
+    /// How far the normal is to be trusted: the number of points, within limits.
+    pub weight: f64,
 }
 
 impl From<&PairPoints> for Place {
@@ -42,6 +44,7 @@ impl From<&PairPoints> for Place {
         Self {
             centroid: pair.centroid,
             normal: pair.normal,
+            weight: (pair.points_first.len() as f64).clamp(1.0, 1000.0),
         }
     }
 }
@@ -130,12 +133,30 @@ fn median_spacing(points: &[Point3<f64>]) -> f64 {
         .unwrap_or(1.0)
 }
 
+/// Frame of the wall: mean of the normals, around the stone, that agree with the one most others agree with.
+///
+/// A stone of few points has a normal of its own that means nothing; the wall around it has one.
 fn wall_frame(place: &Place, places: &[Place], index: &GridIndex, spacing: f64) -> Matrix3<f64> {
-    let mut sum = place.normal;
-    for (j, _) in index.nearest_k(&place.centroid, FRAME_STONES, REACH * spacing) {
-        if places[j].normal.dot(&place.normal) > SAME_WALL_COSINE {
-            sum += places[j].normal;
+    let mut around: Vec<&Place> = index
+        .nearest_k(&place.centroid, FRAME_STONES, REACH * spacing)
+        .into_iter()
+        .map(|(j, _)| &places[j])
+        .collect();
+    if around.is_empty() {
+        around.push(place);
+    }
+    let like = |a: &Place, b: &Place| a.normal.dot(&b.normal) > SAME_WALL_COSINE;
+    let support = |a: &Place| around.iter().filter(|b| like(a, b)).map(|b| b.weight).sum::<f64>();
+    let mut best = around[0];
+    for a in &around[1..] {
+        if support(a) > 1.5 * support(best) {
+            best = a;
         }
     }
+    let sum: Vector3<f64> = around
+        .iter()
+        .filter(|b| like(best, b))
+        .map(|b| b.normal * b.weight)
+        .sum();
     FaceFrame::from_normal(&sum).face_from_world()
 }

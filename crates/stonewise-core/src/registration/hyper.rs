@@ -59,6 +59,13 @@ impl VarianceComponents {
         }
     }
 
+    /// Minus twice the log prior: stones have no motion of their own unless the survey says so (Simpson et al.
+    /// 2017; one in a hundred surveys beyond half a millimetre and five milliradians).
+    pub(super) fn penalty(&self) -> f64 {
+        const RATE: f64 = 2.0 * 4.6;
+        RATE * ((self.own_m[0] + self.own_m[1]) / 5e-4 + self.own_rad / 5e-3)
+    }
+
     /// Variances of a stone's own (translation, rotation, bending) in its frame.
     pub(super) fn own_variances(&self) -> [f64; 9] {
         let [i, o] = self.own_m;

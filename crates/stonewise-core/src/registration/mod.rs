@@ -3,6 +3,7 @@
 //! [`adjust`] is the default: all stones together, as surveyors adjust a network.
 
 mod band;
+mod correlation;
 mod equations;
 mod field;
 mod graph;
@@ -15,6 +16,7 @@ mod params;
 mod patch;
 mod sparse;
 mod survey;
+mod track;
 
 pub use hyper::VarianceComponents;
 pub use network::{AdjustError, adjust};

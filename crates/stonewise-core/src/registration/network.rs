@@ -6,11 +6,13 @@ use super::graph::{Graph, Place};
 use super::hyper::VarianceComponents;
 use super::noise::estimate_noise;
 use super::outcome;
+use super::correlation::{correlation_factor, stone_factor};
 use super::pairs::{PairPoints, PairSource};
 use super::params::{NetworkParams, NetworkReport};
 use super::patch::SurfaceNoise;
 use super::sparse::BlockPattern;
 use super::survey::{self, Survey, survey};
+use super::track::Track;
 use crate::progress::{Interrupted, Progress};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -41,8 +43,12 @@ const NOISE_AT: [usize; 3] = [0, 2, 4];
 const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
 const FIXED_FROM: usize = 10;
-/// A stone is evaluated again once it moved by more than this, metres (of its centroid and of its rim).
-const REFRESH_M: f64 = 2e-7;
+/// Rounds of learning beliefs from the field in an iteration.
+const LEARN_STEPS: usize = 4;
+/// Probability of being loose from which on a stone's own optimum is followed.
+const SUSPECT: f64 = 0.1;
+/// A step within this share of its standard deviation no longer matters.
+const SETTLED: f64 = 0.01;
 
 /// The state of the iteration.
 pub(super) struct Network {
@@ -54,13 +60,16 @@ pub(super) struct Network {
     pub components: VarianceComponents,
     pub loose: LoosePrior,
     pub beliefs: Beliefs,
-    /// Motion of each stone in its frame.
-    pub motions: Vec<Motion9>,
+    /// Each stone moving with the field.
+    pub tight: Vec<Track>,
+    /// Each stone that may have moved on its own, doing so: its likelihood has several maxima, and what it says
+    /// at one must not be read off at another.
+    pub free: Vec<Option<Track>>,
     /// Common translation about which the field is solved, world.
     pub common: Vector3<f64>,
-    pub equations: Vec<Equations>,
-    evaluated_at: Vec<Option<Motion9>>,
     pub correlation_factor: f64,
+    /// How many unknowns each stone's own points determine.
+    determined: Vec<f64>,
 }
 
 /// Adjusts all pairs together.
@@ -75,7 +84,7 @@ pub fn adjust<S: PairSource>(
 ) -> Result<NetworkReport, AdjustError<S::Error>> {
     let survey = survey(source, params)?;
     let mut network = Network::new(survey, params).ok_or(AdjustError::Unsolvable { stones: 0 })?;
-    let stones = network.motions.len();
+    let stones = network.tight.len();
     let unsolvable = AdjustError::Unsolvable { stones };
     let mut iterations = 0;
     let mut converged = stones == 0;
@@ -93,12 +102,29 @@ pub fn adjust<S: PairSource>(
         let Some(field) = network.solve(&terms, iterations < FIXED_FROM, params) else {
             return Err(unsolvable);
         };
-        let step = network.step(&terms, &field, params);
-        converged = iterations >= FIXED_FROM && step <= params.tolerance_m;
+        let settled = network.step(&terms, &field, params);
+        if std::env::var("NETTRACE").is_ok() {
+            eprintln!("it {iterations} {settled} noise {:?} f {:.2} comp {:?} loose {:.1} free {} broken {}", network.noise, network.correlation_factor,
+              network.components, network.beliefs.tight.iter().map(|p| 1.0-p).sum::<f64>(), network.free.iter().flatten().count(), network.beliefs.tie.iter().filter(|t| **t<0.1).count());
+        }
+        converged = iterations >= FIXED_FROM && settled;
         last = Some((terms, field));
         iterations += 1;
     }
     Ok(outcome::report(&network, last, params, iterations, converged))
+}
+
+/// The stones' equations: moving with the field, and on their own where that is followed.
+pub(super) struct Terms {
+    pub tight: Vec<StoneTerm>,
+    pub free: Vec<Option<StoneTerm>>,
+}
+
+/// A stone's motion with its looseness averaged out.
+pub(super) struct Estimate {
+    /// In the stone's frame, about the common translation.
+    pub mean: Motion9,
+    pub covariance: Matrix9,
 }
 
 impl Network {
@@ -108,7 +134,7 @@ impl Network {
         let edges: Vec<_> = graph.edges.iter().map(|e| (e.low, e.high)).collect();
         let pattern = BlockPattern::new(places.len(), &edges)?;
         let start = survey.smoothed_shifts(&graph);
-        let motions = graph
+        let tight: Vec<Track> = graph
             .nodes
             .iter()
             .zip(&start)
@@ -116,7 +142,7 @@ impl Network {
                 let mut x = Motion9::zeros();
                 x.fixed_rows_mut::<3>(0)
                     .copy_from(&(node.face_from_world * shift));
-                x
+                Track::new(x)
             })
             .collect();
         let cell_m = (params.cell_spacings * survey.spacing_m).max(params.min_cell_m);
@@ -141,10 +167,10 @@ impl Network {
                 tie: vec![1.0; edges.len()],
             },
             common: survey::middle(&start),
-            motions,
-            equations: Vec::new(),
-            evaluated_at: vec![None; places.len()],
+            free: vec![None; tight.len()],
+            tight,
             correlation_factor: 1.0,
+            determined: vec![0.0; places.len()],
             survey,
             graph,
             pattern,
@@ -159,13 +185,14 @@ impl Network {
             .map(|(i, pair)| {
                 (
                     LocalPair::new(pair, &self.graph.nodes[*i].face_from_world),
-                    self.motions[*i],
+                    self.tight[*i].motion,
                 )
             })
             .collect();
         let views: Vec<(&LocalPair, Motion9)> = sample.iter().map(|(p, x)| (p, *x)).collect();
         self.noise = estimate_noise(&views, &self.noise, &self.layout);
-        self.evaluated_at.fill(None);
+        self.tight.iter_mut().for_each(Track::invalidate);
+        self.free.iter_mut().flatten().for_each(Track::invalidate);
     }
 
     /// Normal equations of all stones that moved since they were last evaluated.
@@ -178,72 +205,67 @@ impl Network {
         for batch in 0..source.batch_count() {
             progress.check()?;
             let count = self.survey.batch_sizes[batch];
-            let due: Vec<bool> = (start..start + count).map(|i| self.is_due(i)).collect();
-            if due.contains(&true) {
+            let range = start..start + count;
+            let tracks = || range.clone().map(|i| (&self.tight[i], self.free[i].as_ref()));
+            if tracks().any(|(tight, free)| tight.is_due() || free.is_some_and(Track::is_due)) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
-                let new: Vec<Option<Equations>> = pairs
+                let new: Vec<[Option<Equations>; 2]> = pairs
                     .par_iter()
-                    .enumerate()
-                    .map(|(k, pair)| due[k].then(|| self.evaluate_one(start + k, pair)))
+                    .zip(range.clone())
+                    .map(|(pair, i)| self.evaluate_one(i, pair))
                     .collect();
-                for (k, value) in new.into_iter().enumerate() {
-                    if let Some(value) = value {
-                        self.evaluated_at[start + k] = Some(self.motions[start + k]);
-                        if self.equations.len() <= start + k {
-                            self.equations.push(value);
-                        } else {
-                            self.equations[start + k] = value;
-                        }
+                for ([tight, free], i) in new.into_iter().zip(range) {
+                    if let Some(tight) = tight {
+                        self.tight[i].set(tight);
+                    }
+                    if let (Some(free), Some(track)) = (free, &mut self.free[i]) {
+                        track.set(free);
                     }
                 }
             }
             progress.advance(count as u64);
             start += count;
         }
-        let mut differences: Vec<f64> = self
-            .equations
-            .iter()
-            .flat_map(|e| e.differences.iter().copied())
+        let known: Vec<(&Equations, f64)> = (0..self.tight.len())
+            .filter_map(|i| Some((self.tight[i].equations()?, self.determined[i])))
             .collect();
-        self.correlation_factor = survey::chi_square_inflation(&mut differences);
+        self.correlation_factor = correlation_factor(&known);
         Ok(())
     }
 
-    fn is_due(&self, i: usize) -> bool {
-        self.evaluated_at[i].is_none_or(|x| {
-            let d = x - self.motions[i];
-            let rim = 0.2;
-            d.fixed_rows::<3>(0).norm()
-                + rim * d.fixed_rows::<3>(3).norm()
-                + rim * rim * d.fixed_rows::<3>(6).norm()
-                > REFRESH_M
+    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> [Option<Equations>; 2] {
+        let tracks = [Some(&self.tight[i]), self.free[i].as_ref()];
+        if !tracks.iter().flatten().any(|t| t.is_due()) {
+            return [None, None];
+        }
+        let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
+        tracks.map(|t| {
+            t.filter(|t| t.is_due())
+                .map(|t| equations(&local, &t.motion, &self.noise, &self.layout))
         })
     }
 
-    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Equations {
-        let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
-        equations(&local, &self.motions[i], &self.noise, &self.layout)
+    /// Equations about the common translation, with correlation between points accounted for.
+    fn terms(&self) -> Terms {
+        let term = |i: usize, track: &Track| match self.survey.stones[i].usable {
+            true => track.term(&self.common_in(i), self.inflation(i)),
+            false => StoneTerm::nothing(),
+        };
+        Terms {
+            tight: self.tight.iter().enumerate().map(|(i, t)| term(i, t)).collect(),
+            free: self.free.iter().enumerate().map(|(i, t)| t.as_ref().map(|t| term(i, t))).collect(),
+        }
     }
 
-    /// Normal equations about the common translation, with correlation between points accounted for.
-    fn terms(&self) -> Vec<StoneTerm> {
-        self.equations
-            .iter()
-            .enumerate()
-            .map(|(i, e)| {
-                if !self.survey.stones[i].usable {
-                    return StoneTerm {
-                        information: Matrix9::zeros(),
-                        vector: Motion9::zeros(),
-                    };
-                }
-                let at = self.evaluated_at[i].unwrap_or(self.motions[i]) - self.common_in(i);
-                StoneTerm {
-                    information: e.information / self.correlation_factor,
-                    vector: (e.information * at - e.gradient) / self.correlation_factor,
-                }
-            })
-            .collect()
+    /// Factor on a stone's variances, judged at the better of its motions.
+    fn inflation(&self, i: usize) -> f64 {
+        let own = [Some(&self.tight[i]), self.free[i].as_ref()]
+            .into_iter()
+            .flatten()
+            .filter_map(Track::equations)
+            .map(|e| stone_factor(e, self.determined[i], self.correlation_factor))
+            .fold(f64::INFINITY, f64::min);
+        self.correlation_factor * if own.is_finite() { own } else { 1.0 }
     }
 
     /// The common translation in a stone's frame.
@@ -254,11 +276,11 @@ impl Network {
         x
     }
 
-    fn estimate_components(&mut self, terms: &[StoneTerm]) {
+    fn estimate_components(&mut self, terms: &Terms) {
         self.components = field::estimate_components(
             &self.graph,
             &self.pattern,
-            terms,
+            &terms.tight,
             &self.components,
             &self.loose,
             &self.beliefs,
@@ -266,58 +288,63 @@ impl Network {
     }
 
     /// Solves for the field; where `learn`, beliefs about stones and ties follow, and it is solved again.
-    fn solve(&mut self, terms: &[StoneTerm], learn: bool, params: &NetworkParams) -> Option<Field> {
-        let solve = |n: &Self| field::solve(&n.graph, &n.pattern, terms, &n.components, &n.loose, &n.beliefs);
+    fn solve(&mut self, terms: &Terms, learn: bool, params: &NetworkParams) -> Option<Field> {
+        let solve = |n: &Self| field::solve(&n.graph, &n.pattern, &terms.tight, &n.components, &n.loose, &n.beliefs);
         let mut field = solve(self)?;
         if learn {
-            for _ in 0..2 {
-                self.beliefs.tight = field::tight_probability(terms, &field, &self.components, &self.loose);
-                let nu = params.tie_freedom;
-                self.beliefs.tie = field::tie_strain(&self.graph, &field, &self.components)
-                    .iter()
-                    .map(|s| ((nu + 9.0) / (nu + s)).min(1.0))
-                    .collect();
+            for _ in 0..LEARN_STEPS {
+                self.beliefs.tight =
+                    field::tight_probability(&terms.tight, &terms.free, &field, &self.components, &self.loose);
+                field::learn_ties(&self.graph, &field, &mut self.components, &mut self.beliefs, params.tie_freedom);
                 field = solve(self)?;
             }
         }
         Some(field)
     }
 
-    /// Moves every stone to its posterior mean; the largest step, metres.
-    fn step(&mut self, terms: &[StoneTerm], field: &Field, params: &NetworkParams) -> f64 {
-        let mut largest: f64 = 0.0;
-        for i in 0..terms.len() {
-            let mean = self.posterior(i, &terms[i], field).mean + self.common_in(i);
-            let mut step = mean - self.motions[i];
-            let length = step.fixed_rows::<3>(0).norm();
-            if length > params.max_step_m {
-                step *= params.max_step_m / length;
+    /// Moves every stone to its posterior mean; whether none still had to go anywhere.
+    fn step(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) -> bool {
+        let mut settled = true;
+        let own = self.components.own_variances();
+        let wide = field::loose_variances(&self.components, &self.loose);
+        for i in 0..self.tight.len() {
+            let origin = self.common_in(i);
+            let mut follow = |track: &mut Track, posterior: &Posterior| {
+                let step = track.move_to(&(posterior.mean + origin), params.max_step_m);
+                let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+                if std::env::var("NETTRACE").is_ok_and(|v| v=="2") && step > params.tolerance_m.max(SETTLED * sd) { eprint!(" {}:{:.2}mm({:.2})p{:.2}", self.survey.stones[i].first.0, step*1e3, sd*1e3, self.beliefs.tight[i]); }
+                settled &= step <= params.tolerance_m.max(SETTLED * sd);
+            };
+            let prediction = &field.from_others[i];
+            let tight = field::posterior(&terms.tight[i], prediction, &own);
+            self.determined[i] = tight.determined;
+            follow(&mut self.tight[i], &tight);
+            if let (Some(track), Some(term)) = (&mut self.free[i], &terms.free[i]) {
+                follow(track, &field::posterior(term, prediction, &wide));
+            } else if 1.0 - self.beliefs.tight[i] > SUSPECT {
+                let start = field::posterior(&terms.tight[i], prediction, &wide).mean + origin;
+                let mut track = Track::new(self.tight[i].motion);
+                track.move_to(&start, params.max_step_m);
+                self.free[i] = Some(track);
+                settled = false;
             }
-            largest = largest.max(length);
-            self.motions[i] += step;
         }
-        largest
+        settled
     }
 
-    /// Posterior of a stone about the common translation, its looseness averaged out of the mean.
-    pub fn posterior(&self, i: usize, term: &StoneTerm, field: &Field) -> Posterior {
+    /// A stone's motion about the common translation, looseness averaged out.
+    pub fn estimate(&self, i: usize, terms: &Terms, field: &Field) -> Estimate {
         let p = self.beliefs.tight[i];
         let prediction = &field.from_others[i];
-        let tight = field::posterior(term, prediction, &self.components.own_variances());
-        let free = field::posterior(
-            term,
-            prediction,
-            &field::loose_variances(&self.components, &self.loose),
-        );
-        let mean = tight.mean * p + free.mean * (1.0 - p);
-        Posterior {
-            mean,
-            covariance: if p > 0.5 {
-                tight.covariance
-            } else {
-                free.covariance
-            },
-            ..tight
+        let tight = field::posterior(&terms.tight[i], prediction, &self.components.own_variances());
+        let Some(free) = &terms.free[i] else {
+            return Estimate { mean: tight.mean, covariance: tight.covariance };
+        };
+        let free = field::posterior(free, prediction, &field::loose_variances(&self.components, &self.loose));
+        let apart = tight.mean - free.mean;
+        Estimate {
+            mean: tight.mean * p + free.mean * (1.0 - p),
+            covariance: tight.covariance * p + free.covariance * (1.0 - p) + apart * apart.transpose() * (p * (1.0 - p)),
         }
     }
 }

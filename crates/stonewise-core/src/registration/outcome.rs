@@ -1,38 +1,43 @@
 //! From the adjusted network to one row per pair, with tests and uncertainties.
 
-use super::field::{Field, StoneTerm, motion_of_field, tie_strain};
-use super::network::Network;
+use super::field::{self, Field, StoneTerm, motion_of_field, tie_strain};
+use super::network::{Network, Terms};
+use super::track::Track;
 use super::params::{Break, NetworkParams, NetworkReport};
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// A face whose epochs differ by this many times the expected variance shows two different surfaces.
-const DISAGREE: f64 = 6.0;
+/// A cell whose epochs differ by this many times the expected variance shows two surfaces (1 in 400 by chance).
+const BAD_CELL: f64 = 9.0;
+/// A face of which this share shows two surfaces is not the same stone twice.
+const BAD_SHARE: f64 = 0.4;
+/// Factor by which the bending's variance is raised in the test for loose stones.
+const BENDING_SLACK: f64 = 100.0;
 /// A tie weaker than this is broken.
 const BROKEN: f64 = 0.1;
 
 /// Results of the last iteration.
 pub(super) fn report(
     network: &Network,
-    last: Option<(Vec<StoneTerm>, Field)>,
+    last: Option<(Terms, Field)>,
     params: &NetworkParams,
     iterations: usize,
     converged: bool,
 ) -> NetworkReport {
     let (terms, field) = match last {
         Some((t, f)) => (t, Some(f)),
-        None => (Vec::new(), None),
+        None => (Terms { tight: Vec::new(), free: Vec::new() }, None),
     };
     let mut results = Vec::new();
     let mut breaks = Vec::new();
     if let Some(field) = &field {
         let loose = loose_stones(network, &terms, field, params);
-        results = (0..terms.len())
-            .map(|i| result(network, i, &terms[i], field, loose[i], params))
+        results = (0..terms.tight.len())
+            .map(|i| result(network, i, &terms, field, loose[i], params))
             .collect();
-        breaks = find_breaks(network, field);
+        breaks = find_breaks(network, field, &loose);
     }
     let moved: Vec<Vector3<f64>> = results
         .iter()
@@ -70,10 +75,13 @@ pub(super) fn report(
 }
 
 /// Tests each stone against its neighbours, with the false discovery rate controlled (Benjamini & Hochberg 1995).
-fn loose_stones(network: &Network, terms: &[StoneTerm], field: &Field, params: &NetworkParams) -> Vec<bool> {
-    let mut p_values: Vec<(f64, usize)> = (0..terms.len())
+fn loose_stones(network: &Network, terms: &Terms, field: &Field, params: &NetworkParams) -> Vec<bool> {
+    let mut own = network.components.own_variances();
+    // A bent face is not a loose stone: bending is left free.
+    own[6..].iter_mut().for_each(|v| *v *= BENDING_SLACK);
+    let mut p_values: Vec<(f64, usize)> = (0..terms.tight.len())
         .filter_map(|i| {
-            let (misfit, freedom) = network.posterior(i, &terms[i], field).misfit;
+            let (misfit, freedom) = field::posterior(&terms.tight[i], &field.from_others[i], &own).misfit;
             let law = ChiSquared::new(freedom as f64).ok()?;
             (freedom > 0 && network.survey.stones[i].usable).then(|| (1.0 - law.cdf(misfit), i))
         })
@@ -84,7 +92,8 @@ fn loose_stones(network: &Network, terms: &[StoneTerm], field: &Field, params: &
         .iter()
         .enumerate()
         .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
-    let mut loose = vec![false; terms.len()];
+    if std::env::var("NETTRACE").is_ok() { for (p,i) in p_values.iter().take(16) { eprintln!("test {:?} p {p:.2e} tight {:.3}", network.survey.stones[*i].first, network.beliefs.tight[*i]); } }
+    let mut loose = vec![false; terms.tight.len()];
     for &(_, i) in p_values.iter().take(last.map_or(0, |k| k + 1)) {
         loose[i] = true;
     }
@@ -94,13 +103,13 @@ fn loose_stones(network: &Network, terms: &[StoneTerm], field: &Field, params: &
 fn result(
     network: &Network,
     i: usize,
-    term: &StoneTerm,
+    terms: &Terms,
     field: &Field,
     loose: bool,
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
-    let motion = judge(network, i, params).map_or_else(|| Ok(motion(network, i, term, field, loose)), Err);
+    let motion = judge(network, i, params).map_or_else(|| Ok(motion(network, i, terms, field, loose)), Err);
     PairResult {
         first: stone.first,
         second: stone.second,
@@ -111,7 +120,6 @@ fn result(
 /// Why a stone has no motion.
 fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFailure> {
     let stone = &network.survey.stones[i];
-    let e = &network.equations[i];
     if !stone.usable {
         let [first, second] = stone.counts;
         return Some(MotionFailure::TooFewPoints {
@@ -120,20 +128,32 @@ fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFa
             needed: params.min_points,
         });
     }
+    let Some(e) = track(network, i).equations() else {
+        return Some(MotionFailure::NotConverged);
+    };
     let cells = e.differences.len() as f64;
-    let misfit =
-        e.differences.iter().map(|d| d.min(100.0)).sum::<f64>() / (cells * network.correlation_factor);
-    if e.overlap < params.min_overlap || (cells >= 4.0 && misfit > DISAGREE) {
+    let limit = BAD_CELL * network.correlation_factor;
+    let bad = e.differences.iter().filter(|d| **d > limit).count() as f64 / cells.max(1.0);
+    if std::env::var("NETTRACE").is_ok() && (e.overlap < params.min_overlap || bad > 0.1) { eprintln!("judge {:?} overlap {:.2} cells {cells} bad {bad:.2} p {:.2} counts {:?}", stone.first, e.overlap, network.beliefs.tight[i], stone.counts); }
+    if e.overlap < params.min_overlap || (cells >= 4.0 && bad > BAD_SHARE) {
         return Some(MotionFailure::Disagreement);
     }
     None
 }
 
-fn motion(network: &Network, i: usize, term: &StoneTerm, field: &Field, loose: bool) -> StoneMotion {
+/// The motion that the stone more probably made: its own or the field's.
+fn track(network: &Network, i: usize) -> &Track {
+    match &network.free[i] {
+        Some(free) if network.beliefs.tight[i] < 0.5 => free,
+        _ => &network.tight[i],
+    }
+}
+
+fn motion(network: &Network, i: usize, terms: &Terms, field: &Field, loose: bool) -> StoneMotion {
     let node = &network.graph.nodes[i];
     let world = node.face_from_world.transpose();
-    let posterior = network.posterior(i, term, field);
-    let x = network.motions[i];
+    let posterior = network.estimate(i, terms, field);
+    let x = posterior.mean + network.common_in(i);
     let displacement = world * x.fixed_rows::<3>(0);
     let rotation = world * x.fixed_rows::<3>(3);
     let turned = UnitQuaternion::from_scaled_axis(rotation);
@@ -154,8 +174,8 @@ fn motion(network: &Network, i: usize, term: &StoneTerm, field: &Field, loose: b
         relative: displacement - expected,
         relative_covariance: covariance.fixed_view::<3, 3>(0, 0) + spread,
         loose,
-        observability: observability(term),
-        rmse_m: network.equations[i].rms_m,
+        observability: observability(&terms.tight[i]),
+        rmse_m: track(network, i).equations().map_or(f64::NAN, |e| e.rms_m),
     }
 }
 
@@ -174,14 +194,15 @@ fn observability(term: &StoneTerm) -> f64 {
     }
 }
 
-fn find_breaks(network: &Network, field: &Field) -> Vec<Break> {
+fn find_breaks(network: &Network, field: &Field, loose: &[bool]) -> Vec<Break> {
     let strain = tie_strain(&network.graph, field, &network.components);
     network
         .graph
         .edges
         .iter()
         .enumerate()
-        .filter(|(e, _)| network.beliefs.tie[*e] < BROKEN && strain[*e] > 30.0)
+        .filter(|(_, edge)| !loose[edge.low] && !loose[edge.high])
+        .filter(|(e, _)| network.beliefs.tie[*e] < BROKEN && strain[*e][0] + strain[*e][1] > 30.0)
         .map(|(_, edge)| {
             let motion = |i: usize| {
                 let a = motion_of_field(&network.graph.nodes[i].face_from_world) * field.state[i];

@@ -56,7 +56,7 @@ impl Default for NetworkParams {
             loose_move_m: 0.015,
             loose_turn_rad: 0.02,
             false_discovery_rate: 0.05,
-            tie_freedom: 4.0,
+            tie_freedom: 3.0,
             max_step_m: 0.015,
             tolerance_m: 1e-6,
             max_iterations: 30,

@@ -239,10 +239,15 @@ impl PatchFit {
         }
     }
 
+    /// The surface's part of [`Self::deviance`].
+    pub fn surface_deviance(&self, noise: &SurfaceNoise) -> f64 {
+        let rank = self.grid.coefficient_count() as f64 - 3.0;
+        self.factor.log_det() + self.prior_quadratic + rank * 2.0 * noise.tau_m.ln()
+    }
+
     /// Minus twice the log marginal likelihood of the points, up to a constant.
     pub fn deviance(&self, epochs: [&[Observation]; 2], noise: &SurfaceNoise) -> f64 {
-        let rank = self.grid.coefficient_count() as f64 - 3.0;
-        let mut sum = self.factor.log_det() + self.prior_quadratic + rank * 2.0 * noise.tau_m.ln();
+        let mut sum = self.surface_deviance(noise);
         for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
             for o in observations {
                 let r = o.position[2] - self.surface(o.position[0], o.position[1])[0];

@@ -135,15 +135,6 @@ pub(super) fn median(values: &mut [f64]) -> Option<f64> {
     Some(*values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Ratio of the median of values to that of chi-square with one degree of freedom; never under 1.
-pub(super) fn chi_square_inflation(values: &mut [f64]) -> f64 {
-    const MEDIAN: f64 = 0.454_936;
-    if values.len() < 30 {
-        return 1.0;
-    }
-    median(values).map_or(1.0, |m| (m / MEDIAN).max(1.0))
-}
-
 /// Mean point spacing of the sparser epoch.
 fn spacing(pair: &PairPoints) -> Option<f64> {
     let sparse = if pair.points_first.len() < pair.points_second.len() {

@@ -1,0 +1,39 @@
+//! How much less the points say than independent ones would.
+//!
+//! Scan lines, matching windows and differing stations make neighbouring points err alike. The means of both
+//! epochs over small and over larger cells of a face then differ by more than the noise of single points explains.
+
+use super::equations::Equations;
+use super::survey::median;
+
+/// Cells that a stone needs to be judged.
+const CELLS: usize = 10;
+/// Cells' worth of belief that a stone's noise is that of the survey.
+const PRIOR_CELLS: f64 = 30.0;
+/// A cell counts no more than this: a single disturbed cell does not condemn a stone.
+const CAP: f64 = 50.0;
+
+/// Factor on all variances of the survey, at least 1; the larger of that at small and at larger cells.
+///
+/// `fitted`: how many unknowns each stone's own points determined, which their cells lack.
+pub(super) fn correlation_factor(stones: &[(&Equations, f64)]) -> f64 {
+    let at = |cells: fn(&Equations) -> &[f64]| {
+        let mut ratios: Vec<f64> = stones.iter().filter_map(|(e, fitted)| excess(cells(e), *fitted)).collect();
+        median(&mut ratios).filter(|_| ratios.len() >= 10).unwrap_or(1.0)
+    };
+    at(|e| &e.differences).max(at(|e| &e.coarse_differences)).max(1.0)
+}
+
+/// Further factor on one stone's variances, at least 1.
+pub(super) fn stone_factor(stone: &Equations, fitted: f64, survey: f64) -> f64 {
+    let cells = stone.differences.len() as f64;
+    let sum: f64 = stone.differences.iter().map(|d| (d / survey).min(CAP)).sum();
+    ((PRIOR_CELLS + sum) / (PRIOR_CELLS + (cells - fitted).max(0.0))).max(1.0)
+}
+
+/// Mean of a stone's cells over that of independent points, made comparable in the median.
+fn excess(cells: &[f64], fitted: f64) -> Option<f64> {
+    let freedom = (cells.len() as f64 - fitted).max(1.0);
+    let median_of_law = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+    (cells.len() >= CELLS).then(|| cells.iter().sum::<f64>() / freedom / median_of_law)
+}
