@@ -108,7 +108,14 @@ fn build(case: &str, sensor: &str) -> (Vec<PairPoints>, BTreeMap<u32, Truth>) {
         let Some(points) = first.get(id) else { continue };
         let c = mean(points);
         centroids.insert(*id, c);
-        if case.starts_with("combo") {
+        if case == "combo_datum" {
+            let turn = nalgebra::Rotation3::new(t.rotation).inverse();
+            for p in second.get_mut(id).into_iter().flatten() {
+                *p = t.centroid + turn * (*p - t.centroid - t.displacement);
+            }
+            t.displacement = Vector3::zeros();
+            t.loose = false;
+        } else if case.starts_with("combo") {
             let turn = nalgebra::Rotation3::new(t.rotation);
             t.displacement += turn * (c - t.centroid) - (c - t.centroid);
         } else {
@@ -323,6 +330,7 @@ fn main() {
         "translation",
         "bulge",
         "combo",
+        "combo_datum",
         "crack",
         "still",
         "still_masks",

@@ -18,7 +18,10 @@ const CAP: f64 = 50.0;
 /// `fitted`: how many unknowns each stone's own points determined, which their cells lack.
 pub(super) fn correlation_factor(stones: &[(&Equations, f64)]) -> f64 {
     let at = |cells: fn(&Equations) -> &[f64]| {
-        let mut ratios: Vec<f64> = stones.iter().filter_map(|(e, fitted)| excess(cells(e), *fitted)).collect();
+        let mut ratios: Vec<f64> = stones
+            .iter()
+            .filter_map(|(e, fitted)| excess(cells(e), *fitted))
+            .collect();
         median(&mut ratios).filter(|_| ratios.len() >= 10).unwrap_or(1.0)
     };
     at(|e| &e.differences).max(at(|e| &e.coarse_differences)).max(1.0)

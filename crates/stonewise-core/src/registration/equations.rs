@@ -227,7 +227,10 @@ fn add_patch(
     };
     let mut coupling = vec![[0.0; UNKNOWNS]; patch.grid.coefficient_count()];
     let mut compare = Compare::new(patch.grid.low(), patch.grid.high(), COMPARE_CELLS * layout.cell_m);
-    let half = 0.5 * (0..2).map(|a| patch.grid.high()[a] - patch.grid.low()[a]).fold(0.0, f64::max);
+    let half = 0.5
+        * (0..2)
+            .map(|a| patch.grid.high()[a] - patch.grid.low()[a])
+            .fold(0.0, f64::max);
     let mut coarse = Compare::new(patch.grid.low(), patch.grid.high(), half);
     for (epoch, observations) in epochs.iter().enumerate() {
         let sigma = noise.sigma_m[epoch];

@@ -25,7 +25,11 @@ pub(super) struct StoneTerm {
 impl StoneTerm {
     /// Of a stone without points.
     pub fn nothing() -> Self {
-        Self { information: Matrix9::zeros(), vector: Motion9::zeros(), constant: 0.0 }
+        Self {
+            information: Matrix9::zeros(),
+            vector: Motion9::zeros(),
+            constant: 0.0,
+        }
     }
 }
 
@@ -193,7 +197,11 @@ pub(super) fn posterior(term: &StoneTerm, prediction: &Prediction, own: &[f64; 9
         covariance: root * covariance * root.transpose(),
         log_evidence,
         misfit: (misfit, freedom),
-        determined: eigen.eigenvalues.iter().map(|g| g.max(0.0) / (1.0 + g.max(0.0))).sum(),
+        determined: eigen
+            .eigenvalues
+            .iter()
+            .map(|g| g.max(0.0) / (1.0 + g.max(0.0)))
+            .sum(),
     }
 }
 
@@ -235,7 +243,8 @@ pub(super) fn tight_probability(
 pub(super) fn tie_strain(graph: &Graph, field: &Field, components: &VarianceComponents) -> Vec<[f64; 2]> {
     const NO_TIE: f64 = 1e9;
     let [inside, outside] = components.drift;
-    let parts = [[inside, NO_TIE], [NO_TIE, outside]].map(|drift| VarianceComponents { drift, ..*components });
+    let parts =
+        [[inside, NO_TIE], [NO_TIE, outside]].map(|drift| VarianceComponents { drift, ..*components });
     graph
         .edges
         .par_iter()
@@ -276,7 +285,8 @@ pub(super) fn learn_ties(
     }
     if sums[2] > 0.0 {
         for k in 0..2 {
-            components.drift[k] = (components.drift[k] * (sums[k] / sums[2]).sqrt()).clamp(BOUNDS[k][0], BOUNDS[k][1]);
+            components.drift[k] =
+                (components.drift[k] * (sums[k] / sums[2]).sqrt()).clamp(BOUNDS[k][0], BOUNDS[k][1]);
         }
     }
 }
@@ -299,7 +309,9 @@ pub(super) fn estimate_components(
             loose,
             beliefs,
         )
-        .map_or(f64::MAX / 1e6, |d| d + VarianceComponents::from_log(*log).penalty())
+        .map_or(f64::MAX / 1e6, |d| {
+            d + VarianceComponents::from_log(*log).penalty()
+        })
     };
     let clamp = |log: [f64; COUNT]| -> [f64; COUNT] {
         std::array::from_fn(|k| log[k].clamp(BOUNDS[k][0].ln(), BOUNDS[k][1].ln()))

@@ -146,7 +146,13 @@ fn wall_frame(place: &Place, places: &[Place], index: &GridIndex, spacing: f64) 
         around.push(place);
     }
     let like = |a: &Place, b: &Place| a.normal.dot(&b.normal) > SAME_WALL_COSINE;
-    let support = |a: &Place| around.iter().filter(|b| like(a, b)).map(|b| b.weight).sum::<f64>();
+    let support = |a: &Place| {
+        around
+            .iter()
+            .filter(|b| like(a, b))
+            .map(|b| b.weight)
+            .sum::<f64>()
+    };
     let mut best = around[0];
     for a in &around[1..] {
         if support(a) > 1.5 * support(best) {

@@ -5,6 +5,7 @@
 mod band;
 mod correlation;
 mod equations;
+mod excerpt;
 mod field;
 mod graph;
 mod hyper;

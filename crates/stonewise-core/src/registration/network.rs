@@ -1,12 +1,13 @@
 //! The stone network adjustment: the motion of every matched stone, all stones together.
 
+use super::correlation::{correlation_factor, stone_factor};
 use super::equations::{Equations, Layout, LocalPair, Matrix9, Motion9, equations};
+use super::excerpt::Excerpt;
 use super::field::{self, Beliefs, Field, LoosePrior, Posterior, StoneTerm};
 use super::graph::{Graph, Place};
 use super::hyper::VarianceComponents;
 use super::noise::estimate_noise;
 use super::outcome;
-use super::correlation::{correlation_factor, stone_factor};
 use super::pairs::{PairPoints, PairSource};
 use super::params::{NetworkParams, NetworkReport};
 use super::patch::SurfaceNoise;
@@ -40,10 +41,10 @@ pub enum AdjustError<E: std::error::Error + 'static> {
 /// Iterations at which the noise of the points is estimated: rough, aligned, final.
 const NOISE_AT: [usize; 3] = [0, 2, 4];
 /// Iterations at which the variance components are estimated.
-const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
+const COMPONENTS_AT: [usize; 5] = [1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
 const FIXED_FROM: usize = 10;
-/// Rounds of learning beliefs from the field in an iteration.
+/// Rounds of learning beliefs from the field in an iteration; one in a large network, where each is dear.
 const LEARN_STEPS: usize = 4;
 /// Probability of being loose from which on a stone's own optimum is followed.
 const SUSPECT: f64 = 0.1;
@@ -55,6 +56,8 @@ pub(super) struct Network {
     pub survey: Survey,
     pub graph: Graph,
     pub pattern: BlockPattern,
+    /// The part of a large network on which the variance components are estimated.
+    excerpt: Option<Excerpt>,
     pub noise: SurfaceNoise,
     pub layout: Layout,
     pub components: VarianceComponents,
@@ -103,10 +106,6 @@ pub fn adjust<S: PairSource>(
             return Err(unsolvable);
         };
         let settled = network.step(&terms, &field, params);
-        if std::env::var("NETTRACE").is_ok() {
-            eprintln!("it {iterations} {settled} noise {:?} f {:.2} comp {:?} loose {:.1} free {} broken {}", network.noise, network.correlation_factor,
-              network.components, network.beliefs.tight.iter().map(|p| 1.0-p).sum::<f64>(), network.free.iter().flatten().count(), network.beliefs.tie.iter().filter(|t| **t<0.1).count());
-        }
         converged = iterations >= FIXED_FROM && settled;
         last = Some((terms, field));
         iterations += 1;
@@ -133,6 +132,7 @@ impl Network {
         let graph = Graph::new(&places, params.neighbours_per_side);
         let edges: Vec<_> = graph.edges.iter().map(|e| (e.low, e.high)).collect();
         let pattern = BlockPattern::new(places.len(), &edges)?;
+        let excerpt = Excerpt::new(&graph);
         let start = survey.smoothed_shifts(&graph);
         let tight: Vec<Track> = graph
             .nodes
@@ -174,6 +174,7 @@ impl Network {
             survey,
             graph,
             pattern,
+            excerpt,
         })
     }
 
@@ -253,7 +254,12 @@ impl Network {
         };
         Terms {
             tight: self.tight.iter().enumerate().map(|(i, t)| term(i, t)).collect(),
-            free: self.free.iter().enumerate().map(|(i, t)| t.as_ref().map(|t| term(i, t))).collect(),
+            free: self
+                .free
+                .iter()
+                .enumerate()
+                .map(|(i, t)| t.as_ref().map(|t| term(i, t)))
+                .collect(),
         }
     }
 
@@ -277,25 +283,63 @@ impl Network {
     }
 
     fn estimate_components(&mut self, terms: &Terms) {
-        self.components = field::estimate_components(
-            &self.graph,
-            &self.pattern,
-            &terms.tight,
-            &self.components,
-            &self.loose,
-            &self.beliefs,
-        );
+        self.components = match &self.excerpt {
+            None => field::estimate_components(
+                &self.graph,
+                &self.pattern,
+                &terms.tight,
+                &self.components,
+                &self.loose,
+                &self.beliefs,
+            ),
+            Some(part) => field::estimate_components(
+                &part.graph,
+                &part.pattern,
+                &part
+                    .stones
+                    .iter()
+                    .map(|&i| terms.tight[i].clone())
+                    .collect::<Vec<_>>(),
+                &self.components,
+                &self.loose,
+                &Beliefs {
+                    tight: part.stones.iter().map(|&i| self.beliefs.tight[i]).collect(),
+                    tie: part.edges.iter().map(|&e| self.beliefs.tie[e]).collect(),
+                },
+            ),
+        };
     }
 
     /// Solves for the field; where `learn`, beliefs about stones and ties follow, and it is solved again.
     fn solve(&mut self, terms: &Terms, learn: bool, params: &NetworkParams) -> Option<Field> {
-        let solve = |n: &Self| field::solve(&n.graph, &n.pattern, &terms.tight, &n.components, &n.loose, &n.beliefs);
+        let solve = |n: &Self| {
+            field::solve(
+                &n.graph,
+                &n.pattern,
+                &terms.tight,
+                &n.components,
+                &n.loose,
+                &n.beliefs,
+            )
+        };
         let mut field = solve(self)?;
         if learn {
-            for _ in 0..LEARN_STEPS {
-                self.beliefs.tight =
-                    field::tight_probability(&terms.tight, &terms.free, &field, &self.components, &self.loose);
-                field::learn_ties(&self.graph, &field, &mut self.components, &mut self.beliefs, params.tie_freedom);
+            let steps = if self.excerpt.is_some() { 1 } else { LEARN_STEPS };
+            for _ in 0..steps {
+                self.beliefs.tight = field::tight_probability(
+                    &terms.tight,
+                    &terms.free,
+                    &field,
+                    &self.components,
+                    &self.loose,
+                );
+                field::learn_ties(
+                    &self.graph,
+                    &field,
+                    &mut self.components,
+                    &mut self.beliefs,
+                    params.tie_freedom,
+                );
                 field = solve(self)?;
             }
         }
@@ -312,7 +356,6 @@ impl Network {
             let mut follow = |track: &mut Track, posterior: &Posterior| {
                 let step = track.move_to(&(posterior.mean + origin), params.max_step_m);
                 let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
-                if std::env::var("NETTRACE").is_ok_and(|v| v=="2") && step > params.tolerance_m.max(SETTLED * sd) { eprint!(" {}:{:.2}mm({:.2})p{:.2}", self.survey.stones[i].first.0, step*1e3, sd*1e3, self.beliefs.tight[i]); }
                 settled &= step <= params.tolerance_m.max(SETTLED * sd);
             };
             let prediction = &field.from_others[i];
@@ -338,13 +381,22 @@ impl Network {
         let prediction = &field.from_others[i];
         let tight = field::posterior(&terms.tight[i], prediction, &self.components.own_variances());
         let Some(free) = &terms.free[i] else {
-            return Estimate { mean: tight.mean, covariance: tight.covariance };
+            return Estimate {
+                mean: tight.mean,
+                covariance: tight.covariance,
+            };
         };
-        let free = field::posterior(free, prediction, &field::loose_variances(&self.components, &self.loose));
+        let free = field::posterior(
+            free,
+            prediction,
+            &field::loose_variances(&self.components, &self.loose),
+        );
         let apart = tight.mean - free.mean;
         Estimate {
             mean: tight.mean * p + free.mean * (1.0 - p),
-            covariance: tight.covariance * p + free.covariance * (1.0 - p) + apart * apart.transpose() * (p * (1.0 - p)),
+            covariance: tight.covariance * p
+                + free.covariance * (1.0 - p)
+                + apart * apart.transpose() * (p * (1.0 - p)),
         }
     }
 }

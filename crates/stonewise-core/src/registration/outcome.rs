@@ -2,8 +2,8 @@
 
 use super::field::{self, Field, StoneTerm, motion_of_field, tie_strain};
 use super::network::{Network, Terms};
-use super::track::Track;
 use super::params::{Break, NetworkParams, NetworkReport};
+use super::track::Track;
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
@@ -12,7 +12,11 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// A cell whose epochs differ by this many times the expected variance shows two surfaces (1 in 400 by chance).
 const BAD_CELL: f64 = 9.0;
 /// A face of which this share shows two surfaces is not the same stone twice.
-const BAD_SHARE: f64 = 0.4;
+const BAD_SHARE: f64 = 0.25;
+/// The same where the stone is thought loose: what still disagrees at its own optimum was not moved, but spoilt.
+const BAD_SHARE_LOOSE: f64 = 0.1;
+/// A stone less likely than this to move with the field is loose, whatever its test at the field's motion says.
+const SURELY_LOOSE: f64 = 0.05;
 /// Factor by which the bending's variance is raised in the test for loose stones.
 const BENDING_SLACK: f64 = 100.0;
 /// A tie weaker than this is broken.
@@ -28,7 +32,13 @@ pub(super) fn report(
 ) -> NetworkReport {
     let (terms, field) = match last {
         Some((t, f)) => (t, Some(f)),
-        None => (Terms { tight: Vec::new(), free: Vec::new() }, None),
+        None => (
+            Terms {
+                tight: Vec::new(),
+                free: Vec::new(),
+            },
+            None,
+        ),
     };
     let mut results = Vec::new();
     let mut breaks = Vec::new();
@@ -92,8 +102,10 @@ fn loose_stones(network: &Network, terms: &Terms, field: &Field, params: &Networ
         .iter()
         .enumerate()
         .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
-    if std::env::var("NETTRACE").is_ok() { for (p,i) in p_values.iter().take(16) { eprintln!("test {:?} p {p:.2e} tight {:.3}", network.survey.stones[*i].first, network.beliefs.tight[*i]); } }
     let mut loose = vec![false; terms.tight.len()];
+    for i in 0..loose.len() {
+        loose[i] = network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE;
+    }
     for &(_, i) in p_values.iter().take(last.map_or(0, |k| k + 1)) {
         loose[i] = true;
     }
@@ -134,8 +146,12 @@ fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFa
     let cells = e.differences.len() as f64;
     let limit = BAD_CELL * network.correlation_factor;
     let bad = e.differences.iter().filter(|d| **d > limit).count() as f64 / cells.max(1.0);
-    if std::env::var("NETTRACE").is_ok() && (e.overlap < params.min_overlap || bad > 0.1) { eprintln!("judge {:?} overlap {:.2} cells {cells} bad {bad:.2} p {:.2} counts {:?}", stone.first, e.overlap, network.beliefs.tight[i], stone.counts); }
-    if e.overlap < params.min_overlap || (cells >= 4.0 && bad > BAD_SHARE) {
+    let share = if network.beliefs.tight[i] < 0.5 {
+        BAD_SHARE_LOOSE
+    } else {
+        BAD_SHARE
+    };
+    if e.overlap < params.min_overlap || (cells >= 4.0 && bad > share) {
         return Some(MotionFailure::Disagreement);
     }
     None

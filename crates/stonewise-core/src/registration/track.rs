@@ -20,7 +20,12 @@ pub(super) struct Track {
 
 impl Track {
     pub fn new(motion: Motion9) -> Self {
-        Self { motion, evaluated: None, last_step: Motion9::zeros(), share: 1.0 }
+        Self {
+            motion,
+            evaluated: None,
+            last_step: Motion9::zeros(),
+            share: 1.0,
+        }
     }
 
     /// The equations last computed.
