@@ -23,14 +23,14 @@ pub struct VarianceComponents {
 pub(super) const COUNT: usize = 8;
 
 impl VarianceComponents {
-    /// A stiff start: ties that do not fit break before the rest would stretch to meet them.
+    /// A moderate start, neighbours about a millimetre apart: from a stiff one, fields that bend end as loose stones.
     pub(super) fn start() -> Self {
         Self {
-            drift: [1e-3; 2],
-            strain: [3e-3; 2],
-            own_m: [1e-5; 2],
-            own_rad: 1e-4,
-            bending_per_m: 1e-3,
+            drift: [5e-3, 1e-2],
+            strain: [3e-3, 1e-2],
+            own_m: [5e-4; 2],
+            own_rad: 2e-3,
+            bending_per_m: 0.01,
         }
     }
 

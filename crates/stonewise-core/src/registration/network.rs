@@ -41,7 +41,7 @@ pub enum AdjustError<E: std::error::Error + 'static> {
 /// Iterations at which the noise of the points is estimated: rough, aligned, final.
 const NOISE_AT: [usize; 3] = [0, 2, 4];
 /// Iterations at which the variance components are estimated.
-const COMPONENTS_AT: [usize; 5] = [1, 2, 3, 5, 7];
+const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
 const FIXED_FROM: usize = 10;
 /// Rounds of learning beliefs from the field in an iteration; one in a large network, where each is dear.
