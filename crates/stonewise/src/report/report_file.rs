@@ -126,12 +126,14 @@ mod tests {
     #[test]
     fn it_needs_no_network_and_names_from_files_are_harmless() {
         let run = r#"{"project": {"name": "</title><script>alert(1)</script>"}, "<b>": ["\" onload=\"x"],
+            "steps": [{"step": "<i>", "seconds": 1.23456789}, {"step": "label"}],
             "warnings": [{"step": "label", "subject": "<script>.jpg", "message": "'&'", "skipped_input": true}]}"#;
         let html = report(&rows(), run);
         check_nesting(&html);
         assert!(
             !html.contains("<script>alert") && !html.contains("<script>.jpg") && !html.contains("<known>")
         );
+        assert!(html.contains("<td>1.23457</td><td>&lt;i&gt;</td>"));
         assert!(html.contains("&lt;script&gt;.jpg") && html.contains("left out"));
         assert_eq!(html.matches("</script").count(), 2, "the data and the explorer");
         for door in ["http://", "https://", "src=", "@import", "url(//"] {

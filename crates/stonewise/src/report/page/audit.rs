@@ -92,7 +92,7 @@ fn warnings(warnings: &[Value]) -> String {
     )
 }
 
-/// A document as nested lists; arrays of plain values on one line.
+/// A document as nested lists; arrays of plain values on one line, arrays of plain objects as a table.
 fn tree(value: &Value) -> String {
     match value {
         Value::Object(map) => {
@@ -102,6 +102,7 @@ fn tree(value: &Value) -> String {
                 .collect();
             format!("<dl>{items}</dl>")
         }
+        Value::Array(items) if !items.is_empty() && items.iter().all(is_flat_object) => rows(items),
         Value::Array(items) if items.iter().any(|v| v.is_object() || v.is_array()) => {
             let items: String = items.iter().map(|v| format!("<li>{}</li>", tree(v))).collect();
             format!("<ol>{items}</ol>")
@@ -109,6 +110,28 @@ fn tree(value: &Value) -> String {
         Value::Array(items) => items.iter().map(scalar).collect::<Vec<_>>().join(", "),
         _ => scalar(value),
     }
+}
+
+fn is_flat_object(value: &Value) -> bool {
+    value
+        .as_object()
+        .is_some_and(|o| o.values().all(|v| !v.is_object() && !v.is_array()))
+}
+
+/// Objects of plain values as a table, columns in the order of the first.
+fn rows(items: &[Value]) -> String {
+    let keys: Vec<&String> = items
+        .first()
+        .and_then(Value::as_object)
+        .map_or(Vec::new(), |o| o.keys().collect());
+    let head: Vec<String> = keys.iter().map(|k| words(k)).collect();
+    let row = |item: &Value| {
+        keys.iter()
+            .map(|k| scalar(item.get(k.as_str()).unwrap_or(&Value::Null)))
+            .collect()
+    };
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    table(&head, &items.iter().map(row).collect::<Vec<_>>(), head.len())
 }
 
 fn scalar(value: &Value) -> String {
