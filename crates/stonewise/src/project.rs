@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
-use stonewise_core::registration::NetworkParams;
+use stonewise_core::registration::{GicpParams, NetworkParams};
 use stonewise_core::transfer::{StoneParams, TransferParams};
 use toml::Spanned;
 
@@ -77,21 +77,38 @@ impl Default for TileParams {
     }
 }
 
+/// How the motion of a stone is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimator {
+    /// All stones together, each sharing with its neighbours as much as the noise demands.
+    #[default]
+    Network,
+    /// Each stone by itself with its surroundings, by plane-to-plane ICP: the paper's way.
+    Gicp,
+}
+
 /// Which estimator measures the stones, and its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationParams {
+    /// Which estimator. The network: it is the better by far on noisy clouds, and where stones move singly.
+    pub estimator: Estimator,
     /// Standard deviation of the epochs' common registration, per axis, metres; it enters absolute uncertainty.
     pub epoch_error_m: f64,
     /// Parameters of the network adjustment.
     pub network: NetworkParams,
+    /// Parameters of plane-to-plane ICP.
+    pub gicp: GicpParams,
 }
 
 impl Default for RegistrationParams {
     fn default() -> Self {
         Self {
+            estimator: Estimator::default(),
             epoch_error_m: 0.0,
             network: NetworkParams::default(),
+            gicp: GicpParams::default(),
         }
     }
 }

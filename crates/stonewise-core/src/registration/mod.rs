@@ -1,12 +1,14 @@
 //! The motion of every matched stone, from its points in both epochs.
 //!
-//! [`adjust`] is the default: all stones together, as surveyors adjust a network.
+//! [`adjust`] is the default: all stones together, as surveyors adjust a network. [`align`] is the paper's way: every
+//! stone by itself, with its surroundings.
 
 mod band;
 mod correlation;
 mod equations;
 mod excerpt;
 mod field;
+mod gicp;
 mod graph;
 mod hyper;
 mod network;
@@ -19,6 +21,7 @@ mod sparse;
 mod survey;
 mod track;
 
+pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use hyper::VarianceComponents;
 pub use network::{AdjustError, adjust};
 pub use pairs::{MemoryPairs, PairPoints, PairSource};

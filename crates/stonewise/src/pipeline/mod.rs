@@ -19,6 +19,7 @@ mod step;
 mod tables;
 mod tiled;
 mod tiles;
+mod windows;
 
 pub use clouds_only::{Comparison, compare_clouds};
 pub use run::{Summary, Until, run};

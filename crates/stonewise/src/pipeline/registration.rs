@@ -6,6 +6,8 @@ use crate::pipeline::label::{Labelled, read_json};
 use crate::pipeline::matching::Matched;
 use crate::pipeline::pairs::DiskPairs;
 use crate::pipeline::step::Key;
+use crate::pipeline::windows::align_windows;
+use crate::project::Estimator;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use stonewise_core::registration::{NetworkReport, adjust};
@@ -35,8 +37,24 @@ pub fn register(
         &[first.key.as_str(), second.key.as_str(), matched.key.as_str()],
     );
     let step = context.step(&format!("register-{number}"), key, |step, _| {
-        let pairs = DiskPairs::gather(first, second, &matched.pairs(), step, context.progress)?;
-        let registered = of_network(adjust(&pairs, &params.network, context.progress)?);
+        let matches = matched.pairs();
+        let registered = match params.estimator {
+            Estimator::Network => {
+                let pairs = DiskPairs::gather(first, second, &matches, step, context.progress)?;
+                of_network(adjust(&pairs, &params.network, context.progress)?)
+            }
+            Estimator::Gicp => {
+                let size_m = context.project.settings.tiles.size_m;
+                of_windows(align_windows(
+                    first,
+                    second,
+                    &matches,
+                    size_m,
+                    &params.gicp,
+                    context.progress,
+                )?)
+            }
+        };
         write_text(
             &step.file("motions.json"),
             &serde_json::to_string(&registered).unwrap_or_default(),
@@ -65,4 +83,15 @@ fn of_network(mut report: NetworkReport) -> Registered {
         results: report.results,
         summary,
     }
+}
+
+fn of_windows(results: Vec<PairResult>) -> Registered {
+    let measured = results.iter().filter_map(|r| r.motion.as_ref().ok());
+    let summary = json!({
+        "estimator": "gicp",
+        "stones": results.len(),
+        "measured": measured.clone().count(),
+        "loose": measured.filter(|m| m.loose).count(),
+    });
+    Registered { results, summary }
 }

@@ -1,0 +1,104 @@
+//! Stones against their neighbours.
+
+use super::params::GicpParams;
+use crate::cloud::GridIndex;
+use crate::stone::{PairResult, StoneMotion};
+use nalgebra::{Matrix3, Point3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::f64::consts::FRAC_PI_2;
+
+/// Variance of a normal variable over its squared median absolute deviation.
+const MAD_TO_VARIANCE: f64 = 1.4826 * 1.4826;
+/// A neighbour lies within this distance, metres.
+const FAR_M: f64 = 5.0;
+
+/// Fills in `relative`, `relative_covariance` and `loose` of every measured stone.
+///
+/// `centroids`: first epoch, world, one per result. The motion that a stone should have is the median, axis by axis, of
+/// its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k times theirs), with the
+/// spread the neighbours really have. Loose are the stones whose difference is significant with the false discovery
+/// rate controlled (Benjamini & Hochberg 1995).
+pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>], params: &GicpParams) {
+    let measured: Vec<usize> = (0..results.len())
+        .filter(|&i| results[i].motion.is_ok())
+        .collect();
+    let places: Vec<Point3<f64>> = measured.iter().map(|&i| centroids[i]).collect();
+    let index = GridIndex::new(&places, 0.5);
+    let relatives: Vec<Option<(Vector3<f64>, Matrix3<f64>)>> = (0..measured.len())
+        .map(|m| {
+            let motion = |m: usize| results[measured[m]].motion.as_ref().ok();
+            let others: Vec<&StoneMotion> = index
+                .nearest_k(&places[m], params.neighbours + 1, FAR_M)
+                .iter()
+                .filter(|n| n.0 != m)
+                .filter_map(|n| motion(n.0))
+                .collect();
+            Some(relative(motion(m)?, &others))
+        })
+        .collect();
+    let mut tests = Vec::new();
+    for (&i, found) in measured.iter().zip(relatives) {
+        if let (Ok(motion), Some((difference, covariance))) = (&mut results[i].motion, found) {
+            motion.relative = difference;
+            motion.relative_covariance = covariance;
+            tests.push((p_value(&difference, &covariance), i));
+        }
+    }
+    for i in discoveries(tests, params.false_discovery_rate) {
+        if let Ok(motion) = &mut results[i].motion {
+            motion.loose = true;
+        }
+    }
+}
+
+fn relative(own: &StoneMotion, others: &[&StoneMotion]) -> (Vector3<f64>, Matrix3<f64>) {
+    let own_covariance = own.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+    if others.is_empty() {
+        return (Vector3::zeros(), own_covariance);
+    }
+    let k = others.len() as f64;
+    let expected = Vector3::from_fn(|axis, _| median(others.iter().map(|o| o.displacement[axis]).collect()));
+    let spread = Vector3::from_fn(|axis, _| {
+        let deviations = others
+            .iter()
+            .map(|o| (o.displacement[axis] - expected[axis]).abs());
+        MAD_TO_VARIANCE * median(deviations.collect()).powi(2)
+    });
+    let mean: Matrix3<f64> = others
+        .iter()
+        .map(|o| o.covariance.fixed_view::<3, 3>(0, 0).into_owned())
+        .sum::<Matrix3<f64>>()
+        / k;
+    let of_median = (mean + Matrix3::from_diagonal(&spread)) * (FRAC_PI_2 / k);
+    (own.displacement - expected, own_covariance + of_median)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let half = values.len() / 2;
+    match values.len() {
+        0 => 0.0,
+        n if n % 2 == 1 => values[half],
+        _ => 0.5 * (values[half - 1] + values[half]),
+    }
+}
+
+/// Probability of so large a difference by chance.
+fn p_value(difference: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    let (Some(factor), Ok(law)) = (covariance.cholesky(), ChiSquared::new(3.0)) else {
+        return 1.0;
+    };
+    law.sf(difference.dot(&factor.solve(difference)))
+}
+
+/// Tests that stay significant when the share of false ones among them is to be at most `rate`.
+fn discoveries(mut tests: Vec<(f64, usize)>, rate: f64) -> Vec<usize> {
+    tests.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let n = tests.len() as f64;
+    let last = tests
+        .iter()
+        .enumerate()
+        .rposition(|(k, t)| t.0 <= rate * (k + 1) as f64 / n);
+    tests.truncate(last.map_or(0, |k| k + 1));
+    tests.into_iter().map(|t| t.1).collect()
+}
