@@ -1,6 +1,6 @@
 //! Measures the network adjustment on the simulated dam with true labels.
 //!
-//! `cargo run -p stonewise-core --example measure_network [CASE [SENSOR]]`; cases: translation, bulge, combo,
+//! `cargo run -p stonewise-core --example measure_network [CASE [SENSOR]]`, or `scale SENSOR STONES` for time; cases: translation, bulge, combo,
 //! crack, still, merged, each with `tls` or `uav`. Prints RMSE in the face (2D) and out of it, percentiles, loose
 //! stones, coverage. Skips where the data are absent.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout, missing_docs)]
@@ -12,7 +12,7 @@ use stonewise_core::cloud::Cloud;
 use stonewise_core::geometry::{FaceFrame, Plane};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::{MemoryPairs, NetworkParams, PairPoints, adjust};
+use stonewise_core::registration::{MemoryPairs, NetworkParams, PairPoints, PairSource, adjust};
 
 type Stones = BTreeMap<u32, Vec<Point3<f64>>>;
 
@@ -320,12 +320,71 @@ fn measure(case: &str, sensor: &str) {
     }
 }
 
+/// The split survey set side by side many times: a long wall, read copy by copy.
+struct LongWall {
+    pairs: Vec<PairPoints>,
+    copies: usize,
+}
+
+impl PairSource for LongWall {
+    type Error = std::convert::Infallible;
+
+    fn batch_count(&self) -> usize {
+        self.copies
+    }
+
+    fn load(&self, batch: usize) -> Result<Vec<PairPoints>, Self::Error> {
+        let per_row = (self.copies as f64 * 4.0).sqrt().ceil() as usize;
+        let shift = Vector3::new(
+            0.0,
+            4.0 * (batch % per_row) as f64,
+            3.0 * (batch / per_row) as f64,
+        );
+        let moved = |c: &Cloud| Cloud::new(c.origin() + shift, c.offsets().to_vec());
+        Ok(self
+            .pairs
+            .iter()
+            .map(|p| PairPoints {
+                first: StoneId(p.first.0 + 1000 * batch as u32),
+                second: StoneId(p.second.0 + 1000 * batch as u32),
+                centroid: p.centroid + shift,
+                centroid_second: p.centroid_second + shift,
+                normal: p.normal,
+                points_first: moved(&p.points_first),
+                points_second: moved(&p.points_second),
+            })
+            .collect())
+    }
+}
+
+/// Time of the whole adjustment for about this many stones.
+fn measure_scale(sensor: &str, stones: usize) {
+    let (pairs, _) = build("bulge", sensor);
+    let copies = stones.div_ceil(pairs.len());
+    let count = copies * pairs.len();
+    let start = std::time::Instant::now();
+    let report = adjust(&LongWall { pairs, copies }, &NetworkParams::default(), &Silent).unwrap();
+    println!(
+        "{count} stones, {sensor}: {:.0} s, {} iterations, converged {}, loose {}",
+        start.elapsed().as_secs_f64(),
+        report.iterations,
+        report.converged,
+        report.loose
+    );
+}
+
 fn main() {
     if !data().is_dir() {
         println!("skipped: no survey data");
         return;
     }
     let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if let [first, sensor, stones] = &wanted[..]
+        && first == "scale"
+    {
+        measure_scale(sensor, stones.parse().unwrap());
+        return;
+    }
     for case in [
         "translation",
         "bulge",
