@@ -160,6 +160,7 @@ fn align_one(
     };
     let needed = (params.min_overlap * window.len() as f64).max(params.min_points as f64);
     let mut settled = false;
+    let (mut damping, mut last_step) = (1.0, Vector6::zeros());
     for _ in 0..params.max_iterations {
         let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
         let count = for_each_pair(
@@ -177,7 +178,15 @@ fn align_one(
         if (count as f64) < needed {
             return Err(MotionFailure::Disagreement);
         }
-        let step = h.cholesky().ok_or(MotionFailure::NotConverged)?.solve(&g);
+        // Partners change in jumps, so the balance may jump across zero without ever being zero. Steps that turn back
+        // are halved: they close in on the place of the jump.
+        damping = if g.dot(&last_step) < 0.0 {
+            0.5 * damping
+        } else {
+            f64::min(1.02 * damping, 1.0)
+        };
+        let step = h.cholesky().ok_or(MotionFailure::NotConverged)?.solve(&g) * damping;
+        last_step = step;
         let (shift, turn) = (
             step.fixed_rows::<3>(0).into_owned(),
             step.fixed_rows::<3>(3).into_owned(),

@@ -36,8 +36,8 @@ pub struct GicpParams {
     pub tolerance_m: f64,
     /// A rotation below this ends the iteration, radians. 1e-7 is a tenth of `tolerance_m` on a metre.
     pub tolerance_rad: f64,
-    /// Most iterations. On smooth faces steps along the face shrink slowly; 200 is three times what was ever seen to
-    /// be needed on rough masonry.
+    /// Most iterations. On smooth faces steps along the face shrink slowly; rough
+    /// masonry needs less than half of 400.
     pub max_iterations: usize,
     /// Points that a stone needs in each epoch, and pairs that an alignment needs. 25: four for each unknown.
     pub min_points: usize,
@@ -65,7 +65,7 @@ impl Default for GicpParams {
             plane_epsilon: 1e-3,
             tolerance_m: 1e-6,
             tolerance_rad: 1e-7,
-            max_iterations: 200,
+            max_iterations: 400,
             min_points: 25,
             min_overlap: 0.3,
             min_observability: 0.01,
