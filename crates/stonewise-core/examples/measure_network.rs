@@ -27,7 +27,10 @@ struct Truth {
 }
 
 fn data() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/dam_small")
+    std::env::var_os("STONEWISE_SURVEY").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/dam_small"),
+        PathBuf::from,
+    )
 }
 
 fn read_stones(path: &Path) -> Stones {
@@ -138,7 +141,7 @@ fn build(case: &str, sensor: &str) -> (Vec<PairPoints>, BTreeMap<u32, Truth>) {
             }
             let centroid = mean(points);
             let mut normal = Plane::fit(points)?.normal;
-            if normal.x < 0.0 {
+            if normal.dot(&truth[id].normal) < 0.0 {
                 normal = -normal;
             }
             Some(PairPoints {

@@ -34,6 +34,18 @@ pub(super) fn stone_factor(stone: &Equations, fitted: f64, survey: f64) -> f64 {
     ((PRIOR_CELLS + sum) / (PRIOR_CELLS + (cells - fitted).max(0.0))).max(1.0)
 }
 
+/// Variance, m^2, of an error that all points of a stone share, in any direction.
+///
+/// What exceeds the independent noise in the larger cells is taken not to fade at the size of a stone either, as
+/// errors do that have as much power in every octave of length (stereo matching, drifting scan lines).
+pub(super) fn shared_variance(stones: &[&Equations], survey: f64) -> f64 {
+    let mut variances: Vec<f64> = stones
+        .iter()
+        .flat_map(|e| e.coarse_variances.iter().copied())
+        .collect();
+    median(&mut variances).unwrap_or(0.0) * (survey - 1.0).max(0.0)
+}
+
 /// Mean of a stone's cells over that of independent points, made comparable in the median.
 fn excess(cells: &[f64], fitted: f64) -> Option<f64> {
     let freedom = (cells.len() as f64 - fitted).max(1.0);

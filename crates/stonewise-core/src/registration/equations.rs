@@ -62,6 +62,8 @@ pub(super) struct Equations {
     pub differences: Vec<f64>,
     /// The same for quarters of the patches.
     pub coarse_differences: Vec<f64>,
+    /// Expected variances behind `coarse_differences`, m^2.
+    pub coarse_variances: Vec<f64>,
     /// Root mean square of the second epoch's residuals, metres.
     pub rms_m: f64,
     /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
@@ -84,6 +86,7 @@ pub(super) fn equations(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, lay
         overlap: patches.overlap,
         differences: Vec::new(),
         coarse_differences: Vec::new(),
+        coarse_variances: Vec::new(),
         rms_m: 0.0,
         scatter: [(0.0, 0.0); 2],
     };
@@ -261,8 +264,12 @@ fn add_patch(
         sum.information.syger(-1.0, &c, &c, 1.0);
     }
     sum.information.fill_upper_triangle_with_lower_triangle();
-    sum.differences.extend(compare.differences(&noise.sigma_m));
-    sum.coarse_differences.extend(coarse.differences(&noise.sigma_m));
+    sum.differences
+        .extend(compare.differences(&noise.sigma_m).map(|d| d.0));
+    for (difference, variance) in coarse.differences(&noise.sigma_m) {
+        sum.coarse_differences.push(difference);
+        sum.coarse_variances.push(variance);
+    }
 }
 
 /// Fits the surface; points far off it lose weight and it is fitted again.
@@ -330,13 +337,15 @@ impl Compare {
         both / held(|c| c[0].1 > 0.0).max(1.0)
     }
 
-    fn differences<'a>(&'a self, sigma_m: &'a [f64; 2]) -> impl Iterator<Item = f64> + 'a {
+    /// Per cell seen by both: squared difference of the means over its expected variance, and that variance.
+    fn differences<'a>(&'a self, sigma_m: &'a [f64; 2]) -> impl Iterator<Item = (f64, f64)> + 'a {
         self.sums
             .iter()
             .filter(|c| c.iter().all(|e| e.1 >= 3.0))
             .map(|c| {
                 let d = c[1].0 / c[1].1 - c[0].0 / c[0].1;
-                d * d / (sigma_m[0].powi(2) / c[0].1 + sigma_m[1].powi(2) / c[1].1)
+                let variance = sigma_m[0].powi(2) / c[0].1 + sigma_m[1].powi(2) / c[1].1;
+                (d * d / variance, variance)
             })
     }
 }

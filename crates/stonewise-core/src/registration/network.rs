@@ -44,6 +44,8 @@ const NOISE_AT: [usize; 3] = [0, 2, 4];
 const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
 const FIXED_FROM: usize = 10;
+/// One stone in so many may still swing between two optima of its own when the network has settled.
+const RESTLESS: usize = 50;
 /// Rounds of learning beliefs from the field in an iteration; one in a large network, where each is dear.
 const LEARN_STEPS: usize = 4;
 /// Probability of being loose from which on a stone's own optimum is followed.
@@ -346,9 +348,9 @@ impl Network {
         Some(field)
     }
 
-    /// Moves every stone to its posterior mean; whether none still had to go anywhere.
+    /// Moves every stone to its posterior mean; whether the network has settled.
     fn step(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) -> bool {
-        let mut settled = true;
+        let mut restless = 0;
         let own = self.components.own_variances();
         let wide = field::loose_variances(&self.components, &self.loose);
         for i in 0..self.tight.len() {
@@ -356,7 +358,7 @@ impl Network {
             let mut follow = |track: &mut Track, posterior: &Posterior| {
                 let step = track.move_to(&(posterior.mean + origin), params.max_step_m);
                 let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
-                settled &= step <= params.tolerance_m.max(SETTLED * sd);
+                restless += usize::from(step > params.tolerance_m.max(SETTLED * sd));
             };
             let prediction = &field.from_others[i];
             let tight = field::posterior(&terms.tight[i], prediction, &own);
@@ -369,10 +371,10 @@ impl Network {
                 let mut track = Track::new(self.tight[i].motion);
                 track.move_to(&start, params.max_step_m);
                 self.free[i] = Some(track);
-                settled = false;
+                restless += 1;
             }
         }
-        settled
+        restless * RESTLESS <= self.tight.len()
     }
 
     /// A stone's motion about the common translation, looseness averaged out.

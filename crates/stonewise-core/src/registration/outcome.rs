@@ -1,6 +1,8 @@
 //! From the adjusted network to one row per pair, with tests and uncertainties.
 
-use super::field::{self, Field, StoneTerm, motion_of_field, tie_strain};
+use super::correlation::shared_variance;
+use super::equations::{Equations, Motion9};
+use super::field::{self, Field, StoneTerm, tie_strain};
 use super::network::{Network, Terms};
 use super::params::{Break, NetworkParams, NetworkReport};
 use super::track::Track;
@@ -43,9 +45,11 @@ pub(super) fn report(
     let mut results = Vec::new();
     let mut breaks = Vec::new();
     if let Some(field) = &field {
+        let known: Vec<&Equations> = network.tight.iter().filter_map(Track::equations).collect();
+        let shared = shared_variance(&known, network.correlation_factor);
         let loose = loose_stones(network, &terms, field, params);
         results = (0..terms.tight.len())
-            .map(|i| result(network, i, &terms, field, loose[i], params))
+            .map(|i| result(network, i, &terms, field, loose[i], shared, params))
             .collect();
         breaks = find_breaks(network, field, &loose);
     }
@@ -121,10 +125,14 @@ fn result(
     terms: &Terms,
     field: &Field,
     loose: bool,
+    shared_m2: f64,
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
-    let motion = judge(network, i, params).map_or_else(|| Ok(motion(network, i, terms, field, loose)), Err);
+    let motion = judge(network, i, params).map_or_else(
+        || Ok(motion(network, i, terms, field, loose, shared_m2, params)),
+        Err,
+    );
     PairResult {
         first: stone.first,
         second: stone.second,
@@ -168,7 +176,15 @@ fn track(network: &Network, i: usize) -> &Track {
     }
 }
 
-fn motion(network: &Network, i: usize, terms: &Terms, field: &Field, loose: bool) -> StoneMotion {
+fn motion(
+    network: &Network,
+    i: usize,
+    terms: &Terms,
+    field: &Field,
+    loose: bool,
+    shared_m2: f64,
+    params: &NetworkParams,
+) -> StoneMotion {
     let node = &network.graph.nodes[i];
     let world = node.face_from_world.transpose();
     let posterior = network.estimate(i, terms, field);
@@ -178,8 +194,14 @@ fn motion(network: &Network, i: usize, terms: &Terms, field: &Field, loose: bool
     let turned = UnitQuaternion::from_scaled_axis(rotation);
     let arm = node.centroid.coords;
     let mut covariance = Matrix6::zeros();
+    let mut local = posterior.covariance;
+    for k in 0..3 {
+        local[(k, k)] += shared_m2;
+    }
+    let noise = network.noise.sigma_m;
+    local[(2, 2)] += params.systematic_share.powi(2) * 0.5 * (noise[0].powi(2) + noise[1].powi(2));
     for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
-        let block = world * posterior.covariance.fixed_view::<3, 3>(r, c) * world.transpose();
+        let block = world * local.fixed_view::<3, 3>(r, c) * world.transpose();
         covariance.fixed_view_mut::<3, 3>(r, c).copy_from(&block);
     }
     let prediction = &field.from_others[i];
@@ -223,14 +245,14 @@ fn find_breaks(network: &Network, field: &Field, loose: &[bool]) -> Vec<Break> {
         .filter(|(_, edge)| !loose[edge.low] && !loose[edge.high])
         .filter(|(e, _)| network.beliefs.tie[*e] < BROKEN && strain[*e][0] + strain[*e][1] > 30.0)
         .map(|(_, edge)| {
-            let motion = |i: usize| {
-                let a = motion_of_field(&network.graph.nodes[i].face_from_world) * field.state[i];
-                network.graph.nodes[i].face_from_world.transpose() * a.fixed_rows::<3>(0)
-            };
+            let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
+            let part = |state: &Motion9, k: usize| state.fixed_rows::<3>(k).into_owned();
+            let mean_gradient = |k: usize| 0.5 * (part(low, k) + part(high, k));
+            let explained = mean_gradient(3) * edge.step[0] + mean_gradient(6) * edge.step[1];
             Break {
                 from: network.survey.stones[edge.low].first,
                 to: network.survey.stones[edge.high].first,
-                jump: motion(edge.high) - motion(edge.low),
+                jump: part(high, 0) - part(low, 0) - explained,
             }
         })
         .collect()

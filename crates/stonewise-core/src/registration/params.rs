@@ -34,6 +34,9 @@ pub struct NetworkParams {
     pub false_discovery_rate: f64,
     /// Degrees of freedom of the ties between neighbours; fewer let the field break more easily.
     pub tie_freedom: f64,
+    /// Share of a point's noise that no number of points averages away (range bias, drift of a scan line or
+    /// strip): added across the face to every stone's uncertainty.
+    pub systematic_share: f64,
     /// Largest step of a stone in an iteration, metres: within the reach of the stones' relief.
     pub max_step_m: f64,
     /// Iteration stops when no stone moves by more, metres.
@@ -57,9 +60,10 @@ impl Default for NetworkParams {
             loose_turn_rad: 0.02,
             false_discovery_rate: 0.05,
             tie_freedom: 3.0,
+            systematic_share: 0.05,
             max_step_m: 0.015,
             tolerance_m: 1e-6,
-            max_iterations: 30,
+            max_iterations: 24,
         }
     }
 }
