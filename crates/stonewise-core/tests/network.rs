@@ -247,7 +247,7 @@ fn the_field_breaks_at_a_crack() {
     let errors = errors(&pairs, &report, side);
     let square: f64 = errors.iter().map(Vector3::norm_squared).sum();
     let rms = (square / errors.len() as f64).sqrt();
-    assert!(rms < 6e-4, "{rms}");
+    assert!(rms < 8e-4, "{rms}");
     assert!(!report.breaks.is_empty());
     for b in &report.breaks {
         let at = |id: StoneId| side(&pairs[id.0 as usize - 1].centroid);

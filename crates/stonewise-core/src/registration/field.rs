@@ -217,16 +217,19 @@ pub(super) fn loose_variances(components: &VarianceComponents, loose: &LoosePrio
 
 /// Probability of each stone to move with the field, given all others.
 ///
-/// A loose stone's likelihood is taken at its own optimum where that is followed.
+/// A loose stone's likelihood is taken at its own optimum where that is followed. `shared`: variances of errors
+/// that look like a stone's own motion.
 pub(super) fn tight_probability(
     terms: &[StoneTerm],
     free: &[Option<StoneTerm>],
     field: &Field,
     components: &VarianceComponents,
     loose: &LoosePrior,
+    shared: &[f64; 9],
 ) -> Vec<f64> {
-    let own = components.own_variances();
-    let wide = loose_variances(components, loose);
+    let add = |v: [f64; 9]| std::array::from_fn(|k| v[k] + shared[k]);
+    let own: [f64; 9] = add(components.own_variances());
+    let wide: [f64; 9] = add(loose_variances(components, loose));
     (0..terms.len())
         .into_par_iter()
         .map(|i| {

@@ -1,6 +1,6 @@
 //! The stone network adjustment: the motion of every matched stone, all stones together.
 
-use super::correlation::{correlation_factor, stone_factor};
+use super::correlation::{correlation_factor, shared_variance, stone_factor};
 use super::equations::{Equations, Layout, LocalPair, Matrix9, Motion9, equations};
 use super::excerpt::Excerpt;
 use super::field::{self, Beliefs, Field, LoosePrior, Posterior, StoneTerm};
@@ -46,6 +46,8 @@ const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 const FIXED_FROM: usize = 10;
 /// One stone in so many may still swing between two optima of its own when the network has settled.
 const RESTLESS: usize = 50;
+/// Lever by which an error shared by half a stone turns it, metres.
+const HALF_STONE_M: f64 = 0.1;
 /// Rounds of learning beliefs from the field in an iteration; one in a large network, where each is dear.
 const LEARN_STEPS: usize = 4;
 /// Probability of being loose from which on a stone's own optimum is followed.
@@ -265,6 +267,16 @@ impl Network {
         }
     }
 
+    /// Variances of errors that all points of a stone share, beyond what its own cells show: translation, rotation.
+    pub fn shared_variances(&self, params: &NetworkParams) -> [f64; 9] {
+        let known: Vec<&Equations> = self.tight.iter().filter_map(Track::equations).collect();
+        let shared = shared_variance(&known, self.correlation_factor);
+        let noise = self.noise.sigma_m;
+        let bias = params.systematic_share.powi(2) * 0.5 * (noise[0].powi(2) + noise[1].powi(2));
+        let turn = shared / (HALF_STONE_M * HALF_STONE_M);
+        [shared, shared, shared + bias, turn, turn, turn, 0.0, 0.0, 0.0]
+    }
+
     /// Factor on a stone's variances, judged at the better of its motions.
     fn inflation(&self, i: usize) -> f64 {
         let own = [Some(&self.tight[i]), self.free[i].as_ref()]
@@ -334,6 +346,7 @@ impl Network {
                     &field,
                     &self.components,
                     &self.loose,
+                    &self.shared_variances(params),
                 );
                 field::learn_ties(
                     &self.graph,

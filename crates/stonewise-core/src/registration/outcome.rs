@@ -1,7 +1,6 @@
 //! From the adjusted network to one row per pair, with tests and uncertainties.
 
-use super::correlation::shared_variance;
-use super::equations::{Equations, Motion9};
+use super::equations::Motion9;
 use super::field::{self, Field, StoneTerm, tie_strain};
 use super::network::{Network, Terms};
 use super::params::{Break, NetworkParams, NetworkReport};
@@ -45,11 +44,10 @@ pub(super) fn report(
     let mut results = Vec::new();
     let mut breaks = Vec::new();
     if let Some(field) = &field {
-        let known: Vec<&Equations> = network.tight.iter().filter_map(Track::equations).collect();
-        let shared = shared_variance(&known, network.correlation_factor);
+        let shared = network.shared_variances(params);
         let loose = loose_stones(network, &terms, field, params);
         results = (0..terms.tight.len())
-            .map(|i| result(network, i, &terms, field, loose[i], shared, params))
+            .map(|i| result(network, i, &terms, field, loose[i], &shared, params))
             .collect();
         breaks = find_breaks(network, field, &loose);
     }
@@ -96,6 +94,9 @@ fn loose_stones(network: &Network, terms: &Terms, field: &Field, params: &Networ
     let mut own = network.components.own_variances();
     // A bent face is not a loose stone: bending is left free.
     own[6..].iter_mut().for_each(|v| *v *= BENDING_SLACK);
+    for (v, shared) in own.iter_mut().zip(network.shared_variances(params)) {
+        *v += shared;
+    }
     let mut p_values: Vec<(f64, usize)> = (0..terms.tight.len())
         .filter_map(|i| {
             let (misfit, freedom) = field::posterior(&terms.tight[i], &field.from_others[i], &own).misfit;
@@ -125,12 +126,12 @@ fn result(
     terms: &Terms,
     field: &Field,
     loose: bool,
-    shared_m2: f64,
+    shared: &[f64; 9],
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
     let motion = judge(network, i, params).map_or_else(
-        || Ok(motion(network, i, terms, field, loose, shared_m2, params)),
+        || Ok(motion(network, i, terms, field, loose, shared, params)),
         Err,
     );
     PairResult {
@@ -182,7 +183,7 @@ fn motion(
     terms: &Terms,
     field: &Field,
     loose: bool,
-    shared_m2: f64,
+    shared: &[f64; 9],
     params: &NetworkParams,
 ) -> StoneMotion {
     let node = &network.graph.nodes[i];
@@ -195,11 +196,9 @@ fn motion(
     let arm = node.centroid.coords;
     let mut covariance = Matrix6::zeros();
     let mut local = posterior.covariance;
-    for k in 0..3 {
-        local[(k, k)] += shared_m2;
+    for k in 0..6 {
+        local[(k, k)] += shared[k];
     }
-    let noise = network.noise.sigma_m;
-    local[(2, 2)] += params.systematic_share.powi(2) * 0.5 * (noise[0].powi(2) + noise[1].powi(2));
     for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
         let block = world * local.fixed_view::<3, 3>(r, c) * world.transpose();
         covariance.fixed_view_mut::<3, 3>(r, c).copy_from(&block);

@@ -48,7 +48,7 @@ pub struct NetworkParams {
 impl Default for NetworkParams {
     fn default() -> Self {
         Self {
-            cell_spacings: 1.25,
+            cell_spacings: 2.0,
             min_cell_m: 0.003,
             patch_cells: 24,
             outlier_sigmas: 3.5,
