@@ -470,9 +470,9 @@ fn tie_blocks(edge: &Edge, components: &VarianceComponents) -> [Matrix9; 3] {
     let high = [1.0, half[0], half[1]];
     let outer = |p: &[f64; 3], q: &[f64; 3], own: f64| {
         let mut block = Matrix9::zeros();
-        for a in 0..3 {
-            for b in 0..3 {
-                let mut part = level * (p[a] * q[b]);
+        for (a, pa) in p.iter().enumerate() {
+            for (b, qb) in q.iter().enumerate() {
+                let mut part = level * (pa * qb);
                 if a == b && a > 0 {
                     part += slope * own;
                 }

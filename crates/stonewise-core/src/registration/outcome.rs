@@ -111,8 +111,8 @@ fn loose_stones(network: &Network, terms: &Terms, field: &Field, params: &Networ
         .enumerate()
         .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
     let mut loose = vec![false; terms.tight.len()];
-    for i in 0..loose.len() {
-        loose[i] = network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE;
+    for (i, loose) in loose.iter_mut().enumerate() {
+        *loose = network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE;
     }
     for &(_, i) in p_values.iter().take(last.map_or(0, |k| k + 1)) {
         loose[i] |= network.beliefs.tight[i] < 0.5;
@@ -130,10 +130,8 @@ fn result(
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
-    let motion = judge(network, i, params).map_or_else(
-        || Ok(motion(network, i, terms, field, loose, shared, params)),
-        Err,
-    );
+    let motion =
+        judge(network, i, params).map_or_else(|| Ok(motion(network, i, terms, field, loose, shared)), Err);
     PairResult {
         first: stone.first,
         second: stone.second,
@@ -184,7 +182,6 @@ fn motion(
     field: &Field,
     loose: bool,
     shared: &[f64; 9],
-    params: &NetworkParams,
 ) -> StoneMotion {
     let node = &network.graph.nodes[i];
     let world = node.face_from_world.transpose();
@@ -196,8 +193,8 @@ fn motion(
     let arm = node.centroid.coords;
     let mut covariance = Matrix6::zeros();
     let mut local = posterior.covariance;
-    for k in 0..6 {
-        local[(k, k)] += shared[k];
+    for (k, variance) in shared.iter().enumerate() {
+        local[(k, k)] += variance;
     }
     for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
         let block = world * local.fixed_view::<3, 3>(r, c) * world.transpose();

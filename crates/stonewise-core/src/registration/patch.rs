@@ -125,10 +125,10 @@ impl PatchGrid {
                         let row = self.index(&basis, a, b);
                         let w = weight * bl[a] * bs[b];
                         rhs[row][0] += w * o.position[2];
-                        for c in 0..=a {
+                        for (c, along) in bl.iter().enumerate().take(a + 1) {
                             let count = if c == a { b + 1 } else { 4 };
                             let part = matrix.row_part(row, self.index(&basis, c, 0), count);
-                            let wc = w * bl[c];
+                            let wc = w * along;
                             for (entry, s) in part.iter_mut().zip(bs) {
                                 *entry += wc * s;
                             }
