@@ -254,6 +254,13 @@ fn measure(case: &str, sensor: &str) {
         percentile(rows.iter().map(|r| r.1.norm() * mm), 1.0),
         rows.iter().filter(|r| r.1.norm() > 0.01).count(),
     );
+    if case == "crack" {
+        let near = rows.iter().filter(|r| (r.0.y - 0.2).abs() < 0.4);
+        println!(
+            "   within 0.4 m of the crack: in {:.3}",
+            rms(near.map(|r| plane(&r.1)))
+        );
+    }
     let relative: Vec<Vector3<f64>> = rows
         .iter()
         .map(|r| {

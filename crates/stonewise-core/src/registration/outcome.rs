@@ -1,7 +1,7 @@
 //! From the adjusted network to one row per pair, with tests and uncertainties.
 
 use super::equations::Motion9;
-use super::field::{self, Field, StoneTerm, tie_strain};
+use super::field::{self, Field, StoneTerm};
 use super::network::{Network, Terms};
 use super::params::{Break, NetworkParams, NetworkReport};
 use super::track::Track;
@@ -20,6 +20,8 @@ const BAD_SHARE_LOOSE: f64 = 0.1;
 const SURELY_LOOSE: f64 = 0.05;
 /// Factor by which the bending's variance is raised in the test for loose stones.
 const BENDING_SLACK: f64 = 100.0;
+/// Squared jump over the variance that a whole tie gives it: chance alone exceeds it once in a million ties.
+const BREAK_EXCESS: f64 = 30.0;
 /// A tie weaker than this is broken.
 const BROKEN: f64 = 0.1;
 
@@ -231,25 +233,29 @@ fn observability(term: &StoneTerm) -> f64 {
     }
 }
 
+/// Broken ties between stones that are not loose, with a jump far beyond what a whole tie allows.
 fn find_breaks(network: &Network, field: &Field, loose: &[bool]) -> Vec<Break> {
-    let strain = tie_strain(&network.graph, field, &network.components);
+    let drift = network.components.drift;
     network
         .graph
         .edges
         .iter()
-        .enumerate()
-        .filter(|(_, edge)| !loose[edge.low] && !loose[edge.high])
-        .filter(|(e, _)| network.beliefs.tie[*e] < BROKEN && strain[*e][0] + strain[*e][1] > 30.0)
-        .map(|(_, edge)| {
+        .zip(&network.beliefs.tie)
+        .filter(|(edge, tie)| **tie < BROKEN && !loose[edge.low] && !loose[edge.high])
+        .filter_map(|(edge, _)| {
             let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
             let part = |state: &Motion9, k: usize| state.fixed_rows::<3>(k).into_owned();
             let mean_gradient = |k: usize| 0.5 * (part(low, k) + part(high, k));
             let explained = mean_gradient(3) * edge.step[0] + mean_gradient(6) * edge.step[1];
-            Break {
+            let jump = part(high, 0) - part(low, 0) - explained;
+            let local = edge.face_from_world * jump;
+            let [inside, outside] = drift.map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
+            let excess = local.xy().norm_squared() / inside.powi(2) + (local.z / outside).powi(2);
+            (excess > BREAK_EXCESS).then(|| Break {
                 from: network.survey.stones[edge.low].first,
                 to: network.survey.stones[edge.high].first,
-                jump: part(high, 0) - part(low, 0) - explained,
-            }
+                jump,
+            })
         })
         .collect()
 }
