@@ -1,4 +1,5 @@
 //! The command on a small simulated survey: results, resuming, threads, and every way an input can be bad.
+#![allow(clippy::unwrap_used)] // a test that cannot go on must stop
 
 use assert_cmd::Command;
 use std::fs;
@@ -27,7 +28,7 @@ distance_m = 5.0
 "#;
 
 fn stonewise() -> Command {
-    Command::cargo_bin("stonewise").unwrap()
+    Command::new(env!("CARGO_BIN_EXE_stonewise"))
 }
 
 /// The survey, made once for all tests.

@@ -96,6 +96,10 @@ pub struct RegistrationParams {
     pub estimator: Estimator,
     /// Standard deviation of the epochs' common registration, per axis, metres; it enters absolute uncertainty.
     pub epoch_error_m: f64,
+    /// Points nearer to the border of their stone than this many times their noise do not take part in the network
+    /// adjustment. 3: their labels, and so their heights, depend on where the photos were taken; without this the whole
+    /// wall of a UAV survey seems to move by 1 to 2 mm.
+    pub border_noises: f64,
     /// Parameters of the network adjustment.
     pub network: NetworkParams,
     /// Parameters of plane-to-plane ICP.
@@ -107,6 +111,7 @@ impl Default for RegistrationParams {
         Self {
             estimator: Estimator::default(),
             epoch_error_m: 0.0,
+            border_noises: 3.0,
             network: NetworkParams::default(),
             gicp: GicpParams::default(),
         }

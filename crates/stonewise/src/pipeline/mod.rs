@@ -5,6 +5,7 @@ mod clouds_out;
 mod compare;
 mod context;
 mod epoch_tiles;
+mod inner;
 mod label;
 mod matching;
 mod pairs;

@@ -1,6 +1,7 @@
 //! Points of matched stones, gathered from the tiles of two epochs into batches of neighbours on disk.
 
 use crate::error::{Error, Result};
+use crate::pipeline::inner::inner_points;
 use crate::pipeline::label::Labelled;
 use crate::pipeline::spill::{Spill, SpillBins};
 use crate::pipeline::step::StepDir;
@@ -27,10 +28,13 @@ pub struct DiskPairs {
 
 impl DiskPairs {
     /// Gathers the points of the matched stones of two epochs into the step's folder.
+    ///
+    /// Points nearer to the border of their stone than `border_noises` times the noise are left out, see [`inner_points`].
     pub fn gather(
         first: &Labelled,
         second: &Labelled,
         matches: &[(StoneId, StoneId)],
+        border_noises: f64,
         step: &StepDir,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -44,8 +48,46 @@ impl DiskPairs {
         let bins = spill.finish()?;
         (0..pairs.batches.len())
             .into_par_iter()
-            .try_for_each(|b| write_batch(&bins, b, &pairs.file(b)))?;
+            .try_for_each(|b| pairs.write_batch(&bins, b, border_noises))?;
         Ok(pairs)
+    }
+
+    /// Writes the points of a batch: slot, epoch (0 or 1), x, y, z.
+    fn write_batch(&self, bins: &SpillBins<u32>, batch: usize, border_noises: f64) -> Result<()> {
+        let key = batch as u32;
+        let bytes = if bins.keys().contains(&key) {
+            bins.read(&key)?
+        } else {
+            Vec::new()
+        };
+        let mut points = vec![[Vec::new(), Vec::new()]; self.batches[batch].len()];
+        for record in bytes.chunks_exact(RECORD) {
+            let (slot, epoch, offset) = decode(record);
+            points[slot][epoch].push(offset);
+        }
+        let (mut slots, mut epochs, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        for (slot, (of_stone, (stone, _))) in points.into_iter().zip(&self.batches[batch]).enumerate() {
+            for (epoch, of_epoch) in of_stone.into_iter().enumerate() {
+                let inner = if border_noises > 0.0 {
+                    inner_points(of_epoch, &stone.normal, border_noises)
+                } else {
+                    of_epoch
+                };
+                slots.extend(std::iter::repeat_n(slot as u32, inner.len()));
+                epochs.extend(std::iter::repeat_n(epoch as u32, inner.len()));
+                offsets.extend(inner);
+            }
+        }
+        let mut table = Table::new();
+        table.push("slot", slots)?;
+        table.push("epoch", epochs)?;
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            table.push(
+                name,
+                offsets.iter().map(|o: &[f32; 3]| o[axis]).collect::<Vec<f32>>(),
+            )?;
+        }
+        Ok(write_parquet(&self.file(batch), &table)?)
     }
 
     fn file(&self, batch: usize) -> PathBuf {
@@ -153,29 +195,8 @@ fn encode(slot: u16, epoch: u16, offset: [f32; 3]) -> [u8; RECORD] {
     record
 }
 
-fn write_batch(bins: &SpillBins<u32>, batch: usize, path: &std::path::Path) -> Result<()> {
-    let bytes = if bins.keys().contains(&(batch as u32)) {
-        bins.read(&(batch as u32))?
-    } else {
-        Vec::new()
-    };
-    let records = bytes.chunks_exact(RECORD);
-    let short = |r: &[u8], at: usize| u32::from(u16::from_le_bytes([r[at], r[at + 1]]));
-    let real = |r: &[u8], at: usize| f32::from_le_bytes([r[at], r[at + 1], r[at + 2], r[at + 3]]);
-    let mut table = Table::new();
-    table.push("slot", records.clone().map(|r| short(r, 0)).collect::<Vec<u32>>())?;
-    table.push(
-        "epoch",
-        records.clone().map(|r| short(r, 2)).collect::<Vec<u32>>(),
-    )?;
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push(
-            name,
-            records
-                .clone()
-                .map(|r| real(r, 4 + 4 * axis))
-                .collect::<Vec<f32>>(),
-        )?;
-    }
-    Ok(write_parquet(path, &table)?)
+fn decode(record: &[u8]) -> (usize, usize, [f32; 3]) {
+    let short = |at: usize| usize::from(u16::from_le_bytes([record[at], record[at + 1]]));
+    let real = |at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
+    (short(0), short(2), [real(4), real(8), real(12)])
 }

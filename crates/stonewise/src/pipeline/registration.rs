@@ -40,7 +40,14 @@ pub fn register(
         let matches = matched.pairs();
         let registered = match params.estimator {
             Estimator::Network => {
-                let pairs = DiskPairs::gather(first, second, &matches, step, context.progress)?;
+                let pairs = DiskPairs::gather(
+                    first,
+                    second,
+                    &matches,
+                    params.border_noises,
+                    step,
+                    context.progress,
+                )?;
                 of_network(adjust(&pairs, &params.network, context.progress)?)
             }
             Estimator::Gicp => {
