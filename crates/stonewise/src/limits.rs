@@ -4,7 +4,7 @@ use crate::project::Settings;
 use serde_json::Value;
 
 /// Parameters that zero makes useless: sizes, radii, counts, steps.
-const POSITIVE: [&str; 15] = [
+const POSITIVE: [&str; 18] = [
     "size_m",
     "cell_m",
     "sample_m",
@@ -18,7 +18,10 @@ const POSITIVE: [&str; 15] = [
     "tolerance_m",
     "max_iterations",
     "max_ratio",
-    "buffer_m",
+    "max_distance_m",
+    "plane_neighbours",
+    "plane_epsilon",
+    "correlation_cell_m",
     "outlier_sigmas",
 ];
 /// Parameters that are shares or rates without saying so in their names.
