@@ -373,6 +373,24 @@ fn few_points_are_said_to_be_few() {
 }
 
 #[test]
+fn a_flat_wall_does_not_show_motion_in_its_plane() {
+    let wall = Wall {
+        rows: 2,
+        columns: 3,
+        points: 300,
+        relief: 0.0,
+        ..Wall::default()
+    };
+    let report = run(wall.pairs(|_, _| (Vector3::new(0.0, 0.01, 0.0), Vector3::zeros())));
+    for r in &report.results {
+        let Err(MotionFailure::Unobservable { direction }) = &r.motion else {
+            panic!("a motion was reported: {:?}", r.motion)
+        };
+        assert!(direction.x.abs() < 0.1);
+    }
+}
+
+#[test]
 fn nothing_in_nothing_out() {
     assert!(run(Vec::new()).results.is_empty());
 }

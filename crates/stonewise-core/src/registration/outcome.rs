@@ -132,13 +132,30 @@ fn result(
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
-    let motion =
-        judge(network, i, params).map_or_else(|| Ok(motion(network, i, terms, field, loose, shared)), Err);
+    let motion = match judge(network, i, params) {
+        Some(failure) => Err(failure),
+        None => observable(motion(network, i, terms, field, loose, shared), params.max_sd_m),
+    };
     PairResult {
         first: stone.first,
         second: stone.second,
         motion,
     }
+}
+
+/// Refuses a motion whose weakest direction neither the stone nor its neighbours show.
+fn observable(motion: StoneMotion, max_sd_m: f64) -> Result<StoneMotion, MotionFailure> {
+    let eigen = motion
+        .covariance
+        .fixed_view::<3, 3>(0, 0)
+        .into_owned()
+        .symmetric_eigen();
+    let worst = eigen.eigenvalues.imax();
+    if eigen.eigenvalues[worst] > max_sd_m * max_sd_m {
+        let direction = eigen.eigenvectors.column(worst).into_owned();
+        return Err(MotionFailure::Unobservable { direction });
+    }
+    Ok(motion)
 }
 
 /// Why a stone has no motion.

@@ -37,6 +37,8 @@ pub struct NetworkParams {
     /// Share of a point's noise that no number of points averages away (range bias, drift of a scan line or
     /// strip): added across the face to every stone's uncertainty.
     pub systematic_share: f64,
+    /// A motion with a direction less certain than this, metres, is reported as not observable.
+    pub max_sd_m: f64,
     /// Largest step of a stone in an iteration, metres: within the reach of the stones' relief.
     pub max_step_m: f64,
     /// Iteration stops when no stone moves by more, metres.
@@ -61,6 +63,7 @@ impl Default for NetworkParams {
             false_discovery_rate: 0.05,
             tie_freedom: 3.0,
             systematic_share: 0.05,
+            max_sd_m: 0.02,
             max_step_m: 0.015,
             tolerance_m: 1e-6,
             max_iterations: 24,
