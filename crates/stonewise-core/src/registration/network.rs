@@ -55,6 +55,10 @@ const SUSPECT: f64 = 0.1;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
 
+/// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what is known of loose
+/// stones beforehand) has learnt too little from its points to be told from its neighbours.
+const BLIND_SHARE: f64 = 0.85;
+
 /// The state of the iteration.
 pub(super) struct Network {
     pub survey: Survey,
@@ -348,6 +352,7 @@ impl Network {
                     &self.loose,
                     &self.shared_variances(params),
                 );
+                self.disbelieve_the_blind(terms, &field, params);
                 field::learn_ties(
                     &self.graph,
                     &field,
@@ -359,6 +364,20 @@ impl Network {
             }
         }
         Some(field)
+    }
+
+    /// Lets stones whose own points hardly know their motion move with the field: few noisy points have optima far away
+    /// that mean nothing.
+    fn disbelieve_the_blind(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) {
+        let wide = field::loose_variances(&self.components, &self.loose);
+        for (i, tight) in self.beliefs.tight.iter_mut().enumerate() {
+            let term = terms.free[i].as_ref().unwrap_or(&terms.tight[i]);
+            let own = field::posterior(term, &field.from_others[i], &wide).covariance;
+            let variances = own.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
+            if variances.max().sqrt() > BLIND_SHARE * params.loose_move_m {
+                *tight = 1.0;
+            }
+        }
     }
 
     /// Moves every stone to its posterior mean; whether the network has settled.
