@@ -27,6 +27,7 @@ fn main() -> Result<(), CloudError> {
         let label = |index: &u64| PointLabel {
             stone: Some(StoneId((index / 6000) as u32)),
             motion: None,
+            ..PointLabel::default()
         };
         Ok::<_, CloudError>(chunk.indices.iter().map(label).collect())
     })?;
