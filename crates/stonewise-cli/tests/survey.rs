@@ -166,8 +166,8 @@ fn a_known_motion_is_found_again_and_scored() {
     let evaluation: serde_json::Value = serde_json::from_str(&text).unwrap();
     let errors = &evaluation["stones"]["errors"];
     let stones = errors["in_plane_per_axis"]["rmse_m"].as_f64().unwrap();
-    // The points moved by 2 cm and 5 cm. Halves of an 8 mm scan have 11 mm spacing: 5 % of the smaller motion.
-    assert!(stones < 1e-3, "{stones} m");
+    // The points moved by 2 cm and 5 cm. With one photo a half, and over 1 cm between points, a tenth of that is asked.
+    assert!(stones < 2e-3, "{stones} m");
     let m3c2 = evaluation["m3c2"]["errors"]["in_plane_per_axis"]["rmse_m"]
         .as_f64()
         .unwrap();
