@@ -22,8 +22,39 @@ fn main() -> ExitCode {
         Ok(commands::Outcome::Done) => ExitCode::from(DONE),
         Ok(commands::Outcome::SkippedInputs) => ExitCode::from(SKIPPED_INPUTS),
         Err(error) => {
-            printer::note(&format!("error: {error:#}"));
+            printer::note(&format!("error: {}", explain(&error)));
             ExitCode::from(FAILED)
         }
+    }
+}
+
+/// The error and its causes in one line; a cause that is part of the text already is not said twice.
+fn explain(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |text, cause| {
+        let cause = cause.to_string();
+        match text.as_str() {
+            "" => cause,
+            said if said.contains(&cause) => text,
+            said => format!("{said}: {cause}"),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn no_cause_is_said_twice() {
+        let io = std::io::Error::other("disk on fire");
+        let error = Err::<(), _>(io)
+            .context("writing failed: disk on fire: a.csv")
+            .context("the run is not finished");
+        let text = explain(&error.unwrap_err());
+        assert_eq!(
+            text,
+            "the run is not finished: writing failed: disk on fire: a.csv"
+        );
     }
 }
