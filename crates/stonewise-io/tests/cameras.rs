@@ -6,20 +6,11 @@
     reason = "helpers of tests"
 )]
 
-use nalgebra::Point3;
-use std::path::{Path, PathBuf};
-use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
+mod common;
 
-fn survey(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data")
-        .join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: the survey {name} is not here");
-    None
-}
+use common::survey;
+use nalgebra::Point3;
+use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
 
 /// Largest distance, pixels, between where two files put the same points.
 fn largest_difference(a: &CameraFile, b: &CameraFile, points: impl Fn(usize) -> Point3<f64>) -> f64 {

@@ -6,21 +6,12 @@
     reason = "helpers of tests"
 )]
 
+mod common;
+
+use common::survey;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use stonewise_io::image_io::image_size;
 use stonewise_io::masks::MaskSource;
-
-fn survey(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data")
-        .join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: the survey {name} is not here");
-    None
-}
 
 #[test]
 fn coco_and_label_png_of_the_dam_are_the_same_pixels() {

@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a test may stop at the first surprise
 
-use std::path::{Path, PathBuf};
+mod common;
+
+use common::survey;
 use std::time::Instant;
 
 use nalgebra::Vector3;
@@ -11,17 +13,6 @@ use stonewise_core::id::StoneId;
 use stonewise_io::cloud::{
     CloudError, LabelColumns, PointLabel, PointMotion, cloud_info, read_cloud, write_labelled,
 };
-
-fn survey(name: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data")
-        .join(name);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: {name} is not at hand");
-    None
-}
 
 #[test]
 fn counts_and_bounds_agree_with_the_headers() {

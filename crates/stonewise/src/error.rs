@@ -118,9 +118,3 @@ impl Error {
 
 /// Result of everything in this crate.
 pub type Result<T> = std::result::Result<T, Error>;
-
-/// Writes a text file whole or not at all.
-pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
-    stonewise_io::atomic::write_atomically(path, |partial| std::fs::write(partial, text))
-        .map_err(Error::io("writing", path))
-}

@@ -1,6 +1,7 @@
 //! A project file from what lies in a folder.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::write_text;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};

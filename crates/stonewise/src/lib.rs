@@ -1,6 +1,7 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
 mod error;
+mod files;
 mod init;
 mod limits;
 mod pipeline;

@@ -1,6 +1,7 @@
 //! Two disjoint halves of one epoch, for testing the method against a known motion.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::write_text;
 use crate::init::quoted;
 use crate::project::{Epoch, Project};
 use std::fmt::Write as _;

@@ -1,6 +1,7 @@
 //! Results of a run against a table of true stones.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::write_readable_json;
 use crate::report::{ResultSet, StoneRow};
 use nalgebra::{Point3, Vector3};
 use std::fs;
@@ -29,8 +30,7 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     let owners = owners_by_centroid(&centroids, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
-    let text = serde_json::to_string_pretty(&evaluation).unwrap_or_default();
-    write_text(&results.join("evaluation_truth.json"), &(text + "\n"))?;
+    write_readable_json(&results.join("evaluation_truth.json"), &evaluation)?;
     Ok(evaluation)
 }
 

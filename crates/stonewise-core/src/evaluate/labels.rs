@@ -150,6 +150,18 @@ impl LabelConfusion {
 mod tests {
     use super::*;
 
+    /// Predicted, true, points: 7 merges stones 1 and 2; stone 3 is split into 8 and 9; 4 is right but for 2 points; 10
+    /// is invented.
+    const SPOILT: [(u32, u32, u64); 7] = [
+        (7, 1, 60),
+        (7, 2, 40),
+        (8, 3, 30),
+        (9, 3, 50),
+        (4, 4, 98),
+        (0, 4, 2),
+        (10, 0, 20),
+    ];
+
     fn confusion(pairs: &[(u32, u32, u64)]) -> LabelConfusion {
         let mut c = LabelConfusion::default();
         for &(p, t, n) in pairs {
@@ -160,17 +172,8 @@ mod tests {
 
     #[test]
     fn merged_and_split_stones_count_once() {
-        // 7 merges stones 1 and 2; stone 3 is split into 8 and 9; 4 is right but for 2 points; 10 is invented.
-        let c = confusion(&[
-            (7, 1, 60),
-            (7, 2, 40),
-            (8, 3, 30),
-            (9, 3, 50),
-            (4, 4, 98),
-            (0, 4, 2),
-            (10, 0, 20),
-            (0, 0, 80),
-        ]);
+        let mut c = confusion(&SPOILT);
+        (0..80).for_each(|_| c.add(0, 0));
         assert_eq!(c.one_to_one(), BTreeMap::from([(4, 4), (7, 1), (9, 3)]));
         let score = c.score_labels(None);
         assert_eq!(
@@ -186,15 +189,7 @@ mod tests {
 
     #[test]
     fn instances_are_found_at_half_overlap() {
-        let c = confusion(&[
-            (7, 1, 60),
-            (7, 2, 40),
-            (8, 3, 30),
-            (9, 3, 50),
-            (4, 4, 98),
-            (0, 4, 2),
-            (10, 0, 20),
-        ]);
+        let c = confusion(&SPOILT);
         // IoU: (7,1) 0.6, (7,2) 0.4, (8,3) 0.375, (9,3) 0.625, (4,4) 0.98; 3 of 5 predicted, 3 of 4 true.
         let s = c.score_instances();
         assert_eq!((s.predicted, s.truth, s.found), (5, 4, 3));

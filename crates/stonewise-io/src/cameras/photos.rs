@@ -1,6 +1,7 @@
 //! Which file in a folder is which camera's photo.
 
 use super::{CameraError, CameraFile};
+use crate::folder::files_below;
 use crate::photo_name::{PhotoName, is_photo};
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
@@ -23,8 +24,8 @@ pub struct Photos {
 /// # Errors
 /// The folder cannot be read or holds no photo, or two files fit one view equally well.
 pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, CameraError> {
-    let mut files = Vec::new();
-    collect(folder, &mut files)?;
+    let mut files =
+        files_below(folder, &is_photo).map_err(|(path, source)| CameraError::Read { path, source })?;
     if files.is_empty() {
         return Err(CameraError::NoPhotos {
             folder: folder.to_owned(),
@@ -67,27 +68,4 @@ pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, Camera
         paths,
         without_camera: without_camera.collect(),
     })
-}
-
-/// Photos in a folder and below; hidden files and folders are left out.
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), CameraError> {
-    let failed = |source| CameraError::Read {
-        path: folder.to_owned(),
-        source,
-    };
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let is_hidden = path
-            .file_name()
-            .is_some_and(|n| n.to_string_lossy().starts_with('.'));
-        if is_hidden {
-            continue;
-        }
-        if path.is_dir() {
-            collect(&path, files)?;
-        } else if is_photo(&path) {
-            files.push(path);
-        }
-    }
-    Ok(())
 }

@@ -1,6 +1,7 @@
 //! Greyscale PNGs whose values are instances.
 
 use super::{InstanceInfo, LabelledPhoto, MaskError};
+use crate::folder::files_below;
 use crate::image_io;
 use crate::photo_name::PhotoName;
 use image::codecs::png::{PngDecoder, PngEncoder};
@@ -24,8 +25,8 @@ impl LabelFolder {
     /// # Errors
     /// The folder cannot be read or holds no PNG.
     pub fn open(folder: &Path) -> Result<Self, MaskError> {
-        let mut files = Vec::new();
-        collect(folder, &mut files)?;
+        let mut files =
+            files_below(folder, &is_png).map_err(|(path, source)| MaskError::Read { path, source })?;
         if files.is_empty() {
             return Err(MaskError::Empty {
                 path: folder.to_owned(),
@@ -163,25 +164,6 @@ pub fn write_label_png(path: &Path, labels: &LabelImage) -> Result<(), MaskError
     Ok(())
 }
 
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), MaskError> {
-    let failed = |source| MaskError::Read {
-        path: folder.to_owned(),
-        source,
-    };
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        let is_hidden = path
-            .file_name()
-            .is_some_and(|n| n.to_string_lossy().starts_with('.'));
-        let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
-        if is_hidden {
-            continue;
-        }
-        if path.is_dir() {
-            collect(&path, files)?;
-        } else if is_png {
-            files.push(path);
-        }
-    }
-    Ok(())
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"))
 }

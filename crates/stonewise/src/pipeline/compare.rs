@@ -1,8 +1,8 @@
 //! M3C2 between two epochs of a project.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::label::read_json;
 use crate::pipeline::step::Key;
 use crate::pipeline::tiled::Tiled;
 use stonewise_core::change::{ChangeField, OutwardReference, m3c2_survey};
@@ -30,10 +30,7 @@ pub fn compare(
                 Ok(())
             },
         )?;
-        let path = step.file("field.json");
-        let text = serde_json::to_vec(&field).unwrap_or_default();
-        stonewise_io::atomic::write_atomically(&path, |partial| std::fs::write(partial, text))
-            .map_err(Error::io("writing", &path))
+        write_json(&step.file("field.json"), &field)
     })?;
     read_json(&step.file("field.json"))
 }

@@ -1,6 +1,7 @@
 //! What every step needs: where to work, whom to tell, how to resume.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::step::{Key, StepDir, path_digest};
 use crate::project::Project;
 use crate::warnings::{Warning, Warnings};
@@ -70,16 +71,11 @@ impl<'a> Context<'a> {
         let resumed = dir.is_done();
         let noted = dir.file("warnings.json");
         let warnings = if resumed {
-            let text = fs::read_to_string(&noted).map_err(Error::io("reading", &noted))?;
-            serde_json::from_str::<Vec<Warning>>(&text).map_err(|e| Error::Input {
-                path: noted,
-                message: format!("not a list of warnings ({e}); remove its folder"),
-            })?
+            read_json::<Vec<Warning>>(&noted)?
         } else {
             let warnings = Warnings::default();
             make(&dir, &warnings)?;
-            let text = serde_json::to_string_pretty(&warnings.sorted()).unwrap_or_default();
-            write_text(&noted, &text)?;
+            write_json(&noted, &warnings.sorted())?;
             dir.finish()?;
             warnings.sorted()
         };

@@ -1,13 +1,12 @@
 //! An epoch's points with the stone of each.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::photos::Segmented;
 use crate::pipeline::step::{Key, StepDir};
 use crate::pipeline::tiled::Tiled;
 use crate::pipeline::tiles::DiskTiles;
-use serde::Deserialize;
-use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::stone::Stone;
@@ -47,10 +46,7 @@ pub fn label(context: &Context, number: usize, tiled: Tiled, photos: &Segmented)
         let mut store = DiskLabels::new(step.path(), tiles);
         let mask = |image| photos.labels(image).map(Some);
         let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
-        write_text(
-            &step.file("transfer.json"),
-            &serde_json::to_string(&transfer).unwrap_or_default(),
-        )
+        write_json(&step.file("transfer.json"), &transfer)
     })?;
     let transfer = read_json(&step.file("transfer.json"))?;
     let store = DiskLabels::new(step.path(), tiles);
@@ -81,10 +77,7 @@ fn tabulate(
             params,
             context.progress,
         )?;
-        write_text(
-            &step.file("stones.json"),
-            &serde_json::to_string(&stones).unwrap_or_default(),
-        )
+        write_json(&step.file("stones.json"), &stones)
     })?;
     let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
     if stones.is_empty() {
@@ -99,15 +92,6 @@ fn tabulate(
         transfer,
         key: step.key().clone(),
         store,
-    })
-}
-
-/// Reads what an earlier step wrote.
-pub(crate) fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
-    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
-    serde_json::from_str(&text).map_err(|e| Error::Input {
-        path: path.to_path_buf(),
-        message: format!("damaged ({e}); remove its folder"),
     })
 }
 

@@ -1,8 +1,9 @@
 //! The same stones in two epochs.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::label::{Labelled, read_json};
+use crate::pipeline::label::Labelled;
 use crate::pipeline::step::Key;
 use nalgebra::Point3;
 use std::collections::HashSet;
@@ -52,10 +53,7 @@ pub fn find_partners(
             overlap: Some(&overlap),
         };
         let report = match_stones(&first.stones, &second.stones, &surroundings, params);
-        write_text(
-            &step.file("matches.json"),
-            &serde_json::to_string(&report).unwrap_or_default(),
-        )
+        write_json(&step.file("matches.json"), &report)
     })?;
     let matched = Matched {
         report: read_json(&step.file("matches.json"))?,

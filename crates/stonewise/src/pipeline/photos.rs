@@ -1,6 +1,7 @@
 //! The photos of an epoch that can vote: posed, present, with masks.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::step::{Key, StepDir};
 use crate::project::Epoch;
@@ -75,17 +76,9 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
     let step = context.step(&format!("{STEP}-{number}"), key, |step, warnings| {
         let photos = write_labels(context, epoch, masks, step, warnings)?;
-        write_text(
-            &step.file("photos.json"),
-            &serde_json::to_string_pretty(&photos).unwrap_or_default(),
-        )
+        write_json(&step.file("photos.json"), &photos)
     })?;
-    let list = step.file("photos.json");
-    let text = fs::read_to_string(&list).map_err(Error::io("reading", &list))?;
-    let photos: Vec<VotingPhoto> = serde_json::from_str(&text).map_err(|e| Error::Input {
-        path: list,
-        message: format!("not a list of photos ({e}); remove its folder"),
-    })?;
+    let photos: Vec<VotingPhoto> = read_json(&step.file("photos.json"))?;
     let cameras = read_cameras(&epoch.cameras)?;
     let views = photos.iter().enumerate().filter_map(|(i, photo)| {
         let view = cameras.views.iter().find(|v| v.name == photo.camera)?;

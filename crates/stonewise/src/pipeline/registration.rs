@@ -1,8 +1,9 @@
 //! The motion of every matched stone.
 
-use crate::error::{Result, write_text};
+use crate::error::Result;
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::label::{Labelled, read_json};
+use crate::pipeline::label::Labelled;
 use crate::pipeline::matching::Matched;
 use crate::pipeline::pairs::DiskPairs;
 use crate::pipeline::step::Key;
@@ -62,10 +63,7 @@ pub fn register(
                 )?)
             }
         };
-        write_text(
-            &step.file("motions.json"),
-            &serde_json::to_string(&registered).unwrap_or_default(),
-        )
+        write_json(&step.file("motions.json"), &registered)
     })?;
     read_json(&step.file("motions.json"))
 }

@@ -1,6 +1,7 @@
 //! The method, from surveys to results.
 
 use crate::error::{Error, Result};
+use crate::files::write_readable_json;
 use crate::pipeline::clouds_out::write_clouds;
 use crate::pipeline::compare::compare;
 use crate::pipeline::context::Context;
@@ -11,7 +12,7 @@ use crate::pipeline::registration::register;
 use crate::pipeline::run_record::write_run_record;
 use crate::pipeline::score::evaluate;
 use crate::pipeline::series::write_series;
-use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_json, write_stone_outlines};
+use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_stone_outlines};
 use crate::pipeline::tiled::{Tiled, tile_epoch};
 use crate::project::Project;
 use crate::report::{StoneRow, write_layers, write_report, write_stones_named};
@@ -130,7 +131,7 @@ fn measure(
             format!("{stem}_{}", number - 1)
         }
     };
-    write_json(
+    write_readable_json(
         &context.out.join(format!("{}.json", named("matches"))),
         &matched.report,
     )?;
@@ -140,7 +141,7 @@ fn measure(
     let registered = register(context, first, second, &matched, number)?;
     let rows = stone_rows(context, first, second, &matched, &registered);
     write_stones_named(&context.out, &named("stones"), &rows)?;
-    write_json(
+    write_readable_json(
         &context.out.join(format!("{}.json", named("registration"))),
         &json!(registered.summary),
     )?;
@@ -154,7 +155,7 @@ fn measure(
         write_change(&context.out, &named("m3c2"), &change)
     })?;
     if let Some(evaluation) = evaluate(context, &first.stones, &rows, &change, number) {
-        write_json(
+        write_readable_json(
             &context.out.join(format!("{}.json", named("evaluation"))),
             &evaluation,
         )?;

@@ -1,10 +1,10 @@
 //! `run.json`: what was run, on what, how, and how long it took.
 
 use crate::error::{Error, Result};
+use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
 use crate::pipeline::photos::Segmented;
-use crate::pipeline::tables::write_json;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -42,7 +42,7 @@ pub fn write_run_record(context: &Context, photos: &[Segmented], labelled: &[Lab
         "steps": context.times(),
         "warnings": context.warnings.sorted(),
     });
-    write_json(&context.out.join("run.json"), &record)
+    write_readable_json(&context.out.join("run.json"), &record)
 }
 
 fn input(context: &Context, path: &Path) -> Result<Value> {

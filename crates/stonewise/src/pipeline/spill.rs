@@ -1,7 +1,7 @@
 //! Sorting more records into bins than memory holds.
 
 use crate::error::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ pub struct Spill<K> {
     dir: PathBuf,
     name: fn(&K) -> String,
     bins: BTreeMap<K, Vec<u8>>,
-    on_disk: BTreeMap<K, ()>,
+    on_disk: BTreeSet<K>,
     buffered: usize,
 }
 
@@ -29,7 +29,7 @@ impl<K: Ord + Clone> Spill<K> {
             dir: dir.to_path_buf(),
             name,
             bins: BTreeMap::new(),
-            on_disk: BTreeMap::new(),
+            on_disk: BTreeSet::new(),
             buffered: 0,
         })
     }
@@ -53,9 +53,9 @@ impl<K: Ord + Clone> Spill<K> {
         let keys = self
             .bins
             .keys()
-            .chain(self.on_disk.keys())
+            .chain(&self.on_disk)
             .cloned()
-            .collect::<std::collections::BTreeSet<_>>();
+            .collect::<BTreeSet<_>>();
         Ok(SpillBins {
             keys: keys.into_iter().collect(),
             dir: self.dir,
@@ -73,7 +73,7 @@ impl<K: Ord + Clone> Spill<K> {
                 .open(&path)
                 .and_then(|mut file| file.write_all(&bytes))
                 .map_err(Error::io("writing", &path))?;
-            self.on_disk.insert(bin, ());
+            self.on_disk.insert(bin);
         }
         self.buffered = 0;
         Ok(())

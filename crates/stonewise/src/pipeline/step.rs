@@ -4,7 +4,8 @@
 //! that the result depends on. Another key empties the folder; the same key keeps every finished file, so an
 //! interrupted step goes on where it stopped. `done` is written last.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::write_text;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};

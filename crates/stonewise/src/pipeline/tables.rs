@@ -1,6 +1,6 @@
 //! Result tables: stones, outlines, M3C2, evaluation, audit.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
 use crate::pipeline::matching::Matched;
@@ -237,13 +237,4 @@ impl AuditRow {
             },
         }
     }
-}
-
-/// Writes a JSON result.
-pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| Error::Input {
-        path: path.to_path_buf(),
-        message: format!("cannot be written as JSON ({e})"),
-    })?;
-    write_text(path, &(text + "\n"))
 }

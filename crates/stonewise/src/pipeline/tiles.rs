@@ -3,14 +3,14 @@
 //! Each tile is a Parquet file of x, y, z (f32 offsets from the tile's origin, metres), file (which of the
 //! epoch's clouds) and index (which record of it). `tiles.json` lists origins, bounds and counts.
 
-use crate::error::{Error, Result, write_text};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::spill::Spill;
 use crate::pipeline::step::StepDir;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
@@ -50,12 +50,7 @@ pub struct DiskTiles {
 impl DiskTiles {
     /// Opens the tiles that [`ingest`] wrote.
     pub fn open(dir: &Path) -> Result<Self> {
-        let path = dir.join("tiles.json");
-        let text = fs::read_to_string(&path).map_err(Error::io("reading", &path))?;
-        let tiles = serde_json::from_str(&text).map_err(|e| Error::Input {
-            path,
-            message: format!("not a list of tiles ({e}); remove it"),
-        })?;
+        let tiles = read_json(&dir.join("tiles.json"))?;
         Ok(Self {
             dir: dir.to_path_buf(),
             tiles,
@@ -238,7 +233,5 @@ fn write_tile(
 }
 
 fn write_index(step: &StepDir, entries: &[TileEntry]) -> Result<()> {
-    let path = step.file("tiles.json");
-    let text = serde_json::to_string_pretty(entries).unwrap_or_default();
-    write_text(&path, &text)
+    write_json(&step.file("tiles.json"), &entries)
 }

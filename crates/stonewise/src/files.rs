@@ -1,0 +1,40 @@
+//! Small files of text and JSON, whole or not at all.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+
+/// Writes a text file.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
+    stonewise_io::atomic::write_atomically(path, |partial| fs::write(partial, text))
+        .map_err(Error::io("writing", path))
+}
+
+/// Writes JSON for a later step, in one line.
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_text(path, &serde_json::to_string(value).map_err(no_json(path))?)
+}
+
+/// Writes JSON that people read too.
+pub(crate) fn write_readable_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(no_json(path))?;
+    write_text(path, &(text + "\n"))
+}
+
+/// Reads what an earlier step wrote.
+pub(crate) fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
+    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    serde_json::from_str(&text).map_err(|e| Error::Input {
+        path: path.to_path_buf(),
+        message: format!("damaged ({e}); remove its folder"),
+    })
+}
+
+fn no_json(path: &Path) -> impl FnOnce(serde_json::Error) -> Error {
+    let path = path.to_path_buf();
+    move |e| Error::Input {
+        path,
+        message: format!("cannot be written as JSON ({e})"),
+    }
+}
