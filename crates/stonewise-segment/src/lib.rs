@@ -1,7 +1,11 @@
 //! Finds the stones of masonry in photos: Mask R-CNN (He et al. 2017), its training and its evaluation.
 
 mod detection;
+pub mod evaluation;
 mod sample;
+mod segmentation;
+pub mod tiling;
 
 pub use detection::{Detection, Detector, Patch};
 pub use sample::{Sample, SampleError};
+pub use segmentation::Segmentation;

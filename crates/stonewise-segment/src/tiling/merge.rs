@@ -1,0 +1,187 @@
+//! One stone from many candidates.
+
+use super::candidate::Candidate;
+use super::grid::Rect;
+use super::options::TilingOptions;
+use crate::{Patch, Segmentation};
+use std::collections::BTreeMap;
+use stonewise_core::raster::{LabelImage, Raster, connected_components};
+
+/// Two cut masks of neighbouring tiles are one stone if, where both tiles see, this share of the smaller lies in the larger.
+const SAME_STONE_SHARE: f64 = 0.5;
+
+/// Lays candidates on a photo from best to worst.
+///
+/// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone, and come after all whole
+/// ones: only stones larger than the overlap at every scale are made of them. Of the rest the higher score wins, then the finer scale.
+pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &TilingOptions) -> Segmentation {
+    let (cut, mut all): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
+    all.extend(joined(cut));
+    all.sort_by(|a, b| {
+        (a.is_cut.cmp(&b.is_cut))
+            .then(b.score.total_cmp(&a.score))
+            .then((a.scale, a.mask.top, a.mask.left, a.area).cmp(&(b.scale, b.mask.top, b.mask.left, b.area)))
+    });
+    let mut painted: LabelImage = Raster::filled(width, height, 0);
+    let mut scores = Vec::new();
+    for candidate in &all {
+        let mut new = 0;
+        for_each_pixel(&candidate.mask, |x, y| {
+            new += u32::from(painted.get(x, y) == Some(&0))
+        });
+        let is_new = f64::from(new) >= options.min_new_share * f64::from(candidate.area);
+        if is_new && new >= options.min_area_px {
+            scores.push(candidate.score);
+            let label = scores.len() as u32;
+            for_each_pixel(&candidate.mask, |x, y| {
+                if let Some(pixel) = painted.get_mut(x, y).filter(|p| **p == 0) {
+                    *pixel = label;
+                }
+            });
+        }
+    }
+    without_fragments(&painted, &scores, options.min_area_px)
+}
+
+/// The largest part of every stone, numbered by its first pixel in row order.
+fn without_fragments(painted: &LabelImage, scores: &[f32], min_area_px: u32) -> Segmentation {
+    let (mut labels, parts) = connected_components(painted);
+    let mut largest: BTreeMap<u32, usize> = BTreeMap::new();
+    for (index, part) in parts.iter().enumerate() {
+        let best = largest.entry(part.label).or_insert(index);
+        if parts[*best].area < part.area {
+            *best = index;
+        }
+    }
+    let mut kept: Vec<usize> = largest
+        .into_values()
+        .filter(|&i| parts[i].area >= min_area_px)
+        .collect();
+    kept.sort_unstable();
+    let mut number = vec![0u32; parts.len() + 1];
+    let mut stones = BTreeMap::new();
+    for (index, id) in kept.into_iter().zip(1..) {
+        number[index + 1] = id;
+        stones.insert(id, scores[parts[index].label as usize - 1]);
+    }
+    for label in labels.data_mut() {
+        *label = number[*label as usize];
+    }
+    Segmentation {
+        labels,
+        scores: stones,
+    }
+}
+
+/// Cut masks, joined where neighbouring tiles show parts of one stone. Cost: O(n^2) tests of rectangles.
+fn joined(cut: Vec<Candidate>) -> Vec<Candidate> {
+    let mut group: Vec<usize> = (0..cut.len()).collect();
+    for second in 0..cut.len() {
+        for first in 0..second {
+            let (a, b) = (root(&mut group, first), root(&mut group, second));
+            if a != b && is_same_stone(&cut[first], &cut[second]) {
+                group[a.max(b)] = a.min(b);
+            }
+        }
+    }
+    let mut members: BTreeMap<usize, Vec<&Candidate>> = BTreeMap::new();
+    for (index, candidate) in cut.iter().enumerate() {
+        members
+            .entry(root(&mut group, index))
+            .or_default()
+            .push(candidate);
+    }
+    members.into_values().map(|members| union(&members)).collect()
+}
+
+fn root(group: &mut [usize], mut index: usize) -> usize {
+    while group[index] != index {
+        group[index] = group[group[index]];
+        index = group[index];
+    }
+    index
+}
+
+fn is_same_stone(a: &Candidate, b: &Candidate) -> bool {
+    if a.scale != b.scale || a.tile == b.tile {
+        return false;
+    }
+    let Some(zone) = intersection(&a.tile, &b.tile) else {
+        return false;
+    };
+    let [in_a, in_b] = [a, b].map(|c| intersection(&zone, &extent(&c.mask)));
+    let (Some(in_a), Some(in_b)) = (in_a, in_b) else {
+        return false;
+    };
+    let smaller = count(&in_a, |x, y| is_set(&a.mask, x, y)).min(count(&in_b, |x, y| is_set(&b.mask, x, y)));
+    let both = intersection(&in_a, &in_b).map_or(0, |part| {
+        count(&part, |x, y| is_set(&a.mask, x, y) && is_set(&b.mask, x, y))
+    });
+    both > 0 && f64::from(both) >= SAME_STONE_SHARE * f64::from(smaller)
+}
+
+/// All masks as one, with the best score.
+fn union(members: &[&Candidate]) -> Candidate {
+    let mut all = members[0].clone();
+    for member in &members[1..] {
+        let [a, b] = [&all.mask, &member.mask].map(extent);
+        let (left, top) = (a.left.min(b.left), a.top.min(b.top));
+        let right = (a.left + a.width).max(b.left + b.width);
+        let bottom = (a.top + a.height).max(b.top + b.height);
+        let mut pixels = Raster::filled(right - left, bottom - top, false);
+        for mask in [&all.mask, &member.mask] {
+            for_each_pixel(mask, |x, y| {
+                if let Some(pixel) = pixels.get_mut(x - left, y - top) {
+                    *pixel = true;
+                }
+            });
+        }
+        all.area = pixels.data().iter().filter(|p| **p).count() as u32;
+        all.mask = Patch { left, top, pixels };
+        all.score = all.score.max(member.score);
+    }
+    all
+}
+
+fn extent(mask: &Patch) -> Rect {
+    Rect {
+        left: mask.left,
+        top: mask.top,
+        width: mask.pixels.width(),
+        height: mask.pixels.height(),
+    }
+}
+
+fn intersection(a: &Rect, b: &Rect) -> Option<Rect> {
+    let (left, top) = (a.left.max(b.left), a.top.max(b.top));
+    let right = (a.left + a.width).min(b.left + b.width);
+    let bottom = (a.top + a.height).min(b.top + b.height);
+    (left < right && top < bottom).then(|| Rect {
+        left,
+        top,
+        width: right - left,
+        height: bottom - top,
+    })
+}
+
+/// Number of pixels of a rectangle for which something holds.
+fn count(part: &Rect, holds: impl Fn(u32, u32) -> bool) -> u32 {
+    let columns = part.left..part.left + part.width;
+    (part.top..part.top + part.height)
+        .map(|y| columns.clone().filter(|&x| holds(x, y)).count() as u32)
+        .sum()
+}
+
+/// Whether a pixel of the photo, which lies in the mask's extent, is set.
+fn is_set(mask: &Patch, x: u32, y: u32) -> bool {
+    mask.pixels.get(x - mask.left, y - mask.top) == Some(&true)
+}
+
+fn for_each_pixel(mask: &Patch, mut act: impl FnMut(u32, u32)) {
+    let width = mask.pixels.width() as usize;
+    for (y, row) in mask.pixels.data().chunks(width.max(1)).enumerate() {
+        for (x, _) in row.iter().enumerate().filter(|(_, set)| **set) {
+            act(mask.left + x as u32, mask.top + y as u32);
+        }
+    }
+}
