@@ -4,6 +4,7 @@ mod detection;
 pub mod evaluation;
 mod sample;
 mod segmentation;
+pub mod synth;
 pub mod tiling;
 
 pub use detection::{Detection, Detector, Patch};

@@ -37,6 +37,29 @@ impl Sample {
         })
     }
 
+    /// A sample from the colour, the stone and the doubt of every pixel, by its row-major index.
+    pub(crate) fn from_pixels(
+        width: u32,
+        height: u32,
+        mut pixel: impl FnMut(usize) -> ([u8; 3], u32, bool),
+    ) -> Self {
+        let mut sample = Self {
+            image: Raster::filled(width, height, [0; 3]),
+            labels: Raster::filled(width, height, 0),
+            ignore: Raster::filled(width, height, false),
+        };
+        let parts = sample
+            .image
+            .data_mut()
+            .iter_mut()
+            .zip(sample.labels.data_mut())
+            .zip(sample.ignore.data_mut());
+        for (i, ((colour, label), doubt)) in parts.enumerate() {
+            (*colour, *label, *doubt) = pixel(i);
+        }
+        sample
+    }
+
     /// The photo.
     pub fn image(&self) -> &RgbImage {
         &self.image

@@ -1,0 +1,62 @@
+//! Renders a sheet of the photos that the built-in weights learn from, to look at beside real ones.
+//!
+//! `cargo run --release -p stonewise-segment --example masonry_sheet -- SHEET.png [FIRST_SEED] [COLUMNS] [ROWS] [SIZE] [overlay]`
+
+use std::error::Error;
+use stonewise_segment::Sample;
+use stonewise_segment::synth::masonry_photo;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let path = arguments.first().ok_or("say where to write the sheet")?;
+    let number = |index: usize, otherwise: u64| arguments.get(index).map_or(Ok(otherwise), |a| a.parse());
+    let first = number(1, 0)?;
+    let (columns, rows, size) = (number(2, 4)? as u32, number(3, 2)? as u32, number(4, 384)? as u32);
+    let overlay = arguments.get(5).is_some_and(|a| a == "overlay");
+    let mut sheet = image::RgbImage::new(columns * size, rows * size);
+    let start = std::time::Instant::now();
+    for tile in 0..columns * rows {
+        let sample = masonry_photo(first + u64::from(tile), size, size);
+        for (i, &colour) in sample.image().data().iter().enumerate() {
+            let colour = if overlay {
+                marked(&sample, i, colour)
+            } else {
+                colour
+            };
+            let (x, y) = (i as u32 % size, i as u32 / size);
+            let at = (tile % columns * size + x, tile / columns * size + y);
+            sheet.put_pixel(at.0, at.1, image::Rgb(colour));
+        }
+    }
+    let each = start.elapsed().as_secs_f64() * 1000.0 / f64::from((columns * rows).max(1));
+    sheet.save(path)?;
+    writeln!(std::io::stdout(), "{path}: {each:.1} ms a photo")?;
+    Ok(())
+}
+
+use std::io::Write;
+
+/// Each stone tinted in a colour of its own with a bright outline, doubtful places dark.
+fn marked(sample: &Sample, i: usize, colour: [u8; 3]) -> [u8; 3] {
+    let labels = sample.labels();
+    let label = labels.data()[i];
+    if sample.ignore().data()[i] {
+        return colour.map(|c| c / 4);
+    }
+    if label == 0 {
+        return colour;
+    }
+    let width = labels.width() as usize;
+    let edge = [i + 1, i + width]
+        .iter()
+        .any(|&n| labels.data().get(n).is_some_and(|&other| other != label));
+    let hue = label.wrapping_mul(2_654_435_761);
+    let tint = [hue >> 24, hue >> 16 & 255, hue >> 8 & 255];
+    [0, 1, 2].map(|c: usize| {
+        if edge {
+            255 - (tint[c] / 3) as u8
+        } else {
+            ((3 * u32::from(colour[c]) + tint[c]) / 4) as u8
+        }
+    })
+}

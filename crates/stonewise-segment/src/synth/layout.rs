@@ -1,0 +1,494 @@
+//! How stones fill a wall: bonds and rubble as convex cells that meet along their edges.
+//!
+//! Wall coordinates: x right, y down, in pixels of the photo at its centre.
+
+use super::draw::{Rng, between, chance, log_between, normal};
+
+/// A convex polygon, its corners in order.
+pub(super) type Ring = Vec<[f32; 2]>;
+
+/// The part of the wall to be filled: x from, y from, x to, y to.
+pub(super) type Extent = [f32; 4];
+
+/// How the stones of a wall are laid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bond {
+    /// Courses of squared blocks.
+    Courses(Courses),
+    /// Bricks of one size.
+    Brick {
+        /// Length over height, 1.5 to 4.5.
+        aspect: f32,
+        /// How headers and stretchers alternate.
+        pattern: BrickPattern,
+    },
+    /// Squared blocks of several sizes without through-going courses (snecked masonry).
+    Squared {
+        /// Width of the grid that the blocks share, over its height, 0.8 to 2.
+        aspect: f32,
+        /// Shift of its corners in parts of a grid cell, 0 to 0.2.
+        jitter: f32,
+    },
+    /// Irregular polygons: random rubble, cobbles, dry stone.
+    Rubble {
+        /// Mean length over height, 0.8 to 2.2.
+        aspect: f32,
+        /// Probability that a place for a large stone is filled with four smaller, twice over, 0 to 0.8.
+        mixture: f32,
+        /// Shift of the stones' centres in parts of their spacing, 0.1 to 0.9.
+        disorder: f32,
+    },
+}
+
+/// Courses of squared blocks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Courses {
+    /// Median length over height, 0.9 to 3.
+    pub aspect: f32,
+    /// Standard deviation of the logarithm of the courses' heights, 0 to 0.35.
+    pub height_spread: f32,
+    /// Standard deviation of the logarithm of the blocks' lengths, 0.05 to 0.5.
+    pub length_spread: f32,
+    /// Sideways lean of the vertical joints in parts of the height, 0 to 0.3.
+    pub lean: f32,
+    /// Probability that a block is replaced by two thinner ones, 0 to 0.35.
+    pub split: f32,
+}
+
+/// How headers (short faces) and stretchers (long faces) of bricks alternate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BrickPattern {
+    /// Stretchers, shifted by half a length from course to course.
+    Running,
+    /// Stretchers without shift.
+    Stack,
+    /// Courses of headers and of stretchers in turn.
+    English,
+    /// Headers and stretchers in turn within each course.
+    Flemish,
+}
+
+impl Bond {
+    /// A bond drawn at random: courses and rubble a third each, the rest squared blocks and bricks.
+    pub(super) fn random(rng: &mut Rng) -> Self {
+        let kind = between(rng, 0.0, 1.0);
+        if kind < 0.38 {
+            let regular = chance(rng, 0.4);
+            Self::Courses(Courses {
+                aspect: log_between(rng, 0.9, 3.0),
+                height_spread: if regular { 0.0 } else { between(rng, 0.0, 0.35) },
+                length_spread: between(rng, 0.05, 0.5),
+                lean: if regular { 0.0 } else { between(rng, 0.0, 0.3) },
+                split: if regular { 0.0 } else { between(rng, 0.0, 0.35) },
+            })
+        } else if kind < 0.72 {
+            Self::Rubble {
+                aspect: log_between(rng, 0.8, 2.2),
+                mixture: between(rng, 0.0, 0.8),
+                disorder: between(rng, 0.1, 0.9),
+            }
+        } else if kind < 0.87 {
+            Self::Squared {
+                aspect: log_between(rng, 0.8, 2.0),
+                jitter: between(rng, 0.0, 0.2),
+            }
+        } else {
+            let pattern = match rng_index(rng, 5) {
+                0 => BrickPattern::Stack,
+                1 => BrickPattern::English,
+                2 => BrickPattern::Flemish,
+                _ => BrickPattern::Running,
+            };
+            Self::Brick {
+                aspect: between(rng, 1.5, 4.5),
+                pattern,
+            }
+        }
+    }
+
+    /// Cells that fill the extent and reach a little beyond it; `size` is about the square root of a stone's area.
+    pub(super) fn lay(&self, size: f32, extent: Extent, rng: &mut Rng) -> Vec<Ring> {
+        match *self {
+            Self::Courses(courses) => lay_courses(&courses, size, extent, rng),
+            Self::Brick { aspect, pattern } => lay_bricks(aspect, pattern, size, extent, rng),
+            Self::Squared { aspect, jitter } => lay_squared(aspect, jitter, size, extent, rng),
+            Self::Rubble {
+                aspect,
+                mixture,
+                disorder,
+            } => lay_rubble(aspect, mixture, disorder, size, extent, rng),
+        }
+    }
+}
+
+fn rng_index(rng: &mut Rng, count: usize) -> usize {
+    (between(rng, 0.0, count as f32) as usize).min(count - 1)
+}
+
+fn lay_courses(courses: &Courses, size: f32, extent: Extent, rng: &mut Rng) -> Vec<Ring> {
+    let median_height = size / courses.aspect.sqrt();
+    let mut cells = Vec::new();
+    let mut top = extent[1] - between(rng, 0.0, median_height);
+    while top < extent[3] {
+        let height = median_height * (courses.height_spread * normal(rng)).clamp(-0.8, 0.8).exp();
+        let bottom = top + height;
+        let joint = |x: f32, rng: &mut Rng| {
+            let lean = courses.lean * height * between(rng, -0.5, 0.5);
+            [x + lean, x - lean]
+        };
+        let mut x = extent[0] - between(rng, 0.0, size);
+        let mut left = joint(x, rng);
+        while x < extent[2] {
+            let stretch = (courses.length_spread * normal(rng)).clamp(-1.2, 1.2).exp();
+            x += (median_height * courses.aspect * stretch).max(0.4 * height);
+            let right = joint(x, rng);
+            let block = [
+                [left[0], top],
+                [right[0], top],
+                [right[1], bottom],
+                [left[1], bottom],
+            ];
+            if chance(rng, courses.split) {
+                split_block(block, rng, &mut cells);
+            } else {
+                cells.push(block.to_vec());
+            }
+            left = right;
+        }
+        top = bottom;
+    }
+    cells
+}
+
+/// Two blocks one above the other, each at times cut in two side by side.
+fn split_block(block: [[f32; 2]; 4], rng: &mut Rng, cells: &mut Vec<Ring>) {
+    let at = between(rng, 0.3, 0.7);
+    let slope = between(rng, -0.08, 0.08);
+    let (left, right) = (
+        along(block[0], block[3], at + slope),
+        along(block[1], block[2], at - slope),
+    );
+    for half in [
+        [block[0], block[1], right, left],
+        [left, right, block[2], block[3]],
+    ] {
+        if chance(rng, 0.45) {
+            let cut = between(rng, 0.3, 0.7);
+            let (top, bottom) = (
+                along(half[0], half[1], cut),
+                along(half[3], half[2], cut + between(rng, -0.06, 0.06)),
+            );
+            cells.push(vec![half[0], top, bottom, half[3]]);
+            cells.push(vec![top, half[1], half[2], bottom]);
+        } else {
+            cells.push(half.to_vec());
+        }
+    }
+}
+
+fn along(a: [f32; 2], b: [f32; 2], t: f32) -> [f32; 2] {
+    [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])]
+}
+
+fn lay_bricks(aspect: f32, pattern: BrickPattern, size: f32, extent: Extent, rng: &mut Rng) -> Vec<Ring> {
+    let height = size / aspect.sqrt();
+    let length = height * aspect;
+    let (x0, y0) = (
+        extent[0] - between(rng, 0.0, length),
+        extent[1] - between(rng, 0.0, height),
+    );
+    let courses = ((extent[3] - y0) / height).ceil().max(1.0) as usize;
+    let mut cells = Vec::new();
+    for course in 0..courses {
+        let odd = course % 2 == 1;
+        let top = y0 + course as f32 * height;
+        let mut x = x0
+            - match pattern {
+                BrickPattern::Running if odd => 0.5 * length,
+                BrickPattern::English if odd => 0.25 * length,
+                BrickPattern::Flemish if odd => 0.75 * length,
+                _ => 0.0,
+            };
+        let mut header = pattern == BrickPattern::English && odd;
+        while x < extent[2] {
+            let width = if header { 0.5 * length } else { length };
+            let wobble = 0.012 * height;
+            let right = x + width * (1.0 + 0.01 * normal(rng));
+            let (low, high) = (top + wobble * normal(rng), top + height + wobble * normal(rng));
+            cells.push(vec![[x, low], [right, low], [right, high], [x, high]]);
+            x += width;
+            if pattern == BrickPattern::Flemish {
+                header = !header;
+            }
+        }
+    }
+    cells
+}
+
+/// Fills a grid, in reading order, with blocks of random numbers of rows and columns.
+fn lay_squared(aspect: f32, jitter: f32, size: f32, extent: Extent, rng: &mut Rng) -> Vec<Ring> {
+    let row = 0.62 * size / aspect.sqrt();
+    let column = row * aspect;
+    let columns = ((extent[2] - extent[0]) / column).ceil().max(1.0) as usize + 4;
+    let rows = ((extent[3] - extent[1]) / row).ceil().max(1.0) as usize + 3;
+    let corners: Vec<[f32; 2]> = (0..(columns + 1) * (rows + 1))
+        .map(|i| {
+            let (c, r) = ((i % (columns + 1)) as f32, (i / (columns + 1)) as f32);
+            [
+                extent[0] + column * (c - 2.0 + jitter * between(rng, -1.0, 1.0)),
+                extent[1] + row * (r - 1.5 + jitter * between(rng, -1.0, 1.0)),
+            ]
+        })
+        .collect();
+    let corner = |c: usize, r: usize| corners[r * (columns + 1) + c];
+    let mut taken = vec![false; columns * rows];
+    let mut cells = Vec::new();
+    for r in 0..rows {
+        for c in 0..columns {
+            if taken[r * columns + c] {
+                continue;
+            }
+            let most = 1 + rng_index(rng, 3);
+            let wide = (1..=most)
+                .take_while(|k| c + k <= columns && !taken[r * columns + c + k - 1])
+                .count();
+            let high = (1 + rng_index(rng, 3)).min(rows - r).min(wide + 1);
+            for y in r..r + high {
+                taken[y * columns + c..y * columns + c + wide].fill(true);
+            }
+            cells.push(vec![
+                corner(c, r),
+                corner(c + wide, r),
+                corner(c + wide, r + high),
+                corner(c, r + high),
+            ]);
+        }
+    }
+    cells
+}
+
+/// Power diagram (Aurenhammer 1987) of points of several weights: large stones among small ones.
+fn lay_rubble(
+    aspect: f32,
+    mixture: f32,
+    disorder: f32,
+    size: f32,
+    extent: Extent,
+    rng: &mut Rng,
+) -> Vec<Ring> {
+    // In a frame squeezed along x, where stones are as long as high.
+    let squeeze = 1.0 / aspect.sqrt();
+    let frame = [
+        extent[0] * squeeze,
+        extent[1] / squeeze,
+        extent[2] * squeeze,
+        extent[3] / squeeze,
+    ];
+    let coarse = size * (1.0 + mixture);
+    let sites = scatter(coarse, mixture, disorder, frame, rng);
+    let reach = 2.2 * coarse;
+    let bins = Bins::new(&sites, reach, frame);
+    sites
+        .iter()
+        .enumerate()
+        .filter_map(|(i, site)| {
+            let mut ring = vec![
+                [site.x - reach, site.y - reach],
+                [site.x + reach, site.y - reach],
+                [site.x + reach, site.y + reach],
+                [site.x - reach, site.y + reach],
+            ];
+            for j in bins.near(site) {
+                if i != j {
+                    let (dx, dy) = (sites[j].x - site.x, sites[j].y - site.y);
+                    let gap = dx * dx + dy * dy;
+                    if gap < reach * reach && gap > 0.0 {
+                        let t = 0.5 * (gap + site.weight - sites[j].weight);
+                        clip(&mut ring, [dx, dy], t + dx * site.x + dy * site.y);
+                    }
+                }
+            }
+            for point in &mut ring {
+                *point = [point[0] / squeeze, point[1] * squeeze];
+            }
+            (ring.len() >= 3).then_some(ring)
+        })
+        .collect()
+}
+
+/// A point of the power diagram.
+struct Site {
+    x: f32,
+    y: f32,
+    weight: f32,
+}
+
+/// Points on a staggered grid of `spacing`, each replaced by four with probability `mixture`, and those again with half of it.
+fn scatter(spacing: f32, mixture: f32, disorder: f32, frame: Extent, rng: &mut Rng) -> Vec<Site> {
+    let mut sites = Vec::new();
+    let mut y = frame[1] - spacing;
+    let mut odd = false;
+    while y < frame[3] + spacing {
+        let mut x = frame[0] - spacing * if odd { 1.5 } else { 1.0 };
+        while x < frame[2] + spacing {
+            place(
+                &mut sites,
+                [x, y],
+                spacing,
+                [mixture, 0.5 * mixture],
+                disorder,
+                rng,
+            );
+            x += spacing;
+        }
+        y += spacing;
+        odd = !odd;
+    }
+    sites
+}
+
+fn place(sites: &mut Vec<Site>, corner: [f32; 2], side: f32, split: [f32; 2], disorder: f32, rng: &mut Rng) {
+    if chance(rng, split[0]) {
+        let half = 0.5 * side;
+        for (i, j) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let corner = [corner[0] + i * half, corner[1] + j * half];
+            place(sites, corner, half, [split[1], 0.0], disorder, rng);
+        }
+        return;
+    }
+    let shift = 0.5 * disorder * side;
+    sites.push(Site {
+        x: corner[0] + 0.5 * side + between(rng, -shift, shift),
+        y: corner[1] + 0.5 * side + between(rng, -shift, shift),
+        weight: 0.12 * side * side * between(rng, 0.3, 1.0),
+    });
+}
+
+/// Sites by square of a grid.
+struct Bins {
+    origin: [f32; 2],
+    side: f32,
+    columns: usize,
+    rows: usize,
+    sites: Vec<Vec<usize>>,
+}
+
+impl Bins {
+    fn new(sites: &[Site], side: f32, frame: Extent) -> Self {
+        let origin = [frame[0] - side, frame[1] - side];
+        let columns = ((frame[2] - origin[0]) / side) as usize + 2;
+        let rows = ((frame[3] - origin[1]) / side) as usize + 2;
+        let mut bins = Self {
+            origin,
+            side,
+            columns,
+            rows,
+            sites: vec![Vec::new(); columns * rows],
+        };
+        for (i, site) in sites.iter().enumerate() {
+            let (c, r) = bins.square(site);
+            bins.sites[r * columns + c].push(i);
+        }
+        bins
+    }
+
+    fn square(&self, site: &Site) -> (usize, usize) {
+        let c = ((site.x - self.origin[0]) / self.side) as usize;
+        let r = ((site.y - self.origin[1]) / self.side) as usize;
+        (c.min(self.columns - 1), r.min(self.rows - 1))
+    }
+
+    /// Sites at most one square away.
+    fn near(&self, site: &Site) -> impl Iterator<Item = usize> {
+        let (c, r) = self.square(site);
+        let columns = c.saturating_sub(1)..(c + 2).min(self.columns);
+        (r.saturating_sub(1)..(r + 2).min(self.rows)).flat_map(move |y| {
+            columns
+                .clone()
+                .flat_map(move |x| self.sites[y * self.columns + x].iter().copied())
+        })
+    }
+}
+
+/// Keeps the part of a convex ring where `normal . p <= limit` (Sutherland and Hodgman 1974).
+fn clip(ring: &mut Ring, normal: [f32; 2], limit: f32) {
+    let excess = |p: [f32; 2]| normal[0] * p[0] + normal[1] * p[1] - limit;
+    if ring.iter().all(|&p| excess(p) <= 0.0) {
+        return;
+    }
+    let mut kept = Vec::with_capacity(ring.len() + 1);
+    for (i, &b) in ring.iter().enumerate() {
+        let a = ring[(i + ring.len() - 1) % ring.len()];
+        let (ea, eb) = (excess(a), excess(b));
+        if (ea <= 0.0) != (eb <= 0.0) {
+            kept.push(along(a, b, ea / (ea - eb)));
+        }
+        if eb <= 0.0 {
+            kept.push(b);
+        }
+    }
+    *ring = kept;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    fn contains(ring: &Ring, p: [f32; 2]) -> bool {
+        let turn = |i: usize| {
+            let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+        };
+        (0..ring.len()).all(|i| turn(i) >= 0.0)
+    }
+
+    #[test]
+    fn cells_cover_the_extent_once() {
+        let extent = [-150.0, -90.0, 130.0, 110.0];
+        for seed in 0..40 {
+            let mut rng = Rng::seed_from_u64(seed);
+            let bond = Bond::random(&mut rng);
+            let cells = bond.lay(24.0, extent, &mut rng);
+            let (mut covered, mut doubly) = (0, 0);
+            for _ in 0..400 {
+                let p = [between(&mut rng, -150.0, 130.0), between(&mut rng, -90.0, 110.0)];
+                let count = cells.iter().filter(|ring| contains(ring, p)).count();
+                covered += usize::from(count > 0);
+                doubly += usize::from(count > 1);
+            }
+            assert!(covered >= 380, "{bond:?}: {covered}");
+            assert!(doubly <= 24, "{bond:?}: {doubly}");
+        }
+    }
+
+    #[test]
+    fn rubble_cells_are_the_nearest_points_by_power_distance() {
+        let mut rng = Rng::seed_from_u64(5);
+        let frame = [0.0, 0.0, 100.0, 100.0];
+        let cells = lay_rubble(1.0, 0.6, 0.7, 20.0, frame, &mut rng);
+        let mut rng = Rng::seed_from_u64(5);
+        let sites = scatter(20.0 * 1.6, 0.6, 0.7, frame, &mut rng);
+        assert!(cells.len() <= sites.len());
+        for _ in 0..500 {
+            let p = [between(&mut rng, 0.0, 100.0), between(&mut rng, 0.0, 100.0)];
+            let power = |s: &Site| (p[0] - s.x).powi(2) + (p[1] - s.y).powi(2) - s.weight;
+            let Some(nearest) = sites.iter().min_by(|a, b| power(a).total_cmp(&power(b))) else {
+                continue;
+            };
+            let Some(cell) = cells.iter().find(|ring| contains(ring, p)) else {
+                panic!("no cell holds {p:?}");
+            };
+            // A cell is convex, so its centre belongs to the same site.
+            let centre = cell.iter().fold([0.0, 0.0], |sum, q| {
+                [
+                    sum[0] + q[0] / cell.len() as f32,
+                    sum[1] + q[1] / cell.len() as f32,
+                ]
+            });
+            let at_centre = |s: &Site| (centre[0] - s.x).powi(2) + (centre[1] - s.y).powi(2) - s.weight;
+            let least = sites.iter().map(at_centre).fold(f32::INFINITY, f32::min);
+            assert!(at_centre(nearest) - least < 1e-2);
+        }
+    }
+}
