@@ -2,6 +2,7 @@
 
 mod detection;
 pub mod evaluation;
+pub mod model;
 mod sample;
 mod segmentation;
 pub mod synth;

@@ -1,0 +1,56 @@
+//! First values of a network's parameters, the same for the same seed on every machine.
+
+use burn::module::{Param, ParamId};
+use burn::tensor::backend::Backend;
+use burn::tensor::{Tensor, TensorData};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Makes parameters one after the other, numbering them.
+pub struct Init<'a, B: Backend> {
+    rng: ChaCha8Rng,
+    made: u64,
+    device: &'a B::Device,
+}
+
+impl<'a, B: Backend> Init<'a, B> {
+    /// Starts a network.
+    pub fn new(seed: u64, device: &'a B::Device) -> Self {
+        Self {
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            made: 0,
+            device,
+        }
+    }
+
+    /// Normally distributed values.
+    pub fn normal<const D: usize>(&mut self, shape: [usize; D], std: f32) -> Param<Tensor<B, D>> {
+        let mut draw = || {
+            // Box & Muller 1958.
+            let radius = (-2.0 * (1.0 - self.rng.random::<f32>()).ln()).sqrt();
+            std * radius * (std::f32::consts::TAU * self.rng.random::<f32>()).cos()
+        };
+        let values = (0..shape.iter().product()).map(|_| draw()).collect();
+        self.values(shape, values)
+    }
+
+    /// Values spread evenly over -bound to bound.
+    pub fn uniform<const D: usize>(&mut self, shape: [usize; D], bound: f32) -> Param<Tensor<B, D>> {
+        let count = shape.iter().product();
+        let values = (0..count)
+            .map(|_| bound * (2.0 * self.rng.random::<f32>() - 1.0))
+            .collect();
+        self.values(shape, values)
+    }
+
+    /// The same value everywhere.
+    pub fn constant<const D: usize>(&mut self, shape: [usize; D], value: f32) -> Param<Tensor<B, D>> {
+        self.values(shape, vec![value; shape.iter().product()])
+    }
+
+    fn values<const D: usize>(&mut self, shape: [usize; D], values: Vec<f32>) -> Param<Tensor<B, D>> {
+        self.made += 1;
+        let tensor = Tensor::from_data(TensorData::new(values, shape), self.device);
+        Param::initialized(ParamId::from(self.made), tensor.require_grad())
+    }
+}
