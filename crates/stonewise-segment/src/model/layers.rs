@@ -2,12 +2,10 @@
 
 use super::config::Norm as NormConfig;
 use super::init::Init;
-use super::kernels::ModelBackend;
+use super::kernels::{ModelBackend, float, primitive};
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
-use burn::tensor::module::{conv_transpose2d, conv2d};
-use burn::tensor::ops::{ConvOptions, ConvTransposeOptions};
 
 /// How a layer's weights are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -59,9 +57,13 @@ impl<B: ModelBackend> Conv<B> {
 
     /// [batch, in, rows, columns] to [batch, out, rows / stride, columns / stride], rounded up.
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        let padding = self.weight.dims()[2] / 2;
-        let options = ConvOptions::new([self.stride; 2], [padding; 2], [1; 2], 1);
-        conv2d(x, self.weight.val(), self.bias.as_ref().map(Param::val), options)
+        let bias = self.bias.as_ref().map(|bias| primitive(bias.val()));
+        float(B::convolve(
+            primitive(x),
+            primitive(self.weight.val()),
+            bias,
+            self.stride,
+        ))
     }
 }
 
@@ -82,8 +84,26 @@ impl<B: ModelBackend> Doubling<B> {
 
     /// [batch, in, rows, columns] to [batch, out, 2 rows, 2 columns].
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        let options = ConvTransposeOptions::new([2; 2], [0; 2], [0; 2], [1; 2], 1);
-        conv_transpose2d(x, self.weight.val(), Some(self.bias.val()), options)
+        let [inputs, outputs, ..] = self.weight.dims();
+        let [batch, _, rows, columns] = x.dims();
+        // Nothing overlaps: each pixel makes its own four.
+        let weight = self.weight.val().reshape([inputs, 4 * outputs]).transpose();
+        let weight = weight.reshape([4 * outputs, inputs, 1, 1]);
+        let bias = self
+            .bias
+            .val()
+            .unsqueeze_dim::<2>(1)
+            .repeat_dim(1, 4)
+            .flatten::<1>(0, 1);
+        let x = float::<B, 4>(B::convolve(
+            primitive(x),
+            primitive(weight),
+            Some(primitive(bias)),
+            1,
+        ));
+        x.reshape([batch, outputs, 2, 2, rows, columns])
+            .permute([0, 1, 4, 2, 5, 3])
+            .reshape([batch, outputs, 2 * rows, 2 * columns])
     }
 }
 
@@ -147,13 +167,14 @@ impl<B: ModelBackend> Norm<B> {
         match self.frozen() {
             Some([scale, shift]) => x * per_channel(scale) + per_channel(shift),
             None => {
-                let [batch, channels, rows, columns] = x.dims();
-                let x = x.reshape([batch, self.groups, channels / self.groups * rows * columns]);
-                let x = x.clone() - x.mean_dim(2);
-                let variance = x.clone().square().mean_dim(2);
-                let x = x / (variance + self.epsilon).sqrt();
-                x.reshape([batch, channels, rows, columns]) * per_channel(self.weight.val())
-                    + per_channel(self.bias.val())
+                let (scale, shift) = (primitive(self.weight.val()), primitive(self.bias.val()));
+                float(B::group_norm(
+                    primitive(x),
+                    scale,
+                    shift,
+                    self.groups,
+                    self.epsilon,
+                ))
             }
         }
     }

@@ -1,9 +1,9 @@
 //! RoIAlign (He et al. 2017, section 3) on a feature pyramid.
 
 use super::boxes::{Bounds, area};
-use super::kernels::ModelBackend;
+use super::kernels::{ModelBackend, float, primitive};
 use super::sparse::SparseMatrix;
-use burn::tensor::{Tensor, TensorPrimitive};
+use burn::tensor::Tensor;
 use std::sync::Arc;
 
 /// Levels that regions are taken from; the coarsest of the pyramid only makes proposals.
@@ -67,9 +67,8 @@ impl<B: ModelBackend> FeatureRows<B> {
     pub fn cut(&self, regions: &[(usize, Bounds)], align: &RoiAlign) -> Tensor<B, 4> {
         let matrix = Arc::new(sampling_matrix(&self.shape, regions, align));
         let channels = self.rows.dims()[1];
-        let dense = self.rows.clone().into_primitive().tensor();
-        let product = TensorPrimitive::Float(B::sparse_product(&matrix, dense));
-        Tensor::<B, 2>::from_primitive(product)
+        let product = B::sparse_product(&matrix, primitive(self.rows.clone()));
+        float::<B, 2>(product)
             .reshape([regions.len(), align.cells, align.cells, channels])
             .permute([0, 3, 1, 2])
     }
