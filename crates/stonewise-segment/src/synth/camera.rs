@@ -17,7 +17,7 @@ pub struct Camera {
     pub white_balance: [f32; 3],
     /// Standard deviation of the blur, pixels, 0.3 to 2.5.
     pub blur_px: f32,
-    /// Length of the path that the image moved during exposure along x and y, pixels, up to 6.
+    /// Length of the path that the image moved during exposure along x and y, pixels, up to 4.
     pub motion_px: [f32; 2],
     /// Strength of sharpening, 0 to 1.2.
     pub sharpen: f32,
@@ -34,10 +34,11 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera drawn at random, mostly decent.
-    pub(super) fn random(rng: &mut Rng) -> Self {
-        let tint = between(rng, 0.0, 0.1);
+    /// A camera drawn at random, mostly decent; its blur leaves stones of `stone_px` pixels to be seen.
+    pub(super) fn random(stone_px: f32, rng: &mut Rng) -> Self {
+        let tint = between(rng, 0.0, 0.08);
         let moving = chance(rng, 0.12);
+        let most_blur_px = (0.04 * stone_px).clamp(0.5, 2.5);
         Self {
             exposure: log_between(rng, 0.04, 0.6),
             white_balance: [0, 1, 2].map(|_| (tint * normal(rng)).exp().clamp(0.75, 1.3)),
@@ -45,8 +46,15 @@ impl Camera {
                 between(rng, 0.3, 0.9)
             } else {
                 between(rng, 0.9, 2.5)
-            },
-            motion_px: [0, 1].map(|_| if moving { between(rng, -4.0, 4.0) } else { 0.0 }),
+            }
+            .min(most_blur_px),
+            motion_px: [0, 1].map(|_| {
+                if moving {
+                    between(rng, -1.6, 1.6) * most_blur_px
+                } else {
+                    0.0
+                }
+            }),
             sharpen: sometimes(rng, 0.4, 0.1, 1.2),
             vignetting: sometimes(rng, 0.3, 0.05, 0.5),
             contrast: log_between(rng, 0.7, 1.6),
@@ -94,8 +102,9 @@ impl Camera {
 
     /// Applies exposure, vignetting, haze, white balance and noise.
     fn expose(&self, light: &mut [[f32; 3]], [width, height]: [u32; 2], rng: &mut Rng) {
-        let mean = light.iter().map(|p| p[0] + p[1] + p[2]).sum::<f32>() / (3 * light.len().max(1)) as f32;
-        let gain = self.exposure / mean.max(1e-4);
+        // The square of the mean root, so that a bright sky does not leave the wall black.
+        let root = light.iter().map(|p| (p[0] + p[1] + p[2]).sqrt()).sum::<f32>() / light.len().max(1) as f32;
+        let gain = self.exposure / (root * root / 3.0).max(1e-4);
         let veil = self.haze * self.exposure;
         let (cx, cy) = (0.5 * width as f32, 0.5 * height as f32);
         let corner = (cx * cx + cy * cy).max(1.0);

@@ -12,8 +12,10 @@ pub(super) struct Canvas {
     pub(super) relief: Vec<f32>,
     /// Share of the sky's light that arrives, 0 to 1.
     pub(super) openness: Vec<f32>,
-    /// Share of the sun's light that arrives, beside what the relief casts; above 1 where the wall faces the sun more.
-    pub(super) sun: Vec<f32>,
+    /// The sun's strength over that on a surface that faces the camera: below 1 on walls turned away from it.
+    pub(super) facing: Vec<f32>,
+    /// True in the sky, where no shadow falls and no dirt lies.
+    pub(super) sky: Vec<bool>,
     /// Stone, 0 where there is none.
     pub(super) label: Vec<u32>,
     /// True where a person could not say what is there.
@@ -35,7 +37,8 @@ impl Canvas {
             albedo: vec![[0.0; 3]; count],
             relief: vec![0.0; count],
             openness: vec![1.0; count],
-            sun: vec![1.0; count],
+            facing: vec![1.0; count],
+            sky: vec![false; count],
             label: vec![0; count],
             doubtful: vec![false; count],
             stones: 0,

@@ -5,14 +5,15 @@ use stonewise_core::raster::{LabelImage, Raster, connected_components};
 
 /// Fewest visible pixels of a stone that is worth outlining.
 const MIN_AREA_PX: u32 = 40;
-/// Fewest pixels across a stone, as twice its area over its perimeter.
-const MIN_THICKNESS_PX: f32 = 3.0;
+/// Least thickness of a stone, pixels: twice its area over its perimeter, which is half the side of a square.
+const MIN_THICKNESS_PX: f32 = 2.6;
 /// Parts of a stone smaller than this share of it, cut off by something in front, are doubtful.
 const MIN_PART_SHARE: f32 = 0.1;
 
-/// Labels 1, 2, ... without gaps in reading order, and where the truth is doubtful: stones that are too small or thin, bits
+/// Labels 1, 2, ... without gaps in reading order, and where the truth is doubtful: stones that are too small or thin to be seen
+/// through the blur, bits
 /// cut off from a stone, and what the canvas says.
-pub(super) fn finish(canvas: &Canvas, width: u32, height: u32) -> (LabelImage, Raster<bool>) {
+pub(super) fn finish(canvas: &Canvas, blur_px: f32, width: u32, height: u32) -> (LabelImage, Raster<bool>) {
     let mut labels: LabelImage = Raster::filled(width, height, 0);
     let mut doubt = Raster::filled(width, height, false);
     for y in 0..height {
@@ -37,7 +38,7 @@ pub(super) fn finish(canvas: &Canvas, width: u32, height: u32) -> (LabelImage, R
         .map(|(part, &perimeter)| {
             let thickness = 2.0 * part.area as f32 / perimeter.max(1) as f32;
             part.area >= MIN_AREA_PX
-                && thickness >= MIN_THICKNESS_PX / 2.0
+                && thickness >= MIN_THICKNESS_PX.max(2.5 * blur_px)
                 && part.area as f32 >= MIN_PART_SHARE * areas[part.label as usize] as f32
         })
         .collect();

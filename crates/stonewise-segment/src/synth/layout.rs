@@ -29,6 +29,11 @@ pub enum Bond {
         /// Shift of its corners in parts of a grid cell, 0 to 0.2.
         jitter: f32,
     },
+    /// One course that fills the height, as the stones of an arch do.
+    Row {
+        /// Mean length over height, 0.35 to 1.2.
+        aspect: f32,
+    },
     /// Irregular polygons: random rubble, cobbles, dry stone.
     Rubble {
         /// Mean length over height, 0.8 to 2.2.
@@ -69,7 +74,7 @@ pub enum BrickPattern {
 }
 
 impl Bond {
-    /// A bond drawn at random: courses and rubble a third each, the rest squared blocks and bricks.
+    /// A bond drawn at random: courses and rubble over a third each, squared blocks, bricks.
     pub(super) fn random(rng: &mut Rng) -> Self {
         let kind = between(rng, 0.0, 1.0);
         if kind < 0.38 {
@@ -87,7 +92,7 @@ impl Bond {
                 mixture: between(rng, 0.0, 0.8),
                 disorder: between(rng, 0.1, 0.9),
             }
-        } else if kind < 0.87 {
+        } else if kind < 0.9 {
             Self::Squared {
                 aspect: log_between(rng, 0.8, 2.0),
                 jitter: between(rng, 0.0, 0.2),
@@ -112,6 +117,7 @@ impl Bond {
             Self::Courses(courses) => lay_courses(&courses, size, extent, rng),
             Self::Brick { aspect, pattern } => lay_bricks(aspect, pattern, size, extent, rng),
             Self::Squared { aspect, jitter } => lay_squared(aspect, jitter, size, extent, rng),
+            Self::Row { aspect } => lay_row(aspect, extent, rng),
             Self::Rubble {
                 aspect,
                 mixture,
@@ -156,6 +162,17 @@ fn lay_courses(courses: &Courses, size: f32, extent: Extent, rng: &mut Rng) -> V
             left = right;
         }
         top = bottom;
+    }
+    cells
+}
+
+fn lay_row(aspect: f32, [left, top, right, bottom]: Extent, rng: &mut Rng) -> Vec<Ring> {
+    let mut cells = Vec::new();
+    let mut x = left;
+    while x < right {
+        let next = x + (bottom - top) * aspect * (0.15 * normal(rng)).exp();
+        cells.push(vec![[x, top], [next, top], [next, bottom], [x, bottom]]);
+        x = next;
     }
     cells
 }

@@ -87,9 +87,10 @@ impl Light {
     }
 
     /// The light that each sample sends to the camera; a flat white surface in full light sends 1.
-    pub(super) fn shade(&self, canvas: &mut Canvas, rng: &mut Rng) -> Vec<[f32; 3]> {
+    pub(super) fn shade(&self, canvas: &Canvas, rng: &mut Rng) -> Vec<[f32; 3]> {
+        let mut lit = vec![1.0; canvas.label.len()];
         for shadow in &self.cast {
-            shadow.fall(canvas, rng);
+            shadow.fall(canvas, &mut lit, rng);
         }
         let (sin, cos) = self.elevation.sin_cos();
         let towards = [cos * self.azimuth.cos(), cos * self.azimuth.sin(), sin];
@@ -107,8 +108,13 @@ impl Light {
                 let slope_y = 0.5 * canvas.scale * (relief[below * width + x] - relief[above * width + x]);
                 let shrink = 1.0 / (1.0 + slope_x * slope_x + slope_y * slope_y).sqrt();
                 let facing = (towards[2] - slope_x * towards[0] - slope_y * towards[1]).max(0.0) * shrink;
-                let direct = if canvas.sun[i] > 0.0 && facing > 0.0 {
-                    sun * facing * canvas.sun[i] * reach.light(relief, x, y)
+                let lit = if canvas.sky[i] {
+                    1.0
+                } else {
+                    lit[i] * canvas.facing[i]
+                };
+                let direct = if lit > 0.0 && facing > 0.0 {
+                    sun * facing * lit * reach.light(relief, x, y)
                 } else {
                     0.0
                 };
@@ -199,7 +205,7 @@ impl CastShadow {
     }
 
     /// Takes the sun away where the shadow falls.
-    fn fall(&self, canvas: &mut Canvas, rng: &mut Rng) {
+    fn fall(&self, canvas: &Canvas, lit: &mut [f32], rng: &mut Rng) {
         let size = canvas.photo_size();
         let ragged = sometimes(rng, 0.4, 2.0, 20.0);
         let wave = Field::isotropic(rng, Grain::Fractal, 120.0);
@@ -240,7 +246,7 @@ impl CastShadow {
                         smoothstep(threshold - 0.25, threshold + 0.25, leaves.at(p[0], p[1]))
                     }
                 };
-                canvas.sun[y * canvas.width + x] *= 1.0 - dark;
+                lit[y * canvas.width + x] *= 1.0 - dark;
             }
         }
     }
@@ -277,7 +283,7 @@ mod tests {
         let mut canvas = Canvas::new(16, 16, 1.0);
         canvas.albedo.fill([0.25, 0.5, 0.75]);
         let mut rng = Rng::seed_from_u64(0);
-        let radiance = sun_from(1.0, 0.8).shade(&mut canvas, &mut rng);
+        let radiance = sun_from(1.0, 0.8).shade(&canvas, &mut rng);
         for (sent, albedo) in radiance[100].iter().zip([0.25, 0.5, 0.75]) {
             assert!((sent - albedo).abs() < 1e-5);
         }
@@ -287,12 +293,11 @@ mod tests {
     fn a_step_throws_a_shadow_as_long_as_the_sun_is_low() {
         let mut rng = Rng::seed_from_u64(0);
         // Height 6 under 45 degrees: shadow to 6 pixels beyond the step, on the side away from the sun only.
-        let radiance =
-            sun_from(std::f32::consts::PI, 0.25 * std::f32::consts::PI).shade(&mut step(), &mut rng);
+        let radiance = sun_from(std::f32::consts::PI, 0.25 * std::f32::consts::PI).shade(&step(), &mut rng);
         let row = |x: usize| radiance[10 * 60 + x][0];
         assert!(row(33) < 0.3 * row(50), "{} {}", row(33), row(50));
         assert!((row(40) - row(50)).abs() < 1e-5);
-        let radiance = sun_from(0.0, 0.25 * std::f32::consts::PI).shade(&mut step(), &mut rng);
+        let radiance = sun_from(0.0, 0.25 * std::f32::consts::PI).shade(&step(), &mut rng);
         let row = |x: usize| radiance[10 * 60 + x][0];
         assert!((row(33) - row(50)).abs() < 1e-5);
     }

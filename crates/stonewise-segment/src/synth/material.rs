@@ -28,7 +28,7 @@ pub struct Material {
     pub colours: Vec<[f32; 3]>,
     /// Standard deviation of the logarithm of a stone's brightness, 0 to 0.35.
     pub tone_spread: f32,
-    /// The same per colour channel, 0 to 0.1.
+    /// The same per colour channel, 0 to 0.05.
     pub hue_spread: f32,
     /// Brightness of blotches within a stone, 0 to 0.25.
     pub mottle: f32,
@@ -84,7 +84,7 @@ pub struct Mortar {
     pub width_spread: f32,
     /// Depth below the faces in parts of the stones' size; below 0 where the mortar stands out, -0.01 to 0.1.
     pub recess: f32,
-    /// How far mortar covers the stones' edges here and there, in parts of their size, 0 to 0.12.
+    /// How far mortar covers the stones' edges here and there, in parts of their size, 0 to 0.08.
     pub smear: f32,
     /// Brightness of blotches, 0 to 0.25.
     pub mottle: f32,
@@ -93,13 +93,15 @@ pub struct Mortar {
 impl Material {
     /// A material drawn at random.
     pub(super) fn random(rng: &mut Rng) -> Self {
-        let colours = (0..1 + usize::from(chance(rng, 0.3)) + usize::from(chance(rng, 0.2)))
-            .map(|_| stone_colour(rng))
-            .collect();
+        let mut colours = vec![stone_colour(rng)];
+        for _ in 0..usize::from(chance(rng, 0.35)) + usize::from(chance(rng, 0.2)) {
+            let other = mix(colours[0], stone_colour(rng), between(rng, 0.2, 1.0));
+            colours.push(other);
+        }
         Self {
             colours,
             tone_spread: between(rng, 0.0, 0.35) * between(rng, 0.2, 1.0),
-            hue_spread: between(rng, 0.0, 0.1) * between(rng, 0.0, 1.0),
+            hue_spread: between(rng, 0.0, 0.05) * between(rng, 0.0, 1.0),
             mottle: between(rng, 0.0, 0.25) * between(rng, 0.2, 1.0),
             accent: sometimes(rng, 0.5, 0.1, 0.8),
             grain: between(rng, 0.0, 0.15),
@@ -170,7 +172,7 @@ impl Mortar {
             smear: if hairline {
                 0.0
             } else {
-                sometimes(rng, 0.35, 0.01, 0.12)
+                sometimes(rng, 0.35, 0.01, 0.08)
             },
             mottle: between(rng, 0.0, 0.25),
         }
@@ -184,11 +186,11 @@ pub(super) fn stone_colour(rng: &mut Rng) -> [f32; 3] {
         COMMON_COLOURS[index.min(COMMON_COLOURS.len() - 1)]
     } else {
         let grey = between(rng, 0.25, 0.85);
-        [0, 1, 2].map(|_| grey * between(rng, 0.75, 1.2))
+        [0, 1, 2].map(|_| grey * between(rng, 0.88, 1.1))
     };
     let brightness = (0.15 * normal(rng)).exp();
     base.map(|c| {
-        let tinted = c * brightness * (0.05 * normal(rng)).exp();
+        let tinted = c * brightness * (0.035 * normal(rng)).exp();
         linear(tinted.clamp(0.08, 0.95))
     })
 }
@@ -200,6 +202,12 @@ pub(super) fn linear(srgb: f32) -> f32 {
     } else {
         ((srgb + 0.055) / 1.055).powf(2.4)
     }
+}
+
+/// From 1 at 0 to 0 at 1 and beyond, level there.
+fn falling(t: f32) -> f32 {
+    let rest = (1.0 - t).max(0.0);
+    rest * rest
 }
 
 /// What is drawn once for a stone.
@@ -273,10 +281,11 @@ impl Surface {
             let (sin, cos) = angle.sin_cos();
             [from[0], from[1], cos, sin, size * between(rng, 0.0, 0.2)]
         });
+        let shade = (0.3 * normal(rng)).exp();
         Look {
             colour,
             accent: [0, 1, 2].map(|c: usize| {
-                let other = base[c] * (0.25 * normal(rng)).exp() * (0.12 * normal(rng)).exp();
+                let other = base[c] * shade * (0.05 * normal(rng)).exp();
                 other.clamp(0.01, 0.95)
             }),
             shift: [between(rng, 0.0, 4000.0), between(rng, 0.0, 4000.0)],
@@ -324,8 +333,8 @@ impl Surface {
             + look.slope[0] * offset[0]
             + look.slope[1] * offset[1]
             + rough
-            + relief.bulge * size * (1.0 - (-depth / (0.2 * size)).exp())
-            - relief.worn * size * (-depth / (0.06 * size)).exp();
+            + relief.bulge * size * (1.0 - falling(depth / (0.45 * size)))
+            - relief.worn * size * falling(depth / (0.15 * size));
         if m.bedding > 0.0 {
             let layer = self.bedding.at(x, y);
             tone += m.bedding * layer;

@@ -7,62 +7,78 @@
 //!
 //! Lengths are pixels of the photo unless a field says otherwise; pixel (0, 0) covers `[0, 1) x [0, 1)`.
 
+mod backdrop;
 mod camera;
 mod canvas;
+mod dirt;
 mod draw;
 mod labels;
 mod layout;
 mod light;
 mod material;
 mod noise;
+mod object;
+mod scene;
 mod stone;
 mod view;
 mod wall;
 
+pub use backdrop::{Backdrop, BackdropKind};
 pub use camera::Camera;
+pub use dirt::Dirt;
 pub use layout::{Bond, BrickPattern, Courses};
 pub use light::{CastShadow, Light};
 pub use material::{FaceRelief, Material, Mortar};
+pub use object::{Object, ObjectKind};
+pub use scene::{Content, Layer, Masonry, Region};
 pub use stone::StoneShape;
 pub use view::Viewpoint;
-pub use wall::Wall;
+pub use wall::{Ring, Wall};
 
 use crate::Sample;
 use canvas::Canvas;
-use draw::Rng;
+use draw::{Rng, chance};
 use rand::SeedableRng;
-use view::View;
+use std::f32::consts::FRAC_PI_2;
 
 /// Samples per pixel along an axis.
 const CANVAS_SCALE: f32 = 1.5;
-/// Smallest and largest median size of a photo's stones, pixels; single stones are smaller and larger.
-const STONE_PX: [f32; 2] = [13.0, 220.0];
+/// Most things in front of a wall.
+const MAX_OBJECTS: usize = 4;
 
-/// Everything that is drawn for a photo, but for the single stones.
+/// Everything that is drawn for a photo, but for the single stones and the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MasonryStyle {
-    /// Where the camera stands.
-    pub viewpoint: Viewpoint,
-    /// The wall.
-    pub wall: Wall,
-    /// The light on it.
+    /// What is where, from back to front.
+    pub layers: Vec<Layer>,
+    /// What lies on the surfaces.
+    pub dirt: Dirt,
+    /// Things in front, from back to front.
+    pub objects: Vec<Object>,
+    /// The light.
     pub light: Light,
     /// What camera and file format do.
     pub camera: Camera,
 }
 
 impl MasonryStyle {
-    /// A style for a photo of `width` x `height` pixels, in which the largest stones are no larger than the photo.
+    /// A style for a photo of `width` x `height` pixels.
     pub fn random(seed: u64, width: u32, height: u32) -> Self {
         // A stream apart from that of the single stones.
         let mut rng = Rng::seed_from_u64(seed);
         rng.set_stream(1);
-        let largest = STONE_PX[1].min(0.6 * width.min(height) as f32).max(STONE_PX[0]);
+        let viewpoint = Viewpoint::random(&mut rng);
+        let layers = scene::random_layers(viewpoint, width, height, &mut rng);
+        let shorter = width.min(height) as f32;
+        let smallest_px = layers.iter().map(Layer::stone_px).fold(shorter, f32::min);
+        let often = if chance(&mut rng, 0.4) { 0.4 } else { 0.05 };
+        let count = (0..MAX_OBJECTS).filter(|_| chance(&mut rng, often)).count();
         Self {
-            viewpoint: Viewpoint::random(&mut rng),
-            wall: Wall::random(&mut rng, STONE_PX[0], largest),
+            layers,
+            dirt: Dirt::random(&mut rng, FRAC_PI_2 + viewpoint.roll),
+            objects: (0..count).map(|_| Object::random(shorter, &mut rng)).collect(),
             light: Light::random(&mut rng),
-            camera: Camera::random(&mut rng),
+            camera: Camera::random(smallest_px, &mut rng),
         }
     }
 }
@@ -78,14 +94,18 @@ pub fn masonry_photo(seed: u64, width: u32, height: u32) -> Sample {
 pub fn masonry_photo_of(style: &MasonryStyle, seed: u64, width: u32, height: u32) -> Sample {
     let mut rng = Rng::seed_from_u64(seed);
     let mut canvas = Canvas::new(width, height, CANVAS_SCALE);
-    let view = View::new(&style.viewpoint, width, height);
-    let region = vec![true; canvas.label.len()];
-    style.wall.paint(&mut canvas, &view, &region, &mut rng);
-    let radiance = style.light.shade(&mut canvas, &mut rng);
+    for layer in &style.layers {
+        layer.paint(&mut canvas, width, height, &mut rng);
+    }
+    style.dirt.paint(&mut canvas, &mut rng);
+    for object in &style.objects {
+        object.paint(&mut canvas, &mut rng);
+    }
+    let radiance = style.light.shade(&canvas, &mut rng);
     let samples = [canvas.width, canvas.height];
     let pixels = style
         .camera
         .develop(radiance, samples, canvas.scale, [width, height], &mut rng);
-    let (labels, ignore) = labels::finish(&canvas, width, height);
+    let (labels, ignore) = labels::finish(&canvas, style.camera.blur_px, width, height);
     Sample::from_pixels(width, height, |i| (pixels[i], labels.data()[i], ignore.data()[i]))
 }

@@ -2,7 +2,7 @@
 //!
 //! A look-up costs a few nanoseconds, where summing octaves at every pixel would cost most of a photo's time.
 
-use super::draw::{Rng, between};
+use super::draw::{Rng, between, log_between};
 use std::sync::LazyLock;
 
 /// Side of a table, samples; a power of two.
@@ -75,8 +75,14 @@ impl Field {
         Self::new(rng, grain, [wavelength; 2], angle)
     }
 
+    /// The same, of a wavelength drawn between two.
+    pub(super) fn sized(rng: &mut Rng, grain: Grain, low: f32, high: f32) -> Self {
+        let wavelength = log_between(rng, low, high);
+        Self::isotropic(rng, grain, wavelength)
+    }
+
     /// The field's value at a place.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, x: f32, y: f32) -> f32 {
         let u = self.matrix[0] * x + self.matrix[1] * y + self.shift[0];
         let v = self.matrix[2] * x + self.matrix[3] * y + self.shift[1];
@@ -94,7 +100,7 @@ impl Field {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn floor(x: f32) -> (i32, f32) {
     let truncated = x as i32;
     let whole = truncated - i32::from(x < truncated as f32);

@@ -48,6 +48,8 @@ pub(super) struct Stone {
     /// Square root of the cell's area.
     pub(super) size: f32,
     rounding: f32,
+    /// 1 / (4 rounding).
+    sharpness: f32,
     /// Discs that have broken off: centre and radius.
     chips: Vec<[f32; 3]>,
 }
@@ -80,6 +82,7 @@ impl Stone {
         } else {
             Vec::new()
         };
+        let rounding = (shape.rounding * size * between(rng, 0.6, 1.2)).max(1e-3);
         Some(Self {
             edges,
             bounds: [
@@ -90,7 +93,8 @@ impl Stone {
             ],
             centre: [0, 1].map(|axis| ring.iter().map(|p| p[axis]).sum::<f32>() / count),
             size,
-            rounding: shape.rounding * size * between(rng, 0.6, 1.2),
+            rounding,
+            sharpness: 0.25 / rounding,
             chips,
         })
     }
@@ -106,7 +110,7 @@ impl Stone {
             }
             // Polynomial smooth minimum: rounds the corner where two edges are about equally near.
             let overlap = (self.rounding - (distance - next).abs()).max(0.0);
-            distance = distance.min(next) - overlap * overlap / (4.0 * self.rounding).max(1e-6);
+            distance = distance.min(next) - overlap * overlap * self.sharpness;
         }
         for chip in &self.chips {
             distance = distance.min((x - chip[0]).hypot(y - chip[1]) - chip[2]);
@@ -130,6 +134,9 @@ fn chip(ring: &Ring, size: f32, rng: &mut Rng) -> [f32; 3] {
         size * between(rng, 0.06, 0.25),
     ]
 }
+
+/// Depth in parts of a stone's size beyond which no other stone reaches into it.
+const SURE_DEPTH: f32 = 0.12;
 
 /// Finds the stone at a place by a grid over their bounds.
 pub(super) struct StoneIndex {
@@ -184,8 +191,23 @@ impl StoneIndex {
     }
 
     /// The stone in which the point lies deepest, and its distance to the outline.
+    ///
+    /// `guess` is the stone of a point nearby. Cells overlap by little, so a point deep in the guess lies in no other.
     #[inline]
-    pub(super) fn find(&self, stones: &[Stone], x: f32, y: f32) -> Option<(usize, f32)> {
+    pub(super) fn find(
+        &self,
+        stones: &[Stone],
+        x: f32,
+        y: f32,
+        guess: Option<usize>,
+    ) -> Option<(usize, f32)> {
+        if let Some(guess) = guess {
+            let sure = SURE_DEPTH * stones[guess].size;
+            let distance = stones[guess].distance(x, y, sure);
+            if distance > sure {
+                return Some((guess, distance));
+            }
+        }
         let (c, r) = ((x - self.origin[0]) / self.side, (y - self.origin[1]) / self.side);
         if c < 0.0 || r < 0.0 || c as usize >= self.columns || r as usize >= self.rows {
             return None;
@@ -264,14 +286,19 @@ mod tests {
             .filter_map(|ring| Stone::new(ring, &PLAIN, &mut rng))
             .collect();
         let index = StoneIndex::new(&stones, 9.0);
+        let (mut guess, mut last) = (None, None);
         for _ in 0..500 {
             let (x, y) = (between(&mut rng, 0.0, 120.0), between(&mut rng, 0.0, 90.0));
             let deepest = stones
                 .iter()
                 .map(|s| s.distance(x, y, -1e9))
                 .fold(f32::NEG_INFINITY, f32::max);
-            let (_, found) = index.find(&stones, x, y).unwrap();
-            assert!((found - deepest).abs() < 1e-3, "{found} {deepest}");
+            for guess in [None, guess] {
+                let (stone, found) = index.find(&stones, x, y, guess).unwrap();
+                assert!((found - deepest).abs() < 1e-3, "{found} {deepest}");
+                last = Some(stone);
+            }
+            guess = last;
         }
     }
 }

@@ -58,6 +58,9 @@ impl Viewpoint {
 #[derive(Clone, Debug)]
 pub(super) struct View {
     wall_from_photo: Matrix3<f32>,
+    photo_from_wall: Matrix3<f32>,
+    /// Of `wall_from_photo`.
+    determinant: f32,
     middle: [f32; 2],
     /// Distortion per squared pixel.
     distortion: f32,
@@ -72,6 +75,8 @@ impl View {
         let corner = middle[0].hypot(middle[1]).max(1.0);
         let mut view = Self {
             wall_from_photo: Matrix3::identity(),
+            photo_from_wall: Matrix3::identity(),
+            determinant: 1.0,
             middle,
             distortion: viewpoint.distortion / (corner * corner),
             size,
@@ -79,7 +84,7 @@ impl View {
         let mut strength = 1.0;
         // With no obliqueness left the ratio is 1, so this ends.
         while strength > 0.05 {
-            view.wall_from_photo = wall_from_photo(viewpoint, strength, size);
+            view.turn(viewpoint, strength);
             let middle_scale = view.scale(middle[0], middle[1]);
             let fits = [[0.0, 0.0], [size[0], 0.0], [0.0, size[1]], size]
                 .iter()
@@ -92,8 +97,24 @@ impl View {
             }
             strength *= 0.8;
         }
-        view.wall_from_photo = wall_from_photo(viewpoint, 0.0, size);
+        view.turn(viewpoint, 0.0);
         view
+    }
+
+    /// Sets the pinhole projection of a turned plane at the distance of the focal length, about the photo's middle.
+    fn turn(&mut self, viewpoint: &Viewpoint, strength: f32) {
+        let focal = viewpoint.focal * self.size[0].max(self.size[1]);
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), viewpoint.roll)
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), strength * viewpoint.yaw)
+            * Rotation3::from_axis_angle(&Vector3::x_axis(), strength * viewpoint.pitch);
+        let mut plane = *turn.matrix();
+        plane.set_column(2, &Vector3::new(0.0, 0.0, focal));
+        self.photo_from_wall = Matrix3::from_diagonal(&Vector3::new(focal, focal, 1.0)) * plane;
+        self.wall_from_photo = self
+            .photo_from_wall
+            .try_inverse()
+            .unwrap_or_else(Matrix3::identity);
+        self.determinant = self.wall_from_photo.determinant();
     }
 
     /// The place on the wall behind a pixel coordinate.
@@ -110,12 +131,18 @@ impl View {
         ]
     }
 
+    /// The pixel coordinate of a place on the wall, without the lens's distortion.
+    pub(super) fn photo(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        let p = self.photo_from_wall * Vector3::new(u, v, 1.0);
+        [p.x / p.z + self.middle[0], p.y / p.z + self.middle[1]]
+    }
+
     /// Pixels per unit of the wall at a pixel coordinate, the geometric mean over directions; 0 beyond the wall's horizon.
     pub(super) fn scale(&self, x: f32, y: f32) -> f32 {
         let m = &self.wall_from_photo;
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);
         let w = m[(2, 0)] * dx + m[(2, 1)] * dy + m[(2, 2)];
-        let area = m.determinant() / (w * w * w);
+        let area = self.determinant / (w * w * w);
         if area > 0.0 && w * m[(2, 2)] > 0.0 {
             1.0 / area.sqrt()
         } else {
@@ -137,23 +164,6 @@ impl View {
         }
         extent
     }
-}
-
-/// Inverse of the pinhole projection of a turned plane at the distance of the focal length, about the photo's middle.
-fn wall_from_photo(viewpoint: &Viewpoint, strength: f32, size: [f32; 2]) -> Matrix3<f32> {
-    let focal = viewpoint.focal * size[0].max(size[1]);
-    let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), viewpoint.roll)
-        * Rotation3::from_axis_angle(&Vector3::y_axis(), strength * viewpoint.yaw)
-        * Rotation3::from_axis_angle(&Vector3::x_axis(), strength * viewpoint.pitch);
-    let rotation = turn.matrix();
-    let mut photo_from_wall = Matrix3::zeros();
-    photo_from_wall.set_column(0, &rotation.column(0));
-    photo_from_wall.set_column(1, &rotation.column(1));
-    photo_from_wall.set_column(2, &Vector3::new(0.0, 0.0, focal));
-    let camera = Matrix3::from_diagonal(&Vector3::new(focal, focal, 1.0));
-    (camera * photo_from_wall)
-        .try_inverse()
-        .unwrap_or_else(Matrix3::identity)
 }
 
 #[cfg(test)]

@@ -1,0 +1,144 @@
+//! What time leaves on a wall: stains, runs, moss, lichen, soot, damp.
+
+use super::canvas::Canvas;
+use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep, sometimes};
+use super::material::linear;
+use super::noise::{Field, Grain};
+
+/// Cover above which a place does not show the stone any more.
+const HIDDEN: f32 = 0.6;
+/// Share of a stone under cover above which its outline is doubtful.
+const MAX_HIDDEN_SHARE: f32 = 0.65;
+
+/// What lies on the surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dirt {
+    /// Strength of large blotches, dark or bright, 0 to 0.5.
+    pub stains: f32,
+    /// Size of the blotches, 40 to 400 pixels.
+    pub stains_px: f32,
+    /// Strength of runs down the wall, 0 to 0.6.
+    pub runs: f32,
+    /// Share of the wall under moss, 0 to about 0.6.
+    pub moss: f32,
+    /// Share of the wall under lichen, 0 to about 0.4.
+    pub lichen: f32,
+    /// Size of the lichen's spots, 5 to 30 pixels.
+    pub lichen_px: f32,
+    /// Strength of soot or damp that grows towards one side, 0 to 0.7.
+    pub soot: f32,
+    /// Strength of white salt blooms, 0 to 0.6.
+    pub salt: f32,
+    /// Direction in the photo in which water runs, radians; down is pi/2.
+    pub down: f32,
+}
+
+impl Dirt {
+    /// Dirt drawn at random, for water that runs in the direction `down`; half of the walls are nearly clean.
+    pub(super) fn random(rng: &mut Rng, down: f32) -> Self {
+        let often = if chance(rng, 0.5) { 0.5 } else { 0.12 };
+        Self {
+            stains: sometimes(rng, 2.0 * often, 0.05, 0.5),
+            stains_px: log_between(rng, 40.0, 400.0),
+            runs: sometimes(rng, often, 0.1, 0.6),
+            moss: sometimes(rng, 0.6 * often, 0.05, 0.6),
+            lichen: sometimes(rng, 0.6 * often, 0.05, 0.4),
+            lichen_px: log_between(rng, 5.0, 30.0),
+            soot: sometimes(rng, 0.6 * often, 0.1, 0.7),
+            salt: sometimes(rng, 0.5 * often, 0.1, 0.6),
+            down,
+        }
+    }
+
+    /// Dirties everything but the sky; stones that moss or lichen hide become doubtful.
+    pub(super) fn paint(&self, canvas: &mut Canvas, rng: &mut Rng) {
+        let size = canvas.photo_size();
+        let blotches = Field::isotropic(rng, Grain::Fractal, self.stains_px);
+        let streak_px = log_between(rng, 8.0, 50.0);
+        let streaks = Field::new(rng, Grain::Fractal, [18.0 * streak_px, streak_px], self.down);
+        let clumps = Field::sized(rng, Grain::Fractal, 40.0, 250.0);
+        let tufts = Field::isotropic(rng, Grain::Fractal, 9.0);
+        let spots = Field::isotropic(rng, Grain::Cells, self.lichen_px);
+        let bloom = Field::sized(rng, Grain::Fractal, 30.0, 200.0);
+        let green = [0.30, 0.34, 0.14].map(|c| linear(c) * (0.3 * normal(rng)).exp());
+        let crust = {
+            let base = [[0.78, 0.78, 0.74], [0.80, 0.62, 0.20], [0.28, 0.28, 0.27]];
+            let pick = (between(rng, 0.0, 3.0) as usize).min(2);
+            base[pick].map(linear)
+        };
+        let stain = [0.9, 0.8, 0.6].map(|c| c * (0.2 * normal(rng)).exp());
+        let bright = chance(rng, 0.3);
+        let side = between(rng, 0.0, std::f32::consts::TAU);
+        let joints = between(rng, 0.0, 1.2);
+        let mut covered = vec![[0u32; 2]; canvas.stones as usize + 1];
+        for y in 0..canvas.height {
+            for x in 0..canvas.width {
+                let i = y * canvas.width + x;
+                if canvas.sky[i] {
+                    continue;
+                }
+                let [px, py] = canvas.photo(x, y);
+                let mut colour = canvas.albedo[i];
+                let mut cover = 0.0f32;
+                if self.stains > 0.0 {
+                    let amount = self.stains * smoothstep(-0.3, 1.2, blotches.at(px, py));
+                    let tone = if bright { 1.0 + amount } else { 1.0 - 0.8 * amount };
+                    colour = mix(scaled(colour, tone), product(colour, stain), 0.5 * amount);
+                }
+                if self.runs > 0.0 {
+                    let amount = self.runs * smoothstep(0.2, 1.6, streaks.at(px, py));
+                    colour = scaled(colour, 1.0 - 0.8 * amount);
+                }
+                if self.soot > 0.0 {
+                    let along = (px / size[0] - 0.5) * side.cos() + (py / size[1] - 0.5) * side.sin();
+                    let amount = self.soot * smoothstep(-0.1, 0.6, along + 0.1 * clumps.at(px, py));
+                    colour = scaled(colour, 1.0 - 0.85 * amount);
+                }
+                if self.salt > 0.0 {
+                    let amount = self.salt * smoothstep(0.7, 2.0, bloom.at(px, py));
+                    colour = mix(colour, [0.75; 3], amount);
+                }
+                if self.lichen > 0.0 {
+                    let radius = 0.75
+                        * smoothstep(
+                            1.8 - 4.5 * self.lichen,
+                            3.0 - 4.0 * self.lichen,
+                            clumps.at(px, py),
+                        );
+                    let edge = spots.at(px, py) + 0.06 * tufts.at(px, py);
+                    let amount = smoothstep(radius, radius - 0.15, edge) * smoothstep(0.0, 0.1, radius);
+                    colour = mix(colour, crust, 0.85 * amount);
+                    cover = cover.max(0.8 * amount);
+                }
+                if self.moss > 0.0 {
+                    let tuft = tufts.at(px, py);
+                    let wet = joints * (1.0 - canvas.openness[i])
+                        + if canvas.label[i] == 0 { 0.3 * joints } else { 0.0 };
+                    let amount = smoothstep(
+                        1.5 - 2.6 * self.moss,
+                        2.2 - 2.6 * self.moss,
+                        clumps.at(px, py) + 0.35 * tuft + wet,
+                    );
+                    colour = mix(colour, scaled(green, (0.35 * tuft).exp()), 0.92 * amount);
+                    canvas.relief[i] += amount * (0.8 + 0.5 * tuft);
+                    cover = cover.max(amount);
+                }
+                canvas.albedo[i] = colour.map(|c| c.clamp(0.003, 1.0));
+                let count = &mut covered[canvas.label[i] as usize];
+                count[0] += 1;
+                count[1] += u32::from(cover > HIDDEN);
+            }
+        }
+        for (label, doubtful) in canvas.label.iter_mut().zip(&mut canvas.doubtful) {
+            let [area, hidden] = covered[*label as usize];
+            if *label != 0 && hidden as f32 > MAX_HIDDEN_SHARE * area as f32 {
+                *label = 0;
+                *doubtful = true;
+            }
+        }
+    }
+}
+
+fn product(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [0, 1, 2].map(|c| a[c] * b[c])
+}
