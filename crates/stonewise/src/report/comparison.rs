@@ -10,8 +10,8 @@ const SQUARE_M: f64 = 0.5;
 
 /// The same place in both methods.
 pub(crate) struct Comparison {
-    /// Out-of-plane displacement of each measured stone and the median M3C2 distance on it, metres.
-    pub out_of_plane: Vec<[f64; 2]>,
+    /// Median M3C2 distance on each stone, metres, in the order of [`ResultSet::stones`]; `None` without core points.
+    pub on_stone: Vec<Option<f64>>,
     /// In-plane components (along, up) of the M3C2 displacement vectors, distance times normal, metres.
     pub in_plane: Vec<[f64; 2]>,
 }
@@ -35,13 +35,13 @@ pub(crate) fn compare(results: &ResultSet) -> Comparison {
             }
         }
     }
-    let mut on_stone: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    let mut on_stone: Vec<Vec<f64>> = vec![Vec::new(); rings.len()];
     let mut in_plane = Vec::new();
     for point in &results.distances {
         let place = results.facade.place(&point.position);
         let candidates = squares.get(&square(&place)).into_iter().flatten();
         if let Some(&i) = candidates.into_iter().find(|&&i| contains(&rings[i], &place)) {
-            on_stone.entry(i).or_default().push(point.distance_m);
+            on_stone[i].push(point.distance_m);
         }
         if let Some(normal) = point.normal {
             let frame = results.facade.frame_at(&point.position);
@@ -49,13 +49,24 @@ pub(crate) fn compare(results: &ResultSet) -> Comparison {
             in_plane.push([d.dot(&frame.along), d.dot(&frame.up)]);
         }
     }
-    let pair = |(i, distances): (usize, Vec<f64>)| {
-        let stone: &StoneRow = &results.stones[i];
-        Some([stone.motion.as_ref()?.face.z, Sorted::new(distances).median()?])
-    };
     Comparison {
-        out_of_plane: on_stone.into_iter().filter_map(pair).collect(),
+        on_stone: on_stone.into_iter().map(|d| Sorted::new(d).median()).collect(),
         in_plane,
+    }
+}
+
+impl Comparison {
+    /// Out-of-plane displacement of each measured stone and the median M3C2 distance on it, metres.
+    pub(crate) fn out_of_plane(&self, results: &ResultSet) -> Vec<[f64; 2]> {
+        let pair = |(stone, distance): (&StoneRow, &Option<f64>)| {
+            Some([stone.motion.as_ref()?.face.z, (*distance)?])
+        };
+        results
+            .stones
+            .iter()
+            .zip(&self.on_stone)
+            .filter_map(pair)
+            .collect()
     }
 }
 

@@ -3,13 +3,14 @@
 use super::change_points::{DistancePoint, read_distance_points};
 use super::outlines::{StoneOutline, read_outlines};
 use super::stone_table::read_stones;
-use super::{Facade, ReportError, StoneRow};
-use nalgebra::{Point2, Vector3};
+use super::{Facade, ReportError, RowMotion, StoneRow};
+use nalgebra::{Matrix3, Point2, Vector3};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::evaluate::Evaluation;
+use stonewise_core::geometry::FaceFrame;
 
 /// The result files of one pair of epochs, read back; photos and clouds are not needed.
 #[derive(Clone, Debug)]
@@ -71,6 +72,18 @@ impl ResultSet {
             registration: read_json(&dir.join(of_pair("registration", pair, "json")))?.unwrap_or(Value::Null),
             decisions: read_decisions(dir)?,
         })
+    }
+
+    /// Outward normal of a stone's face; of the wall at its place where the outline is missing.
+    pub fn normal(&self, stone: &StoneRow) -> Vector3<f64> {
+        let own = self.outlines.get(&stone.stone_id).map(|o| o.normal);
+        own.unwrap_or_else(|| self.facade.frame_at(&stone.centroid).out)
+    }
+
+    /// Covariance of a stone's displacement as (along, up, out), m^2.
+    pub fn face_covariance(&self, stone: &StoneRow, motion: &RowMotion) -> Matrix3<f64> {
+        let face = FaceFrame::from_normal(&self.normal(stone)).face_from_world();
+        face * motion.covariance * face.transpose()
     }
 
     /// Outline of a stone in the unrolled facade, metres; a square of its area where the outline is missing.

@@ -2,7 +2,7 @@
 
 use super::html::{figure, section, table};
 use crate::report::ResultSet;
-use crate::report::comparison::compare;
+use crate::report::comparison::Comparison;
 use crate::report::draw::{Series, count, histogram, mm_or_dash, scatter};
 use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
@@ -10,7 +10,12 @@ use crate::report::summary::Summary;
 const NAMES: [&str; 3] = ["along the wall", "up the face", "out of the wall"];
 
 /// Histograms and scatter plots. `truth_mm`: a known common in-plane translation.
-pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Option<[f64; 2]>) -> String {
+pub(super) fn distributions(
+    results: &ResultSet,
+    facts: &Summary,
+    compared: &Comparison,
+    truth_mm: Option<[f64; 2]>,
+) -> String {
     let mut grid = String::new();
     for (name, component) in NAMES.iter().zip(&facts.components) {
         let values: Vec<f64> = component.values().iter().map(|v| v * 1e3).collect();
@@ -21,7 +26,7 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
             "",
         ));
     }
-    let compared = compare(results);
+    let out_of_plane = compared.out_of_plane(results);
     let stones: Vec<[f64; 2]> = facts
         .measured
         .iter()
@@ -58,8 +63,8 @@ pub(super) fn distributions(results: &ResultSet, facts: &Summary, truth_mm: Opti
             &text,
         ));
     }
-    if !compared.out_of_plane.is_empty() {
-        let pairs: Vec<[f64; 2]> = compared.out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
+    if !out_of_plane.is_empty() {
+        let pairs: Vec<[f64; 2]> = out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
         let limits = shared_limits(&[&pairs]);
         let difference = Sorted::new(pairs.iter().map(|p| p[0] - p[1]));
         let text = format!(

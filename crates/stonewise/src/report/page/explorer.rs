@@ -1,124 +1,233 @@
-//! The map that answers to the mouse and the keyboard; without scripts the page is whole without it.
+//! The part of the page that answers to mouse, touch and keyboard; without scripts the page is whole without it.
+//!
+//! The program lies in `web/` (TypeScript) and is embedded as one bundle. Its data are a small JSON document and blocks
+//! of packed columns ([`Block`]), so that a wall of 10,000 stones stays small and opens at once.
 
-use crate::report::draw::{colours, escape};
+use super::block::Block;
+use super::{epoch_names, known_translation_mm};
+use crate::report::comparison::Comparison;
+use crate::report::draw::{colours, component_limit_m};
+use crate::report::joints::{Joint, joints};
 use crate::report::statistics::{Sorted, nice_above};
 use crate::report::summary::Summary;
-use crate::report::{ResultSet, RowMotion, Status, StoneRow};
-use nalgebra::Point2;
-use serde_json::{Value, json};
+use crate::report::{ReportError, ResultSet, RowMotion, Status, StoneRow};
+use nalgebra::{Point2, Point3, Vector3};
+use serde_json::{Map, Value, json};
 use std::fmt::Write;
+use stonewise_core::geometry::FaceFrame;
 
-const SCRIPT: &str = include_str!("explorer.js");
+/// The program; `web/README.md` says how it is built from its sources.
+pub(in crate::report) const SCRIPT: &str = include_str!("../../../assets/report.js");
+/// Its style sheet.
+pub(in crate::report) const STYLE: &str = include_str!("../../../assets/report.css");
 
-/// Quantities to choose from: key in the script, label.
-const QUANTITIES: [(&str, &str); 9] = [
-    ("out", "Out of the wall"),
-    ("along", "Along the wall"),
-    ("up", "Up the face"),
-    ("norm", "Length of the motion"),
-    ("relative", "Against the neighbours"),
-    ("limit", "Detection limit (LoD95)"),
-    ("rotation", "Rotation"),
-    ("confidence", "Confidence of the outline"),
-    ("status", "Outcome"),
-];
+/// Where the program puts its views; hidden until it starts.
+pub(super) const PLACE: &str = "<div id=\"explore\" hidden></div>\n";
 
-/// Controls and canvas, hidden until the script shows them.
-pub(super) fn explorer() -> String {
-    let options: String = QUANTITIES.iter().fold(String::new(), |mut out, (key, label)| {
-        let _ = write!(out, "<option value=\"{key}\">{}</option>", escape(label));
-        out
-    });
-    format!(
-        "<div id=\"explore\" hidden><div class=\"controls\">\
-         <label>Show <select id=\"quantity\">{options}</select></label>\
-         <label><input type=\"checkbox\" id=\"fade\" checked> fade below the detection limit</label>\
-         <label><input type=\"checkbox\" id=\"arrows\"> in-plane arrows</label>\
-         <label>Stone <input id=\"search\" type=\"search\" inputmode=\"numeric\" size=\"7\" placeholder=\"id\"></label>\
-         <span class=\"zoom\"><button type=\"button\" id=\"zoom-in\" aria-label=\"zoom in\">+</button>\
-         <button type=\"button\" id=\"zoom-out\" aria-label=\"zoom out\">\u{2212}</button>\
-         <button type=\"button\" id=\"zoom-all\">whole wall</button></span></div>\
-         <div class=\"view\"><canvas id=\"wall\" tabindex=\"0\" aria-label=\"map of the stones; arrow keys move, plus and minus zoom\">\
-         </canvas><div id=\"tip\" hidden></div></div>\
-         <div id=\"stone\" aria-live=\"polite\"><p class=\"note\">Point at a stone for its motion, click to keep it. Drag to move; \
-         zoom with the buttons, a double click, or the wheel after a click.</p></div></div>\n"
-    )
-}
+/// Steps in which the page keeps motions and places.
+const MICROMETRE: f64 = 1e-6;
+const MILLIMETRE: f64 = 1e-3;
+const TENTH_MM: f64 = 1e-4;
 
-/// Data and script, for the end of the page.
-pub(super) fn script(results: &ResultSet, facts: &Summary, component_limit_m: f64) -> String {
-    let data = data(results, facts, component_limit_m).to_string();
+/// Data of the program, as elements for the end of the page.
+pub(super) fn data(
+    results: &ResultSet,
+    facts: &Summary,
+    compared: &Comparison,
+) -> Result<String, ReportError> {
+    let joints = joints(results);
+    let blocks = [
+        ("stones", stones(results, compared)),
+        ("joints", joint_block(&joints)),
+        ("change", change(results)),
+    ];
+    let mut lists = Map::new();
+    let mut texts = String::new();
+    for (name, block) in blocks {
+        let (columns, text) = block
+            .finish()
+            .map_err(ReportError::io("packing the report's data", "report"))?;
+        lists.insert(name.to_owned(), columns);
+        let _ = writeln!(
+            texts,
+            "<script type=\"text/plain\" id=\"block-{name}\">{text}</script>"
+        );
+    }
+    let document = document(results, facts, &joints, lists).to_string();
     // Inside a script element only the end tag could do harm; no "<" is left at all.
-    let data = data.replace('<', "\\u003c");
-    format!("<script type=\"application/json\" id=\"data\">{data}</script>\n<script>\n{SCRIPT}</script>\n")
+    let document = document.replace('<', "\\u003c");
+    Ok(format!(
+        "<script type=\"application/json\" id=\"report-data\">{document}</script>\n{texts}"
+    ))
 }
 
-/// Columns of whole numbers: places in mm, motions in 0.01 mm, rotations in 0.01 mrad, shares in percent.
-fn data(results: &ResultSet, facts: &Summary, component_limit_m: f64) -> Value {
-    let stones = &results.stones;
-    let whole = |v: f64, unit: f64| {
-        if v.is_finite() {
-            json!((v / unit).round() as i64)
-        } else {
-            Value::Null
-        }
-    };
-    let column = |of: &dyn Fn(&StoneRow) -> Value| stones.iter().map(of).collect::<Vec<_>>();
-    let motion = |unit: f64, of: fn(&RowMotion) -> f64| {
-        column(&|s: &StoneRow| s.motion.as_ref().map_or(Value::Null, |m| whole(of(m), unit)))
-    };
-    let flag = |of: fn(&RowMotion) -> bool| {
-        column(&|s: &StoneRow| json!(u8::from(s.motion.as_ref().is_some_and(of))))
-    };
-    let limit = |of: fn(&RowMotion) -> f64, unit: f64| {
+fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<String, Value>) -> Value {
+    let limit = |of: fn(&RowMotion) -> f64| {
         let values = Sorted::new(facts.measured.iter().map(|(_, m)| of(m)));
-        nice_above(values.quantile(0.98).unwrap_or(0.0) / unit)
+        nice_above(values.quantile(0.98).unwrap_or(0.0) * 1e3)
     };
-    let component = component_limit_m * 1e3;
+    let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
+    let component = component_limit_m(facts) * 1e3;
+    let names = epoch_names(&results.run, results.pair);
     let [diverging, sequential] = colours();
     json!({
-        "diverging": diverging,
-        "sequential": sequential,
+        "epochs": names.unwrap_or_else(|| [1, results.pair + 1].map(|n| format!("epoch {n}"))),
+        "statuses": Status::ALL.map(|s| json!({ "word": s.word(), "meaning": s.meaning() })),
+        "colours": { "diverging": diverging, "sequential": sequential },
         "limits": {
-            "along": component, "up": component, "out": component,
-            "norm": limit(|m| m.displacement.norm(), 1e-3),
-            "relative": limit(|m| m.relative.norm(), 1e-3),
-            "limit": limit(|m| m.detection_limit_m, 1e-3),
-            "rotation": limit(|m| m.rotation.norm(), 1e-3),
-            "confidence": 100,
+            "component": component,
+            "norm": limit(|m| m.displacement.norm()),
+            "relative": limit(|m| m.relative.norm()),
+            "limit": limit(|m| m.detection_limit_m),
+            "rotation": limit(|m| m.rotation.norm()),
+            "opening": nice_above(Sorted::new(openings).quantile(0.98).unwrap_or(0.0) * 1e3),
         },
-        "words": Status::ALL.map(Status::word),
-        "meanings": Status::ALL.map(Status::meaning),
-        "id": column(&|s| json!(s.stone_id)),
-        "state": column(&|s| json!(Status::ALL.iter().position(|w| *w == s.status))),
-        "match": column(&|s| json!(s.matched_id)),
-        "area": column(&|s| whole(s.area_m2, 1e-4)),
-        "points": column(&|s| json!([s.points_1, s.points_2])),
-        "photos": column(&|s| json!(s.photos)),
-        "confidence": column(&|s| whole(s.confidence, 0.01)),
-        "along": motion(1e-5, |m| m.face.x),
-        "up": motion(1e-5, |m| m.face.y),
-        "out": motion(1e-5, |m| m.face.z),
-        "relative": motion(1e-5, |m| m.relative.norm()),
-        "limit": motion(1e-5, |m| m.detection_limit_m),
-        "rotation": motion(1e-5, |m| m.rotation.norm()),
-        "significant": flag(|m| m.significant),
-        "loose": flag(|m| m.loose),
-        "rings": stones.iter().map(|s| ring(&results.unrolled(s))).collect::<Vec<_>>(),
+        "truth": known_translation_mm(results),
+        "blocks": blocks,
+        "cameras": [],
+        "crops": [null, null],
     })
 }
 
-/// First vertex, then steps, whole millimetres; empty where a coordinate is not finite.
-fn ring(vertices: &[Point2<f64>]) -> Vec<i64> {
-    if vertices.iter().any(|p| !p.x.is_finite() || !p.y.is_finite()) {
-        return Vec::new();
+/// World origin of the page's coordinates: a whole metre near the first stone.
+fn origin(results: &ResultSet) -> Point3<f64> {
+    let finite = |s: &&StoneRow| s.centroid.iter().all(|v| v.is_finite());
+    let first = results.stones.iter().find(finite);
+    first.map_or(Point3::origin(), |s| s.centroid.map(f64::round))
+}
+
+/// One row for each stone; rings as (along, up) from the stone's place, their vertices in a column of their own.
+fn stones(results: &ResultSet, compared: &Comparison) -> Block {
+    let rows = &results.stones;
+    let mut block = Block::default();
+    block.u32("id", rows.iter().map(|s| s.stone_id));
+    block.u8("state", rows.iter().map(|s| s.status as u8));
+    block.u32("partner", rows.iter().map(|s| s.matched_id.unwrap_or(0)));
+    block.i32("area", TENTH_MM, rows.iter().map(|s| s.area_m2));
+    block.u32("points1", rows.iter().map(|s| s.points_1));
+    block.u32("points2", rows.iter().map(|s| s.points_2.unwrap_or(0)));
+    block.u16(
+        "photos",
+        1.0,
+        rows.iter().map(|s| u16::try_from(s.photos).unwrap_or(u16::MAX)),
+    );
+    block.i8("confidence", 0.01, rows.iter().map(|s| s.confidence));
+    motions(results, &mut block);
+    block.i32(
+        "m3c2",
+        MICROMETRE,
+        compared.on_stone.iter().map(|d| d.unwrap_or(f64::NAN)),
+    );
+    let centroid = |axis: usize| rows.iter().map(move |s| s.centroid[axis] - origin(results)[axis]);
+    ["x", "y", "z"]
+        .into_iter()
+        .enumerate()
+        .for_each(|(k, name)| block.i32(name, TENTH_MM, centroid(k)));
+    let normals: Vec<Vector3<f64>> = rows.iter().map(|s| results.normal(s)).collect();
+    for (k, name) in ["nx", "ny", "nz"].into_iter().enumerate() {
+        block.i16(name, 1.0 / 32_767.0, normals.iter().map(|n| n[k]));
     }
-    let mut last = [0, 0];
-    let mut out = Vec::with_capacity(2 * vertices.len());
-    for p in vertices {
-        let next = [(p.x * 1e3).round() as i64, (p.y * 1e3).round() as i64];
-        out.extend([next[0] - last[0], next[1] - last[1]]);
-        last = next;
+    let places: Vec<Point2<f64>> = rows.iter().map(|s| results.facade.place(&s.centroid)).collect();
+    block.i32("a", MILLIMETRE, places.iter().map(|p| p.x));
+    block.i32("u", MILLIMETRE, places.iter().map(|p| p.y));
+    let mut ends = Vec::with_capacity(rows.len());
+    let mut vertices: Vec<f64> = Vec::new();
+    for (stone, place) in rows.iter().zip(&places) {
+        let ring = results.unrolled(stone);
+        if ring.iter().all(|p| p.x.is_finite() && p.y.is_finite()) {
+            vertices.extend(ring.iter().flat_map(|p| [p.x - place.x, p.y - place.y]));
+        }
+        ends.push((vertices.len() / 2) as u32);
     }
-    out
+    block.u32("ringEnd", ends);
+    block.i16("ring", MILLIMETRE, vertices);
+    block
+}
+
+/// Columns of what was measured: motions, their covariances and rotations in the face frame (along, up, out).
+fn motions(results: &ResultSet, block: &mut Block) {
+    let rows = &results.stones;
+    let of = |pick: &dyn Fn(&StoneRow, &RowMotion) -> f64| -> Vec<f64> {
+        let value = |s: &StoneRow| s.motion.as_ref().map_or(f64::NAN, |m| pick(s, m));
+        rows.iter().map(value).collect()
+    };
+    let in_face = |s: &StoneRow, world: &Vector3<f64>| {
+        FaceFrame::from_normal(&results.normal(s)).face_from_world() * world
+    };
+    for (k, axis) in ["Along", "Up", "Out"].into_iter().enumerate() {
+        block.i32(&format!("d{axis}"), MICROMETRE, of(&|_, m| m.face[k]));
+        block.i32(
+            &format!("rel{axis}"),
+            MICROMETRE,
+            of(&|s, m| in_face(s, &m.relative)[k]),
+        );
+        block.i32(
+            &format!("rot{axis}"),
+            MICROMETRE,
+            of(&|s, m| in_face(s, &m.rotation)[k]),
+        );
+    }
+    // Standard deviations and correlations survive quantisation better than covariances.
+    let sigma = |s: &StoneRow, m: &RowMotion, k: usize| results.face_covariance(s, m)[(k, k)].max(0.0).sqrt();
+    for (k, axis) in ["Along", "Up", "Out"].into_iter().enumerate() {
+        block.i32(&format!("sigma{axis}"), MICROMETRE, of(&|s, m| sigma(s, m, k)));
+    }
+    for (name, i, j) in [("corAlongUp", 0, 1), ("corAlongOut", 0, 2), ("corUpOut", 1, 2)] {
+        let correlation = |s: &StoneRow, m: &RowMotion| {
+            results.face_covariance(s, m)[(i, j)] / (sigma(s, m, i) * sigma(s, m, j))
+        };
+        block.i16(name, 1.0 / 32_767.0, of(&correlation));
+    }
+    block.i32("limit", MICROMETRE, of(&|_, m| m.detection_limit_m));
+    block.i8("observability", 0.01, of(&|_, m| m.observability));
+    let flag = |of: fn(&RowMotion) -> bool| {
+        rows.iter()
+            .map(move |s| u8::from(s.motion.as_ref().is_some_and(of)))
+    };
+    block.u8("significant", flag(|m| m.significant));
+    block.u8("loose", flag(|m| m.loose));
+}
+
+fn joint_block(joints: &[Joint]) -> Block {
+    let mut block = Block::default();
+    block.u32("first", joints.iter().map(|j| j.stones[0] as u32));
+    block.u32("second", joints.iter().map(|j| j.stones[1] as u32));
+    for (k, end) in ["1", "2"].into_iter().enumerate() {
+        block.i32(&format!("a{end}"), MILLIMETRE, joints.iter().map(|j| j.line[k].x));
+        block.i32(&format!("u{end}"), MILLIMETRE, joints.iter().map(|j| j.line[k].y));
+    }
+    block.i16("width", TENTH_MM, joints.iter().map(|j| j.width_m));
+    let of = |pick: fn(&crate::report::JointMotion) -> f64| {
+        joints
+            .iter()
+            .map(move |j| j.motion.as_ref().map_or(f64::NAN, pick))
+    };
+    block.i32("opening", MICROMETRE, of(|m| m.opening_m));
+    block.i32("sliding", MICROMETRE, of(|m| m.sliding_m));
+    block.i32("step", MICROMETRE, of(|m| m.step_m));
+    block.i32("sigma", MICROMETRE, of(|m| m.opening_sigma_m));
+    block
+}
+
+/// M3C2 core points on the unrolled wall.
+fn change(results: &ResultSet) -> Block {
+    let mut block = Block::default();
+    let places: Vec<Point2<f64>> = results
+        .distances
+        .iter()
+        .map(|p| results.facade.place(&p.position))
+        .collect();
+    block.i32("a", MILLIMETRE, places.iter().map(|p| p.x));
+    block.i32("u", MILLIMETRE, places.iter().map(|p| p.y));
+    block.i32(
+        "distance",
+        MICROMETRE,
+        results.distances.iter().map(|p| p.distance_m),
+    );
+    block.i32(
+        "limit",
+        MICROMETRE,
+        results.distances.iter().map(|p| p.detection_limit_m),
+    );
+    block
 }

@@ -1,6 +1,6 @@
 //! The maps.
 
-use super::explorer::explorer;
+use super::explorer::PLACE;
 use super::html::{figure, section};
 use crate::report::draw::{
     MapLayout, MapPicture, Scale, component_limit_m, distance_map, mm, nice_scale_m, stone_map,
@@ -63,8 +63,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary) -> String {
     };
     let body = format!(
         "<p>The wall seen from the front, unrolled. Components share one scale; millimetres, second epoch minus first.{note}</p>\
-         {}{LEGEND}<div class=\"maps{wide}\">{grid}</div>",
-        explorer()
+         {PLACE}{LEGEND}<div class=\"maps{wide}\">{grid}</div>"
     );
     section("maps", "Maps", &body)
 }

@@ -1,6 +1,7 @@
 //! The page: what it says, in order.
 
 mod audit;
+mod block;
 mod distributions;
 mod evaluation;
 mod explorer;
@@ -9,12 +10,16 @@ mod maps;
 mod method;
 mod overview;
 
-use super::ResultSet;
-use super::draw::{component_limit_m, escape};
+use super::comparison::compare;
+use super::draw::escape;
 use super::summary::Summary;
+use super::{ReportError, ResultSet};
 use serde_json::Value;
 
-const STYLE: &str = include_str!("style.css");
+#[cfg(test)]
+pub(super) use explorer::{SCRIPT, STYLE};
+
+const PAGE_STYLE: &str = include_str!("style.css");
 
 /// Sections in the order of the page.
 const SECTIONS: [(&str, &str); 8] = [
@@ -38,8 +43,15 @@ pub(super) fn page_name(pair: usize) -> String {
 }
 
 /// The whole report as one HTML document. The same results give the same bytes.
-pub(super) fn page(results: &ResultSet) -> String {
+///
+/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be fetched: markup
+/// that a name from an input might smuggle in would stay dead.
+///
+/// # Errors
+/// None in practice: compressing in memory does not fail.
+pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     let facts = Summary::new(results);
+    let compared = compare(results);
     let mut body = String::new();
     body.push_str(&overview::summary(results, &facts));
     if !results.stones.is_empty() {
@@ -50,6 +62,7 @@ pub(super) fn page(results: &ResultSet) -> String {
         body.push_str(&distributions::distributions(
             results,
             &facts,
+            &compared,
             known_translation_mm(results),
         ));
         body.push_str(&distributions::datum(results, &facts));
@@ -66,22 +79,31 @@ pub(super) fn page(results: &ResultSet) -> String {
     let links: String = present
         .map(|(id, name)| format!("<a href=\"#{id}\">{name}</a>"))
         .collect();
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: stone by stone</title>\n<style>\n{STYLE}</style></head>\n\
-         <body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
+    let data = if results.stones.is_empty() {
+        String::new()
+    } else {
+        explorer::data(results, &facts, &compared)?
+    };
+    let body = format!(
+        "<body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
          <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V60\" class=\"hatching\"/></pattern></defs></svg>\n\
          <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
-         <main>\n{body}</main>\n{}</body></html>\n",
-        cover(results),
-        if results.stones.is_empty() {
-            String::new()
-        } else {
-            explorer::script(results, &facts, component_limit_m(&facts))
-        }
-    )
+         <main>\n{body}</main>\n{data}",
+        cover(results)
+    );
+    // Of all that the page holds, so that no input can guess it.
+    let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
+    Ok(format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'nonce-{nonce}'; \
+         style-src 'unsafe-inline'; img-src blob: data:; base-uri 'none'; form-action 'none'\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: stone by stone</title>\n\
+         <style>\n{PAGE_STYLE}{}</style></head>\n{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
+        explorer::STYLE,
+        explorer::SCRIPT
+    ))
 }
 
 fn title(run: &Value) -> String {
@@ -91,12 +113,20 @@ fn title(run: &Value) -> String {
 }
 
 /// Names of the first and of the compared epoch, as far as run.json has them.
-fn epochs(run: &Value, pair: usize) -> Option<String> {
+fn epoch_names(run: &Value, pair: usize) -> Option<[String; 2]> {
     let name = |i: usize| {
         let epoch = run.get("epochs")?.get(i)?;
-        epoch.as_str().or_else(|| epoch.get("name")?.as_str()).map(escape)
+        epoch
+            .as_str()
+            .or_else(|| epoch.get("name")?.as_str())
+            .map(str::to_owned)
     };
-    Some(format!("{} \u{2192} {}", name(0)?, name(pair)?))
+    Some([name(0)?, name(pair)?])
+}
+
+/// The same as one line of HTML.
+fn epochs(run: &Value, pair: usize) -> Option<String> {
+    epoch_names(run, pair).map(|[first, second]| format!("{} \u{2192} {}", escape(&first), escape(&second)))
 }
 
 /// Epochs, version and time of the run, and the way to the reports on other epochs.

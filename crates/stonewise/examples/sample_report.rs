@@ -1,0 +1,190 @@
+//! Made-up results of a wall of any number of stones, for the browser tests of the report (`web/tests`).
+//!
+//! `cargo run --example sample_report -- STONES DIR` writes result files into DIR as `stonewise run` would, with names
+//! from inputs that try to be markup, and makes the report and the layers from them.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+use serde_json::json;
+use std::fmt::Write;
+use std::path::Path;
+use stonewise::report::{
+    RowMotion, Status, StoneOutline, StoneRow, detection_limit_m, write_layers, write_outlines, write_report,
+    write_stones,
+};
+use stonewise_core::geometry::FaceFrame;
+
+/// Size of a stone with its joint, metres.
+const PITCH_M: [f64; 2] = [0.42, 0.26];
+/// Half of the joint, metres.
+const JOINT_M: f64 = 0.012;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [stones, dir] = arguments.as_slice() else {
+        return Err("usage: sample_report STONES DIR".into());
+    };
+    let (stones, dir) = (stones.parse()?, Path::new(dir));
+    std::fs::create_dir_all(dir)?;
+    let wall = Wall::new(stones);
+    write_stones(dir, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
+    write_outlines(dir, &(0..stones).map(|i| wall.outline(i)).collect::<Vec<_>>())?;
+    std::fs::write(dir.join("m3c2.csv"), wall.core_points())?;
+    write_records(dir)?;
+    write_report(dir)?;
+    write_layers(dir)?;
+    Ok(())
+}
+
+/// A battered wall in running bond, three times as long as high, that settles to the right and bulges in its middle.
+struct Wall {
+    columns: usize,
+    corner: Point3<f64>,
+    frame: FaceFrame,
+    length_m: f64,
+    height_m: f64,
+}
+
+impl Wall {
+    fn new(stones: usize) -> Self {
+        let courses = ((stones as f64 * PITCH_M[0] / PITCH_M[1] / 3.0).sqrt().round() as usize).max(1);
+        let columns = stones.div_ceil(courses);
+        Self {
+            columns,
+            corner: Point3::new(451_000.0, 5_601_000.0, 310.0),
+            frame: FaceFrame::from_normal(&Vector3::new(0.6, -0.75, 0.2)),
+            length_m: columns as f64 * PITCH_M[0],
+            height_m: courses as f64 * PITCH_M[1],
+        }
+    }
+
+    /// (along, up) of the middle of a stone.
+    fn place(&self, i: usize) -> [f64; 2] {
+        let (column, course) = (i % self.columns, i / self.columns);
+        let shift = if course % 2 == 1 { 0.5 } else { 0.0 };
+        [
+            (column as f64 + shift + 0.5) * PITCH_M[0],
+            (course as f64 + 0.5) * PITCH_M[1],
+        ]
+    }
+
+    fn world(&self, [along, up]: [f64; 2]) -> Point3<f64> {
+        self.corner + self.frame.along * along + self.frame.up * up
+    }
+
+    /// Displacement as (along, up, out).
+    fn motion(&self, [along, up]: [f64; 2], i: usize) -> Vector3<f64> {
+        let (x, y) = (along / self.length_m - 0.5, up / self.height_m - 0.5);
+        let bulge = 0.03 * (-(x * x * 30.0 + y * y * 8.0)).exp();
+        let loose = if i % 97 == 40 { 0.012 } else { 0.0 };
+        Vector3::new(
+            0.004 + loose + noise(i, 1),
+            -0.012 * (x + 0.5) + noise(i, 2),
+            bulge + noise(i, 3),
+        )
+    }
+
+    fn row(&self, i: usize) -> StoneRow {
+        let place = self.place(i);
+        let status = Status::ALL[if i % 23 == 7 { 1 + i % 8 } else { 0 }];
+        let matched = !status.word().starts_with("unmatched");
+        StoneRow {
+            stone_id: i as u32 + 1,
+            centroid: self.world(place),
+            area_m2: (PITCH_M[0] - 2.0 * JOINT_M) * (PITCH_M[1] - 2.0 * JOINT_M),
+            points_1: 3000 + (i % 500) as u32,
+            points_2: matched.then_some(2900),
+            photos: 3 + (i % 5) as u32,
+            confidence: 0.85 + 0.1 * (i % 10) as f64 / 10.0,
+            matched_id: matched.then_some(i as u32 + 1),
+            status,
+            motion: (status == Status::Ok).then(|| self.row_motion(place, i)),
+        }
+    }
+
+    fn row_motion(&self, place: [f64; 2], i: usize) -> RowMotion {
+        let face = self.motion(place, i);
+        let world_from_face = self.frame.face_from_world().transpose();
+        let displacement = world_from_face * face;
+        let sigma = Vector3::new(0.0009, 0.0006, 0.0004);
+        let covariance: Matrix3<f64> = world_from_face
+            * Matrix3::from_diagonal(&sigma.component_mul(&sigma))
+            * world_from_face.transpose();
+        let limit = detection_limit_m(&displacement, &covariance);
+        RowMotion {
+            displacement,
+            face,
+            rotation: world_from_face * Vector3::new(0.0004, noise(i, 4), 0.001),
+            covariance,
+            relative: world_from_face
+                * Vector3::new(if i % 97 == 40 { 0.012 } else { noise(i, 5) }, 0.0, 0.0),
+            detection_limit_m: limit,
+            significant: displacement.norm() > limit,
+            loose: i % 97 == 40,
+            observability: 0.6,
+        }
+    }
+
+    fn outline(&self, i: usize) -> StoneOutline {
+        let [along, up] = self.place(i);
+        let (w, h) = (PITCH_M[0] / 2.0 - JOINT_M, PITCH_M[1] / 2.0 - JOINT_M);
+        let ring = (0..16).map(|k| {
+            let angle = f64::from(k) / 16.0 * std::f64::consts::TAU;
+            // A superellipse: a square with rounded, slightly rough corners.
+            let round = |v: f64| v.signum() * v.abs().powf(0.35);
+            let rough = 1.0 + noise(16 * i + k as usize, 6) * 40.0;
+            self.world([
+                along + w * round(angle.cos()) * rough.min(1.02),
+                up + h * round(angle.sin()) * rough.min(1.02),
+            ])
+        });
+        StoneOutline {
+            stone_id: i as u32 + 1,
+            normal: self.frame.out,
+            ring: ring.collect(),
+        }
+    }
+
+    /// `m3c2.csv`, a core point every 10 cm.
+    fn core_points(&self) -> String {
+        let mut csv = String::from("x,y,z,NormalX,NormalY,NormalZ,m3c2_distance,m3c2_uncertainty\n");
+        let n = self.frame.out;
+        for course in 0..(self.height_m / 0.1) as usize {
+            for column in 0..(self.length_m / 0.1) as usize {
+                let place = [column as f64 * 0.1, course as f64 * 0.1];
+                let p = self.world(place);
+                let d = self.motion(place, 1).z + noise(course * 1000 + column, 7);
+                let _ = writeln!(csv, "{},{},{},{},{},{},{d},0.0015", p.x, p.y, p.z, n.x, n.y, n.z);
+            }
+        }
+        csv
+    }
+}
+
+/// A repeatable number between minus and plus half a millimetre.
+fn noise(i: usize, salt: u64) -> f64 {
+    let mixed = (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ salt.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((mixed >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 1e-3
+}
+
+/// The other files of a run, with hostile names.
+fn write_records(dir: &Path) -> std::io::Result<()> {
+    let run = json!({
+        "version": "0.0.0",
+        "project": { "name": "Sample </title><script>alert(1)</script> wall" },
+        "epochs": [{ "name": "2025 <b>", "photos": 12, "points": 1_000_000, "stones": 200 },
+                   { "name": "2026", "photos": 12, "points": 1_000_000, "stones": 200 }],
+        "parameters": { "registration": { "epoch_error_m": 0.0 } },
+        "steps": [{ "step": "ingest-1", "seconds": 1.5, "resumed": false, "peak_memory_bytes": 1000 }],
+        "warnings": [{ "step": "segment", "subject": "<script>.jpg", "message": "cut off: \"'&", "skipped_input": true }],
+    });
+    std::fs::write(dir.join("run.json"), run.to_string())?;
+    std::fs::write(
+        dir.join("registration.json"),
+        r#"{"converged":true,"noise_m":[0.001,0.001]}"#,
+    )?;
+    std::fs::write(
+        dir.join("audit_epoch1.csv"),
+        "event,photo,instance,stones,share,points\nsplit_instance,<script>.jpg,4,1 2,,\n",
+    )
+}

@@ -1,0 +1,50 @@
+// Elements without markup: every text becomes a text node, so that nothing from an input can be read as HTML.
+
+type Child = Node | string | null;
+
+/** An HTML element with properties, attributes that are no properties, and children. */
+export function el<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  attributes: Readonly<Record<string, string | number | boolean>> = {},
+  ...children: readonly Child[]
+): HTMLElementTagNameMap[K] {
+  const element = document.createElement(tag);
+  setAll(element, attributes);
+  append(element, children);
+  return element;
+}
+
+/** An SVG element. */
+export function svg<K extends keyof SVGElementTagNameMap>(
+  tag: K,
+  attributes: Readonly<Record<string, string | number | boolean>> = {},
+  ...children: readonly Child[]
+): SVGElementTagNameMap[K] {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  setAll(element, attributes);
+  append(element, children);
+  return element;
+}
+
+/** A button that says what it does. */
+export function button(text: string, title: string, press: () => void): HTMLButtonElement {
+  const element = el("button", { type: "button", title, "aria-label": title }, text);
+  element.addEventListener("click", press);
+  return element;
+}
+
+/** A value of the style sheet that follows light and dark. */
+export function css(name: string): string {
+  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+}
+
+function setAll(element: Element, attributes: Readonly<Record<string, string | number | boolean>>): void {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (value === false) continue;
+    element.setAttribute(name, value === true ? "" : String(value));
+  }
+}
+
+function append(element: Element, children: readonly Child[]): void {
+  for (const child of children) if (child !== null) element.append(child);
+}

@@ -1,0 +1,59 @@
+// The controls above the views.
+
+import type { Report } from "../data.ts";
+import { button, el } from "../dom.ts";
+import type { Quantity, QuantityKey } from "../quantities.ts";
+import type { State, Store } from "../store.ts";
+
+/** What the buttons of a view do. */
+export interface Zoomable {
+  zoom(by: number): void;
+  whole(): void;
+}
+
+/** The controls; `current` gives the view that is shown. */
+export function toolbar(report: Report, store: Store, quantities: readonly Quantity[], current: () => Zoomable): HTMLElement {
+  const select = el("select", { id: "quantity" }, ...quantities.map((q) => el("option", { value: q.key }, q.label)));
+  select.addEventListener("change", () => store.set({ quantity: select.value as QuantityKey }));
+  const check = (text: string, key: "fade" | "arrows") => {
+    const box = el("input", { type: "checkbox", ...(store.get()[key] ? { checked: true } : {}), id: key });
+    box.addEventListener("change", () => store.set({ [key]: box.checked }));
+    return el("label", {}, box, ` ${text}`);
+  };
+  const tab = (text: string, view: State["view"]) => {
+    const element = button(text, view === "map" ? "show the unrolled wall" : "show the wall in space", () => store.set({ view }));
+    element.id = `view-${view}`;
+    return element;
+  };
+  const tabs = [tab("Map", "map"), tab("3D", "scene")] as const;
+  const draw = button("Draw a profile", "then drag a line across the map", () =>
+    store.set({ view: "map", tool: store.get().tool === "profile" ? "move" : "profile" }));
+  draw.id = "draw-profile";
+  const reflect = () => {
+    const { view, tool } = store.get();
+    tabs[0].setAttribute("aria-pressed", String(view === "map"));
+    tabs[1].setAttribute("aria-pressed", String(view === "scene"));
+    draw.setAttribute("aria-pressed", String(tool === "profile"));
+  };
+  store.on(reflect);
+  reflect();
+  const zoom = el("span", { class: "group" },
+    button("+", "zoom in", () => current().zoom(1.6)),
+    button("\u2212", "zoom out", () => current().zoom(1 / 1.6)),
+    button("whole wall", "show the whole wall", () => current().whole()));
+  return el("div", { class: "controls" }, el("span", { class: "group", role: "group", "aria-label": "view" }, ...tabs),
+    el("label", {}, "Show ", select), check("fade below the limit", "fade"), check("in-plane arrows", "arrows"),
+    search(report, store), draw, zoom);
+}
+
+/** Finds a stone by its number. */
+function search(report: Report, store: Store): HTMLElement {
+  const input = el("input", { type: "search", id: "search", inputmode: "numeric", size: 7, placeholder: "number" });
+  input.addEventListener("input", () => {
+    const text = input.value.trim();
+    const stone = text === "" ? undefined : report.indexOfId.get(Number(text));
+    input.setAttribute("aria-invalid", String(text !== "" && stone === undefined));
+    if (stone !== undefined) store.choose(stone);
+  });
+  return el("label", {}, "Stone ", input);
+}

@@ -1,0 +1,90 @@
+// Modules without a browser, against closed forms.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { gzipSync } from "node:zlib";
+import { load } from "./load.mjs";
+
+const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store } =
+  await load(`
+    export { Columns, unpack } from "./src/blocks.ts";
+    export * from "./src/geometry.ts";
+    export * from "./src/format.ts";
+    export { Store } from "./src/store.ts";
+  `);
+
+test("columns come out of base64 of gzip, and missing values are NaN", async () => {
+  const bytes = Buffer.alloc(12);
+  bytes.writeInt32LE(1234, 0);
+  bytes.writeInt32LE(-2147483648, 4);
+  bytes.writeUInt8(200, 8);
+  const entries = [
+    { name: "d", type: "i32", unit: 1e-6, start: 0, length: 2 },
+    { name: "flag", type: "u8", unit: 1, start: 8, length: 1 },
+  ];
+  const columns = await unpack(entries, gzipSync(bytes).toString("base64"));
+  assert.ok(columns instanceof Columns);
+  const d = columns.numbers("d");
+  assert.ok(Math.abs(d[0] - 0.001234) < 1e-12 && Number.isNaN(d[1]));
+  assert.equal(columns.integers("flag")[0], 200);
+  assert.throws(() => columns.numbers("none"), /no column none/);
+});
+
+test("numbers read as an engineer writes them", () => {
+  assert.equal(fixed(-0.04, 1), "0.0");
+  assert.equal(fixed(NaN, 1), "\u2013");
+  assert.equal(mm(-0.0123), "\u221212.3");
+  assert.equal(mm(0.0004), "0.40");
+  assert.equal(mm(0.25), "250");
+  assert.equal(signedMm(0.002), "+2.0");
+  assert.equal(count(1234567), "1\u202f234\u202f567");
+  assert.ok(Math.abs(niceAbove(0.23) - 0.25) < 1e-12);
+  assert.deepEqual(ticks(-1, 4.2, 5), [0, 2, 4]);
+});
+
+test("a bay of a polygon is outside, and a line through it meets two pieces", () => {
+  const u = [0, 0, 3, 0, 3, 2, 2, 2, 2, 1, 1, 1, 1, 2, 0, 2];
+  assert.ok(contains(u, 0.5, 1.5) && !contains(u, 1.5, 1.5) && !contains(u, 4, 0.5));
+  const pieces = crossings(u, { a1: -1, u1: 1.5, a2: 5, u2: 1.5 });
+  assert.deepEqual(pieces, [[1, 2], [3, 4]]);
+  // A line that begins inside starts at zero.
+  assert.deepEqual(crossings(u, { a1: 0.5, u1: 0.5, a2: 0.5, u2: 9 }), [[0, 1.5]]);
+});
+
+test("eigenvalues and vectors rebuild a matrix that was turned", () => {
+  const r = [0.3, -0.5, 0.8];
+  const columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((e) => rotate(e, r));
+  const values = [9, 4, 1];
+  const m = [0, 1, 2].map((i) => [0, 1, 2].map((j) => values.reduce((s, v, k) => s + v * columns[k][i] * columns[k][j], 0)));
+  const found = eigen3(m);
+  found.values.forEach((v, k) => assert.ok(Math.abs(v - values[k]) < 1e-9));
+  found.vectors.forEach((v, k) => assert.ok(Math.abs(Math.abs(v.reduce((s, x, i) => s + x * columns[k][i], 0)) - 1) < 1e-9));
+});
+
+test("a quarter turn about z takes x to y", () => {
+  const [x, y, z] = rotate([1, 0, 0], [0, 0, Math.PI / 2]);
+  assert.ok(Math.hypot(x, y - 1, z) < 1e-12);
+});
+
+test("an ellipse of a covariance has its deviations as half axes", () => {
+  const { major, minor, turn } = ellipse(4, 0, 1);
+  assert.ok(Math.abs(major - 2) < 1e-12 && Math.abs(minor - 1) < 1e-12 && Math.abs(turn) < 1e-12);
+  // Turned by 45 degrees: xx = yy = 2.5, xy = 1.5.
+  assert.ok(Math.abs(ellipse(2.5, 1.5, 2.5).turn - Math.PI / 4) < 1e-12);
+});
+
+test("a face that looks along x has y to the right and z up", () => {
+  const { along, up } = faceAxes([2, 0, 0]);
+  assert.deepEqual(along.map((v) => v + 0), [0, 1, 0]);
+  assert.ok(Math.hypot(up[0], up[1], up[2] - 1) < 1e-12);
+});
+
+test("listeners hear of changes and of nothing else", () => {
+  const store = new Store({ chosen: -1, follow: 0 });
+  let calls = 0;
+  store.on(() => calls++);
+  store.set({ chosen: -1 });
+  store.set({ chosen: 3 });
+  store.choose(3);
+  assert.equal(calls, 2);
+  assert.equal(store.get().follow, 1);
+});
