@@ -1,7 +1,7 @@
 //! What is not masonry: sky, plants, ground, plaster, planks. Painted under or beside the walls.
 
 use super::canvas::Canvas;
-use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep};
+use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep, sometimes};
 use super::material::{linear, stone_colour};
 use super::noise::{Field, Grain};
 use std::f32::consts::{FRAC_PI_2, PI};
@@ -111,6 +111,8 @@ impl Backdrop {
         let crack = Field::sized(rng, Grain::Fractal, 80.0, 400.0);
         let cracked = chance(rng, 0.4);
         let clouds = chance(rng, 0.5);
+        let pebbles = sometimes(rng, 0.35, 0.1, 0.5);
+        let gravel = Field::sized(rng, Grain::Cells, 5.0, 40.0);
         let (sin, cos) = stripe_angle.sin_cos();
         for y in 0..canvas.height {
             for x in 0..canvas.width {
@@ -139,8 +141,14 @@ impl Backdrop {
                         )
                     }
                     BackdropKind::Ground => {
-                        let tone = 1.0 + 0.15 * rough + 0.12 * grain;
-                        (scaled(self.colour, tone.max(0.2)), 0.25 * grain)
+                        let mut tone = 1.0 + 0.15 * rough + 0.12 * grain;
+                        let mut height = 0.25 * grain;
+                        if pebbles > 0.0 {
+                            let pebble = smoothstep(pebbles, 0.6 * pebbles, gravel.at(px, py) + 0.05 * grain);
+                            tone += 0.2 * pebble;
+                            height += 3.0 * pebbles * pebble;
+                        }
+                        (scaled(self.colour, tone.max(0.2)), height)
                     }
                     BackdropKind::Plaster => {
                         let line = cracked && crack.at(px, py).abs() < 0.012;

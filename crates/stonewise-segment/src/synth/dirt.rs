@@ -27,6 +27,8 @@ pub struct Dirt {
     pub lichen_px: f32,
     /// Strength of soot or damp that grows towards one side, 0 to 0.7.
     pub soot: f32,
+    /// Number of small holes and rusty nails, 0 to 12.
+    pub marks: u32,
     /// Strength of white salt blooms, 0 to 0.6.
     pub salt: f32,
     /// Direction in the photo in which water runs, radians; down is pi/2.
@@ -45,6 +47,7 @@ impl Dirt {
             lichen: sometimes(rng, 0.6 * often, 0.05, 0.4),
             lichen_px: log_between(rng, 5.0, 30.0),
             soot: sometimes(rng, 0.6 * often, 0.1, 0.7),
+            marks: sometimes(rng, often, 1.0, 13.0) as u32,
             salt: sometimes(rng, 0.5 * often, 0.1, 0.6),
             down,
         }
@@ -129,11 +132,51 @@ impl Dirt {
                 count[1] += u32::from(cover > HIDDEN);
             }
         }
+        for _ in 0..self.marks {
+            self.mark(canvas, rng);
+        }
         for (label, doubtful) in canvas.label.iter_mut().zip(&mut canvas.doubtful) {
             let [area, hidden] = covered[*label as usize];
             if *label != 0 && hidden as f32 > MAX_HIDDEN_SHARE * area as f32 {
                 *label = 0;
                 *doubtful = true;
+            }
+        }
+    }
+}
+
+impl Dirt {
+    /// A hole or a nail with rust around and below it.
+    fn mark(&self, canvas: &mut Canvas, rng: &mut Rng) {
+        let size = canvas.photo_size();
+        let middle = size.map(|side| between(rng, 0.0, side));
+        let radius = log_between(rng, 0.7, 5.0);
+        let halo = radius * between(rng, 1.0, 5.0);
+        let rust = sometimes(rng, 0.5, 0.1, 0.8);
+        let (sin, cos) = self.down.sin_cos();
+        let reach = (2.5 * halo + 2.0) * canvas.scale;
+        let range = |axis: usize, count: usize| {
+            let at = middle[axis] * canvas.scale;
+            (at - reach).max(0.0) as usize..((at + reach) as usize).min(count)
+        };
+        for y in range(1, canvas.height) {
+            for x in range(0, canvas.width) {
+                let i = y * canvas.width + x;
+                let p = canvas.photo(x, y);
+                let (dx, dy) = (p[0] - middle[0], p[1] - middle[1]);
+                let (below, aside) = (dx * cos + dy * sin, dx * sin - dy * cos);
+                let stretched = if below > 0.0 { 0.5 * below } else { below };
+                let amount = rust * smoothstep(halo, 0.0, stretched.hypot(aside));
+                let hole = smoothstep(radius + 0.5, radius - 0.5, dx.hypot(dy));
+                if !canvas.sky[i] {
+                    let stained = mix(
+                        canvas.albedo[i],
+                        product(canvas.albedo[i], [0.7, 0.45, 0.2]),
+                        amount,
+                    );
+                    canvas.albedo[i] = scaled(stained, 1.0 - 0.85 * hole);
+                    canvas.relief[i] -= 0.6 * radius * hole;
+                }
             }
         }
     }

@@ -34,6 +34,10 @@ pub struct Material {
     pub mottle: f32,
     /// Share of a second colour in blotches, 0 to 0.8.
     pub accent: f32,
+    /// Width over which the second colour sets in, 0.05 (a sharp line) to 1.2, in deviations of the noise.
+    pub accent_softness: f32,
+    /// Brightness of veins through the stones, bright or dark, -0.5 to 0.6.
+    pub veins: f32,
     /// Brightness of grain, 0 to 0.15.
     pub grain: f32,
     /// Size of the grain, 2 to 10 pixels.
@@ -91,8 +95,13 @@ pub struct Mortar {
 }
 
 impl Material {
-    /// A material drawn at random.
+    /// A material drawn at random, from plain to busy.
     pub(super) fn random(rng: &mut Rng) -> Self {
+        let busy = if chance(rng, 0.3) {
+            between(rng, 0.05, 0.3)
+        } else {
+            1.0
+        };
         let mut colours = vec![stone_colour(rng)];
         for _ in 0..usize::from(chance(rng, 0.35)) + usize::from(chance(rng, 0.2)) {
             let other = mix(colours[0], stone_colour(rng), between(rng, 0.2, 1.0));
@@ -102,12 +111,14 @@ impl Material {
             colours,
             tone_spread: between(rng, 0.0, 0.35) * between(rng, 0.2, 1.0),
             hue_spread: between(rng, 0.0, 0.05) * between(rng, 0.0, 1.0),
-            mottle: between(rng, 0.0, 0.25) * between(rng, 0.2, 1.0),
-            accent: sometimes(rng, 0.5, 0.1, 0.8),
-            grain: between(rng, 0.0, 0.15),
+            mottle: busy * between(rng, 0.0, 0.25) * between(rng, 0.2, 1.0),
+            accent: busy * sometimes(rng, 0.5, 0.1, 0.8),
+            accent_softness: log_between(rng, 0.05, 1.2),
+            veins: busy * sometimes(rng, 0.12, -0.5, 0.6),
+            grain: busy * between(rng, 0.0, 0.15),
             grain_px: log_between(rng, 2.0, 10.0),
-            bedding: sometimes(rng, 0.35, 0.03, 0.2),
-            speckle: sometimes(rng, 0.3, 0.03, 0.2),
+            bedding: busy * sometimes(rng, 0.35, 0.03, 0.2),
+            speckle: busy * sometimes(rng, 0.3, 0.03, 0.2),
             pits: sometimes(rng, 0.35, 0.1, 0.35),
             pits_px: log_between(rng, 4.0, 30.0),
             cracks: sometimes(rng, 0.4, 0.0, 0.2),
@@ -340,6 +351,9 @@ impl Surface {
             tone += m.bedding * layer;
             height += 0.6 * relief.fine_px * layer;
         }
+        if m.veins != 0.0 {
+            tone *= 1.0 + m.veins * smoothstep(0.06, 0.02, self.accent.at(y, x).abs());
+        }
         if m.speckle > 0.0 {
             tone += m.speckle * self.speckle.at(x, y);
         }
@@ -363,7 +377,12 @@ impl Surface {
             mix(
                 look.colour,
                 look.accent,
-                m.accent * smoothstep(-0.2, 0.9, self.accent.at(x, y)),
+                m.accent
+                    * smoothstep(
+                        0.3 - 0.5 * m.accent_softness,
+                        0.3 + 0.5 * m.accent_softness,
+                        self.accent.at(x, y),
+                    ),
             )
         } else {
             look.colour

@@ -73,10 +73,17 @@ impl MasonryStyle {
         let smallest_px = layers.iter().map(Layer::stone_px).fold(shorter, f32::min);
         let often = if chance(&mut rng, 0.4) { 0.4 } else { 0.05 };
         let count = (0..MAX_OBJECTS).filter(|_| chance(&mut rng, often)).count();
+        let colour = layers.first().map_or([0.3; 3], Layer::colour);
+        let mut objects = if chance(&mut rng, 0.06) {
+            Object::carvings(shorter, colour, &mut rng)
+        } else {
+            Vec::new()
+        };
+        objects.extend((0..count).map(|_| Object::random(shorter, colour, &mut rng)));
         Self {
             layers,
             dirt: Dirt::random(&mut rng, FRAC_PI_2 + viewpoint.roll),
-            objects: (0..count).map(|_| Object::random(shorter, &mut rng)).collect(),
+            objects,
             light: Light::random(&mut rng),
             camera: Camera::random(smallest_px, &mut rng),
         }

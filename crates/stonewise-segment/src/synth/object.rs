@@ -63,9 +63,39 @@ const KINDS: [ObjectKind; 10] = [
 ];
 
 impl Object {
-    /// A thing drawn at random for a photo whose shorter side has `shorter` pixels.
-    pub(super) fn random(shorter: f32, rng: &mut Rng) -> Self {
+    /// A thing drawn at random for a photo whose shorter side has `shorter` pixels, before a wall of some colour.
+    pub(super) fn random(shorter: f32, wall: [f32; 3], rng: &mut Rng) -> Self {
         let kind = KINDS[(between(rng, 0.0, KINDS.len() as f32) as usize).min(KINDS.len() - 1)];
+        Self::of(kind, shorter, wall, rng)
+    }
+
+    /// Ornaments close together, as on a fountain or a portal.
+    pub(super) fn carvings(shorter: f32, wall: [f32; 3], rng: &mut Rng) -> Vec<Self> {
+        let middle = [between(rng, 0.0, 1.0), between(rng, 0.0, 1.0)];
+        let spread = between(rng, 0.1, 0.3);
+        let base = Self::of(ObjectKind::Ornament, shorter, wall, rng);
+        (0..3 + (between(rng, 0.0, 7.0) as usize))
+            .map(|_| {
+                let kind = if chance(rng, 0.25) {
+                    ObjectKind::Cornice
+                } else {
+                    ObjectKind::Ornament
+                };
+                let own = Self::of(kind, shorter, wall, rng);
+                Self {
+                    centre: middle.map(|c| c + spread * normal(rng)),
+                    half_px: match kind {
+                        ObjectKind::Cornice => [own.half_px[0], shorter * spread],
+                        _ => own.half_px,
+                    },
+                    colours: base.colours,
+                    ..own
+                }
+            })
+            .collect()
+    }
+
+    fn of(kind: ObjectKind, shorter: f32, wall: [f32; 3], rng: &mut Rng) -> Self {
         let part = |low: f32, high: f32, rng: &mut Rng| shorter * log_between(rng, low, high);
         let long = 1.5 * shorter;
         let half_px = match kind {
@@ -99,7 +129,11 @@ impl Object {
                 .map(|base| base.map(|c| linear(c) * (0.25 * normal(rng)).exp())),
             ObjectKind::Target => [[0.9; 3], [0.02; 3]],
             ObjectKind::Ornament | ObjectKind::Cornice | ObjectKind::Patch => {
-                let colour = stone_colour(rng);
+                let colour = if chance(rng, 0.6) {
+                    scaled(wall, (0.2 * normal(rng)).exp())
+                } else {
+                    stone_colour(rng)
+                };
                 [colour, scaled(colour, 0.7)]
             }
             _ => [any(rng), any(rng)],
@@ -162,6 +196,15 @@ struct Brush<'a> {
     sectors: f32,
     rings: f32,
     round: bool,
+    motif: Motif,
+}
+
+/// What an ornament shows.
+enum Motif {
+    Rosette,
+    Scroll,
+    Lattice,
+    Flutes,
 }
 
 impl<'a> Brush<'a> {
@@ -177,6 +220,12 @@ impl<'a> Brush<'a> {
             sectors: between(rng, 2.0, 9.0).floor(),
             rings: between(rng, 1.0, 6.0),
             round: chance(rng, 0.5),
+            motif: match between(rng, 0.0, 4.0) as u32 {
+                0 => Motif::Rosette,
+                1 => Motif::Scroll,
+                2 => Motif::Lattice,
+                _ => Motif::Flutes,
+            },
         }
     }
 
@@ -265,8 +314,16 @@ impl<'a> Brush<'a> {
             }
             ObjectKind::Ornament => {
                 let shape = if self.round { radius < 1.0 } else { inside };
-                let petals = (y.atan2(x) * self.sectors).cos();
-                let wave = (radius * self.rings * std::f32::consts::TAU + petals).sin();
+                let turn = y.atan2(x) * self.sectors;
+                let ring = radius * self.rings * std::f32::consts::TAU;
+                let wave = match self.motif {
+                    Motif::Rosette => (ring + turn.cos()).sin(),
+                    Motif::Scroll => (ring + (turn / self.sectors)).sin(),
+                    Motif::Lattice => {
+                        (self.sectors * x / half_x * 3.0).sin() * (self.rings * y / half_y * 3.0).sin()
+                    }
+                    Motif::Flutes => (self.sectors * x / half_x * 4.0).sin(),
+                };
                 let tone = 1.0 + 0.1 * self.rough.at(x, y);
                 let deep = half_x.min(half_y) * 0.06;
                 shape.then(|| {

@@ -118,6 +118,14 @@ impl Layer {
         }
     }
 
+    /// Colour of the layer's stones or surface, linear.
+    pub(super) fn colour(&self) -> [f32; 3] {
+        match &self.content {
+            Content::Backdrop(backdrop) => backdrop.colour,
+            Content::Masonry(masonry) => masonry.wall.material.colours.first().copied().unwrap_or([0.3; 3]),
+        }
+    }
+
     /// Paints the layer.
     pub(super) fn paint(&self, canvas: &mut Canvas, width: u32, height: u32, rng: &mut Rng) {
         let mask = self.region.mask(canvas, rng);

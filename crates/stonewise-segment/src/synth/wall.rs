@@ -198,15 +198,16 @@ fn make_visible(material: &mut Material, mortar: &mut Mortar, stone_px: f32, rng
     let stone = material.colours.first().map_or(1.0, |&c| brightness(c));
     let contrast = (brightness(mortar.colour) / stone.max(1e-3)).ln().abs();
     let width_px = mortar.width * stone_px;
-    let by_colour = contrast * width_px.min(1.5) > 0.2 + 0.5 * material.mottle;
-    let by_depth = mortar.recess * stone_px > 0.8;
+    let rough_px = material.relief.roughness * stone_px;
+    let by_colour = contrast * width_px.min(1.5) > 0.2 + 0.5 * material.mottle + 0.2 * material.accent;
+    let by_depth = mortar.recess * stone_px > 0.8 + rough_px;
     let by_tone = material.tone_spread > 0.12 + 0.5 * material.mottle;
     if by_colour || by_depth || by_tone {
         return;
     }
     if chance(rng, 0.6) {
-        mortar.width = mortar.width.max(0.7 / stone_px);
-        mortar.recess = between(rng, 0.8, 2.5) / stone_px;
+        mortar.width = mortar.width.max((0.7 + 0.5 * rough_px) / stone_px);
+        mortar.recess = (between(rng, 0.8, 2.5) + rough_px) / stone_px;
     } else {
         material.tone_spread = between(rng, 0.13, 0.3);
         material.mottle *= 0.3;
