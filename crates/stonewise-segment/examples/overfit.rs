@@ -30,6 +30,7 @@ fn main() {
     let mut model =
         MaskRcnn::<Autodiff<Flex>>::init(&config, 1, &Default::default()).expect("a valid preset");
     let mut optimizer = AdamWConfig::new()
+        .with_epsilon(1e-8)
         .with_grad_clipping(Some(GradientClippingConfig::Norm(1.0)))
         .init();
     let start = Instant::now();

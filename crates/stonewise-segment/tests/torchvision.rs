@@ -1,4 +1,5 @@
 //! The same weights and image give the same objects here and in torchvision (testdata/mask_rcnn).
+#![allow(clippy::unwrap_used)]
 
 use burn::backend::Flex;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -79,7 +80,7 @@ fn fnv1a(text: &str) -> u32 {
 fn unit(key: u32, place: u32) -> f64 {
     let mut h = place.wrapping_mul(2_654_435_761).wrapping_add(key);
     for _ in 0..2 {
-        h = (h ^ (h >> 16)).wrapping_mul(0x45D9_F3B);
+        h = (h ^ (h >> 16)).wrapping_mul(0x045D_9F3B);
     }
     f64::from((h ^ (h >> 16)) >> 8) / f64::from(1 << 23) - 1.0
 }

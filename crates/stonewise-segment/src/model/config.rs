@@ -13,16 +13,18 @@ pub enum ResnetDepth {
     R50,
 }
 
-/// How the backbone's activations are normalised.
+/// How activations are normalised.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Norm {
-    /// Batch normalisation with stored statistics that training leaves alone: for weights that come with statistics.
+    /// Batch normalisation of the backbone with stored statistics that training leaves alone: for weights that come with
+    /// statistics.
     FrozenBatch {
         /// Added to the variance.
         epsilon: f64,
     },
-    /// Group normalisation (Wu & He 2018): for training from scratch with small batches.
+    /// Group normalisation (Wu & He 2018) of backbone, pyramid and convolutional heads: for training from scratch with small
+    /// batches (He et al. 2019).
     Group {
         /// Groups of channels.
         groups: usize,
@@ -36,7 +38,7 @@ pub struct BackboneConfig {
     pub depth: ResnetDepth,
     /// Channels of the first stage; 64 as published.
     pub width: usize,
-    /// Normalisation.
+    /// Normalisation, of the whole network.
     pub norm: Norm,
 }
 
@@ -138,6 +140,16 @@ pub struct MaskRcnnConfig {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("model configuration: {0}")]
 pub struct ConfigError(String);
+
+impl Norm {
+    /// The normalisation of pyramid and heads.
+    pub(super) fn beyond_backbone(self) -> Option<Self> {
+        match self {
+            Self::FrozenBatch { .. } => None,
+            Self::Group { .. } => Some(self),
+        }
+    }
+}
 
 impl MaskRcnnConfig {
     /// The network of torchvision's `maskrcnn_resnet50_fpn` with its released weights: 91 classes of COCO.
@@ -246,10 +258,14 @@ impl MaskRcnnConfig {
         if self.roi.box_cells == 0 || self.roi.mask_cells == 0 || self.roi.samples == 0 {
             return fail("roi.box_cells, roi.mask_cells and roi.samples must be 1 or more");
         }
-        if let Norm::Group { groups } = self.backbone.norm
-            && (groups == 0 || !self.backbone.width.is_multiple_of(groups))
-        {
-            return fail("backbone.norm.group.groups must divide backbone.width");
+        if let Norm::Group { groups } = self.backbone.norm {
+            let mut normalised = self.roi.mask_channels.clone();
+            normalised.extend([self.backbone.width, self.fpn_channels]);
+            if groups == 0 || normalised.iter().any(|channels| !channels.is_multiple_of(groups)) {
+                return fail(
+                    "norm.group.groups must divide backbone.width, fpn_channels and roi.mask_channels",
+                );
+            }
         }
         let per_level = self.anchors.sizes[0].len();
         if per_level == 0 || self.anchors.sizes.iter().any(|sizes| sizes.len() != per_level) {

@@ -1,8 +1,9 @@
 //! Feature pyramid (Lin et al. 2017, section 3).
 
+use super::config::Norm;
 use super::init::Init;
 use super::kernels::ModelBackend;
-use super::layers::{Conv, ConvBlock, Spread};
+use super::layers::{ConvBlock, Spread};
 use burn::module::Module;
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
@@ -17,11 +18,9 @@ pub struct Fpn<B: Backend> {
 }
 
 impl<B: ModelBackend> Fpn<B> {
-    pub fn new(init: &mut Init<B>, inputs: [usize; 4], channels: usize) -> Self {
-        let mut block = |inputs, size| ConvBlock {
-            conv: Conv::new(init, [inputs, channels], size, 1, Spread::KaimingUniform, true),
-            norm: None,
-        };
+    pub fn new(init: &mut Init<B>, inputs: [usize; 4], channels: usize, norm: Option<Norm>) -> Self {
+        let mut block =
+            |inputs, size| ConvBlock::new(init, [inputs, channels], size, Spread::KaimingUniform, norm);
         Self {
             inner_blocks: inputs.iter().map(|&inputs| block(inputs, 1)).collect(),
             layer_blocks: inputs.iter().map(|_| block(channels, 3)).collect(),

@@ -40,6 +40,7 @@ impl<B: ModelBackend> RoiHeads<B> {
     pub fn new(init: &mut Init<B>, config: &MaskRcnnConfig) -> Self {
         let features = config.fpn_channels * config.roi.box_cells * config.roi.box_cells;
         let hidden = config.roi.box_hidden;
+        let norm = config.backbone.norm.beyond_backbone();
         let mut channels = config.fpn_channels;
         let box_head = BoxHead {
             fc6: Linear::new(init, [features, hidden]),
@@ -51,10 +52,13 @@ impl<B: ModelBackend> RoiHeads<B> {
         };
         let mut mask_head = Vec::with_capacity(config.roi.mask_channels.len());
         for &outputs in &config.roi.mask_channels {
-            mask_head.push(ConvBlock {
-                conv: Conv::new(init, [channels, outputs], 3, 1, Spread::KaimingNormal, true),
-                norm: None,
-            });
+            mask_head.push(ConvBlock::new(
+                init,
+                [channels, outputs],
+                3,
+                Spread::KaimingNormal,
+                norm,
+            ));
             channels = outputs;
         }
         let mask_predictor = MaskPredictor {

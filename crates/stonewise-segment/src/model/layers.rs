@@ -219,6 +219,20 @@ pub struct ConvBlock<B: Backend> {
 }
 
 impl<B: ModelBackend> ConvBlock<B> {
+    /// A convolution of stride 1 with a bias, or with a normalisation instead.
+    pub fn new(
+        init: &mut Init<B>,
+        channels: [usize; 2],
+        size: usize,
+        spread: Spread,
+        norm: Option<NormConfig>,
+    ) -> Self {
+        Self {
+            conv: Conv::new(init, channels, size, 1, spread, norm.is_none()),
+            norm: norm.map(|norm| Norm::new(init, norm, channels[1], 1.0)),
+        }
+    }
+
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         normalised(&self.conv, &self.norm, x)
     }

@@ -76,12 +76,13 @@ impl<B: ModelBackend> MaskRcnn<B> {
         config.check()?;
         let init = &mut Init::new(seed, device);
         let shapes = config.anchors.sizes[0].len() * config.anchors.aspect_ratios.len();
+        let norm = config.backbone.norm.beyond_backbone();
         Ok(Self {
             backbone: Backbone {
                 body: Resnet::new(init, &config.backbone),
-                fpn: Fpn::new(init, channels(&config.backbone), config.fpn_channels),
+                fpn: Fpn::new(init, channels(&config.backbone), config.fpn_channels, norm),
             },
-            rpn: Rpn::new(init, config.fpn_channels, shapes),
+            rpn: Rpn::new(init, config.fpn_channels, shapes, norm),
             roi_heads: RoiHeads::new(init, config),
             config: config.clone(),
         })

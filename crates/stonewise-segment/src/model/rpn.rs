@@ -1,7 +1,7 @@
 //! Region proposal network (Ren et al. 2015).
 
 use super::boxes::{Bounds, PROPOSAL_WEIGHTS, clip, decode, is_large};
-use super::config::ProposalConfig;
+use super::config::{Norm, ProposalConfig};
 use super::init::Init;
 use super::kernels::ModelBackend;
 use super::layers::{Conv, ConvBlock, Spread};
@@ -38,17 +38,15 @@ pub struct AnchorScores<B: Backend> {
 
 impl<B: ModelBackend> Rpn<B> {
     /// `shapes`: reference boxes at a place.
-    pub fn new(init: &mut Init<B>, channels: usize, shapes: usize) -> Self {
-        let mut conv =
-            |outputs, size| Conv::new(init, [channels, outputs], size, 1, Spread::Normal(0.01), true);
+    pub fn new(init: &mut Init<B>, channels: usize, shapes: usize, norm: Option<Norm>) -> Self {
+        let spread = Spread::Normal(0.01);
+        let hidden = vec![ConvBlock::new(init, [channels; 2], 3, spread, norm)];
+        let mut conv = |outputs| Conv::new(init, [channels, outputs], 1, 1, spread, true);
         Self {
             head: Head {
-                hidden: vec![ConvBlock {
-                    conv: conv(channels, 3),
-                    norm: None,
-                }],
-                cls_logits: conv(shapes, 1),
-                bbox_pred: conv(4 * shapes, 1),
+                hidden,
+                cls_logits: conv(shapes),
+                bbox_pred: conv(4 * shapes),
             },
         }
     }
