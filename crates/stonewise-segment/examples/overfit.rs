@@ -43,7 +43,7 @@ fn main() {
         let gradients = GradientsParams::from_grads(total.backward(), &model);
         let progress = (step as f64 + 1.0) / f64::from(steps);
         let rate =
-            5e-4 * (step as f64 / 50.0).min(1.0) * (0.5 + 0.5 * (std::f64::consts::PI * progress).cos());
+            5e-4 * (step as f64 / 20.0).min(1.0) * (0.5 + 0.5 * (std::f64::consts::PI * progress).cos());
         model = optimizer.step(rate, model, gradients);
         if step % 20 == 0 {
             let parts = [

@@ -13,18 +13,16 @@ pub enum ResnetDepth {
     R50,
 }
 
-/// How activations are normalised.
+/// How the backbone's activations are normalised.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Norm {
-    /// Batch normalisation of the backbone with stored statistics that training leaves alone: for weights that come with
-    /// statistics.
+    /// Batch normalisation with stored statistics that training leaves alone: for weights that come with statistics.
     FrozenBatch {
         /// Added to the variance.
         epsilon: f64,
     },
-    /// Group normalisation (Wu & He 2018) of backbone, pyramid and convolutional heads: for training from scratch with small
-    /// batches (He et al. 2019).
+    /// Group normalisation (Wu & He 2018): for training from scratch with small batches.
     Group {
         /// Groups of channels.
         groups: usize,
@@ -38,7 +36,7 @@ pub struct BackboneConfig {
     pub depth: ResnetDepth,
     /// Channels of the first stage; 64 as published.
     pub width: usize,
-    /// Normalisation, of the whole network.
+    /// Normalisation.
     pub norm: Norm,
 }
 
@@ -118,6 +116,10 @@ pub struct MaskRcnnConfig {
     pub backbone: BackboneConfig,
     /// Channels of the feature pyramid.
     pub fpn_channels: usize,
+    /// Groups of channels of a group normalisation of pyramid and convolutional heads, which training from scratch needs
+    /// (He et al. 2019); `None`: not normalised, as published.
+    #[serde(default)]
+    pub head_groups: Option<usize>,
     /// Reference boxes.
     pub anchors: AnchorConfig,
     /// Reference boxes in training.
@@ -141,16 +143,6 @@ pub struct MaskRcnnConfig {
 #[error("model configuration: {0}")]
 pub struct ConfigError(String);
 
-impl Norm {
-    /// The normalisation of pyramid and heads.
-    pub(super) fn beyond_backbone(self) -> Option<Self> {
-        match self {
-            Self::FrozenBatch { .. } => None,
-            Self::Group { .. } => Some(self),
-        }
-    }
-}
-
 impl MaskRcnnConfig {
     /// The network of torchvision's `maskrcnn_resnet50_fpn` with its released weights: 91 classes of COCO.
     pub fn torchvision_r50() -> Self {
@@ -168,6 +160,7 @@ impl MaskRcnnConfig {
                 norm: Norm::FrozenBatch { epsilon: 0.0 },
             },
             fpn_channels: 256,
+            head_groups: None,
             anchors: AnchorConfig {
                 sizes: [32.0, 64.0, 128.0, 256.0, 512.0].map(|size| vec![size]),
                 aspect_ratios: vec![0.5, 1.0, 2.0],
@@ -215,6 +208,7 @@ impl MaskRcnnConfig {
                 norm: Norm::Group { groups: 16 },
             },
             fpn_channels: 64,
+            head_groups: Some(16),
             anchors: AnchorConfig {
                 sizes: [16.0, 32.0, 64.0, 128.0, 256.0].map(|size| vec![size]),
                 aspect_ratios: vec![0.5, 1.0, 2.0],
@@ -284,5 +278,10 @@ impl MaskRcnnConfig {
             return fail("resize.shorter and resize.longest must be 1 or more");
         }
         Ok(())
+    }
+
+    /// Normalisation of pyramid and convolutional heads.
+    pub(super) fn head_norm(&self) -> Option<Norm> {
+        self.head_groups.map(|groups| Norm::Group { groups })
     }
 }

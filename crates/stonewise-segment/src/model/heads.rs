@@ -40,7 +40,7 @@ impl<B: ModelBackend> RoiHeads<B> {
     pub fn new(init: &mut Init<B>, config: &MaskRcnnConfig) -> Self {
         let features = config.fpn_channels * config.roi.box_cells * config.roi.box_cells;
         let hidden = config.roi.box_hidden;
-        let norm = config.backbone.norm.beyond_backbone();
+        let norm = config.head_norm();
         let mut channels = config.fpn_channels;
         let box_head = BoxHead {
             fc6: Linear::new(init, [features, hidden]),

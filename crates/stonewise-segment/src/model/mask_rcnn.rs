@@ -76,7 +76,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         config.check()?;
         let init = &mut Init::new(seed, device);
         let shapes = config.anchors.sizes[0].len() * config.anchors.aspect_ratios.len();
-        let norm = config.backbone.norm.beyond_backbone();
+        let norm = config.head_norm();
         Ok(Self {
             backbone: Backbone {
                 body: Resnet::new(init, &config.backbone),
