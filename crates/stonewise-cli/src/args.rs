@@ -36,6 +36,12 @@ pub enum Command {
     /// Bring the masks of every photo into one label image.
     #[command(after_help = "Example:\n  stonewise segment survey/stonewise.toml --out results/")]
     Segment(ProjectArgs),
+    /// Teach the network that finds stones: a wall from a few labelled photos, or masonry in general from rendered ones.
+    #[command(
+        after_help = "Examples:\n  stonewise train --rendered --from none --minutes 60 --out training/\n\n\
+        A training goes on where it stopped when the same command is given again."
+    )]
+    Train(TrainArgs),
     /// Carry the labels of the photos into the point clouds.
     #[command(after_help = "Example:\n  stonewise label survey/stonewise.toml --out results/")]
     Label(ProjectArgs),
@@ -130,6 +136,29 @@ pub struct CompareArgs {
     /// Farther points get no distance, metres (c2c and c2m).
     #[arg(long, value_name = "M", default_value_t = 1.0)]
     pub max_distance: f64,
+}
+
+/// Arguments of `train`.
+#[derive(Debug, ClapArgs)]
+pub struct TrainArgs {
+    /// Learn from photos that are rendered on the way.
+    #[arg(long, required = true)]
+    pub rendered: bool,
+    /// Weights to start from: a file that `train` wrote, or `none`.
+    #[arg(long, value_name = "FILE|none")]
+    pub from: String,
+    /// Folder of the checkpoint, the curves and the trained network (model.safetensors); made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Stop after so many minutes; the same command goes on.
+    #[arg(long, value_name = "M")]
+    pub minutes: Option<f64>,
+    /// How long the training lasts in all, minutes; --minutes when absent, else 30. The learning rate falls towards its end.
+    #[arg(long, value_name = "M")]
+    pub total_minutes: Option<f64>,
+    /// Parameters (TOML, every key optional); the defaults are in docs/src/method/segmentation.md.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
 }
 
 /// Arguments of `evaluate`.

@@ -8,6 +8,7 @@ mod report;
 mod run;
 mod simulate;
 mod split;
+mod train;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
@@ -33,6 +34,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     match args.command {
         Command::Run(args) => run::run(&args, Until::Reported, printer),
         Command::Segment(args) => run::run(&args, Until::Segmented, printer),
+        Command::Train(args) => train::train(&args, printer),
         Command::Label(args) => run::run(&args, Until::Labelled, printer),
         Command::Match(args) => run::run(&args, Until::Matched, printer),
         Command::Register(args) => run::run(&args, Until::Registered, printer),

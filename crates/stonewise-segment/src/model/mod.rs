@@ -14,6 +14,7 @@ mod layers;
 mod losses;
 mod mask_rcnn;
 mod matcher;
+mod model_file;
 mod nms;
 mod paste;
 mod preprocess;
@@ -32,6 +33,7 @@ pub use config::{
 pub use kernels::{ModelBackend, TrainBackend};
 pub use losses::Losses;
 pub use mask_rcnn::{Instance, MaskRcnn, StoneDetector};
+pub use model_file::{load_model, model_from_bytes, save_model};
 pub use paste::paste_mask;
 pub use sparse::SparseMatrix;
 pub use weights::{

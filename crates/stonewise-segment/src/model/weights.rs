@@ -7,8 +7,11 @@ use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
+
+/// Key of the network's configuration in a file's metadata.
+pub(super) const CONFIG_KEY: &str = "stonewise_model";
 
 /// How weights are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +41,14 @@ pub enum WeightsError {
         name: String,
         /// What went wrong.
         source: SafeTensorError,
+    },
+    /// The file does not say what the network looks like.
+    #[error("{name} does not say what its network looks like: {problem}")]
+    Config {
+        /// The file or what stands for it.
+        name: String,
+        /// What is wrong.
+        problem: String,
     },
     /// A parameter of the model is not in the file.
     #[error(
@@ -180,7 +191,12 @@ pub fn weights_to_bytes<B: ModelBackend>(
         .map(|(key, (shape, bytes))| Ok((key, TensorView::new(dtype, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, SafeTensorError>>()
         .map_err(format)?;
-    safetensors::serialize(views, None).map_err(format)
+    let config = serde_json::to_string(model.config()).map_err(|e| WeightsError::Config {
+        name: "the model".to_owned(),
+        problem: e.to_string(),
+    })?;
+    let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config)]);
+    safetensors::serialize(views, Some(metadata)).map_err(format)
 }
 
 /// torchvision's name of a parameter: its lists hold (convolution, normalisation) pairs without names.

@@ -1,0 +1,85 @@
+//! Figures of a training, step by step, as CSV.
+
+use super::error::TrainError;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use stonewise_io::atomic::write_atomically;
+
+/// A CSV that grows by a row at a time; its first column is the step.
+pub struct Curve {
+    path: PathBuf,
+    file: File,
+}
+
+impl Curve {
+    /// Opens the curve of a training that has come to `steps`: rows of later steps, which will be done again, are removed.
+    ///
+    /// # Errors
+    /// The file cannot be read or written.
+    pub fn open(path: &Path, header: &str, steps: u64) -> Result<Self, TrainError> {
+        let old = match std::fs::read_to_string(path) {
+            Ok(text) if steps > 0 => text,
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(TrainError::io("reading the curve", path)(error));
+            }
+            _ => String::new(),
+        };
+        let mut text = format!("{header}\n");
+        for row in old.lines().skip(1) {
+            let step = row.split(',').next().and_then(|s| s.parse::<u64>().ok());
+            if step.is_some_and(|step| step <= steps) {
+                text += &format!("{row}\n");
+            }
+        }
+        write_atomically(path, |partial| std::fs::write(partial, text))
+            .map_err(TrainError::io("writing the curve", path))?;
+        let file = OpenOptions::new().append(true).open(path);
+        Ok(Self {
+            path: path.to_owned(),
+            file: file.map_err(TrainError::io("writing the curve", path))?,
+        })
+    }
+
+    /// Adds a row.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, step: u64, values: &[f64]) -> Result<(), TrainError> {
+        let values: String = values.iter().map(|v| format!(",{v:.6}")).collect();
+        let written = self.file.write_all(format!("{step}{values}\n").as_bytes());
+        written.map_err(TrainError::io("writing the curve", &self.path))
+    }
+}
+
+/// The columns of a curve by position, the step among them; rows that are not numbers throughout are left out.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn read_curve(path: &Path) -> Result<Vec<Vec<f64>>, TrainError> {
+    let text = std::fs::read_to_string(path).map_err(TrainError::io("reading the curve", path))?;
+    let row = |line: &str| {
+        line.split(',')
+            .map(|v| v.parse().ok())
+            .collect::<Option<Vec<f64>>>()
+    };
+    Ok(text.lines().skip(1).filter_map(row).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_resumed_curve_has_no_row_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("loss.csv");
+        let mut curve = Curve::open(&path, "step,loss", 0).unwrap();
+        for step in 1..=4 {
+            curve.add(step, &[step as f64 / 2.0]).unwrap();
+        }
+        let mut curve = Curve::open(&path, "step,loss", 2).unwrap();
+        curve.add(3, &[9.0]).unwrap();
+        assert_eq!(read_curve(&path).unwrap(), [[1.0, 0.5], [2.0, 1.0], [3.0, 9.0]]);
+    }
+}

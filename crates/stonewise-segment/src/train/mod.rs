@@ -1,0 +1,35 @@
+//! Training: images in, weights out, in as many runs of the program as it takes.
+
+mod checkpoint;
+mod curve;
+mod error;
+mod optimizer;
+mod parameters;
+mod params;
+mod rendered;
+mod run;
+mod schedule;
+pub(crate) mod seed;
+mod source;
+mod start;
+mod trainer;
+
+pub use error::TrainError;
+pub use optimizer::AdamWParams;
+pub use params::{TrainConfig, TrainParams};
+pub use rendered::Rendered;
+pub use run::{Run, Stop, evaluate_samples, model_path};
+pub use schedule::{Elapsed, Schedule, Total};
+pub use source::SampleSource;
+pub use start::{Start, open_training};
+pub use trainer::{StepFigures, Trainer};
+
+use std::path::{Path, PathBuf};
+
+/// Where a training keeps what it needs to go on.
+pub fn checkpoint_path(out: &Path) -> PathBuf {
+    out.join("checkpoint.safetensors")
+}
+
+#[cfg(test)]
+mod tests;

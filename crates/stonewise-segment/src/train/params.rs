@@ -1,0 +1,85 @@
+//! Parameters of a training.
+
+use super::optimizer::AdamWParams;
+use super::schedule::{Schedule, Total};
+use crate::model::MaskRcnnConfig;
+use serde::{Deserialize, Serialize};
+
+/// Everything that decides a training; kept in its checkpoints.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainConfig {
+    /// The network.
+    pub model: MaskRcnnConfig,
+    /// How it is trained.
+    pub training: TrainParams,
+    /// How long in all.
+    pub total: Total,
+}
+
+/// How a network is trained.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrainParams {
+    /// Another seed draws other images and other samples of boxes.
+    pub seed: u64,
+    /// Edge of a training image, pixels.
+    pub crop_px: u32,
+    /// Images that go through the network together.
+    pub batch: usize,
+    /// Batches whose gradients make one step.
+    pub accumulate: usize,
+    /// The learning rate.
+    pub schedule: Schedule,
+    /// The optimiser.
+    pub optimizer: AdamWParams,
+    /// Minutes between checkpoints.
+    pub checkpoint_minutes: f64,
+    /// Steps between evaluations; 0 for none.
+    pub evaluate_steps: u64,
+}
+
+impl Default for TrainParams {
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            crop_px: 320,
+            batch: 1,
+            accumulate: 2,
+            schedule: Schedule::default(),
+            optimizer: AdamWParams::default(),
+            checkpoint_minutes: 5.0,
+            evaluate_steps: 250,
+        }
+    }
+}
+
+impl TrainParams {
+    /// Images of one step.
+    pub fn images_per_step(&self) -> usize {
+        self.batch * self.accumulate
+    }
+
+    /// The first value that cannot be, and what it must be.
+    pub fn impossible(&self) -> Option<String> {
+        let checks = [
+            (self.crop_px >= 64, "crop_px must be at least 64"),
+            (
+                self.images_per_step() > 0,
+                "batch and accumulate must be at least 1",
+            ),
+            (self.schedule.learning_rate > 0.0, "learning_rate must be above 0"),
+            (
+                (0.0..=1.0).contains(&self.schedule.decay_share),
+                "decay_share is a share, 0 to 1",
+            ),
+            (
+                self.checkpoint_minutes > 0.0,
+                "checkpoint_minutes must be above 0",
+            ),
+        ];
+        checks
+            .iter()
+            .find(|(is_possible, _)| !is_possible)
+            .map(|(_, message)| (*message).to_owned())
+    }
+}

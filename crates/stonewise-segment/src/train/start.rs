@@ -1,0 +1,69 @@
+//! The beginning of a training, or of another run of one.
+
+use super::checkpoint_path;
+use super::error::TrainError;
+use super::params::{TrainConfig, TrainParams};
+use super::schedule::Total;
+use super::trainer::Trainer;
+use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend, load_model};
+use burn::tensor::Device;
+use std::path::{Path, PathBuf};
+
+/// What a training starts from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Start {
+    /// Random weights of a network that looks like this.
+    Nothing(MaskRcnnConfig),
+    /// The weights of a file.
+    File(PathBuf),
+}
+
+/// How long a training lasts that does not say it, minutes: enough to learn a wall from a few labelled photos on two CPU cores.
+const DEFAULT_MINUTES: f64 = 30.0;
+
+/// Takes up the training in a folder, or starts one where there is none.
+///
+/// A training goes on under the parameters that it was started with; `total`, where given, replaces how long it lasts in all. A new one
+/// without a total lasts for the `minutes` of its first run.
+///
+/// # Errors
+/// The folder holds a training with other parameters, the weights cannot be read, or a parameter is impossible.
+pub fn open_training<B: TrainBackend>(
+    out: &Path,
+    start: &Start,
+    params: Option<TrainParams>,
+    total: Option<Total>,
+    minutes: Option<f64>,
+    device: &Device<B>,
+) -> Result<Trainer<B>, TrainError> {
+    let path = checkpoint_path(out);
+    if path.exists() {
+        let mut trainer = Trainer::resume(&path, device)?;
+        if params.is_some_and(|p| p != trainer.config().training) {
+            return Err(TrainError::Checkpoint {
+                path,
+                problem: "it was started with other parameters: leave --config away to continue it, or give another \
+                          folder to start anew"
+                    .to_owned(),
+            });
+        }
+        if let Some(total) = total {
+            trainer.set_total(total);
+        }
+        return Ok(trainer);
+    }
+    let training = params.unwrap_or_default();
+    if let Some(problem) = training.impossible() {
+        return Err(TrainError::Data(problem));
+    }
+    let model = match start {
+        Start::Nothing(config) => MaskRcnn::init(config, training.seed, device)?,
+        Start::File(path) => load_model(path, device)?,
+    };
+    let config = TrainConfig {
+        model: model.config().clone(),
+        training,
+        total: total.unwrap_or(Total::Minutes(minutes.unwrap_or(DEFAULT_MINUTES))),
+    };
+    Ok(Trainer::new(config, model))
+}

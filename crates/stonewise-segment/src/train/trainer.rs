@@ -1,0 +1,191 @@
+//! One step of training after the other.
+
+use super::checkpoint::Checkpoint;
+use super::error::TrainError;
+use super::optimizer::AdamW;
+use super::parameters::{Gradients, parameters, with_parameters};
+use super::params::TrainConfig;
+use super::schedule::Elapsed;
+use crate::Sample;
+use crate::model::{Losses, MaskRcnn, TrainBackend};
+use burn::module::AutodiffModule;
+use burn::tensor::{Device, Tensor};
+use std::path::Path;
+
+/// A network in training.
+pub struct Trainer<B: TrainBackend> {
+    config: TrainConfig,
+    elapsed: Elapsed,
+    model: MaskRcnn<B>,
+    optimizer: AdamW<B::InnerBackend>,
+}
+
+/// Figures of one step; losses are means over its batches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StepFigures {
+    /// Learning rate.
+    pub rate: f64,
+    /// Losses in the order of [`StepFigures::LOSSES`].
+    pub losses: [f64; 5],
+    /// Length of the gradient before clipping.
+    pub gradient_norm: f64,
+}
+
+impl StepFigures {
+    /// Names of the parts of the loss.
+    pub const LOSSES: [&str; 5] = ["rpn_objectness", "rpn_box", "class", "box", "mask"];
+
+    /// Sum of the losses.
+    pub fn total(&self) -> f64 {
+        self.losses.iter().sum()
+    }
+}
+
+impl<B: TrainBackend> Trainer<B> {
+    /// Starts a training of a network that was made as `config.model` says.
+    pub fn new(config: TrainConfig, model: MaskRcnn<B>) -> Self {
+        Self {
+            optimizer: AdamW::new(config.training.optimizer),
+            elapsed: Elapsed::default(),
+            config,
+            model,
+        }
+    }
+
+    /// Takes up a training where its checkpoint was written.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no checkpoint, or was made by another version of the network.
+    pub fn resume(path: &Path, device: &Device<B>) -> Result<Self, TrainError> {
+        let checkpoint: Checkpoint<TrainConfig> = Checkpoint::read(path)?;
+        let config = checkpoint.config;
+        let model = MaskRcnn::init(&config.model, config.training.seed, device)?;
+        let model =
+            with_parameters(model, &checkpoint.parameters).map_err(|name| TrainError::Checkpoint {
+                path: path.to_owned(),
+                problem: format!("parameter {name} is missing or has another shape"),
+            })?;
+        let steps = i32::try_from(checkpoint.elapsed.steps).unwrap_or(i32::MAX);
+        Ok(Self {
+            optimizer: AdamW::from_state(config.training.optimizer, checkpoint.moments, steps, device),
+            elapsed: checkpoint.elapsed,
+            config,
+            model,
+        })
+    }
+
+    /// Writes everything that [`Trainer::resume`] needs.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), TrainError> {
+        let checkpoint = Checkpoint {
+            elapsed: self.elapsed,
+            config: self.config.clone(),
+            parameters: parameters(&self.model),
+            moments: self.optimizer.state(),
+        };
+        checkpoint.write(path)
+    }
+
+    /// Trains on the images of one step, `batch` at a time.
+    ///
+    /// # Errors
+    /// The loss or its gradient is not finite; the network is left as it was.
+    pub fn step(&mut self, images: &[Sample]) -> Result<StepFigures, TrainError> {
+        let batches = images.chunks(self.config.training.batch);
+        let count = batches.len() as f64;
+        let rate = self
+            .config
+            .training
+            .schedule
+            .rate(&self.config.total, &self.elapsed);
+        let mut figures = StepFigures {
+            rate,
+            ..StepFigures::default()
+        };
+        let mut sum: Option<Gradients<B::InnerBackend>> = None;
+        for (index, batch) in batches.enumerate() {
+            let losses = self.model.losses(batch, self.batch_seed(index));
+            for (mean, loss) in figures.losses.iter_mut().zip(values(&losses)) {
+                *mean += loss / count;
+            }
+            if !figures.total().is_finite() {
+                return Err(self.diverged("the loss", figures.total(), rate));
+            }
+            let gradients = Gradients::of::<B, _>(&self.model, &losses.total().backward());
+            match &mut sum {
+                Some(sum) => sum.add(gradients),
+                None => sum = Some(gradients),
+            }
+        }
+        let Some(mut gradients) = sum else {
+            return Ok(figures);
+        };
+        if count > 1.0 {
+            gradients.scale(1.0 / count);
+        }
+        let (model, norm) = self.optimizer.step::<B, _>(self.model.clone(), gradients, rate);
+        self.model = model;
+        if !norm.is_finite() {
+            return Err(self.diverged("the gradient", norm, rate));
+        }
+        figures.gradient_norm = norm;
+        self.elapsed.steps += 1;
+        Ok(figures)
+    }
+
+    /// Counts time spent in training.
+    pub fn add_seconds(&mut self, seconds: f64) {
+        self.elapsed.seconds += seconds;
+    }
+
+    /// Replaces how long the training lasts in all.
+    pub fn set_total(&mut self, total: super::Total) {
+        self.config.total = total;
+    }
+
+    /// How far the training has come.
+    pub fn elapsed(&self) -> &Elapsed {
+        &self.elapsed
+    }
+
+    /// Its configuration.
+    pub fn config(&self) -> &TrainConfig {
+        &self.config
+    }
+
+    /// The network as it is now, to be used.
+    pub fn network(&self) -> MaskRcnn<B::InnerBackend> {
+        self.model.valid()
+    }
+
+    /// Seeds the draws of a batch: the same when a step is done again.
+    fn batch_seed(&self, batch: usize) -> u64 {
+        let number = self.elapsed.steps * self.config.training.accumulate as u64 + batch as u64;
+        super::seed::mix(self.config.training.seed, number)
+    }
+
+    fn diverged(&self, what: &'static str, value: f64, rate: f64) -> TrainError {
+        TrainError::Diverged {
+            step: self.elapsed.steps + 1,
+            what,
+            value,
+            rate,
+        }
+    }
+}
+
+/// Values of the parts of a loss, fetched from the device at once.
+fn values<B: TrainBackend>(losses: &Losses<B>) -> Vec<f64> {
+    let parts = [
+        &losses.rpn_objectness,
+        &losses.rpn_box,
+        &losses.class,
+        &losses.box_regression,
+        &losses.mask,
+    ];
+    let parts = parts.map(|part| part.clone().inner()).to_vec();
+    let data = Tensor::cat(parts, 0).into_data();
+    data.iter::<f64>().collect()
+}
