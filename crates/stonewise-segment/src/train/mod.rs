@@ -6,6 +6,7 @@ mod error;
 mod optimizer;
 mod parameters;
 mod params;
+mod plot;
 mod rendered;
 mod run;
 mod schedule;

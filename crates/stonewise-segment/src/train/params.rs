@@ -26,7 +26,7 @@ pub struct TrainParams {
     pub crop_px: u32,
     /// Images that go through the network together.
     pub batch: usize,
-    /// Batches whose gradients make one step.
+    /// Batches whose gradients make one step; they are computed side by side.
     pub accumulate: usize,
     /// The learning rate.
     pub schedule: Schedule,
@@ -48,7 +48,7 @@ impl Default for TrainParams {
             schedule: Schedule::default(),
             optimizer: AdamWParams::default(),
             checkpoint_minutes: 5.0,
-            evaluate_steps: 250,
+            evaluate_steps: 500,
         }
     }
 }

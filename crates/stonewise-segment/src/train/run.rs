@@ -3,6 +3,7 @@
 use super::checkpoint_path;
 use super::curve::Curve;
 use super::error::TrainError;
+use super::plot::draw_curves;
 use super::source::{Prefetch, SampleSource};
 use super::trainer::{StepFigures, Trainer};
 use crate::evaluation::{MaskScore, pair_masks};
@@ -12,6 +13,10 @@ use crate::{Detector, Sample};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stonewise_core::progress::{Progress, Silent};
+
+/// Names of the curves.
+const LOSS: &str = "loss.csv";
+const VALIDATION: &str = "validation.csv";
 
 /// Why a run of a training ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +50,7 @@ impl Run<'_> {
     ///
     /// - `checkpoint.safetensors`: everything needed to go on, written every few minutes and at the end,
     /// - `model.safetensors`: the network, to be used,
-    /// - `loss.csv`: losses of every step, `validation.csv`: figures on the validation images.
+    /// - `loss.csv`: losses of every step, `validation.csv`: figures on the validation images, `curves.svg`: both as a picture.
     ///
     /// # Errors
     /// The loss diverges, an image cannot be made, a file cannot be written.
@@ -117,11 +122,9 @@ impl Run<'_> {
 
     fn save<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<(), TrainError> {
         trainer.save(&checkpoint_path(self.out))?;
-        Ok(save_model(
-            &trainer.network(),
-            &model_path(self.out),
-            Precision::Half,
-        )?)
+        save_model(&trainer.network(), &model_path(self.out), Precision::Half)?;
+        let [loss, validation, picture] = [LOSS, VALIDATION, "curves.svg"].map(|name| self.out.join(name));
+        draw_curves(&loss, &validation, &picture)
     }
 
     fn evaluate<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<MaskScore, TrainError> {
@@ -163,8 +166,8 @@ impl Curves {
         let loss = format!("step,seconds,learning_rate,gradient_norm,waited_s,{losses},total");
         let validation = "step,seconds,precision,recall,f1,mean_iou,ap50,ap";
         Ok(Self {
-            loss: Curve::open(&out.join("loss.csv"), &loss, steps)?,
-            validation: Curve::open(&out.join("validation.csv"), validation, steps)?,
+            loss: Curve::open(&out.join(LOSS), &loss, steps)?,
+            validation: Curve::open(&out.join(VALIDATION), validation, steps)?,
         })
     }
 

@@ -51,8 +51,8 @@ pub struct Schedule {
 impl Default for Schedule {
     fn default() -> Self {
         Self {
-            learning_rate: 5e-4,
-            warmup_steps: 100,
+            learning_rate: 6e-4,
+            warmup_steps: 200,
             decay_share: 0.4,
         }
     }

@@ -41,6 +41,9 @@ impl StepFigures {
     }
 }
 
+/// Losses of a batch, and their gradients.
+type BatchResult<B> = (Vec<f64>, Gradients<B>);
+
 impl<B: TrainBackend> Trainer<B> {
     /// Starts a training of a network that was made as `config.model` says.
     pub fn new(config: TrainConfig, model: MaskRcnn<B>) -> Self {
@@ -88,13 +91,11 @@ impl<B: TrainBackend> Trainer<B> {
         checkpoint.write(path)
     }
 
-    /// Trains on the images of one step, `batch` at a time.
+    /// Trains on the images of one step, `batch` at a time; the batches are computed side by side.
     ///
     /// # Errors
     /// The loss or its gradient is not finite; the network is left as it was.
     pub fn step(&mut self, images: &[Sample]) -> Result<StepFigures, TrainError> {
-        let batches = images.chunks(self.config.training.batch);
-        let count = batches.len() as f64;
         let rate = self
             .config
             .training
@@ -104,27 +105,25 @@ impl<B: TrainBackend> Trainer<B> {
             rate,
             ..StepFigures::default()
         };
+        let batches = self.batches(images);
+        let count = batches.len() as f64;
         let mut sum: Option<Gradients<B::InnerBackend>> = None;
-        for (index, batch) in batches.enumerate() {
-            let losses = self.model.losses(batch, self.batch_seed(index));
-            for (mean, loss) in figures.losses.iter_mut().zip(values(&losses)) {
+        for (losses, gradients) in batches {
+            for (mean, loss) in figures.losses.iter_mut().zip(losses) {
                 *mean += loss / count;
             }
-            if !figures.total().is_finite() {
-                return Err(self.diverged("the loss", figures.total(), rate));
-            }
-            let gradients = Gradients::of::<B, _>(&self.model, &losses.total().backward());
             match &mut sum {
                 Some(sum) => sum.add(gradients),
                 None => sum = Some(gradients),
             }
         }
+        if !figures.total().is_finite() {
+            return Err(self.diverged("the loss", figures.total(), rate));
+        }
         let Some(mut gradients) = sum else {
             return Ok(figures);
         };
-        if count > 1.0 {
-            gradients.scale(1.0 / count);
-        }
+        gradients.scale(1.0 / count);
         let (model, norm) = self.optimizer.step::<B, _>(self.model.clone(), gradients, rate);
         self.model = model;
         if !norm.is_finite() {
@@ -133,6 +132,32 @@ impl<B: TrainBackend> Trainer<B> {
         figures.gradient_norm = norm;
         self.elapsed.steps += 1;
         Ok(figures)
+    }
+
+    /// Losses and gradients of every batch of a step, each computed by a thread of its own: a single image leaves cores idle.
+    fn batches(&self, images: &[Sample]) -> Vec<BatchResult<B::InnerBackend>> {
+        std::thread::scope(|scope| {
+            let batches = images.chunks(self.config.training.batch.max(1)).enumerate();
+            let start = |(index, batch)| {
+                // A graph of its own for every thread, over the same weights.
+                let model = MaskRcnn::<B>::from_inner(self.model.valid());
+                let seed = self.batch_seed(index);
+                scope.spawn(move || {
+                    let losses = model.losses(batch, seed);
+                    let gradients = losses.total().backward();
+                    (values(&losses), Gradients::of::<B, _>(&model, &gradients))
+                })
+            };
+            let running: Vec<_> = batches.map(start).collect();
+            running
+                .into_iter()
+                .map(|batch| {
+                    batch
+                        .join()
+                        .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+                })
+                .collect()
+        })
     }
 
     /// Counts time spent in training.
