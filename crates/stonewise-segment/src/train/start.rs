@@ -65,5 +65,5 @@ pub fn open_training<B: TrainBackend>(
         training,
         total: total.unwrap_or(Total::Minutes(minutes.unwrap_or(DEFAULT_MINUTES))),
     };
-    Ok(Trainer::new(config, model))
+    Trainer::new(config, model)
 }

@@ -10,6 +10,7 @@ use crate::Sample;
 use crate::model::{Losses, MaskRcnn, TrainBackend};
 use burn::module::AutodiffModule;
 use burn::tensor::{Device, Tensor};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::path::Path;
 
 /// A network in training.
@@ -18,6 +19,7 @@ pub struct Trainer<B: TrainBackend> {
     elapsed: Elapsed,
     model: MaskRcnn<B>,
     optimizer: AdamW<B::InnerBackend>,
+    pools: Vec<ThreadPool>,
 }
 
 /// Figures of one step; losses are means over its batches.
@@ -46,13 +48,17 @@ type BatchResult<B> = (Vec<f64>, Gradients<B>);
 
 impl<B: TrainBackend> Trainer<B> {
     /// Starts a training of a network that was made as `config.model` says.
-    pub fn new(config: TrainConfig, model: MaskRcnn<B>) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// No threads can be started.
+    pub fn new(config: TrainConfig, model: MaskRcnn<B>) -> Result<Self, TrainError> {
+        Ok(Self {
             optimizer: AdamW::new(config.training.optimizer),
+            pools: pools(config.training.accumulate)?,
             elapsed: Elapsed::default(),
             config,
             model,
-        }
+        })
     }
 
     /// Takes up a training where its checkpoint was written.
@@ -71,6 +77,7 @@ impl<B: TrainBackend> Trainer<B> {
         let steps = i32::try_from(checkpoint.elapsed.steps).unwrap_or(i32::MAX);
         Ok(Self {
             optimizer: AdamW::from_state(config.training.optimizer, checkpoint.moments, steps, device),
+            pools: pools(config.training.accumulate)?,
             elapsed: checkpoint.elapsed,
             config,
             model,
@@ -134,21 +141,22 @@ impl<B: TrainBackend> Trainer<B> {
         Ok(figures)
     }
 
-    /// Losses and gradients of every batch of a step, each computed by a thread of its own: a single image leaves cores idle.
+    /// Losses and gradients of every batch of a step, each computed by threads of its own: one image is too little work to share.
     fn batches(&self, images: &[Sample]) -> Vec<BatchResult<B::InnerBackend>> {
         std::thread::scope(|scope| {
             let batches = images.chunks(self.config.training.batch.max(1)).enumerate();
-            let start = |(index, batch)| {
+            let mut running = Vec::new();
+            for ((index, batch), pool) in batches.zip(self.pools.iter().cycle()) {
                 // A graph of its own for every thread, over the same weights.
                 let model = MaskRcnn::<B>::from_inner(self.model.valid());
                 let seed = self.batch_seed(index);
-                scope.spawn(move || {
+                let compute = move || {
                     let losses = model.losses(batch, seed);
                     let gradients = losses.total().backward();
                     (values(&losses), Gradients::of::<B, _>(&model, &gradients))
-                })
-            };
-            let running: Vec<_> = batches.map(start).collect();
+                };
+                running.push(scope.spawn(|| pool.install(compute)));
+            }
             running
                 .into_iter()
                 .map(|batch| {
@@ -199,6 +207,15 @@ impl<B: TrainBackend> Trainer<B> {
             rate,
         }
     }
+}
+
+/// Threads for batches that are computed side by side: the cores, divided among them.
+fn pools(count: usize) -> Result<Vec<ThreadPool>, TrainError> {
+    let threads = (rayon::current_num_threads() / count.max(1)).max(1);
+    let pool = || ThreadPoolBuilder::new().num_threads(threads).build();
+    (0..count.max(1))
+        .map(|_| pool().map_err(|e| TrainError::Data(format!("cannot start threads: {e}"))))
+        .collect()
 }
 
 /// Values of the parts of a loss, fetched from the device at once.
