@@ -3,6 +3,8 @@
 //! Rotation flags in a photo's EXIF are not applied: cameras refer to the pixels as they are stored.
 
 use crate::atomic::write_atomically;
+use crate::folder::files_below;
+use crate::photo_name::is_photo;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageError, ImageReader};
@@ -58,6 +60,17 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
     let (width, height) = decoded.dimensions();
     let pixels = decoded.pixels().map(|p| p.0).collect();
     Ok(Raster::from_vec(width, height, pixels).unwrap_or_else(|| Raster::filled(0, 0, [0; 3])))
+}
+
+/// Photos in a folder and below, sorted; hidden files and folders are left out.
+///
+/// # Errors
+/// A folder cannot be read.
+pub fn photos_in(folder: &Path) -> Result<Vec<PathBuf>, ImageIoError> {
+    let mut photos = files_below(folder, &is_photo)
+        .map_err(|(path, error)| read_error(&path, ImageError::IoError(error)))?;
+    photos.sort();
+    Ok(photos)
 }
 
 /// Width and height, pixels, from the file's header alone.

@@ -31,6 +31,14 @@ pub enum MaskError {
         /// What and where.
         problem: String,
     },
+    /// Not a file of valid regions.
+    #[error("not a file of valid regions: {problem}: {}", path.display())]
+    Regions {
+        /// File.
+        path: PathBuf,
+        /// What and where.
+        problem: String,
+    },
     /// Nothing in it.
     #[error("no masks: {expected}: {}", path.display())]
     Empty {

@@ -4,11 +4,13 @@ mod coco;
 mod coco_write;
 mod error;
 mod label_png;
+mod valid_regions;
 
 pub use coco::CocoMasks;
 pub use coco_write::{CocoPhoto, write_coco};
 pub use error::MaskError;
 pub use label_png::{LabelFolder, read_label_png, write_label_png};
+pub use valid_regions::ValidRegions;
 
 use std::path::Path;
 use stonewise_core::raster::LabelImage;

@@ -44,7 +44,7 @@ impl Default for TrainParams {
             seed: 1,
             crop_px: 320,
             batch: 1,
-            accumulate: 2,
+            accumulate: 4,
             schedule: Schedule::default(),
             optimizer: AdamWParams::default(),
             checkpoint_minutes: 5.0,

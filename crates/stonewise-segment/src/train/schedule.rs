@@ -51,7 +51,7 @@ pub struct Schedule {
 impl Default for Schedule {
     fn default() -> Self {
         Self {
-            learning_rate: 6e-4,
+            learning_rate: 8e-4,
             warmup_steps: 200,
             decay_share: 0.4,
         }
