@@ -14,7 +14,7 @@ fn main() {
     let (weights, out) = (next(), next());
     let mut config = MaskRcnnConfig::torchvision_r50();
     config.backbone.norm = Norm::FrozenBatch { epsilon: 1e-5 };
-    let model = MaskRcnn::<Flex>::init(&config, 0, &Default::default()).expect("a valid preset");
+    let model = MaskRcnn::<Flex>::zeros(&config, &Default::default()).expect("a valid preset");
     let model = load_weights(model, &weights)
         .expect("torchvision's weights")
         .for_inference();

@@ -132,7 +132,7 @@ fn image(width: u32, height: u32) -> RgbImage {
 
 /// A network whose every parameter follows from its name in torchvision.
 fn network(depth: ResnetDepth) -> MaskRcnn<Flex> {
-    let model = MaskRcnn::<Flex>::init(&config(depth), 0, &Default::default()).unwrap();
+    let model = MaskRcnn::<Flex>::zeros(&config(depth), &Default::default()).unwrap();
     let bytes = weights_to_bytes(&model, Precision::Single).unwrap();
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let tensors: Vec<(String, Vec<usize>, Vec<u8>)> = file

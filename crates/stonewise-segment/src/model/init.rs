@@ -8,16 +8,17 @@ use rand_chacha::ChaCha8Rng;
 
 /// Makes parameters one after the other, numbering them.
 pub struct Init<'a, B: Backend> {
-    rng: ChaCha8Rng,
+    /// Draws values; without it all are 0.
+    rng: Option<ChaCha8Rng>,
     made: u64,
     device: &'a B::Device,
 }
 
 impl<'a, B: Backend> Init<'a, B> {
-    /// Starts a network.
-    pub fn new(seed: u64, device: &'a B::Device) -> Self {
+    /// Starts a network of values drawn by chance, or of zeros where there is no seed.
+    pub fn new(seed: Option<u64>, device: &'a B::Device) -> Self {
         Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
+            rng: seed.map(ChaCha8Rng::seed_from_u64),
             made: 0,
             device,
         }
@@ -25,27 +26,34 @@ impl<'a, B: Backend> Init<'a, B> {
 
     /// Normally distributed values.
     pub fn normal<const D: usize>(&mut self, shape: [usize; D], std: f32) -> Param<Tensor<B, D>> {
-        let mut draw = || {
+        self.drawn(shape, |rng| {
             // Box & Muller 1958.
-            let radius = (-2.0 * (1.0 - self.rng.random::<f32>()).ln()).sqrt();
-            std * radius * (std::f32::consts::TAU * self.rng.random::<f32>()).cos()
-        };
-        let values = (0..shape.iter().product()).map(|_| draw()).collect();
-        self.values(shape, values)
+            let radius = (-2.0 * (1.0 - rng.random::<f32>()).ln()).sqrt();
+            std * radius * (std::f32::consts::TAU * rng.random::<f32>()).cos()
+        })
     }
 
     /// Values spread evenly over -bound to bound.
     pub fn uniform<const D: usize>(&mut self, shape: [usize; D], bound: f32) -> Param<Tensor<B, D>> {
-        let count = shape.iter().product();
-        let values = (0..count)
-            .map(|_| bound * (2.0 * self.rng.random::<f32>() - 1.0))
-            .collect();
-        self.values(shape, values)
+        self.drawn(shape, |rng| bound * (2.0 * rng.random::<f32>() - 1.0))
     }
 
     /// The same value everywhere.
     pub fn constant<const D: usize>(&mut self, shape: [usize; D], value: f32) -> Param<Tensor<B, D>> {
         self.values(shape, vec![value; shape.iter().product()])
+    }
+
+    fn drawn<const D: usize>(
+        &mut self,
+        shape: [usize; D],
+        draw: impl Fn(&mut ChaCha8Rng) -> f32,
+    ) -> Param<Tensor<B, D>> {
+        let count = shape.iter().product();
+        let values = match &mut self.rng {
+            Some(rng) => (0..count).map(|_| draw(rng)).collect(),
+            None => vec![0.0; count],
+        };
+        self.values(shape, values)
     }
 
     fn values<const D: usize>(&mut self, shape: [usize; D], values: Vec<f32>) -> Param<Tensor<B, D>> {

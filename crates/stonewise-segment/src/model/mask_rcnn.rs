@@ -73,6 +73,18 @@ impl<B: ModelBackend> MaskRcnn<B> {
     /// # Errors
     /// The configuration makes no sense.
     pub fn init(config: &MaskRcnnConfig, seed: u64, device: &B::Device) -> Result<Self, ConfigError> {
+        Self::build(config, Some(seed), device)
+    }
+
+    /// A network of zeros, to [load weights](super::load_weights) into.
+    ///
+    /// # Errors
+    /// The configuration makes no sense.
+    pub fn zeros(config: &MaskRcnnConfig, device: &B::Device) -> Result<Self, ConfigError> {
+        Self::build(config, None, device)
+    }
+
+    fn build(config: &MaskRcnnConfig, seed: Option<u64>, device: &B::Device) -> Result<Self, ConfigError> {
         config.check()?;
         let init = &mut Init::new(seed, device);
         let shapes = config.anchors.sizes[0].len() * config.anchors.aspect_ratios.len();
