@@ -4,6 +4,8 @@ pub mod backend;
 mod detection;
 pub mod evaluation;
 pub mod model;
+#[cfg(feature = "onnx")]
+pub mod onnx;
 mod sample;
 mod segmentation;
 pub mod synth;

@@ -410,6 +410,13 @@ impl<B: ModelBackend> StoneDetector<B> {
             model: model.for_inference(),
         }
     }
+
+    /// Leaves out stones that score less, before their masks cost time.
+    pub fn with_min_score(mut self, score: f32) -> Self {
+        let threshold = &mut self.model.config.score_threshold;
+        *threshold = threshold.max(score);
+        self
+    }
 }
 
 impl<B: ModelBackend> Detector for StoneDetector<B>
