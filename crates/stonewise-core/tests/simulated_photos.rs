@@ -3,7 +3,8 @@
 use stonewise_core::geometry::View;
 use stonewise_core::raster::LabelImage;
 use stonewise_core::simulate::{
-    PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views, plan_views,
+    PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views, plan_views, shown_part,
+    true_labels,
 };
 
 fn params() -> (SceneParams, PhotoParams) {
@@ -49,7 +50,7 @@ fn labels_under_projected_points_are_their_stones() {
         let scene = world.scene(epoch);
         let scan = world.scan(&params, epoch).tls.unwrap();
         let studio = Studio::new(&scene, 3);
-        for view in plan_views(&scene, &photos, epoch, 5) {
+        for view in plan_views(&world.wall, &photos, epoch, 5) {
             let photo = studio.photograph(&view, &photos.sensor);
             let (mut right, mut all) = (0, 0);
             for i in (0..scan.len()).step_by(7) {
@@ -75,6 +76,29 @@ fn labels_under_projected_points_are_their_stones() {
 }
 
 #[test]
+fn a_part_of_the_wall_is_enough_for_a_photo_that_shows_no_more() {
+    let (mut params, mut photos) = params();
+    params.wall.width_m = 8.0;
+    photos.columns = 3;
+    let world = World::new(&params);
+    let view = &plan_views(&world.wall, &photos, 0, 5)[0];
+    let part = shown_part(&world.wall, view).unwrap();
+    assert!(part[1] < 3.0, "the photo at the left end shows {part:?}");
+    let surface = world.surface(part);
+    let labels = true_labels(&world.scene_of(&surface, 0), view);
+    let whole = true_labels(&world.scene(0), view);
+    let same = labels
+        .data()
+        .iter()
+        .zip(whole.data())
+        .filter(|(a, b)| a == b)
+        .count();
+    assert!(same * 1000 >= labels.data().len() * 999, "{same}");
+    let photo = Studio::new(&world.scene(0), 3).photograph(view, &photos.sensor);
+    assert_eq!(photo.labels, whole);
+}
+
+#[test]
 fn photos_are_exposed_and_do_not_depend_on_threads() {
     let (params, photos) = params();
     let world = World::new(&params);
@@ -85,7 +109,7 @@ fn photos_are_exposed_and_do_not_depend_on_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let views = plan_views(&scene, &photos, 0, 5);
+            let views = plan_views(&world.wall, &photos, 0, 5);
             Studio::new(&scene, 3).photograph(&views[0], &photos.sensor)
         })
     };
@@ -106,7 +130,7 @@ fn delivered_poses_are_off_by_the_stated_pixels() {
         ..photos
     };
     let world = World::new(&params);
-    let exact = plan_views(&world.scene(0), &photos, 0, 5);
+    let exact = plan_views(&world.wall, &photos, 0, 5);
     let off = |a: &View, b: &View| {
         let (from, along) = a.ray(a.camera.center_px).unwrap();
         let p = b.project(&(from + along * photos.distance_m)).unwrap().pixel;

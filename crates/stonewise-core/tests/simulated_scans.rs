@@ -1,9 +1,10 @@
 //! What the simulator promises about its clouds, measured back from them.
 
 use nalgebra::{Point3, Vector3};
+use stonewise_core::cloud::GridIndex;
 use stonewise_core::simulate::{
-    FacePoint, Scan, SceneParams, SurroundingsParams, Target, TlsParams, UavParams, WallMotion, WallParams,
-    World, simulate_scans, surroundings,
+    FacePoint, Scan, SceneParams, Sensor, SurroundingsParams, Target, TlsParams, UavParams, WallMotion,
+    WallParams, Window, World, scan_window, simulate_scans, surroundings,
 };
 
 fn small(seed: u64) -> SceneParams {
@@ -209,7 +210,7 @@ fn nothing_behind_the_annex_is_measured() {
         n: tls.distance_m,
     });
     station.z = tls.height_m;
-    let props = surroundings(1.8, 1.4, 0.2, &params.surroundings);
+    let props = surroundings(&world.wall, &params.surroundings);
     let hidden = |p: &Point3<f64>| {
         let towards = (station - p).normalize();
         (5..70).any(|k| {
@@ -231,6 +232,144 @@ fn nothing_behind_the_annex_is_measured() {
     let all = stones(&full);
     let behind = all.iter().filter(|&&i| hidden(&exact(&full, i))).count();
     assert!(behind > all.len() / 20, "{behind} of {} points", all.len());
+}
+
+#[test]
+fn a_dam_scanned_piece_by_piece_is_the_dam_scanned_at_once() {
+    let mut uav = UavParams {
+        spacing_m: 0.03,
+        ..UavParams::default()
+    };
+    let mut tls = TlsParams {
+        stations: 2,
+        spacing_m: 0.02,
+        ..plain_tls()
+    };
+    for beam in [&mut uav.beam, &mut tls.beam] {
+        beam.pointing_noise_rad = 0.0;
+        beam.exit_radius_m = 0.0;
+        beam.divergence_rad = 0.0;
+    }
+    let params = SceneParams {
+        wall: WallParams {
+            width_m: 18.0,
+            height_m: 2.0,
+            plan_radius_m: 40.0,
+            ..WallParams::default()
+        },
+        tls: Some(tls),
+        uav: Some(uav),
+        ..small(9)
+    };
+    let world = World::new(&params);
+    let extent = world.wall.extent();
+    let windows = Window::cover(extent);
+    assert_eq!(windows.len(), 2);
+    let whole = world.scan(&params, 0);
+    for (sensor, whole) in [
+        (Sensor::Tls, whole.tls.unwrap()),
+        (Sensor::Uav, whole.uav.unwrap()),
+    ] {
+        let known: Vec<Point3<f64>> = (0..whole.len()).map(|i| exact(&whole, i)).collect();
+        let index = GridIndex::new(&known, 0.05);
+        let (mut count, mut same) = (0usize, 0usize);
+        for window in &windows {
+            let surface = world.surface(window.surroundings(extent));
+            let scan = scan_window(&world.scene_of(&surface, 0), &params, sensor, 0, window).unwrap();
+            for i in 0..scan.len() {
+                let near = index.nearest(&exact(&scan, i), 0.01);
+                count += 1;
+                same += usize::from(near.is_some_and(|(j, d)| d < 1e-4 && whole.stone[j] == scan.stone[i]));
+            }
+        }
+        assert!(
+            count.abs_diff(whole.len()) * 1000 < whole.len(),
+            "{count} of {}",
+            whole.len()
+        );
+        assert!(same * 1000 >= count * 999, "{sensor:?}: {same} of {count}");
+    }
+}
+
+#[test]
+fn incidence_follows_from_where_the_station_stands() {
+    let params = SceneParams {
+        surroundings: nothing_around(),
+        wall: WallParams {
+            width_m: 12.0,
+            height_m: 2.0,
+            relief: 0.3,
+            ..WallParams::default()
+        },
+        tls: Some(TlsParams {
+            distance_m: 4.0,
+            spacing_m: 0.02,
+            ..plain_tls()
+        }),
+        ..small(10)
+    };
+    let world = World::new(&params);
+    let scan = world.scan(&params, 0).tls.unwrap();
+    let place = world.wall.face.world_of(&FacePoint {
+        a: 0.0,
+        u: 0.0,
+        n: 4.0,
+    });
+    // The scanner's height is known to 10 cm.
+    let station = Point3::new(place.x, place.y, 1.7);
+    let out = world.wall.face.frame(0.0).out;
+    for (low, high) in [(0.0, 1.0), (2.5, 3.5), (5.0, 6.0)] {
+        let inside =
+            (0..scan.len()).filter(|&i| scan.stone[i] > 0 && (low..high).contains(&exact(&scan, i).y.abs()));
+        let (mut stated, mut plane, mut n) = (0.0, 0.0, 0.0);
+        for i in inside {
+            stated += f64::from(scan.cos_incidence[i]);
+            plane += (station - exact(&scan, i)).normalize().dot(&out);
+            n += 1.0;
+        }
+        assert!(n > 2000.0, "{n}");
+        // Relief turns faces towards and away from the beam alike, and hides a little of the latter.
+        assert!(
+            (stated / n - plane / n).abs() < 0.06,
+            "{low}: {} and {}",
+            stated / n,
+            plane / n
+        );
+    }
+}
+
+#[test]
+fn a_station_scans_no_further_than_it_reaches() {
+    let params = SceneParams {
+        surroundings: nothing_around(),
+        wall: WallParams {
+            width_m: 12.0,
+            height_m: 1.5,
+            ..WallParams::default()
+        },
+        tls: Some(TlsParams {
+            stations: 4,
+            reach_m: 3.0,
+            spacing_m: 0.02,
+            distance_m: 5.0,
+            placement_m: 0.0,
+            ..TlsParams::default()
+        }),
+        ..small(11)
+    };
+    let world = World::new(&params);
+    let scan = world.scan(&params, 0).tls.unwrap();
+    for i in 0..scan.len() {
+        let station = -4.5 + 3.0 * f64::from(scan.station[i]);
+        assert!((exact(&scan, i).y - station).abs() < 3.01);
+    }
+    // Two stations see each place but for the ends; square on the merged spacing is as asked.
+    let middle = (0..scan.len()).filter(|&i| {
+        let f = world.wall.face.face_of(&scan.cloud.world(i));
+        f.a.abs() < 1.5 && (0.4..1.2).contains(&f.u)
+    });
+    let spacing = (3.0 * 0.8 / middle.count() as f64).sqrt();
+    assert!((spacing / 0.02 - 1.0).abs() < 0.2, "{spacing}");
 }
 
 #[test]

@@ -7,7 +7,10 @@ use std::path::{Path, PathBuf};
 use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
-use stonewise_io::cloud::{CloudError, ExtraColumn, cloud_info, read_cloud, write_points_laz};
+use stonewise_core::geometry::Bounds;
+use stonewise_io::cloud::{
+    CloudError, ExtraColumn, ExtraType, cloud_info, read_cloud, stream_points_laz, write_points_laz,
+};
 
 /// Keeps a file for `testdata/clouds/check_written.py`, where asked to.
 fn keep(path: &Path) {
@@ -15,6 +18,38 @@ fn keep(path: &Path) {
         std::fs::create_dir_all(&folder).unwrap();
         std::fs::copy(path, folder.join(path.file_name().unwrap())).unwrap();
     }
+}
+
+#[test]
+fn points_that_come_in_pieces_make_the_same_file_and_strays_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, pieces) = (folder.path().join("whole.laz"), folder.path().join("pieces.laz"));
+    let points: Vec<_> = (0..1000)
+        .map(|i| Point3::new(f64::from(i) * 0.01, 2.0, -1.0))
+        .collect();
+    let ids: Vec<u32> = (0..1000).collect();
+    write_points_laz(&whole, &points, &[("stone_id", ExtraColumn::U32(&ids))]).unwrap();
+    let bounds = Bounds::of(points.iter().copied()).unwrap();
+    let columns = [("stone_id", ExtraType::U32)];
+    stream_points_laz(&pieces, &bounds, &columns, |sink| {
+        for (p, i) in points.chunks(300).zip(ids.chunks(300)) {
+            sink.append(p, &[ExtraColumn::U32(i)])?;
+        }
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    assert_eq!(std::fs::read(&whole).unwrap(), std::fs::read(&pieces).unwrap());
+
+    let refused = |positions: &[Point3<f64>], values: &[ExtraColumn<'_>]| {
+        let path = folder.path().join("refused.laz");
+        let result = stream_points_laz(&path, &bounds, &columns, |sink| sink.append(positions, values));
+        assert!(!path.exists());
+        result.unwrap_err().to_string()
+    };
+    let outside = [Point3::new(0.0, 2.1, -1.0)];
+    assert!(refused(&outside, &[ExtraColumn::U32(&ids[..1])]).contains("outside"));
+    assert!(refused(&points[..1], &[ExtraColumn::F64(&[1.0])]).contains("dimensions"));
+    assert!(refused(&points[..2], &[ExtraColumn::U32(&ids[..1])]).contains("1 values"));
 }
 
 #[test]

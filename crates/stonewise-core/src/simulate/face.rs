@@ -1,7 +1,7 @@
 //! The idealised face of the dam: battered, straight or curved in plan.
 
 use crate::geometry::{FaceFrame, Rigid3};
-use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
+use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A battered face and its coordinates: `a` along the face from its middle, `u` up in the face, `n` out of it.
@@ -81,27 +81,49 @@ impl Face {
         )
     }
 
+    /// Where a ray that starts in front of the face meets it within `limit_m`; `along` is a unit vector.
+    pub fn meet(&self, from: &Point3<f64>, along: &Vector3<f64>, limit_m: f64) -> Option<FacePoint> {
+        let n = |t: f64| self.face_of(&(from + along * t)).n;
+        let (mut before, mut behind) = (0.0, 1.0);
+        while n(behind) > 0.0 {
+            before = behind;
+            behind += 1.0;
+            if behind > limit_m {
+                return None;
+            }
+        }
+        for _ in 0..50 {
+            let middle = 0.5 * (before + behind);
+            if n(middle) > 0.0 {
+                before = middle;
+            } else {
+                behind = middle;
+            }
+        }
+        Some(self.face_of(&(from + along * before)))
+    }
+
     /// Axes (along, up, out) of the face at `a`.
     pub fn frame(&self, a: f64) -> FaceFrame {
         let angle = if self.is_plane() { 0.0 } else { a / self.radius_m };
-        let turn = Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), -angle);
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), -angle);
         let [c, s] = self.lean;
         FaceFrame {
-            along: turn * nalgebra::Vector3::y(),
-            up: turn * nalgebra::Vector3::new(-s, 0.0, c),
-            out: turn * nalgebra::Vector3::new(c, 0.0, s),
+            along: turn * Vector3::y(),
+            up: turn * Vector3::new(-s, 0.0, c),
+            out: turn * Vector3::new(c, 0.0, s),
         }
     }
 
     /// Outward normal of the face at `a`.
     #[inline]
-    pub fn frame_out(&self, a: f64) -> nalgebra::Vector3<f64> {
+    pub fn frame_out(&self, a: f64) -> Vector3<f64> {
         let [c, s] = self.lean;
         if self.is_plane() {
-            return nalgebra::Vector3::new(c, 0.0, s);
+            return Vector3::new(c, 0.0, s);
         }
         let (sin, cos) = (-a / self.radius_m).sin_cos();
-        nalgebra::Vector3::new(c * cos, c * sin, s)
+        Vector3::new(c * cos, c * sin, s)
     }
 
     /// Pose of a flat patch that touches the face at (a, u): its x, y, z are along, up, out.
@@ -139,6 +161,15 @@ mod tests {
                 });
                 let here = face.world_of(&FacePoint { a, u: 0.0, n: 0.0 });
                 assert!(((beside - here) / 1e-4 - face.frame(a).along).norm() < 1e-5);
+                let from = face.world_of(&FacePoint {
+                    a: a + 3.0,
+                    u,
+                    n: 9.0,
+                });
+                let target = face.world_of(&FacePoint { a, u, n: 0.0 });
+                let met = face.meet(&from, &(target - from).normalize(), 50.0).unwrap();
+                assert!((met.a - a).abs() < 1e-6 && (met.u - u).abs() < 1e-6);
+                assert!(face.meet(&from, &face.frame(a).out, 50.0).is_none());
             }
         }
     }

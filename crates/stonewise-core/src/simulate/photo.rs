@@ -11,6 +11,7 @@ use crate::simulate::noise::{Noise, normal};
 use crate::simulate::props::Material;
 use crate::simulate::scene::{Hit, Scene, Target};
 use crate::simulate::tls::about;
+use crate::simulate::wall::Wall;
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -45,6 +46,8 @@ pub struct PhotoParams {
     pub pose_noise_px: f64,
     /// Whether the last photo of an epoch has no orientation, as happens.
     pub last_unaligned: bool,
+    /// Whether photos are rendered; if not they are plain grey, which is quicker and enough where masks are given.
+    pub rendered: bool,
     /// Lens and sensor.
     pub sensor: SensorParams,
 }
@@ -65,6 +68,7 @@ impl Default for PhotoParams {
             placement_m: 0.3,
             pose_noise_px: 0.4,
             last_unaligned: false,
+            rendered: true,
             sensor: SensorParams::default(),
         }
     }
@@ -80,10 +84,10 @@ pub struct Photo {
 }
 
 /// Places that the drone took photos from, exactly. `names`: `IMG_e001` for the first of epoch e.
-pub fn plan_views(scene: &Scene, params: &PhotoParams, epoch: usize, seed: u64) -> Vec<View> {
+pub fn plan_views(wall: &Wall, params: &PhotoParams, epoch: usize, seed: u64) -> Vec<View> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let w = scene.window();
-    let face = &scene.wall().face;
+    let w = wall.extent();
+    let face = &wall.face;
     let (wide, high, foot) = (w[1] - w[0], w[3] - w[2].max(0.0), w[2].max(0.0));
     // Half of the width of the wall that a photo shows.
     let seen = 0.5 * params.distance_m * f64::from(params.width) / params.focal_px;
@@ -138,6 +142,59 @@ pub fn disturb_views(views: &[View], params: &PhotoParams, seed: u64) -> Vec<Vie
             }
         })
         .collect()
+}
+
+/// The part of the section that a photo shows, and a margin around it: smallest a, largest a, smallest u, largest u,
+/// metres; `None` where it shows nothing of the section.
+pub fn shown_part(wall: &Wall, view: &View) -> Option<[f64; 4]> {
+    const STEPS: u32 = 12;
+    const MARGIN_M: f64 = 1.5;
+    let extent = wall.extent();
+    let mut part = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
+    for j in 0..=STEPS {
+        for i in 0..=STEPS {
+            let share = |k: u32, size: u32| f64::from(size) * f64::from(k) / f64::from(STEPS);
+            let pixel = [share(i, view.camera.width), share(j, view.camera.height)];
+            let met = view
+                .ray(pixel)
+                .and_then(|(from, along)| wall.face.meet(&from, &along, 300.0));
+            if let Some(f) = met {
+                part = [
+                    part[0].min(f.a),
+                    part[1].max(f.a),
+                    part[2].min(f.u),
+                    part[3].max(f.u),
+                ];
+            }
+        }
+    }
+    let inside = [
+        (part[0] - MARGIN_M).max(extent[0]),
+        (part[1] + MARGIN_M).min(extent[1]),
+        (part[2] - MARGIN_M).max(extent[2]),
+        (part[3] + MARGIN_M).min(extent[3]),
+    ];
+    (inside[0] < inside[1] && inside[2] < inside[3]).then_some(inside)
+}
+
+/// The true stone under each pixel's centre, 0 elsewhere, without taking the photo: a third of its cost.
+pub fn true_labels(scene: &Scene, view: &View) -> LabelImage {
+    let (width, height) = (view.camera.width, view.camera.height);
+    let mut labels = LabelImage::filled(width, height, 0);
+    let stone = |x: usize, y: usize| {
+        let (from, along) = view.ray([x as f64 + 0.5, y as f64 + 0.5])?;
+        scene.trace(&from, &along)?.target.stone()
+    };
+    labels
+        .data_mut()
+        .par_chunks_mut(width as usize)
+        .enumerate()
+        .for_each(|(y, row)| {
+            for (x, label) in row.iter_mut().enumerate() {
+                *label = stone(x, y).map_or(0, |s| s.0);
+            }
+        });
+    labels
 }
 
 /// The light and the look of one epoch; photos of the epoch share it.

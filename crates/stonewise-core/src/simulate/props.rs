@@ -1,6 +1,9 @@
 //! What stands around the wall and does not move: ground, banks, crown, an annex, railings, shrubs.
 
-use nalgebra::{Point3, Vector3};
+use crate::geometry::Rigid3;
+use crate::simulate::face::FacePoint;
+use crate::simulate::wall::{Wall, WallParams};
+use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
@@ -38,9 +41,11 @@ pub struct Prop {
 
 #[derive(Clone, Debug)]
 enum Form {
+    /// A box in a frame of its own: x out of the wall, y along it, z up.
     Box {
         min: Point3<f64>,
         max: Point3<f64>,
+        box_from_world: Rigid3,
     },
     Leaves {
         middle: Point3<f64>,
@@ -82,20 +87,18 @@ impl Default for SurroundingsParams {
 }
 
 impl Prop {
-    fn block(material: Material, min: [f64; 3], max: [f64; 3]) -> Self {
-        Self {
-            material,
-            shape: Form::Box {
-                min: Point3::from(min),
-                max: Point3::from(max),
-            },
-        }
-    }
-
     /// Distance along the ray to the first hit within `limit`, and the outward normal there.
     pub fn trace(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<(f64, Vector3<f64>)> {
         match &self.shape {
-            Form::Box { min, max } => trace_box(from, along, min, max, limit),
+            Form::Box {
+                min,
+                max,
+                box_from_world,
+            } => {
+                let (from, along) = (box_from_world * from, box_from_world * along);
+                let (t, normal) = trace_box(&from, &along, min, max, limit)?;
+                Some((t, box_from_world.rotation.inverse() * normal))
+            }
             Form::Leaves {
                 middle,
                 radius_m,
@@ -117,72 +120,155 @@ impl Prop {
     /// Whether the point lies inside the body, leaves apart.
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         match &self.shape {
-            Form::Box { min, max } => (0..3).all(|i| min[i] < p[i] && p[i] < max[i]),
+            Form::Box {
+                min,
+                max,
+                box_from_world,
+            } => {
+                let p = box_from_world * p;
+                (0..3).all(|i| min[i] < p[i] && p[i] < max[i])
+            }
             Form::Leaves { .. } => false,
+        }
+    }
+
+    /// Whether any of the body may lie within `radius_m` of a place.
+    pub(super) fn is_near(&self, place: &Point3<f64>, radius_m: f64) -> bool {
+        match &self.shape {
+            Form::Box {
+                min,
+                max,
+                box_from_world,
+            } => {
+                let p = box_from_world * place;
+                let nearest = p.coords.sup(&min.coords).inf(&max.coords);
+                (p.coords - nearest).norm() <= radius_m
+            }
+            Form::Leaves {
+                middle,
+                radius_m: own,
+                ..
+            } => (middle - place).norm() <= radius_m + own,
         }
     }
 }
 
-/// The surroundings of a section `width_m` x `height_m` (measured in the face) with this batter; ground is z = 0.
-pub fn surroundings(width_m: f64, height_m: f64, batter: f64, params: &SurroundingsParams) -> Vec<Prop> {
-    use Material::{Bank, Concrete, Door, Ground, Metal, Plaster, Roof};
+/// Where things are put: beside a place at the foot of the wall.
+struct Site<'a> {
+    wall: &'a Wall,
+    props: Vec<Prop>,
+}
+
+impl Site<'_> {
+    /// Adds a box that stands at `a` along the wall; corners relative to the foot of the face there: x out, y along, z up.
+    fn block(&mut self, material: Material, a: f64, min: [f64; 3], max: [f64; 3]) {
+        self.props.push(Prop {
+            material,
+            shape: Form::Box {
+                min: Point3::from(min),
+                max: Point3::from(max),
+                box_from_world: self.foot(a).inverse(),
+            },
+        });
+    }
+
+    /// Pose of the foot of the face at `a`: x level and out of the wall, y along it, z up.
+    fn foot(&self, a: f64) -> Rigid3 {
+        let along = self.wall.face.frame(a).along;
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), (-along.x).atan2(along.y));
+        let at = self.wall.face.world_of(&FacePoint { a, u: 0.0, n: 0.0 });
+        Rigid3::from_parts(
+            Translation3::from(at.coords),
+            UnitQuaternion::from_rotation_matrix(&turn),
+        )
+    }
+}
+
+/// Longest straight piece of the crown of a curved wall, metres.
+const CROWN_PIECE_M: f64 = 4.0;
+
+/// The surroundings of a wall; ground is z = 0.
+pub fn surroundings(wall: &Wall, params: &SurroundingsParams) -> Vec<Prop> {
+    use Material::{Bank, Concrete, Ground};
+    let WallParams {
+        width_m,
+        height_m,
+        batter,
+        ..
+    } = *wall.params();
     let half = width_m / 2.0;
     let top = height_m / batter.hypot(1.0);
     let back = -batter * top;
-    let mut props = vec![
-        Prop::block(Ground, [-60.0, -90.0, -2.0], [60.0, 90.0, 0.0]),
-        Prop::block(
+    let mut site = Site {
+        wall,
+        props: Vec::new(),
+    };
+    let far = 90.0 + width_m;
+    site.block(Ground, 0.0, [-far, -far, -2.0], [far, far, 0.0]);
+    let pieces = if wall.face.is_plane() {
+        1.0
+    } else {
+        (width_m / CROWN_PIECE_M).ceil()
+    };
+    let length = width_m / pieces;
+    for k in 0..pieces as usize {
+        let a = -half + (k as f64 + 0.5) * length;
+        // Pieces of a curve meet behind the face with a gap or an overlap of a centimetre.
+        let end = 0.5 * length + if pieces > 1.0 { 0.02 } else { 0.0 };
+        site.block(
             Concrete,
-            [back - 3.0, -half, -0.5],
-            [back - 0.12, half, top - 0.03],
-        ),
-        Prop::block(Bank, [-40.0, half, -0.5], [0.02, half + 60.0, top + 0.15]),
-        Prop::block(Bank, [-40.0, -half - 60.0, -0.5], [0.02, -half, top + 0.05]),
-    ];
+            a,
+            [back - 3.0, -end, -0.5],
+            [back - 0.12, end, top - 0.03],
+        );
+    }
+    site.block(Bank, half, [-40.0, 0.0, -0.5], [0.02, 60.0, top + 0.15]);
+    site.block(Bank, -half, [-40.0, -60.0, -0.5], [0.02, 0.0, top + 0.05]);
     if params.annex {
-        let (y, w, h) = (0.12 * width_m, 0.17 * width_m.min(14.0), 0.36 * height_m.min(8.0));
-        props.push(Prop::block(Plaster, [0.35, y, 0.0], [0.35 + 0.8 * w, y + w, h]));
-        props.push(Prop::block(
-            Door,
-            [0.35 + 0.8 * w, y + 0.3 * w, 0.0],
-            [0.355 + 0.8 * w, y + 0.65 * w, 0.8 * h],
-        ));
-        props.push(Prop::block(
-            Roof,
-            [0.28, y - 0.07, h],
-            [0.42 + 0.8 * w, y + w + 0.07, h + 0.08],
-        ));
+        annex(&mut site, width_m, height_m);
     }
     if params.railing {
-        let (from, to, x) = (-0.92 * half, -0.25 * half, 0.75);
-        let h = 0.9f64.min(0.4 * height_m);
-        let posts = ((to - from) / 1.4).ceil().max(1.0);
-        for k in 0..=posts as usize {
-            let y = from + (to - from) * k as f64 / posts;
-            props.push(Prop::block(
-                Metal,
-                [x - 0.02, y - 0.02, 0.0],
-                [x + 0.02, y + 0.02, h],
-            ));
-        }
-        for z in [0.5 * h, h] {
-            props.push(Prop::block(
-                Metal,
-                [x - 0.018, from, z - 0.018],
-                [x + 0.018, to, z + 0.018],
-            ));
-        }
+        railing(&mut site, half, height_m);
     }
     let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
     for k in 0..params.shrubs {
         let share = (f64::from(k) + rng.random_range(0.25..0.75)) / f64::from(params.shrubs);
-        props.push(shrub(
-            [0.3, -half + width_m * share],
-            0.09 * height_m.min(5.0),
-            &mut rng,
-        ));
+        let foot = site.foot(-half + width_m * share) * Point3::new(0.3, 0.0, 0.0);
+        let body = shrub([foot.x, foot.y], 0.09 * height_m.min(5.0), &mut rng);
+        site.props.push(body);
     }
-    props
+    site.props
+}
+
+fn annex(site: &mut Site, width_m: f64, height_m: f64) {
+    use Material::{Door, Plaster, Roof};
+    let (a, w, h) = (0.12 * width_m, 0.17 * width_m.min(14.0), 0.36 * height_m.min(8.0));
+    site.block(Plaster, a, [0.35, 0.0, 0.0], [0.35 + 0.8 * w, w, h]);
+    site.block(
+        Door,
+        a,
+        [0.35 + 0.8 * w, 0.3 * w, 0.0],
+        [0.355 + 0.8 * w, 0.65 * w, 0.8 * h],
+    );
+    site.block(Roof, a, [0.28, -0.07, h], [0.42 + 0.8 * w, w + 0.07, h + 0.08]);
+}
+
+fn railing(site: &mut Site, half: f64, height_m: f64) {
+    use Material::Metal;
+    let (from, to, x) = (-0.92 * half, -0.25 * half, 0.75);
+    let h = 0.9f64.min(0.4 * height_m);
+    let bays = ((to - from) / 1.4).ceil().max(1.0);
+    let bay = (to - from) / bays;
+    for k in 0..=bays as usize {
+        let a = from + bay * k as f64;
+        site.block(Metal, a, [x - 0.02, -0.02, 0.0], [x + 0.02, 0.02, h]);
+        if k > 0 {
+            for z in [0.5 * h, h] {
+                let (low, high) = ([x - 0.018, -bay, z - 0.018], [x + 0.018, 0.0, z + 0.018]);
+                site.block(Metal, a, low, high);
+            }
+        }
+    }
 }
 
 fn shrub(foot: [f64; 2], radius_m: f64, rng: &mut ChaCha8Rng) -> Prop {

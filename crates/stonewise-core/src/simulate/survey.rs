@@ -9,7 +9,9 @@ use crate::simulate::surface::Surface;
 use crate::simulate::tls::{TlsParams, scan_terrestrial};
 use crate::simulate::uav::{UavParams, scan_airborne};
 use crate::simulate::wall::{Wall, WallParams};
+use crate::simulate::window::Window;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Everything about the clouds of a simulated survey; equal parameters give equal bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,7 +62,7 @@ pub struct World {
     pub wall: Wall,
     /// True motion of each stone, in the order of the wall's stones.
     pub motions: Vec<TrueMotion>,
-    surface: Surface,
+    whole: OnceLock<Surface>,
     props: Vec<Prop>,
     still: Vec<TrueMotion>,
 }
@@ -75,35 +77,82 @@ pub struct EpochScans {
 }
 
 impl World {
-    /// Builds the wall and moves its stones.
+    /// Builds the wall and moves its stones. Surfaces are sampled when they are asked for.
     pub fn new(params: &SceneParams) -> Self {
         let wall = Wall::new(&params.wall);
         let motions = move_stones(&wall, &params.motions, params.seed);
         let still = move_stones(&wall, &[], params.seed);
-        let w = &params.wall;
         Self {
-            surface: Surface::new(&wall, wall.extent()),
-            props: surroundings(w.width_m, w.height_m, w.batter, &params.surroundings),
+            props: surroundings(&wall, &params.surroundings),
+            whole: OnceLock::new(),
             wall,
             motions,
             still,
         }
     }
 
-    /// The scene of an epoch: 0 before the motion, 1 after it.
+    /// The scene of an epoch: 0 before the motion, 1 after it. The whole section, which a large dam is too large for.
     pub fn scene(&self, epoch: usize) -> Scene<'_> {
+        let whole = self
+            .whole
+            .get_or_init(|| Surface::new(&self.wall, self.wall.extent()));
+        self.scene_of(whole, epoch)
+    }
+
+    /// The same of a part of the section whose surface was sampled with [`World::surface`].
+    pub fn scene_of<'a>(&'a self, surface: &'a Surface, epoch: usize) -> Scene<'a> {
         let motions = if epoch == 0 { &self.still } else { &self.motions };
-        Scene::new(&self.wall, &self.surface, motions, &self.props)
+        Scene::new(&self.wall, surface, motions, &self.props)
+    }
+
+    /// Samples the surface of a part of the section: smallest a, largest a, smallest u, largest u, metres.
+    pub fn surface(&self, part: [f64; 4]) -> Surface {
+        Surface::new(&self.wall, part)
     }
 
     /// Scans an epoch's scene with the sensors of the parameters; noise differs between epochs and sensors.
     pub fn scan(&self, params: &SceneParams, epoch: usize) -> EpochScans {
-        let scene = self.scene(epoch);
-        let seed = |sensor: u64| epoch_seed(params.seed, epoch, sensor);
+        let (scene, whole) = (self.scene(epoch), Window::whole());
         EpochScans {
-            tls: params.tls.as_ref().map(|p| scan_terrestrial(&scene, p, seed(0))),
-            uav: params.uav.as_ref().map(|p| scan_airborne(&scene, p, seed(1))),
+            tls: scan_window(&scene, params, Sensor::Tls, epoch, &whole),
+            uav: scan_window(&scene, params, Sensor::Uav, epoch, &whole),
         }
+    }
+}
+
+/// Which scanner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// On tripods.
+    Tls,
+    /// Under a drone.
+    Uav,
+}
+
+impl Sensor {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tls => "tls",
+            Self::Uav => "uav",
+        }
+    }
+}
+
+/// What one scanner measures of a piece of the section; `None` where the survey has no such scanner.
+///
+/// `scene`: of the piece's [`Window::surroundings`] at least. The points of all pieces together are the cloud.
+pub fn scan_window(
+    scene: &Scene,
+    params: &SceneParams,
+    sensor: Sensor,
+    epoch: usize,
+    window: &Window,
+) -> Option<Scan> {
+    let seed = epoch_seed(params.seed, epoch, sensor as u64);
+    match sensor {
+        Sensor::Tls => Some(scan_terrestrial(scene, window, params.tls.as_ref()?, seed)),
+        Sensor::Uav => Some(scan_airborne(scene, window, params.uav.as_ref()?, seed)),
     }
 }
 

@@ -5,6 +5,7 @@ use crate::simulate::face::FacePoint;
 use crate::simulate::noise::normal;
 use crate::simulate::scan::{BeamParams, Scan, Shot, shoot};
 use crate::simulate::scene::Scene;
+use crate::simulate::window::Window;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -19,6 +20,8 @@ pub struct TlsParams {
     pub stations: u32,
     /// Distance of the stations from the face, metres.
     pub distance_m: f64,
+    /// How far to either side along the section a station scans, metres; 0 for all of the section.
+    pub reach_m: f64,
     /// Height of the scanner over ground, metres.
     pub height_m: f64,
     /// Mean point distance of the merged cloud on the face straight in front of a station, metres.
@@ -40,6 +43,7 @@ impl Default for TlsParams {
         Self {
             stations: 2,
             distance_m: 9.0,
+            reach_m: 0.0,
             height_m: 1.7,
             spacing_m: 0.005,
             placement_m: 0.5,
@@ -51,116 +55,152 @@ impl Default for TlsParams {
     }
 }
 
-/// One station: where it stands, and the rays it sends, row by row.
+/// One station: where it stands, and the grid of its rays.
 struct Station {
     number: u16,
     place: Point3<f64>,
     step_rad: f64,
-    /// Smallest and largest azimuth, and smallest and largest elevation, radians.
-    field: [f64; 4],
+    /// Smallest and largest a that it scans, metres.
+    reach: [f64; 2],
     /// What the registration gets wrong.
     error: Rigid3,
 }
 
-/// Scans the scene's window from all stations. The same points for any number of threads.
+/// Scans a window of the section from all stations; `scene` holds the window's surroundings at least.
 ///
-/// Cost: about three microseconds a beam.
-pub fn scan_terrestrial(scene: &Scene, params: &TlsParams, seed: u64) -> Scan {
+/// The same points for any number of threads. Cost: about three microseconds a beam.
+pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
-    scan_terrestrial_rows(scene, params, seed, |station, shots| scan.push(shots, station));
+    for station in stations(scene, params, seed) {
+        let Some([west, east, low, high]) = station.field(scene, window, params.margin_m) else {
+            continue;
+        };
+        // Rows and columns belong to the station's one grid, whatever the window.
+        let rows = (low / station.step_rad).floor() as i64..=(high / station.step_rad).ceil() as i64;
+        let measured: Vec<Vec<_>> = rows
+            .into_par_iter()
+            .map(|row| station.row(scene, window, params, row, [west, east], seed))
+            .collect();
+        for shots in measured {
+            scan.push(shots, station.number);
+        }
+    }
     scan
 }
 
-/// As [`scan_terrestrial`], but hands over a few rows at a time: a large scan never lies in memory.
-fn scan_terrestrial_rows(
-    scene: &Scene,
-    params: &TlsParams,
-    seed: u64,
-    mut take: impl FnMut(u16, Vec<(Shot, Point3<f64>)>),
-) {
-    const ROWS: usize = 64;
-    for station in stations(scene, params, seed) {
-        let [_, _, low, high] = station.field;
-        let rows = ((high - low) / station.step_rad) as usize + 1;
-        for start in (0..rows).step_by(ROWS) {
-            let measured: Vec<Vec<_>> = (start..rows.min(start + ROWS))
-                .into_par_iter()
-                .map(|row| station.row(scene, params, row, seed))
-                .collect();
-            for shots in measured {
-                take(station.number, shots);
-            }
-        }
-    }
-}
+/// Middle of the range of rows, so that their numbers are positive: more rows than a grid of 5 mm at 10 m has.
+const ROW_ZERO: i64 = 1 << 20;
 
 impl Station {
-    fn row(&self, scene: &Scene, params: &TlsParams, row: usize, seed: u64) -> Vec<(Shot, Point3<f64>)> {
+    fn row(
+        &self,
+        scene: &Scene,
+        window: &Window,
+        params: &TlsParams,
+        row: i64,
+        [west, east]: [f64; 2],
+        seed: u64,
+    ) -> Vec<(Shot, Point3<f64>)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(((u64::from(self.number) + 1) << 32) | row as u64);
-        let elevation = self.field[2] + row as f64 * self.step_rad;
+        rng.set_stream(window.stream(u64::from(self.number), (row + ROW_ZERO) as u64));
+        let elevation = row as f64 * self.step_rad;
         // Columns closer together in azimuth away from the horizon, so that points keep their distance.
         let step = self.step_rad / elevation.cos();
-        let columns = ((self.field[1] - self.field[0]) / step) as usize + 1;
-        (0..columns)
+        ((west / step).floor() as i64..=(east / step).ceil() as i64)
             .filter_map(|column| {
-                let azimuth = self.field[0] + column as f64 * step;
-                let along = direction(azimuth, elevation);
+                let along = direction(column as f64 * step, elevation);
                 let shot = shoot(scene, &self.place, &along, &params.beam, &mut rng)?;
                 let measured = self.error * shot.measured;
-                near_section(scene, &shot.hit.point, params.margin_m).then_some((shot, measured))
+                let face = scene.wall().face.face_of(&shot.hit.point);
+                let wanted = window.holds(face.a, face.u)
+                    && (self.reach[0]..=self.reach[1]).contains(&face.a)
+                    && near_section(scene, &shot.hit.point, params.margin_m);
+                wanted.then_some((shot, measured))
             })
             .collect()
+    }
+
+    /// The part of the sphere around the station that holds the window, within its reach, and what stands in front of
+    /// it: smallest and largest azimuth, smallest and largest elevation, radians; `None` where it does not reach.
+    fn field(&self, scene: &Scene, window: &Window, margin_m: f64) -> Option<[f64; 4]> {
+        const STEPS: i32 = 32;
+        let mut limits = grown(scene.wall().extent(), margin_m);
+        limits = [
+            limits[0].max(self.reach[0]),
+            limits[1].min(self.reach[1]),
+            limits[2],
+            limits[3],
+        ];
+        let w = window.grown(0.0, limits);
+        if w[0] >= w[1] || w[2] >= w[3] {
+            return None;
+        }
+        let mut field = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
+        for i in 0..=STEPS {
+            for j in 0..=STEPS {
+                for n in DEPTH_M {
+                    let share = |k: i32| f64::from(k) / f64::from(STEPS);
+                    let a = w[0] + (w[1] - w[0]) * share(i);
+                    let u = w[2] + (w[3] - w[2]) * share(j);
+                    let d = scene.wall().face.world_of(&FacePoint { a, u, n }) - self.place;
+                    let (azimuth, elevation) = (d.y.atan2(-d.x), d.z.atan2(d.x.hypot(d.y)));
+                    field = [
+                        field[0].min(azimuth),
+                        field[1].max(azimuth),
+                        field[2].min(elevation),
+                        field[3].max(elevation),
+                    ];
+                }
+            }
+        }
+        Some(field)
     }
 }
 
 fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let window = scene.window();
+    let extent = scene.wall().extent();
     let face = &scene.wall().face;
+    let apart = (extent[1] - extent[0]) / f64::from(params.stations.max(1));
+    // How many stations see a place.
+    let cover = match params.reach_m {
+        reach if reach > 0.0 => (2.0 * reach / apart).clamp(1.0, f64::from(params.stations)),
+        _ => f64::from(params.stations),
+    };
     (0..params.stations)
         .map(|k| {
             let share = (f64::from(k) + 0.5) / f64::from(params.stations);
             let mut jitter = |size: f64| size * rng.random_range(-1.0..=1.0);
-            let a = window[0] + (window[1] - window[0]) * share + jitter(params.placement_m);
+            let a = extent[0] + (extent[1] - extent[0]) * share + jitter(params.placement_m);
             let n = params.distance_m + jitter(params.placement_m);
             let foot = face.world_of(&FacePoint { a, u: 0.0, n });
             let place = Point3::new(foot.x, foot.y, params.height_m + jitter(0.1));
+            // Targets stand near the wall: there the registration is at its best.
+            let front = face.world_of(&FacePoint {
+                a,
+                u: 0.5 * (extent[2] + extent[3]),
+                n: 0.0,
+            });
             let turn = Vector3::from_fn(|_, _| params.registration_rad * normal(&mut rng));
             let shift = Vector3::from_fn(|_, _| params.registration_m * normal(&mut rng));
+            let reach = if params.reach_m > 0.0 {
+                params.reach_m
+            } else {
+                f64::INFINITY
+            };
             Station {
                 number: k as u16,
                 place,
-                step_rad: params.spacing_m * f64::from(params.stations).sqrt() / n,
-                field: field(scene, &place, params.margin_m),
-                error: about(&middle(scene), turn, shift),
+                step_rad: params.spacing_m * cover.sqrt() / n,
+                reach: [a - reach, a + reach],
+                error: about(&front, turn, shift),
             }
         })
         .collect()
 }
 
-/// The part of the sphere around a station that holds the window and its margin.
-fn field(scene: &Scene, place: &Point3<f64>, margin_m: f64) -> [f64; 4] {
-    let w = scene.window();
-    let mut field = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
-    let steps = 32;
-    for i in 0..=steps {
-        for j in 0..=steps {
-            let share = |k: i32| f64::from(k) / f64::from(steps);
-            let a = w[0] - margin_m + (w[1] - w[0] + 2.0 * margin_m) * share(i);
-            let u = w[2] - margin_m + (w[3] - w[2] + 2.0 * margin_m) * share(j);
-            let d = scene.wall().face.world_of(&FacePoint { a, u, n: 0.0 }) - place;
-            let (azimuth, elevation) = (d.y.atan2(-d.x), d.z.atan2(d.x.hypot(d.y)));
-            field = [
-                field[0].min(azimuth),
-                field[1].max(azimuth),
-                field[2].min(elevation),
-                field[3].max(elevation),
-            ];
-        }
-    }
-    field
-}
+/// Where things that belong to the cloud lie before and behind the face, metres.
+const DEPTH_M: [f64; 3] = [-0.3, 0.0, 1.5];
 
 /// Unit vector at an azimuth (0 looks at the wall, positive to the right) and an elevation.
 fn direction(azimuth: f64, elevation: f64) -> Vector3<f64> {
@@ -173,13 +213,14 @@ fn direction(azimuth: f64, elevation: f64) -> Vector3<f64> {
 
 /// Whether a point belongs to the delivered cloud: near the section, also where things stand in front of it.
 pub(super) fn near_section(scene: &Scene, p: &Point3<f64>, margin_m: f64) -> bool {
-    let (f, w) = (scene.wall().face.face_of(p), scene.window());
-    f.a > w[0] - margin_m
-        && f.a < w[1] + margin_m
-        && f.u > w[2] - margin_m
-        && f.u < w[3] + margin_m
-        && f.n < 1.5
-        && f.n > -1.5
+    let f = scene.wall().face.face_of(p);
+    let [a0, a1, u0, u1] = grown(scene.wall().extent(), margin_m);
+    a0 < f.a && f.a < a1 && u0 < f.u && f.u < u1 && DEPTH_M[0] < f.n && f.n < DEPTH_M[2]
+}
+
+/// An extent, larger by a margin on every side.
+pub(super) fn grown(e: [f64; 4], margin_m: f64) -> [f64; 4] {
+    [e[0] - margin_m, e[1] + margin_m, e[2] - margin_m, e[3] + margin_m]
 }
 
 /// Middle of the scene's window on the face, rounded to whole metres: the origin of its clouds.

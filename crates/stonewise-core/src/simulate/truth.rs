@@ -1,11 +1,15 @@
 //! What is true of every simulated stone, and how much of it the surveys saw.
 
 use crate::evaluate::TrueStone;
+use crate::geometry::Rigid3;
 use crate::id::StoneId;
 use crate::raster::LabelImage;
+use crate::simulate::deform::TrueMotion;
 use crate::simulate::scan::Scan;
 use crate::simulate::scene::{Scene, Target};
 use crate::simulate::survey::World;
+use crate::simulate::wall::SimStone;
+use crate::simulate::window::Window;
 use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -43,96 +47,117 @@ const CELL_M: f64 = 0.025;
 /// Step of the raster on the face from which cells, areas and centroids are taken, metres.
 const STEP_M: f64 = 0.006;
 
-/// The truth of all stones, in the wall's order. Cost: about 30,000 rays a square metre.
+/// The truth of all stones, in the wall's order, a piece of the section at a time. Cost: about 40,000 rays a square metre.
 pub fn stone_truths(world: &World) -> Vec<StoneTruth> {
-    let faces = face_samples(&world.scene(0));
-    let wall = &world.wall;
-    let measure = |(stone, motion): (&super::SimStone, &super::TrueMotion)| {
-        let samples = faces.get(&stone.id.0).map_or(&[][..], Vec::as_slice);
-        let mean =
-            samples.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords) / samples.len().max(1) as f64;
-        let centroid = if samples.is_empty() {
-            stone.world_from_stone.translation.vector.into()
-        } else {
-            Point3::from(mean)
-        };
-        StoneTruth {
-            id: stone.id,
-            centroid,
-            middle: stone.middle,
-            area_m2: samples.len() as f64 * STEP_M * STEP_M,
-            size_m: [
-                stone.bounds[1] - stone.bounds[0],
-                stone.bounds[3] - stone.bounds[2],
-            ],
-            displacement: motion.second_from_first * centroid - centroid,
-            rotation: motion.second_from_first.rotation.scaled_axis(),
-            shared: motion.shared,
-            loose: motion.loose,
-            edge: stone.edge,
-            normal: wall.face.frame(stone.middle[0]).out,
-            cells: samples.iter().map(|(_, at)| cell(*at)).collect(),
-        }
-    };
-    wall.stones.iter().zip(&world.motions).map(measure).collect()
+    let extent = world.wall.extent();
+    let mut truths = Vec::with_capacity(world.wall.stones.len());
+    for window in Window::cover(extent) {
+        // Stones belong to the piece that holds their middle, and are looked at as a whole.
+        let surface = world.surface(window.grown(LARGEST_STONE_M, extent));
+        let faces = face_samples(&world.scene_of(&surface, 0), &window);
+        let stones = world.wall.stones.iter().zip(&world.motions);
+        let inside = stones.filter(|(s, _)| window.holds(s.middle[0], s.middle[1]));
+        truths.extend(inside.map(|(stone, motion)| {
+            let samples = faces.get(&stone.id.0).map_or(&[][..], Vec::as_slice);
+            stone_truth(world, stone, motion, samples)
+        }));
+    }
+    truths.sort_by_key(|t| t.id);
+    truths
 }
 
-/// Share of each stone's face that a scan measured, 0..1, in the wall's order. `epoch`: 0 or 1, that of the scan.
-pub fn seen_share(world: &World, truths: &[StoneTruth], scan: &Scan, epoch: usize) -> Vec<f64> {
-    let mut hit: Vec<BTreeSet<[i32; 2]>> = vec![BTreeSet::new(); truths.len()];
-    let to_stone: Vec<_> = world
-        .wall
-        .stones
-        .iter()
-        .zip(&world.motions)
-        .map(|(stone, motion)| {
+/// More than any stone reaches from its middle, metres.
+const LARGEST_STONE_M: f64 = 1.0;
+
+fn stone_truth(world: &World, stone: &SimStone, motion: &TrueMotion, samples: &[FaceSample]) -> StoneTruth {
+    let mean = samples.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords) / samples.len().max(1) as f64;
+    let centroid = if samples.is_empty() {
+        stone.world_from_stone.translation.vector.into()
+    } else {
+        Point3::from(mean)
+    };
+    StoneTruth {
+        id: stone.id,
+        centroid,
+        middle: stone.middle,
+        area_m2: samples.len() as f64 * STEP_M * STEP_M,
+        size_m: [
+            stone.bounds[1] - stone.bounds[0],
+            stone.bounds[3] - stone.bounds[2],
+        ],
+        displacement: motion.second_from_first * centroid - centroid,
+        rotation: motion.second_from_first.rotation.scaled_axis(),
+        shared: motion.shared,
+        loose: motion.loose,
+        edge: stone.edge,
+        normal: world.wall.face.frame(stone.middle[0]).out,
+        cells: samples.iter().map(|(_, at)| cell(*at)).collect(),
+    }
+}
+
+/// What scans have measured of each stone, gathered scan by scan.
+pub struct SeenCells {
+    /// World to stone, in the epoch of the scans.
+    to_stone: Vec<Rigid3>,
+    hit: Vec<BTreeSet<[i32; 2]>>,
+    points: Vec<u32>,
+}
+
+impl SeenCells {
+    /// Nothing seen yet. `epoch`: 0 or 1, that of the scans.
+    pub fn new(world: &World, epoch: usize) -> Self {
+        let stones = world.wall.stones.iter().zip(&world.motions);
+        let to_stone = stones.map(|(stone, motion)| {
             let pose = if epoch == 0 {
                 stone.world_from_stone
             } else {
                 motion.second_from_first * stone.world_from_stone
             };
             pose.inverse()
-        })
-        .collect();
-    for (i, &stone) in scan.stone.iter().enumerate().filter(|(_, s)| **s > 0) {
-        let stone = stone as usize - 1;
-        let exact = scan.cloud.origin() + Vector3::from(scan.exact[i]).cast::<f64>();
-        let local = to_stone[stone] * exact;
-        let cell = cell([local.x, local.y]);
-        if truths[stone].cells.contains(&cell) {
-            hit[stone].insert(cell);
+        });
+        let count = world.wall.stones.len();
+        Self {
+            to_stone: to_stone.collect(),
+            hit: vec![BTreeSet::new(); count],
+            points: vec![0; count],
         }
     }
-    let share = |(t, h): (&StoneTruth, BTreeSet<_>)| h.len() as f64 / t.cells.len().max(1) as f64;
-    truths.iter().zip(hit).map(share).collect()
+
+    /// Adds what a scan measured.
+    pub fn add(&mut self, truths: &[StoneTruth], scan: &Scan) {
+        for (i, &stone) in scan.stone.iter().enumerate().filter(|(_, s)| **s > 0) {
+            let stone = stone as usize - 1;
+            self.points[stone] += 1;
+            let exact = scan.cloud.origin() + Vector3::from(scan.exact[i]).cast::<f64>();
+            let local = self.to_stone[stone] * exact;
+            let cell = cell([local.x, local.y]);
+            if truths[stone].cells.contains(&cell) {
+                self.hit[stone].insert(cell);
+            }
+        }
+    }
+
+    /// Points of each stone, in the wall's order.
+    pub fn points(&self) -> &[u32] {
+        &self.points
+    }
+
+    /// Share of each stone's face that was measured, 0..1, in the wall's order.
+    pub fn shares(&self, truths: &[StoneTruth]) -> Vec<f64> {
+        let share = |(t, h): (&StoneTruth, &BTreeSet<_>)| h.len() as f64 / t.cells.len().max(1) as f64;
+        truths.iter().zip(&self.hit).map(share).collect()
+    }
 }
 
-/// Points of each stone in a scan, in the wall's order.
-pub fn point_counts(scan: &Scan, stones: usize) -> Vec<u32> {
-    let mut counts = vec![0; stones];
-    for &stone in scan.stone.iter().filter(|s| **s > 0) {
-        counts[stone as usize - 1] += 1;
+/// Adds one to each stone of which a photo shows at least `pixels` pixels; `counts` in the wall's order.
+pub fn photo_counts(labels: &LabelImage, pixels: u32, counts: &mut [u32]) {
+    let mut seen: BTreeMap<u32, u32> = BTreeMap::new();
+    for &label in labels.data().iter().filter(|l| **l > 0) {
+        *seen.entry(label).or_default() += 1;
     }
-    counts
-}
-
-/// Number of photos that show at least `pixels` pixels of each stone, in the wall's order.
-pub fn photo_counts<'a>(
-    labels: impl IntoIterator<Item = &'a LabelImage>,
-    stones: usize,
-    pixels: u32,
-) -> Vec<u32> {
-    let mut photos = vec![0; stones];
-    for image in labels {
-        let mut counts = vec![0u32; stones + 1];
-        for &label in image.data() {
-            counts[label as usize] += 1;
-        }
-        for (photo, &count) in photos.iter_mut().zip(&counts[1..]) {
-            *photo += u32::from(count >= pixels);
-        }
+    for (label, _) in seen.into_iter().filter(|(_, n)| *n >= pixels) {
+        counts[label as usize - 1] += 1;
     }
-    photos
 }
 
 impl StoneTruth {
@@ -158,8 +183,8 @@ fn cell(at: [f64; 2]) -> [i32; 2] {
 /// A point of a stone's face, in the world and in the stone's frame.
 type FaceSample = (Point3<f64>, [f64; 2]);
 
-/// Points of each stone's face on a square raster.
-fn face_samples(scene: &Scene) -> BTreeMap<u32, Vec<FaceSample>> {
+/// Points of each stone's face on a square raster, of the stones whose middle the window holds.
+fn face_samples(scene: &Scene, window: &Window) -> BTreeMap<u32, Vec<FaceSample>> {
     use rayon::prelude::*;
     let w = scene.window();
     let steps = [0, 2].map(|i| ((w[i + 1] - w[i]) / STEP_M) as usize);
@@ -170,7 +195,10 @@ fn face_samples(scene: &Scene) -> BTreeMap<u32, Vec<FaceSample>> {
             let sample = |i: usize| {
                 let hit = scene.on_face(w[0] + (i as f64 + 0.5) * STEP_M, u)?;
                 match hit.target {
-                    Target::Stone(k, at) => Some((k as u32 + 1, (hit.point, at))),
+                    Target::Stone(k, at) => {
+                        let [a, u] = scene.wall().stones[k].middle;
+                        window.holds(a, u).then_some((k as u32 + 1, (hit.point, at)))
+                    }
                     Target::Other(..) => None,
                 }
             };

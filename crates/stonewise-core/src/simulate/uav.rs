@@ -2,9 +2,10 @@
 
 use crate::simulate::face::FacePoint;
 use crate::simulate::noise::{Noise, normal};
-use crate::simulate::scan::{BeamParams, Scan, shoot};
+use crate::simulate::scan::{BeamParams, Scan, Shot, shoot};
 use crate::simulate::scene::Scene;
-use crate::simulate::tls::{middle, near_section};
+use crate::simulate::tls::{grown, middle, near_section};
+use crate::simulate::window::Window;
 use nalgebra::{Point3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -48,35 +49,47 @@ impl Default for UavParams {
     }
 }
 
-/// Scans the scene's window from all strips: fans across the flight line, one after the other.
+/// Scans a window of the section from all strips: fans across the flight line, one after the other. `scene` holds the
+/// window's surroundings at least.
 ///
 /// The same points for any number of threads. Cost: about three microseconds a beam.
-pub fn scan_airborne(scene: &Scene, params: &UavParams, seed: u64) -> Scan {
+pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let datum = Vector3::from_fn(|_, _| params.datum_m * normal(&mut rng));
-    let window = scene.window();
     let step = params.spacing_m * f64::from(params.strips).sqrt();
-    let (from, to) = (window[0] - params.margin_m, window[1] + params.margin_m);
-    let fans = ((to - from) / step) as usize + 1;
+    let limits = grown(scene.wall().extent(), params.margin_m);
+    // Beams that end on things before the face aim at places beside the window.
+    let aimed = window.grown(PARALLAX_M, limits);
+    let range = |axis: usize| {
+        let first = |v: f64| (v - limits[2 * axis]) / step;
+        first(aimed[2 * axis]).floor().max(0.0) as usize..=first(aimed[2 * axis + 1]) as usize
+    };
     for strip in 0..params.strips {
         let path = Path::new(scene, params, strip, seed);
-        for start in (0..fans).step_by(64) {
-            let measured: Vec<Vec<_>> = (start..fans.min(start + 64))
-                .into_par_iter()
-                .map(|fan| {
-                    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                    rng.set_stream(((u64::from(strip) + 1) << 32) | fan as u64);
-                    path.fan(scene, params, from + fan as f64 * step, step, datum, &mut rng)
-                })
-                .collect();
-            for shots in measured {
-                scan.push(shots, strip as u16);
-            }
+        let measured: Vec<Vec<_>> = range(0)
+            .into_par_iter()
+            .map(|fan| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                rng.set_stream(window.stream(u64::from(strip), fan as u64));
+                let a = limits[0] + fan as f64 * step;
+                let places = range(1).map(|k| limits[2] + (k as f64 + path.phase) * step);
+                path.fan(scene, params, (a, step), places, datum, &mut rng)
+            })
+            .collect();
+        for mut shots in measured {
+            shots.retain(|(shot, _)| {
+                let face = scene.wall().face.face_of(&shot.hit.point);
+                window.holds(face.a, face.u)
+            });
+            scan.push(shots, strip as u16);
         }
     }
     scan
 }
+
+/// How far the place where a beam meets a thing 1.5 m before the face can lie from where it aims, metres.
+const PARALLAX_M: f64 = 1.0;
 
 /// A flight line and its error.
 struct Path {
@@ -91,7 +104,7 @@ struct Path {
 
 impl Path {
     fn new(scene: &Scene, params: &UavParams, strip: u32, seed: u64) -> Self {
-        let w = scene.window();
+        let w = scene.wall().extent();
         let share = (f64::from(strip) + 0.8) / f64::from(params.strips);
         let purpose = 100 + 3 * u64::from(strip);
         Self {
@@ -102,17 +115,17 @@ impl Path {
         }
     }
 
-    /// One fan of beams, from the foot of the face to its crown.
+    /// One fan of beams at a, aimed at places up the face.
     fn fan(
         &self,
         scene: &Scene,
         params: &UavParams,
-        a: f64,
-        step: f64,
+        (a, step): (f64, f64),
+        places: impl Iterator<Item = f64>,
         datum: Vector3<f64>,
         rng: &mut ChaCha8Rng,
-    ) -> Vec<(super::scan::Shot, Point3<f64>)> {
-        let (w, face) = (scene.window(), &scene.wall().face);
+    ) -> Vec<(Shot, Point3<f64>)> {
+        let face = &scene.wall().face;
         let a = a + (self.phase - 0.5) * step;
         let sensor = face.world_of(&FacePoint {
             a: a + self.squint * params.distance_m,
@@ -125,10 +138,8 @@ impl Path {
                 let along_strip = a / params.drift_length_m + 40.0 * self.drift[axis].uniform(0);
                 params.drift_m / 0.3 * self.drift[axis].at(along_strip, 0.5)
             });
-        let (low, high) = (w[2] - params.margin_m, w[3] + params.margin_m);
-        (0..=((high - low) / step) as usize)
-            .filter_map(|k| {
-                let u = low + (k as f64 + self.phase) * step;
+        places
+            .filter_map(|u| {
                 let along = (face.world_of(&FacePoint { a, u, n: 0.0 }) - sensor).normalize();
                 let shot = shoot(scene, &sensor, &along, &params.beam, rng)?;
                 let measured = shot.measured + error;

@@ -21,6 +21,7 @@ pub use error::CloudError;
 pub use format::CloudFormat;
 pub use info::{CloudInfo, Scan, cloud_info};
 pub use label::{LabelColumns, PointLabel, PointMotion, select_points, write_labelled};
+pub use las::ExtraType;
 pub use ply::read_mesh;
-pub use points::{ExtraColumn, write_points_laz};
+pub use points::{ExtraColumn, PointSink, stream_points_laz, write_points_laz};
 pub use read::read_cloud;

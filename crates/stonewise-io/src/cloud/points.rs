@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use las::{Transform, Vector};
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
@@ -39,32 +40,76 @@ pub fn write_points_laz(
     positions: &[Point3<f64>],
     columns: &[(&str, ExtraColumn<'_>)],
 ) -> Result<(), CloudError> {
-    if let Some(i) = positions.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-        return Err(CloudError::unwritable(path, format!("point {i} has no position")));
-    }
-    let mut descriptors = Vec::new();
-    for (name, column) in columns {
-        if column.len() != positions.len() {
-            let reason = format!(
-                "{} values of {name:?} for {} points",
-                column.len(),
-                positions.len()
-            );
-            return Err(CloudError::unwritable(path, reason));
-        }
-        let reason = || CloudError::unwritable(path, format!("not a name of a dimension: {name:?}"));
-        descriptors.extend(describe(name, column.kind(), "").ok_or_else(reason)?);
-    }
-    let extra_bytes = columns.iter().map(|(_, c)| c.kind().size()).sum();
-    let bounds = Bounds::of(positions.iter().copied()).unwrap_or(Bounds {
-        min: Point3::origin(),
-        max: Point3::origin(),
+    let origin = Point3::origin();
+    let finite = positions
+        .iter()
+        .copied()
+        .filter(|p| p.iter().all(|c| c.is_finite()));
+    let bounds = Bounds::of(finite).unwrap_or(Bounds {
+        min: origin,
+        max: origin,
     });
-    let transforms = transforms_for(&bounds, FINEST_M)
+    let kinds: Vec<(&str, ExtraType)> = columns.iter().map(|(name, c)| (*name, c.kind())).collect();
+    let values: Vec<ExtraColumn<'_>> = columns.iter().map(|(_, c)| *c).collect();
+    stream_points_laz(path, &bounds, &kinds, |sink| sink.append(positions, &values))
+}
+
+/// Writes points that come piece by piece, as [`write_points_laz`] does; none of them needs to stay in memory.
+///
+/// `bounds`: a box that holds all points; the step of the coordinates follows from it. `columns`: names and types of the
+/// extra dimensions, in the order in which `write` gives their values.
+///
+/// # Errors
+/// As [`write_points_laz`], a point outside the box, or what `write` returns; `path` then stays as it was.
+pub fn stream_points_laz<E: From<CloudError>>(
+    path: &Path,
+    bounds: &Bounds,
+    columns: &[(&str, ExtraType)],
+    write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut descriptors = Vec::new();
+    for (name, kind) in columns {
+        let reason = || CloudError::unwritable(path, format!("not a name of a dimension: {name:?}"));
+        descriptors.extend(describe(name, *kind, "").ok_or_else(reason)?);
+    }
+    let extra_bytes = columns.iter().map(|(_, kind)| kind.size()).sum();
+    let transforms = transforms_for(bounds, FINEST_M)
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
     write_whole(path, |partial| {
         let header = export_header(false, transforms, extra_bytes, descriptors);
-        let mut writer = LazWriter::create(partial, path, header)?;
+        let mut sink = PointSink {
+            path,
+            columns,
+            bounds: *bounds,
+            transforms,
+            writer: LazWriter::create(partial, path, header)?,
+        };
+        write(&mut sink)?;
+        Ok(sink.writer.finish()?)
+    })
+}
+
+/// A LAZ file that takes points.
+pub struct PointSink<'a> {
+    path: &'a Path,
+    columns: &'a [(&'a str, ExtraType)],
+    bounds: Bounds,
+    transforms: Vector<Transform>,
+    writer: LazWriter,
+}
+
+impl PointSink<'_> {
+    /// Appends points with the values of their extra dimensions.
+    ///
+    /// # Errors
+    /// A position is not finite or outside the box, a column is missing or has another type or length, or the file cannot
+    /// be written.
+    pub fn append(
+        &mut self,
+        positions: &[Point3<f64>],
+        columns: &[ExtraColumn<'_>],
+    ) -> Result<(), CloudError> {
+        self.check(positions, columns)?;
         for start in (0..positions.len()).step_by(CHUNK_POINTS) {
             let mut out = Vec::new();
             for (i, position) in positions.iter().enumerate().skip(start).take(CHUNK_POINTS) {
@@ -74,13 +119,38 @@ pub fn write_points_laz(
                     color: None,
                     source: 0,
                 };
-                record.append(&transforms, &mut out);
-                columns.iter().for_each(|(_, c)| c.append(i, &mut out));
+                record.append(&self.transforms, &mut out);
+                columns.iter().for_each(|c| c.append(i, &mut out));
             }
-            writer.write(out)?;
+            self.writer.write(out)?;
         }
-        writer.finish()
-    })
+        Ok(())
+    }
+
+    fn check(&self, positions: &[Point3<f64>], columns: &[ExtraColumn<'_>]) -> Result<(), CloudError> {
+        let fail = |reason: String| Err(CloudError::unwritable(self.path, reason));
+        let finite = |p: &Point3<f64>| p.iter().all(|c| c.is_finite());
+        if let Some(i) = positions.iter().position(|p| !finite(p)) {
+            return fail(format!("point {i} has no position"));
+        }
+        if let Some(p) = positions.iter().find(|p| !self.bounds.contains(p)) {
+            return fail(format!("point {p:?} lies outside {:?}", self.bounds));
+        }
+        let kinds = columns.iter().map(ExtraColumn::kind);
+        if columns.len() != self.columns.len() || !kinds.eq(self.columns.iter().map(|(_, kind)| *kind)) {
+            return fail("other dimensions than the file has".to_owned());
+        }
+        for ((name, _), column) in self.columns.iter().zip(columns) {
+            if column.len() != positions.len() {
+                return fail(format!(
+                    "{} values of {name:?} for {} points",
+                    column.len(),
+                    positions.len()
+                ));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl ExtraColumn<'_> {

@@ -1,49 +1,102 @@
 //! Photos, cameras and masks of one epoch.
 
-use crate::simulate::write::create_folder;
+use crate::simulate::truth::SHOWN_PIXELS;
+use crate::simulate::write::{Survey, create_folder};
 use crate::simulate::{MaskFiles, SimulateError, SurveyParams};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
-use stonewise_core::progress::Progress;
-use stonewise_core::raster::LabelImage;
-use stonewise_core::simulate::{Scene, Studio, disturb_views, plan_views};
+use stonewise_core::raster::{LabelImage, Raster};
+use stonewise_core::simulate::{
+    Photo, Scene, SensorParams, Studio, disturb_views, photo_counts, plan_views, shown_part, true_labels,
+};
 use stonewise_io::cameras::{write_colmap, write_metashape};
 use stonewise_io::image_io::write_jpeg;
 use stonewise_io::masks::{CocoPhoto, InstanceInfo, write_coco, write_label_png};
+use stonewise_io::table::{Table, write_csv};
 
-/// Takes and writes the photos of an epoch (0 or 1) with all that belongs to them; gives back the true labels.
-pub fn write_photos(
-    folder: &Path,
-    scene: &Scene,
-    params: &SurveyParams,
-    epoch: usize,
-    progress: &dyn Progress,
-) -> Result<Vec<LabelImage>, SimulateError> {
-    let number = epoch + 1;
+/// Largest section that is photographed from one sampled surface, m^2: about 100 MB. Beyond it each photo gets its own part.
+const ONE_SURFACE_M2: f64 = 100.0;
+
+/// Takes and writes the photos of an epoch with all that belongs to them; gives back how many photos show each stone.
+pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
+    let (params, number) = (survey.params, survey.number());
     let seed = params
         .scene
         .seed
         .wrapping_mul(1000)
-        .wrapping_add(10 + epoch as u64);
-    let images = folder.join(format!("epoch{number}/images"));
+        .wrapping_add(10 + survey.epoch as u64);
+    let images = survey.folder.join(format!("epoch{number}/images"));
     create_folder(&images)?;
-    let exact = plan_views(scene, &params.photos, epoch, seed);
-    let studio = Studio::new(scene, seed + 2);
-    let mut labels = Vec::new();
+    let wall = &survey.world.wall;
+    let exact = plan_views(wall, &params.photos, survey.epoch, seed);
+    let extent = wall.extent();
+    let mut masks = MaskWriter::new(survey, seed + 6)?;
+    let mut shown = vec![0; wall.stones.len()];
+    survey
+        .progress
+        .begin(&format!("photos of epoch {number}"), exact.len() as u64);
+    let is_small = (extent[1] - extent[0]) * (extent[3] - extent[2]) <= ONE_SURFACE_M2;
+    let whole = is_small.then(|| survey.world.surface(extent));
+    let scene = whole.as_ref().map(|s| survey.world.scene_of(s, survey.epoch));
+    let darkroom = scene.as_ref().map(|s| Darkroom::new(s, params, seed + 2));
     for view in &exact {
-        progress.check()?;
-        let photo = studio.photograph(view, &params.photos.sensor);
+        survey.progress.check()?;
+        let photo = match (&darkroom, shown_part(wall, view)) {
+            (Some(darkroom), _) => darkroom.photo(view),
+            (None, Some(part)) => {
+                let surface = survey.world.surface(part);
+                let scene = survey.world.scene_of(&surface, survey.epoch);
+                Darkroom::new(&scene, params, seed + 2).photo(view)
+            }
+            (None, None) => blank(view),
+        };
         let name = format!("{}.jpg", view.name);
         write_jpeg(&images.join(&name), &photo.image, params.jpeg_quality)?;
-        labels.push(photo.labels);
-        progress.advance(1);
+        photo_counts(&photo.labels, SHOWN_PIXELS, &mut shown);
+        masks.add(view, photo.labels)?;
+        survey.progress.advance(1);
     }
-    write_cameras(folder, &exact, params, number, seed + 4)?;
-    write_masks(folder, &exact, &labels, params, number, seed + 6)?;
-    Ok(labels)
+    masks.finish()?;
+    write_cameras(survey.folder, &exact, params, number, seed + 4)?;
+    Ok(shown)
+}
+
+/// Takes photos of one scene, or their labels alone on grey where photos are not rendered.
+struct Darkroom<'a> {
+    scene: &'a Scene<'a>,
+    studio: Option<Studio<'a>>,
+    sensor: &'a SensorParams,
+}
+
+impl<'a> Darkroom<'a> {
+    fn new(scene: &'a Scene<'a>, params: &'a SurveyParams, day: u64) -> Self {
+        Self {
+            scene,
+            studio: params.photos.rendered.then(|| Studio::new(scene, day)),
+            sensor: &params.photos.sensor,
+        }
+    }
+
+    fn photo(&self, view: &View) -> Photo {
+        match &self.studio {
+            Some(studio) => studio.photograph(view, self.sensor),
+            None => Photo {
+                labels: true_labels(self.scene, view),
+                ..blank(view)
+            },
+        }
+    }
+}
+
+fn blank(view: &View) -> Photo {
+    let (width, height) = (view.camera.width, view.camera.height);
+    Photo {
+        image: Raster::filled(width, height, [128; 3]),
+        labels: LabelImage::filled(width, height, 0),
+    }
 }
 
 fn write_cameras(
@@ -69,39 +122,93 @@ fn write_cameras(
     Ok(())
 }
 
-/// Masks for the project, with numbers that say nothing about the stone, and the true ones beside them.
-fn write_masks(
-    folder: &Path,
-    views: &[View],
-    labels: &[LabelImage],
-    params: &SurveyParams,
-    number: usize,
+/// Masks for the project, with numbers that say nothing about the stone, and beside them which stone each one is.
+///
+/// COCO json holds all photos of an epoch, so their labels stay in memory; label PNGs are written photo by photo, with a table
+/// of (photo, instance, stone_id) as their truth. Where the project gets no masks, the PNGs belong to the truth.
+struct MaskWriter<'a> {
+    survey: &'a Survey<'a>,
     seed: u64,
-) -> Result<(), SimulateError> {
-    let names: Vec<String> = views.iter().map(|v| format!("{}.jpg", v.name)).collect();
-    create_folder(&folder.join("truth/masks"))?;
-    let known: Vec<Vec<InstanceInfo>> = labels.iter().map(true_instances).collect();
-    let truth = folder.join(format!("truth/masks/epoch{number}_coco.json"));
-    write_coco(&truth, &coco_photos(&names, labels, &known))?;
+    /// Folder of the label PNGs.
+    folder: Option<PathBuf>,
+    /// Photos and their labels, for COCO.
+    kept: Vec<(String, LabelImage)>,
+    /// Photo, instance, stone.
+    known: Vec<(String, u32, u32)>,
+}
 
-    let shuffled: Vec<LabelImage> = labels.iter().zip(seed..).map(|(l, s)| shuffle(l, s)).collect();
-    match params.masks {
-        MaskFiles::None => {}
-        MaskFiles::Coco => {
-            create_folder(&folder.join("masks"))?;
-            let unknown = vec![Vec::new(); shuffled.len()];
-            let path = folder.join(format!("masks/epoch{number}.json"));
-            write_coco(&path, &coco_photos(&names, &shuffled, &unknown))?;
+impl<'a> MaskWriter<'a> {
+    fn new(survey: &'a Survey<'a>, seed: u64) -> Result<Self, SimulateError> {
+        create_folder(&survey.folder.join("truth/masks"))?;
+        let number = survey.number();
+        let folder = match survey.params.masks {
+            MaskFiles::Coco => None,
+            MaskFiles::Png => Some(survey.folder.join(format!("masks/epoch{number}"))),
+            MaskFiles::None => Some(survey.folder.join(format!("truth/masks/epoch{number}"))),
+        };
+        if let Some(folder) = &folder {
+            create_folder(folder)?;
         }
-        MaskFiles::Png => {
-            let masks = folder.join(format!("masks/epoch{number}"));
-            create_folder(&masks)?;
-            for (view, image) in views.iter().zip(&shuffled) {
-                write_label_png(&masks.join(format!("{}.png", view.name)), image)?;
-            }
-        }
+        Ok(Self {
+            survey,
+            seed,
+            folder,
+            kept: Vec::new(),
+            known: Vec::new(),
+        })
     }
-    Ok(())
+
+    fn add(&mut self, view: &View, labels: LabelImage) -> Result<(), SimulateError> {
+        let name = format!("{}.jpg", view.name);
+        let Some(folder) = &self.folder else {
+            self.kept.push((name, labels));
+            return Ok(());
+        };
+        let (shuffled, numbers) = shuffle(&labels, self.seed.wrapping_add(u64::from(view.image.0)));
+        write_label_png(&folder.join(format!("{}.png", view.name)), &shuffled)?;
+        let known = numbers
+            .into_iter()
+            .map(|(stone, instance)| (name.clone(), instance, stone));
+        self.known.extend(known);
+        Ok(())
+    }
+
+    fn finish(self) -> Result<(), SimulateError> {
+        let number = self.survey.number();
+        let truth = self.survey.folder.join("truth/masks");
+        if self.folder.is_some() {
+            let mut table = Table::new();
+            table.push(
+                "photo",
+                self.known.iter().map(|k| k.0.clone()).collect::<Vec<_>>(),
+            )?;
+            table.push("instance", self.known.iter().map(|k| k.1).collect::<Vec<_>>())?;
+            table.push("stone_id", self.known.iter().map(|k| k.2).collect::<Vec<_>>())?;
+            return Ok(write_csv(
+                &truth.join(format!("epoch{number}_stones.csv")),
+                &table,
+            )?);
+        }
+        let (names, labels): (Vec<String>, Vec<LabelImage>) = self.kept.into_iter().unzip();
+        let known: Vec<Vec<InstanceInfo>> = labels.iter().map(true_instances).collect();
+        write_coco(
+            &truth.join(format!("epoch{number}_coco.json")),
+            &coco_photos(&names, &labels, &known),
+        )?;
+        let shuffled: Vec<LabelImage> = labels
+            .iter()
+            .zip(self.seed..)
+            .map(|(l, s)| shuffle(l, s).0)
+            .collect();
+        let masks = self.survey.folder.join("masks");
+        create_folder(&masks)?;
+        let unknown = vec![Vec::new(); shuffled.len()];
+        write_coco(
+            &masks.join(format!("epoch{number}.json")),
+            &coco_photos(&names, &shuffled, &unknown),
+        )?;
+        Ok(())
+    }
 }
 
 fn coco_photos<'a>(
@@ -140,8 +247,8 @@ fn true_instances(labels: &LabelImage) -> Vec<InstanceInfo> {
         .collect()
 }
 
-/// The same masks, numbered from 1 in random order.
-fn shuffle(labels: &LabelImage, seed: u64) -> LabelImage {
+/// The same masks, numbered from 1 in random order, and the pairs of old and new numbers.
+fn shuffle(labels: &LabelImage, seed: u64) -> (LabelImage, Vec<(u32, u32)>) {
     let mut ids = present(labels);
     ids.shuffle(&mut ChaCha8Rng::seed_from_u64(seed));
     let largest = ids.iter().copied().max().unwrap_or(0) as usize;
@@ -153,5 +260,5 @@ fn shuffle(labels: &LabelImage, seed: u64) -> LabelImage {
     for label in shuffled.data_mut() {
         *label = new[*label as usize];
     }
-    shuffled
+    (shuffled, ids.into_iter().zip(1..).collect())
 }

@@ -26,7 +26,7 @@ struct EpochEntry {
 
 /// Text of a project that uses the cloud of one sensor: `tls` or `uav`.
 pub fn project_text(params: &SurveyParams, sensor: &str) -> Result<String, SimulateError> {
-    let epochs = (1..=2)
+    let epochs = (1..=params.epochs)
         .map(|e| EpochEntry {
             name: format!("epoch {e}"),
             clouds: vec![format!("epoch{e}/cloud_{sensor}.laz")],

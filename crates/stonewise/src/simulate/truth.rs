@@ -2,47 +2,34 @@
 
 use crate::simulate::SimulateError;
 use std::path::Path;
-use stonewise_core::raster::LabelImage;
-use stonewise_core::simulate::{EpochScans, Scan, StoneTruth, World, photo_counts, point_counts, seen_share};
+use stonewise_core::simulate::StoneTruth;
 use stonewise_io::table::{Table, TableError, write_csv};
 
 /// What was measured of each stone in one epoch, in the wall's order.
 pub struct Seen {
-    tls: (Vec<u32>, Vec<f64>),
-    uav: (Vec<u32>, Vec<f64>),
-    images: Vec<u32>,
+    /// By terrestrial scanner and drone.
+    pub scans: [SeenByScan; 2],
+    /// Photos that show it.
+    pub photos: Vec<u32>,
+}
+
+/// What a scan measured of each stone, in the wall's order.
+pub struct SeenByScan {
+    /// Points.
+    pub points: Vec<u32>,
+    /// Share of the face.
+    pub shares: Vec<f64>,
 }
 
 /// A stone counts as shown in a photo from this many pixels on.
-const SHOWN_PIXELS: u32 = 150;
-
-/// Counts what one epoch (0 or 1) shows of each stone.
-pub fn count_seen(
-    world: &World,
-    truths: &[StoneTruth],
-    scans: &EpochScans,
-    labels: &[LabelImage],
-    epoch: usize,
-) -> Seen {
-    let stones = truths.len();
-    let of = |scan: &Option<Scan>| {
-        scan.as_ref().map_or((vec![0; stones], vec![0.0; stones]), |s| {
-            (point_counts(s, stones), seen_share(world, truths, s, epoch))
-        })
-    };
-    Seen {
-        tls: of(&scans.tls),
-        uav: of(&scans.uav),
-        images: photo_counts(labels, stones, SHOWN_PIXELS),
-    }
-}
+pub const SHOWN_PIXELS: u32 = 150;
 
 /// Writes truth/stones.csv, one row a stone.
-pub fn write_stone_table(path: &Path, truths: &[StoneTruth], seen: &[Seen; 2]) -> Result<(), SimulateError> {
+pub fn write_stone_table(path: &Path, truths: &[StoneTruth], seen: &[Seen]) -> Result<(), SimulateError> {
     Ok(write_csv(path, &stone_table(truths, seen)?)?)
 }
 
-fn stone_table(truths: &[StoneTruth], seen: &[Seen; 2]) -> Result<Table, TableError> {
+fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError> {
     let mut table = Table::new();
     table.push("stone_id", truths.iter().map(|t| t.id.0).collect::<Vec<_>>())?;
     let real = |get: &dyn Fn(&StoneTruth) -> f64| truths.iter().map(get).collect::<Vec<f64>>();
@@ -70,17 +57,22 @@ fn stone_table(truths: &[StoneTruth], seen: &[Seen; 2]) -> Result<Table, TableEr
     for (axis, name) in ["nx", "ny", "nz"].iter().enumerate() {
         table.push(name, real(&|t| t.normal[axis]))?;
     }
-    for (number, epoch) in (1..).zip(seen) {
-        table.push(&format!("n_tls_{number}"), epoch.tls.0.clone())?;
+    for (sensor, name) in SENSORS.iter().enumerate() {
+        for (number, epoch) in (1..).zip(seen) {
+            table.push(&format!("n_{name}_{number}"), epoch.scans[sensor].points.clone())?;
+        }
     }
     for (number, epoch) in (1..).zip(seen) {
-        table.push(&format!("n_uav_{number}"), epoch.uav.0.clone())?;
+        table.push(&format!("n_img_{number}"), epoch.photos.clone())?;
     }
-    for (number, epoch) in (1..).zip(seen) {
-        table.push(&format!("n_img_{number}"), epoch.images.clone())?;
+    for (sensor, name) in SENSORS.iter().enumerate() {
+        let least = |i: usize| seen.iter().map(|e| e.scans[sensor].shares[i]).fold(1.0, f64::min);
+        table.push(
+            &format!("vis_{name}"),
+            (0..truths.len()).map(least).collect::<Vec<f64>>(),
+        )?;
     }
-    let both = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(p, q)| p.min(*q)).collect::<Vec<f64>>();
-    table.push("vis_tls", both(&seen[0].tls.1, &seen[1].tls.1))?;
-    table.push("vis_uav", both(&seen[0].uav.1, &seen[1].uav.1))?;
     Ok(table)
 }
+
+const SENSORS: [&str; 2] = ["tls", "uav"];

@@ -2,14 +2,17 @@
 
 use crate::simulate::photos::write_photos;
 use crate::simulate::project_file::project_text;
-use crate::simulate::truth::{count_seen, write_stone_table};
+use crate::simulate::truth::{Seen, SeenByScan, write_stone_table};
 use crate::simulate::{SimulateError, SurveyParams};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
+use stonewise_core::geometry::Bounds;
 use stonewise_core::progress::Progress;
-use stonewise_core::simulate::{EpochScans, Scan, World, stone_truths};
+use stonewise_core::simulate::{
+    FacePoint, Scan, SeenCells, Sensor, StoneTruth, Window, World, scan_window, stone_truths,
+};
 use stonewise_io::atomic::write_atomically;
-use stonewise_io::cloud::{ExtraColumn, write_points_laz};
+use stonewise_io::cloud::{ExtraColumn, ExtraType, PointSink, stream_points_laz};
 
 /// What was written.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,12 +31,15 @@ pub struct SurveySummary {
     pub photos: usize,
 }
 
-/// Simulates a survey of two epochs and writes it into `folder`, which is made where it is missing:
+/// Simulates a survey of one or two epochs and writes it into `folder`, which is made where it is missing:
 ///
 /// - `stonewise.toml` (and `stonewise_uav.toml` where there are both kinds of cloud), `simulation.toml` (the parameters)
 /// - `epoch1/`, `epoch2/`: `cloud_tls.laz`, `cloud_uav.laz`, `images/*.jpg`, `cameras_metashape.xml`
-/// - `masks/epoch1.json`, ...: true outlines, numbered at random in every photo
-/// - `truth/`: `stones.csv`, clouds with `stone_id` in the same order, exact cameras, masks with `stone_id`
+/// - `masks/epoch1.json`, ... (or `masks/epoch1/`): true outlines, numbered at random in every photo
+/// - `truth/`: `stones.csv`, clouds with `stone_id` in the same order, exact cameras, and which stone each mask is
+///
+/// The section is worked on piece by piece and photo by photo: memory does not grow with the number of points. Masks as COCO
+/// json stay in memory until the epoch is done.
 ///
 /// Every file appears whole or not at all, and the project file last: without it the survey is not complete.
 ///
@@ -47,23 +53,29 @@ pub fn write_survey(
     params.check()?;
     prepare(folder)?;
     let photos = (params.photos.columns * params.photos.rows) as usize;
-    progress.begin("simulate", 2 * (2 + photos as u64));
     let world = World::new(&params.scene);
+    let windows = Window::cover(world.wall.extent());
     let truths = stone_truths(&world);
     let (mut seen, mut points) = (Vec::new(), 0);
-    for epoch in 0..2 {
-        progress.check()?;
-        let scans = world.scan(&params.scene, epoch);
-        progress.advance(1);
-        points += write_clouds(folder, &scans, epoch + 1)?;
-        progress.advance(1);
-        let labels = write_photos(folder, &world.scene(epoch), params, epoch, progress)?;
-        seen.push(count_seen(&world, &truths, &scans, &labels, epoch));
+    for epoch in 0..params.epochs as usize {
+        let survey = Survey {
+            folder,
+            world: &world,
+            windows: &windows,
+            truths: &truths,
+            params,
+            epoch,
+            progress,
+        };
+        let (scans, count) = survey.write_clouds()?;
+        points += count;
+        seen.push(Seen {
+            scans,
+            photos: write_photos(&survey)?,
+        });
     }
     let truth = folder.join("truth/stones.csv");
-    if let Ok(seen) = <[_; 2]>::try_from(seen) {
-        write_stone_table(&truth, &truths, &seen)?;
-    }
+    write_stone_table(&truth, &truths, &seen)?;
     write_text(&folder.join("simulation.toml"), &toml::to_string(params)?)?;
     let (project, project_uav) = write_projects(folder, params)?;
     Ok(SurveySummary {
@@ -72,8 +84,20 @@ pub fn write_survey(
         truth,
         stones: truths.len(),
         points,
-        photos: 2 * photos,
+        photos: params.epochs as usize * photos,
     })
+}
+
+/// One epoch that is being written.
+pub(super) struct Survey<'a> {
+    pub folder: &'a Path,
+    pub world: &'a World,
+    pub windows: &'a [Window],
+    pub truths: &'a [StoneTruth],
+    pub params: &'a SurveyParams,
+    /// 0 or 1.
+    pub epoch: usize,
+    pub progress: &'a dyn Progress,
 }
 
 /// Makes a folder and those above it.
@@ -101,34 +125,92 @@ fn prepare(folder: &Path) -> Result<(), SimulateError> {
     create_folder(&folder.join("truth"))
 }
 
-fn write_clouds(folder: &Path, scans: &EpochScans, number: usize) -> Result<usize, SimulateError> {
-    let mut points = 0;
-    create_folder(&folder.join(format!("epoch{number}")))?;
-    for (sensor, scan) in [("tls", &scans.tls), ("uav", &scans.uav)] {
-        let Some(scan) = scan else { continue };
-        points += scan.len();
-        let positions: Vec<Point3<f64>> = (0..scan.len()).map(|i| scan.cloud.world(i)).collect();
-        let path = folder.join(format!("epoch{number}/cloud_{sensor}.laz"));
-        write_points_laz(&path, &positions, &[])?;
-        write_true_cloud(folder, &positions, scan, sensor, number)?;
+impl Survey<'_> {
+    /// Number of the epoch in names of files.
+    pub fn number(&self) -> usize {
+        self.epoch + 1
     }
-    Ok(points)
+
+    /// Writes the clouds of both scanners and their truth; gives back what they saw, and the number of points.
+    fn write_clouds(&self) -> Result<([SeenByScan; 2], usize), SimulateError> {
+        create_folder(&self.folder.join(format!("epoch{}", self.number())))?;
+        let (tls, uav) = (self.write_cloud(Sensor::Tls)?, self.write_cloud(Sensor::Uav)?);
+        let points = tls.1 + uav.1;
+        let seen = [tls.0, uav.0].map(|s| SeenByScan {
+            points: s.points().to_vec(),
+            shares: s.shares(self.truths),
+        });
+        Ok((seen, points))
+    }
+
+    /// Scans the section piece by piece into `cloud_SENSOR.laz`, and the same points in the same order, with the true stone
+    /// of each, into the truth; gives back what it saw, and the number of points.
+    fn write_cloud(&self, sensor: Sensor) -> Result<(SeenCells, usize), SimulateError> {
+        let mut seen = SeenCells::new(self.world, self.epoch);
+        let wanted = match sensor {
+            Sensor::Tls => self.params.scene.tls.is_some(),
+            Sensor::Uav => self.params.scene.uav.is_some(),
+        };
+        if !wanted {
+            return Ok((seen, 0));
+        }
+        let mut points = 0;
+        let (name, number) = (sensor.name(), self.number());
+        let path = self.folder.join(format!("epoch{number}/cloud_{name}.laz"));
+        let truth = self
+            .folder
+            .join(format!("truth/epoch{number}_cloud_{name}_truth.laz"));
+        let bounds = self.bounds();
+        let columns = [("stone_id", ExtraType::U32), ("station", ExtraType::U16)];
+        self.progress
+            .begin(&format!("scan epoch {number}, {name}"), self.windows.len() as u64);
+        stream_points_laz(&path, &bounds, &[], |cloud| {
+            stream_points_laz(&truth, &bounds, &columns, |known| {
+                for window in self.windows {
+                    self.progress.check()?;
+                    let surface = self.world.surface(window.surroundings(self.world.wall.extent()));
+                    let scene = self.world.scene_of(&surface, self.epoch);
+                    if let Some(scan) = scan_window(&scene, &self.params.scene, sensor, self.epoch, window) {
+                        seen.add(self.truths, &scan);
+                        points += scan.len();
+                        append(cloud, known, &scan)?;
+                    }
+                    self.progress.advance(1);
+                }
+                Ok::<(), SimulateError>(())
+            })
+        })?;
+        Ok((seen, points))
+    }
+
+    /// A box that holds all that scanners can measure.
+    fn bounds(&self) -> Bounds {
+        const AROUND_M: f64 = 3.0;
+        let scene = &self.params.scene;
+        let margins = [
+            scene.tls.as_ref().map(|t| t.margin_m),
+            scene.uav.as_ref().map(|u| u.margin_m),
+        ];
+        let margin = margins.iter().flatten().fold(0.0, |m: f64, v| m.max(*v));
+        let [a0, a1, u0, u1] = self.world.wall.extent();
+        let corners = (0..=64).flat_map(|i| {
+            let a = a0 + (a1 - a0) * f64::from(i) / 64.0;
+            [u0, u1].map(|u| self.world.wall.face.world_of(&FacePoint { a, u, n: 0.0 }))
+        });
+        let origin = Point3::origin();
+        let around = Bounds::of(corners).unwrap_or(Bounds {
+            min: origin,
+            max: origin,
+        });
+        around.grown(margin + AROUND_M)
+    }
 }
 
-/// The same points in the same order, with the true stone of each.
-fn write_true_cloud(
-    folder: &Path,
-    positions: &[Point3<f64>],
-    scan: &Scan,
-    sensor: &str,
-    number: usize,
-) -> Result<(), SimulateError> {
-    let path = folder.join(format!("truth/epoch{number}_cloud_{sensor}_truth.laz"));
-    let columns = [
-        ("stone_id", ExtraColumn::U32(&scan.stone)),
-        ("station", ExtraColumn::U16(&scan.station)),
-    ];
-    Ok(write_points_laz(&path, positions, &columns)?)
+fn append(cloud: &mut PointSink<'_>, known: &mut PointSink<'_>, scan: &Scan) -> Result<(), SimulateError> {
+    let positions: Vec<Point3<f64>> = (0..scan.len()).map(|i| scan.cloud.world(i)).collect();
+    cloud.append(&positions, &[])?;
+    let columns = [ExtraColumn::U32(&scan.stone), ExtraColumn::U16(&scan.station)];
+    Ok(known.append(&positions, &columns)?)
 }
 
 fn write_projects(folder: &Path, params: &SurveyParams) -> Result<(PathBuf, Option<PathBuf>), SimulateError> {

@@ -10,11 +10,15 @@ const NAME: Range<usize> = 4..36;
 const DESCRIPTION: Range<usize> = 160..192;
 
 /// A type of extra dimension that is written here.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExtraType {
+    /// Integers from 0 to 65535.
     U16,
+    /// Integers.
     U32,
+    /// Single precision.
     F32,
+    /// Double precision.
     F64,
 }
 
