@@ -1,7 +1,8 @@
 //! The command line, as typed.
 
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use stonewise::experiment::{Dimension, Influence};
 
 /// Measures how a masonry dam moves, stone by stone, from point clouds and posed photos.
 #[derive(Debug, Parser)]
@@ -70,8 +71,19 @@ pub enum Command {
     #[command(after_help = "Example:\n  stonewise report results/")]
     Report(ReportArgs),
     /// Make a simulated survey with truth.
-    #[command(after_help = "Example:\n  stonewise simulate --seed 7 --out survey/")]
+    #[command(after_help = "Examples:\n  stonewise simulate --seed 7 --out survey/\n  \
+        stonewise simulate dam --size 40x20 --out survey/")]
     Simulate(SimulateArgs),
+    /// Choose parameters: try every combination of a grid against a known motion.
+    #[command(
+        after_help = "Examples:\n  stonewise tune survey/stonewise.toml --out tuned/ --part 5x5\n  \
+        stonewise tune survey/stonewise.toml --out tuned/ --grid matching.max_ratio=0.3..0.6..0.1 \
+        --grid registration.estimator=gicp --grid registration.gicp.buffer_m=0,0.3,0.6"
+    )]
+    Tune(TuneArgs),
+    /// The paper's experiment, or how the results depend on masks, noise, spacing and the rest.
+    #[command(subcommand)]
+    Experiment(ExperimentCommand),
     /// Say what is in a cloud, a camera file, a mask file or a project.
     #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
@@ -178,9 +190,81 @@ pub struct ReportArgs {
     pub results: PathBuf,
 }
 
+/// Which experiment.
+#[derive(Debug, Subcommand)]
+pub enum ExperimentCommand {
+    /// One epoch split into halves, the second moved; Table 1, Table 2 and figures 5 to 9 of the paper from the data given.
+    #[command(
+        after_help = "Examples:\n  stonewise experiment paper --size 10x5 --out paper/       # simulates a section first\n  \
+        stonewise experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
+    )]
+    Paper(PaperArgs),
+    /// Curves of error and of stones measured against mask quality, noise, spacing, motion, pose error and overlap.
+    #[command(
+        after_help = "Examples:\n  stonewise experiment sensitivity --out curves/\n  \
+        stonewise experiment sensitivity --influence masks --influence pose --seeds 3 --out curves/"
+    )]
+    Sensitivity(SensitivityArgs),
+}
+
+/// Arguments of `experiment sensitivity`.
+#[derive(Debug, ClapArgs)]
+pub struct SensitivityArgs {
+    /// Folder of the page, the curves and the steps; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What to vary: masks, noise, spacing, motion, pose or overlap; may be given several times. Absent: all.
+    #[arg(long, value_name = "WHAT")]
+    pub influence: Vec<Influence>,
+    /// Width and height of the simulated walls, metres.
+    #[arg(long, value_name = "WxH", default_value = "3x2", value_parser = parse_size)]
+    pub size: [f64; 2],
+    /// Number of walls.
+    #[arg(long, default_value_t = 1)]
+    pub seeds: u64,
+    /// Measure with the paper's matching and estimator too.
+    #[arg(long)]
+    pub with_paper: bool,
+}
+
+/// Arguments of `experiment paper`.
+#[derive(Debug, ClapArgs)]
+pub struct PaperArgs {
+    /// Projects, one for each scanner, as NAME=FILE or FILE; a simulated section where absent.
+    #[arg(value_name = "SURVEY")]
+    pub surveys: Vec<String>,
+    /// Folder of the page, the tables and the steps; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Name of the epoch to split; the first when absent.
+    #[arg(long, value_name = "NAME")]
+    pub epoch: Option<String>,
+    /// Which points and photos go to which half, and which section is simulated.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Width and height of the simulated section, metres.
+    #[arg(long, value_name = "WxH", default_value = "10x5", value_parser = parse_size)]
+    pub size: [f64; 2],
+}
+
+/// Ready-made surveys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// A small section, as `simulation.toml` has it.
+    Section,
+    /// A curved gravity dam of any size: several stations, lidar and photos from a drone.
+    Dam,
+}
+
 /// Arguments of `simulate`.
 #[derive(Debug, ClapArgs)]
 pub struct SimulateArgs {
+    /// What to make where no parameters are given.
+    #[arg(value_enum, default_value_t = Preset::Section)]
+    pub preset: Preset,
+    /// Width and height of a dam, metres; up to 200x27.7.
+    #[arg(long, value_name = "WxH", default_value = "10x5", value_parser = parse_size)]
+    pub size: [f64; 2],
     /// Folder of the survey; made if need be.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -192,10 +276,44 @@ pub struct SimulateArgs {
     pub seed: Option<u64>,
 }
 
+/// Arguments of `tune`.
+#[derive(Debug, ClapArgs)]
+pub struct TuneArgs {
+    /// The project file. Where no epoch has a known motion, the first epoch is split into halves that get one.
+    pub project: PathBuf,
+    /// Folder of the table, the plot and the steps; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// A parameter and its values, key=a,b,c or key=from..to..step; may be given several times. Absent: ratio
+    /// threshold, area ratio and buffer, as in the paper (for the network the border instead of the buffer).
+    #[arg(long, value_name = "KEY=VALUES")]
+    pub grid: Vec<Dimension>,
+    /// Use only a part: x0,y0,z0,x1,y1,z1 (metres, world frame), or WIDTHxHEIGHT in the middle of the wall, such as 5x5.
+    #[arg(long, allow_hyphen_values = true)]
+    pub part: Option<String>,
+    /// Which points and photos go to which half.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
 /// Arguments of `info`.
 #[derive(Debug, ClapArgs)]
 pub struct InfoArgs {
     /// Files or folders.
     #[arg(required = true)]
     pub paths: Vec<PathBuf>,
+}
+
+/// Reads `WIDTHxHEIGHT`, metres.
+fn parse_size(text: &str) -> Result<[f64; 2], String> {
+    let numbers: Vec<f64> = text
+        .split('x')
+        .map(|n| n.trim().parse().unwrap_or(f64::NAN))
+        .collect();
+    match numbers[..] {
+        [width, height] if width >= 1.0 && height >= 1.0 && width <= 1e4 && height <= 1e3 => {
+            Ok([width, height])
+        }
+        _ => Err("write WIDTHxHEIGHT in metres, at least 1 each, such as 40x20".to_owned()),
+    }
 }

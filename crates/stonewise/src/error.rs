@@ -42,6 +42,17 @@ pub enum Error {
     /// The inputs are fine one by one and impossible together.
     #[error("{0}")]
     Survey(String),
+    /// Two epochs have no stone in common.
+    #[error(
+        "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both epochs show the same wall, in one frame?",
+        .epochs[0], .epochs[1], .stones[0], .stones[1]
+    )]
+    NoMatch {
+        /// Names of the epochs.
+        epochs: [String; 2],
+        /// Number of their stones.
+        stones: [usize; 2],
+    },
     /// A point cloud could not be read or written.
     #[error(transparent)]
     Cloud(#[from] stonewise_io::cloud::CloudError),
@@ -54,6 +65,12 @@ pub enum Error {
     /// Masks could not be read.
     #[error(transparent)]
     Masks(#[from] stonewise_io::masks::MaskError),
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] stonewise_io::image_io::ImageIoError),
+    /// A simulated survey could not be made.
+    #[error(transparent)]
+    Simulate(crate::simulate::SimulateError),
     /// Labels could not be carried into a cloud.
     #[error(transparent)]
     Transfer(TransferError),
@@ -82,6 +99,15 @@ impl From<TransferError> for Error {
         match error {
             TransferError::Interrupted(_) => Self::Interrupted,
             error => Self::Transfer(error),
+        }
+    }
+}
+
+impl From<crate::simulate::SimulateError> for Error {
+    fn from(error: crate::simulate::SimulateError) -> Self {
+        match error {
+            crate::simulate::SimulateError::Interrupted(_) => Self::Interrupted,
+            error => Self::Simulate(error),
         }
     }
 }

@@ -11,6 +11,11 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
         .map_err(Error::io("writing", path))
 }
 
+/// Reads a file as it is.
+pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(Error::io("reading", path))
+}
+
 /// Writes JSON for a later step, in one line.
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
     write_text(path, &serde_json::to_string(value).map_err(no_json(path))?)

@@ -1,9 +1,12 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
 mod error;
+pub mod experiment;
+mod figure;
 mod files;
 mod init;
 mod limits;
+mod part;
 mod pipeline;
 mod project;
 pub mod report;
@@ -14,7 +17,8 @@ mod warnings;
 
 pub use error::{Error, Result};
 pub use init::init;
-pub use pipeline::{Comparison, Summary, Until, compare_clouds, run};
+pub use part::Part;
+pub use pipeline::{Comparison, PairSummary, Summary, Until, compare_clouds, run};
 pub use project::{Epoch, Project, RegistrationParams, Settings, TileParams};
 pub use split::split;
 pub use truth::evaluate_truth;

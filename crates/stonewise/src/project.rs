@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::limits::impossible;
+use crate::part::Part;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::ops::Range;
@@ -24,6 +25,8 @@ pub struct Project {
     pub epochs: Vec<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
+    /// Which points take part; all where absent. No key of the file: commands set it.
+    pub part: Option<Part>,
 }
 
 /// One survey.
@@ -201,6 +204,7 @@ impl Project {
             name: raw.project.name.into_inner(),
             epochs,
             settings,
+            part: None,
         })
     }
 }
@@ -224,6 +228,7 @@ impl Project {
                 m3c2,
                 ..Settings::default()
             },
+            part: None,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod compare;
 mod evaluate;
+mod experiment;
 mod info;
 mod init;
 mod report;
@@ -9,6 +10,7 @@ mod run;
 mod simulate;
 mod split;
 mod train;
+mod tune;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
@@ -46,6 +48,8 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Demo(args) => simulate::demo(&args, printer),
         Command::Simulate(args) => simulate::simulate(&args, printer),
         Command::Split(args) => split::split(&args, printer),
+        Command::Tune(args) => tune::tune(&args, printer),
+        Command::Experiment(which) => experiment::experiment(&which, printer),
         Command::Init(args) => init::init(&args),
         Command::Info(args) => info::info(&args),
     }

@@ -30,13 +30,13 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         let word = if warning.skipped_input { "skipped" } else { "note" };
         printer.log(&format!("{word}: {}: {}", warning.subject, warning.message));
     }
-    for (epoch, rows) in project.epochs.iter().skip(1).zip(&summary.rows) {
-        if !rows.is_empty() {
+    for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
+        if !pair.rows.is_empty() {
             printer.log(&format!(
                 "{} against {}: {}",
                 epoch.name,
                 project.epochs[0].name,
-                counts(rows)
+                counts(&pair.rows)
             ));
         }
     }

@@ -1,9 +1,10 @@
 //! `simulate` and `demo`.
 
-use crate::args::{DemoArgs, ProjectArgs, SimulateArgs};
+use crate::args::{DemoArgs, Preset, ProjectArgs, SimulateArgs};
 use crate::commands::{Outcome, run};
 use crate::printer::Printer;
 use anyhow::{Context, Result};
+use std::path::Path;
 use stonewise::Until;
 use stonewise::simulate::{SurveyParams, write_survey};
 
@@ -14,12 +15,7 @@ pub fn demo(args: &DemoArgs, printer: &Printer) -> Result<Outcome> {
     params.scene.wall.seed = args.seed;
     let folder = args.out.join("survey");
     let project = folder.join("stonewise.toml");
-    let written = std::fs::read_to_string(folder.join("simulation.toml")).ok();
-    let is_there = project.exists()
-        && written.and_then(|t| toml::from_str::<SurveyParams>(&t).ok()) == Some(params.clone());
-    if !is_there {
-        write_survey(&folder, &params, printer)?;
-    }
+    make_once(&folder, &params, printer)?;
     let outcome = run::run(
         &ProjectArgs {
             project,
@@ -34,9 +30,21 @@ pub fn demo(args: &DemoArgs, printer: &Printer) -> Result<Outcome> {
     Ok(outcome)
 }
 
+/// Makes a simulated survey, unless the folder holds the one with these parameters.
+pub fn make_once(folder: &Path, params: &SurveyParams, printer: &Printer) -> Result<()> {
+    let written = std::fs::read_to_string(folder.join("simulation.toml")).ok();
+    let is_there = folder.join("stonewise.toml").exists()
+        && written.and_then(|t| toml::from_str::<SurveyParams>(&t).ok()) == Some(params.clone());
+    if !is_there {
+        write_survey(folder, params, printer)?;
+    }
+    Ok(())
+}
+
 /// Makes a simulated survey.
 pub fn simulate(args: &SimulateArgs, printer: &Printer) -> Result<Outcome> {
     let mut params = match &args.params {
+        None if args.preset == Preset::Dam => SurveyParams::dam(args.size),
         None => SurveyParams::default(),
         Some(path) => {
             let text =
@@ -45,8 +53,7 @@ pub fn simulate(args: &SimulateArgs, printer: &Printer) -> Result<Outcome> {
         }
     };
     if let Some(seed) = args.seed {
-        params.scene.seed = seed;
-        params.scene.wall.seed = seed;
+        params = params.seeded(seed);
     }
     let summary = write_survey(&args.out, &params, printer)?;
     printer.log(&format!(

@@ -26,7 +26,7 @@ pub fn write_clouds(
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
     let name = format!("clouds-{number}");
-    let done = context.work.join(&name).join("done");
+    let done = context.store.folder().join(&name).join("done");
     if !outputs.iter().all(|o| o.exists()) && done.exists() {
         fs::remove_file(&done).map_err(Error::io("removing", &done))?;
     }

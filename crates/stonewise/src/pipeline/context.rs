@@ -2,16 +2,18 @@
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
-use crate::pipeline::step::{Key, StepDir, path_digest};
+use crate::pipeline::step::{Keeps, Key, StepDir, StepStore};
 use crate::project::Project;
 use crate::warnings::{Warning, Warnings};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use stonewise_core::progress::Progress;
+
+/// Where a step notes its warnings.
+const WARNINGS: &str = "warnings.json";
 
 /// Wall time and memory of one step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,28 +35,36 @@ pub struct Context<'a> {
     /// Where results go.
     pub out: PathBuf,
     /// Where steps keep their files.
-    pub work: PathBuf,
+    pub store: Arc<StepStore>,
     /// Whom to tell, and who may stop the run.
     pub progress: &'a dyn Progress,
     /// What went wrong without stopping the run.
     pub warnings: Warnings,
     times: Mutex<Vec<StepTime>>,
-    digests: Mutex<BTreeMap<PathBuf, String>>,
 }
 
 impl<'a> Context<'a> {
-    /// Makes the folders of a run.
+    /// Makes the folders of a run that keeps its steps beside its results.
     pub fn new(project: &'a Project, out: &Path, progress: &'a dyn Progress) -> Result<Self> {
-        let work = out.join("work");
-        fs::create_dir_all(&work).map_err(Error::io("making the result folder", &work))?;
+        let store = StepStore::new(&out.join("work"), Keeps::Newest)?;
+        Self::with_store(project, out, Arc::new(store), progress)
+    }
+
+    /// The same with the steps in a store that other runs may share.
+    pub fn with_store(
+        project: &'a Project,
+        out: &Path,
+        store: Arc<StepStore>,
+        progress: &'a dyn Progress,
+    ) -> Result<Self> {
+        fs::create_dir_all(out).map_err(Error::io("making the result folder", out))?;
         Ok(Self {
             project,
             out: out.to_path_buf(),
-            work,
+            store,
             progress,
             warnings: Warnings::default(),
             times: Mutex::default(),
-            digests: Mutex::default(),
         })
     }
 
@@ -67,18 +77,12 @@ impl<'a> Context<'a> {
     ) -> Result<StepDir> {
         self.progress.check()?;
         let started = Instant::now();
-        let dir = StepDir::open(&self.work, name, key)?;
-        let resumed = dir.is_done();
-        let noted = dir.file("warnings.json");
-        let warnings = if resumed {
-            read_json::<Vec<Warning>>(&noted)?
-        } else {
+        let (dir, resumed) = self.store.step(name, key, |dir| {
             let warnings = Warnings::default();
-            make(&dir, &warnings)?;
-            write_json(&noted, &warnings.sorted())?;
-            dir.finish()?;
-            warnings.sorted()
-        };
+            make(dir, &warnings)?;
+            write_json(&dir.file(WARNINGS), &warnings.sorted())
+        })?;
+        let warnings: Vec<Warning> = read_json(&dir.file(WARNINGS))?;
         warnings.into_iter().for_each(|w| self.warnings.push(w));
         self.record(name, started, resumed);
         Ok(dir)
@@ -93,15 +97,9 @@ impl<'a> Context<'a> {
         Ok(result)
     }
 
-    /// Digest of an input file or folder, read once a run.
+    /// Digest of an input file or folder, read once.
     pub fn digest(&self, path: &Path) -> Result<String> {
-        let mut known = self.digests.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(digest) = known.get(path) {
-            return Ok(digest.clone());
-        }
-        let digest = path_digest(path)?;
-        known.insert(path.to_path_buf(), digest.clone());
-        Ok(digest)
+        self.store.digest(path)
     }
 
     /// Times of all steps so far, in order.

@@ -1,6 +1,6 @@
 //! The same stones in two epochs.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
@@ -19,8 +19,6 @@ const COVERAGE_CELL_M: f64 = 0.1;
 pub struct Matched {
     /// What became of every stone.
     pub report: MatchReport,
-    /// Key of the step.
-    pub key: Key,
 }
 
 impl Matched {
@@ -55,22 +53,9 @@ pub fn find_partners(
         let report = match_stones(&first.stones, &second.stones, &surroundings, params);
         write_json(&step.file("matches.json"), &report)
     })?;
-    let matched = Matched {
+    Ok(Matched {
         report: read_json(&step.file("matches.json"))?,
-        key: step.key().clone(),
-    };
-    if matched.pairs().is_empty() {
-        let names = [0, number - 1].map(|e| context.project.epochs[e].name.clone());
-        return Err(Error::Survey(format!(
-            "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both epochs show the same wall, \
-             in one frame?",
-            names[0],
-            names[1],
-            first.stones.len(),
-            second.stones.len()
-        )));
-    }
-    Ok(matched)
+    })
 }
 
 type Cell = [i64; 3];

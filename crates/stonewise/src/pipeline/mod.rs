@@ -23,4 +23,8 @@ mod tiles;
 mod windows;
 
 pub use clouds_only::{Comparison, compare_clouds};
-pub use run::{Summary, Until, run};
+pub(crate) use context::Context;
+pub(crate) use photos::segment;
+pub use run::{PairSummary, Summary, Until, run};
+pub(crate) use run::{first_stones, run_in};
+pub(crate) use step::{Keeps, Key, StepStore};

@@ -7,6 +7,7 @@ use crate::pipeline::spill::{Spill, SpillBins};
 use crate::pipeline::step::StepDir;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::PathBuf;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::id::StoneId;
@@ -50,6 +51,14 @@ impl DiskPairs {
             .into_par_iter()
             .try_for_each(|b| pairs.write_batch(&bins, b, border_noises))?;
         Ok(pairs)
+    }
+
+    /// Removes the files: once the motions are known nobody needs them.
+    pub fn remove(self) -> Result<()> {
+        (0..self.batches.len()).try_for_each(|batch| {
+            let path = self.file(batch);
+            fs::remove_file(&path).map_err(Error::io("removing", &path))
+        })
     }
 
     /// Writes the points of a batch: slot, epoch (0 or 1), x, y, z.

@@ -32,13 +32,14 @@ pub fn register(
     number: usize,
 ) -> Result<Registered> {
     let params = &context.project.settings.registration;
+    // The pairs themselves, not how they were found: other parameters of the matching that find the same pairs cost nothing.
+    let matches = matched.pairs();
     let key = Key::new(
         "register",
-        params,
-        &[first.key.as_str(), second.key.as_str(), matched.key.as_str()],
+        &(params, &matches),
+        &[first.key.as_str(), second.key.as_str()],
     );
     let step = context.step(&format!("register-{number}"), key, |step, _| {
-        let matches = matched.pairs();
         let registered = match params.estimator {
             Estimator::Network => {
                 let pairs = DiskPairs::gather(
@@ -49,7 +50,9 @@ pub fn register(
                     step,
                     context.progress,
                 )?;
-                of_network(adjust(&pairs, &params.network, context.progress)?)
+                let report = adjust(&pairs, &params.network, context.progress)?;
+                pairs.remove()?;
+                of_network(report)
             }
             Estimator::Gicp => {
                 let size_m = context.project.settings.tiles.size_m;

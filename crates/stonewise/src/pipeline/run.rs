@@ -22,8 +22,10 @@ use serde_json::json;
 use std::path::Path;
 use stonewise_core::change::OutwardReference;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::{Bounds, View};
 use stonewise_core::progress::Progress;
+use stonewise_core::stone::Stone;
 
 /// How far to go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,6 +38,8 @@ pub enum Until {
     Matched,
     /// Motions of stones.
     Registered,
+    /// Every table of results, M3C2 and evaluation too, but no copies of the clouds and no report.
+    Compared,
     /// Everything.
     Reported,
 }
@@ -45,8 +49,17 @@ pub enum Until {
 pub struct Summary {
     /// What went wrong without stopping the run.
     pub warnings: Vec<Warning>,
-    /// Rows of each later epoch against the first.
-    pub rows: Vec<Vec<StoneRow>>,
+    /// Each later epoch against the first.
+    pub pairs: Vec<PairSummary>,
+}
+
+/// What came out for a later epoch against the first.
+#[derive(Clone, Debug, Default)]
+pub struct PairSummary {
+    /// One row for each stone of the first epoch; empty where the run did not go so far.
+    pub rows: Vec<StoneRow>,
+    /// Where the project knows the motion, and the run went so far.
+    pub evaluation: Option<Evaluation>,
 }
 
 impl Summary {
@@ -61,57 +74,70 @@ impl Summary {
 /// Errors: an input that cannot be used, epochs that do not overlap, a full disk, interruption. What is finished
 /// stays, and the same call goes on from there.
 pub fn run(project: &Project, out: &Path, until: Until, progress: &dyn Progress) -> Result<Summary> {
-    let context = Context::new(project, out, progress)?;
-    let epochs = 1..=project.epochs.len();
+    run_in(&Context::new(project, out, progress)?, until)
+}
 
+/// The same in a context of the caller's.
+pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
+    let epochs = 1..=context.project.epochs.len();
     let tiled = epochs
         .clone()
-        .map(|n| tile_epoch(&context, n))
+        .map(|n| tile_epoch(context, n))
         .collect::<Result<Vec<_>>>()?;
-    check_overlap(&context, &tiled)?;
+    check_overlap(context, &tiled)?;
     let photos = epochs
         .clone()
-        .map(|n| segment(&context, n))
+        .map(|n| segment(context, n))
         .collect::<Result<Vec<_>>>()?;
     if until == Until::Segmented {
-        return Ok(summary(&context, Vec::new()));
+        return Ok(summary(context, Vec::new()));
     }
     let labelled = tiled
         .into_iter()
         .zip(&photos)
         .zip(1..)
-        .map(|((tiled, photos), number)| label(&context, number, tiled, photos))
+        .map(|((tiled, photos), number)| label(context, number, tiled, photos))
         .collect::<Result<Vec<_>>>()?;
     for number in epochs.clone() {
-        write_audit(&context, number, &photos[number - 1], &labelled[number - 1])?;
+        write_audit(context, number, &photos[number - 1], &labelled[number - 1])?;
     }
     if until == Until::Labelled {
         epochs
             .clone()
-            .try_for_each(|n| write_clouds(&context, n, &labelled[n - 1], None))?;
-        return Ok(summary(&context, Vec::new()));
+            .try_for_each(|n| write_clouds(context, n, &labelled[n - 1], None))?;
+        return Ok(summary(context, Vec::new()));
     }
     let mut pairs = Vec::new();
-    for number in 2..=project.epochs.len() {
-        pairs.push(measure(&context, &photos, &labelled, number, until)?);
+    for number in epochs.clone().skip(1) {
+        pairs.push(measure(context, &photos, &labelled, number, until)?);
     }
+    if until == Until::Matched {
+        return Ok(summary(context, pairs));
+    }
+    write_stone_outlines(context, &labelled[0])?;
     if until < Until::Reported {
-        return Ok(summary(&context, pairs));
+        write_run_record(context, &photos, &labelled)?;
+        return Ok(summary(context, pairs));
     }
-    context.timed("outlines", || write_stone_outlines(&context, &labelled[0]))?;
     for number in epochs {
         let rows = if number == 1 {
-            pairs.first().map(Vec::as_slice)
+            pairs.first().map(|pair| pair.rows.as_slice())
         } else {
             None
         };
-        write_clouds(&context, number, &labelled[number - 1], rows)?;
+        write_clouds(context, number, &labelled[number - 1], rows)?;
     }
-    write_series(&context, &pairs)?;
-    write_run_record(&context, &photos, &labelled)?;
+    write_series(context, &pairs)?;
+    write_run_record(context, &photos, &labelled)?;
     context.timed("report", || Ok(write_report(&context.out)?))?;
     context.timed("layers", || Ok(write_layers(&context.out)?))?;
-    Ok(summary(&context, pairs))
+    Ok(summary(context, pairs))
+}
+
+/// Stones of the first epoch, before any known motion is asked for.
+pub(crate) fn first_stones(context: &Context) -> Result<Vec<Stone>> {
+    let tiled = tile_epoch(context, 1)?;
+    Ok(label(context, 1, tiled, &segment(context, 1)?)?.stones)
 }
 
 /// Matches, measures and compares one later epoch against the first, and writes its tables.
@@ -121,9 +147,15 @@ fn measure(
     labelled: &[Labelled],
     number: usize,
     until: Until,
-) -> Result<Vec<StoneRow>> {
+) -> Result<PairSummary> {
     let (first, second) = (&labelled[0], &labelled[number - 1]);
     let matched = find_partners(context, first, second, number)?;
+    if matched.pairs().is_empty() {
+        return Err(Error::NoMatch {
+            epochs: [0, number - 1].map(|e| context.project.epochs[e].name.clone()),
+            stones: [first.stones.len(), second.stones.len()],
+        });
+    }
     let named = |stem: &str| {
         if number == 2 {
             stem.to_owned()
@@ -136,7 +168,7 @@ fn measure(
         &matched.report,
     )?;
     if until == Until::Matched {
-        return Ok(Vec::new());
+        return Ok(PairSummary::default());
     }
     let registered = register(context, first, second, &matched, number)?;
     let rows = stone_rows(context, first, second, &matched, &registered);
@@ -145,22 +177,25 @@ fn measure(
         &context.out.join(format!("{}.json", named("registration"))),
         &json!(registered.summary),
     )?;
-    if until == Until::Registered {
-        return Ok(rows);
-    }
-    let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
-    let outward = OutwardReference::Towards(&centres);
-    let change = compare(context, [&first.tiled, &second.tiled], number, &outward)?;
-    context.timed("write m3c2", || {
-        write_change(&context.out, &named("m3c2"), &change)
-    })?;
-    if let Some(evaluation) = evaluate(context, &first.stones, &rows, &change, number) {
+    let change = if until > Until::Registered {
+        let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
+        let outward = OutwardReference::Towards(&centres);
+        let change = compare(context, [&first.tiled, &second.tiled], number, &outward)?;
+        context.timed("write m3c2", || {
+            write_change(&context.out, &named("m3c2"), &change)
+        })?;
+        Some(change)
+    } else {
+        None
+    };
+    let evaluation = evaluate(context, &first.stones, &rows, change.as_ref(), number);
+    if let Some(evaluation) = &evaluation {
         write_readable_json(
             &context.out.join(format!("{}.json", named("evaluation"))),
-            &evaluation,
+            evaluation,
         )?;
     }
-    Ok(rows)
+    Ok(PairSummary { rows, evaluation })
 }
 
 /// Epochs whose clouds lie apart cannot be compared.
@@ -189,9 +224,9 @@ fn check_overlap(context: &Context, tiled: &[Tiled]) -> Result<()> {
     Ok(())
 }
 
-fn summary(context: &Context, rows: Vec<Vec<StoneRow>>) -> Summary {
+fn summary(context: &Context, pairs: Vec<PairSummary>) -> Summary {
     Summary {
         warnings: context.warnings.sorted(),
-        rows,
+        pairs,
     }
 }

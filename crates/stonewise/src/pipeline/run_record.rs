@@ -38,6 +38,7 @@ pub fn write_run_record(context: &Context, photos: &[Segmented], labelled: &[Lab
         "version": env!("CARGO_PKG_VERSION"),
         "project": { "name": project.name, "file": project.path },
         "parameters": project.settings,
+        "part": project.part,
         "epochs": epochs,
         "steps": context.times(),
         "warnings": context.warnings.sorted(),

@@ -9,7 +9,8 @@ use stonewise_core::cloud::GridIndex;
 use stonewise_core::evaluate::{Evaluation, StoneOutcome, score_change, score_stones};
 use stonewise_core::stone::Stone;
 
-/// Scores stones and M3C2 of epoch `number` against its known motion; `None` where the project knows none.
+/// Scores stones, and M3C2 where there is any, of epoch `number` against its known motion; `None` where the project
+/// knows none.
 ///
 /// The motion is that of the later epoch's points, as a function of where they were; a known motion of epoch 1 is
 /// taken away from it.
@@ -17,7 +18,7 @@ pub fn evaluate(
     context: &Context,
     stones: &[Stone],
     rows: &[StoneRow],
-    change: &ChangeField,
+    change: Option<&ChangeField>,
     number: usize,
 ) -> Option<Evaluation> {
     let epochs = &context.project.epochs;
@@ -47,6 +48,6 @@ pub fn evaluate(
             .nearest(&p.position, 2.0)
             .map_or(p.normal, |(i, _)| stones[i].normal)
     };
-    evaluation.m3c2 = Some(score_change(change, truth, face, params));
+    evaluation.m3c2 = change.map(|field| score_change(field, truth, face, params));
     Some(evaluation)
 }

@@ -1,20 +1,23 @@
 //! Result tables: stones, outlines, M3C2, evaluation, audit.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
 use crate::pipeline::matching::Matched;
 use crate::pipeline::photos::Segmented;
 use crate::pipeline::registration::Registered;
-use crate::report::{StoneOutline, StoneRow, write_outlines};
+use crate::pipeline::step::Key;
+use crate::report::{OUTLINES_FILE, StoneOutline, StoneRow, write_outlines};
 use nalgebra::{Matrix3, Point3};
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::Path;
 use stonewise_core::change::ChangeField;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{OutlineParams, face_outline};
 use stonewise_core::stone::MatchOutcome;
 use stonewise_core::transfer::AuditEvent;
+use stonewise_io::atomic::write_atomically;
 use stonewise_io::cloud::{ExtraColumn, write_points_laz};
 use stonewise_io::table::{Table, write_csv};
 
@@ -51,6 +54,18 @@ pub fn stone_rows(
 
 /// Writes the outlines of the first epoch's stones.
 pub fn write_stone_outlines(context: &Context, first: &Labelled) -> Result<()> {
+    let key = Key::new("outlines", &(), &[first.key.as_str()]);
+    let step = context.step("outlines", key, |step, _| {
+        Ok(write_outlines(step.path(), &stone_outlines(context, first)?)?)
+    })?;
+    let to = context.out.join(OUTLINES_FILE);
+    write_atomically(&to, |partial| {
+        fs::copy(step.file(OUTLINES_FILE), partial).map(|_| ())
+    })
+    .map_err(Error::io("writing", &to))
+}
+
+fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     context
         .progress
@@ -72,8 +87,7 @@ pub fn write_stone_outlines(context: &Context, first: &Labelled) -> Result<()> {
             ring,
         })
     };
-    let outlines: Vec<_> = first.stones.iter().filter_map(outline).collect();
-    Ok(write_outlines(&context.out, &outlines)?)
+    Ok(first.stones.iter().filter_map(outline).collect())
 }
 
 /// Writes `m3c2.laz` and `m3c2.csv` (or another stem) with PDAL's dimension names.

@@ -5,6 +5,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::epoch_tiles::EpochTiles;
 use crate::pipeline::step::{Key, StepDir};
 use crate::pipeline::tiles::{DiskTiles, ingest};
+use nalgebra::Point3;
 use stonewise_core::cloud::TileSource;
 
 /// The tiles of an epoch and the step that made them.
@@ -25,9 +26,11 @@ pub fn tile_epoch(context: &Context, number: usize) -> Result<Tiled> {
         .collect::<Result<Vec<_>>>()?;
     let inputs: Vec<&str> = digests.iter().map(String::as_str).collect();
     let size_m = context.project.settings.tiles.size_m;
-    let key = Key::new("ingest", &context.project.settings.tiles, &inputs);
+    let part = &context.project.part;
+    let key = Key::new("ingest", &(&context.project.settings.tiles, part), &inputs);
     let step = context.step(&format!("ingest-{number}"), key, |step, warnings| {
-        let invalid = ingest(&epoch.clouds, size_m, step, context.progress)?;
+        let takes_part = |p: &Point3<f64>| part.as_ref().is_none_or(|part| part.contains(p));
+        let invalid = ingest(&epoch.clouds, size_m, takes_part, step, context.progress)?;
         if invalid > 0 {
             let message = format!("{invalid} points without finite coordinates are left out");
             warnings.notice("ingest", epoch.name.clone(), message);
@@ -40,8 +43,13 @@ pub fn tile_epoch(context: &Context, number: usize) -> Result<Tiled> {
     };
     if tiles.tile_count() == 0 {
         return Err(Error::Survey(format!(
-            "the clouds of epoch {:?} hold no points",
-            epoch.name
+            "the clouds of epoch {:?} hold no points{}",
+            epoch.name,
+            if part.is_some() {
+                " in the part that was asked for"
+            } else {
+                ""
+            }
         )));
     }
     Ok(Tiled { step, tiles })

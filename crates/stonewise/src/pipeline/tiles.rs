@@ -120,8 +120,14 @@ impl TileSource for DiskTiles {
 
 /// Cuts clouds into tiles in one streaming pass; points of a tile keep the order of files and records.
 ///
-/// `size_m`: edge of a tile, metres. Returns the number of records without finite coordinates, which no tile holds.
-pub fn ingest(clouds: &[PathBuf], size_m: f64, step: &StepDir, progress: &dyn Progress) -> Result<u64> {
+/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of records without finite coordinates, which no tile holds.
+pub fn ingest(
+    clouds: &[PathBuf],
+    size_m: f64,
+    takes_part: impl Fn(&Point3<f64>) -> bool,
+    step: &StepDir,
+    progress: &dyn Progress,
+) -> Result<u64> {
     let mut spill = Spill::new(&step.file("spill"), |k: &[i64; 3]| {
         format!("t_{}_{}_{}", k[0], k[1], k[2])
     })?;
@@ -137,7 +143,12 @@ pub fn ingest(clouds: &[PathBuf], size_m: f64, step: &StepDir, progress: &dyn Pr
         );
         let summary = read_cloud(path, CHUNK, |chunk| {
             progress.check()?;
-            for (p, &index) in chunk.positions.iter().zip(&chunk.indices) {
+            let taken = chunk
+                .positions
+                .iter()
+                .zip(&chunk.indices)
+                .filter(|(p, _)| takes_part(p));
+            for (p, &index) in taken {
                 let key = [0, 1, 2].map(|a| (p[a] / size_m).floor() as i64);
                 spill.push(key, &encode(p, &tile_origin(&key, size_m), file as u32, index))?;
             }

@@ -1,0 +1,89 @@
+//! `experiment`.
+
+use crate::args::{ExperimentCommand, PaperArgs, SensitivityArgs};
+use crate::commands::{Outcome, simulate};
+use crate::printer::Printer;
+use anyhow::{Result, bail};
+use std::io::Write;
+use std::path::Path;
+use stonewise::Project;
+use stonewise::experiment::{
+    PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
+};
+use stonewise::simulate::SurveyParams;
+
+/// Runs an experiment.
+pub fn experiment(which: &ExperimentCommand, printer: &Printer) -> Result<Outcome> {
+    match which {
+        ExperimentCommand::Paper(args) => paper(args, printer),
+        ExperimentCommand::Sensitivity(args) => sensitivity(args, printer),
+    }
+}
+
+/// The paper's experiment; its tables go to stdout.
+fn paper(args: &PaperArgs, printer: &Printer) -> Result<Outcome> {
+    let surveys = match args.surveys.as_slice() {
+        [] => simulated(args, printer)?,
+        given => given.iter().map(|s| survey(s)).collect::<Result<_>>()?,
+    };
+    let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, &args.out, printer)?;
+    printer.finish();
+    write!(std::io::stdout(), "{}", tables.markdown())?;
+    printer.log(&format!("open {}", args.out.join("index.html").display()));
+    Ok(Outcome::Done)
+}
+
+/// Curves of what the results depend on.
+fn sensitivity(args: &SensitivityArgs, printer: &Printer) -> Result<Outcome> {
+    let options = SensitivityOptions {
+        influences: args.influence.clone(),
+        size_m: args.size,
+        seeds: args.seeds,
+        with_paper: args.with_paper,
+    };
+    let points = run_sensitivity(&options, &args.out, printer)?;
+    printer.log(&format!(
+        "{} points of curves: open {}",
+        points.len(),
+        args.out.join("index.html").display()
+    ));
+    Ok(Outcome::Done)
+}
+
+/// `NAME=FILE`, or a file that gives its own name.
+fn survey(text: &str) -> Result<PaperSurvey> {
+    let (name, path) = match text.split_once('=') {
+        Some((name, path)) if !Path::new(text).exists() => (name.to_owned(), path),
+        _ => {
+            let stem = Path::new(text).file_stem().unwrap_or_default();
+            (stem.to_string_lossy().into_owned(), text)
+        }
+    };
+    if name.is_empty() {
+        bail!("{text:?}: write NAME=FILE or FILE");
+    }
+    Ok(PaperSurvey {
+        name,
+        project: Project::read_for_split(Path::new(path))?,
+    })
+}
+
+/// One epoch of a dam, from both scanners.
+fn simulated(args: &PaperArgs, printer: &Printer) -> Result<Vec<PaperSurvey>> {
+    let folder = args.out.join("survey");
+    let params = SurveyParams {
+        epochs: 1,
+        ..SurveyParams::dam(args.size).seeded(args.seed)
+    };
+    simulate::make_once(&folder, &params, printer)?;
+    let read = |name: &str, file: &str| -> Result<PaperSurvey> {
+        Ok(PaperSurvey {
+            name: name.to_owned(),
+            project: Project::read_for_split(&folder.join(file))?,
+        })
+    };
+    Ok(vec![
+        read("TLS", "stonewise.toml")?,
+        read("UAV", "stonewise_uav.toml")?,
+    ])
+}

@@ -1,0 +1,39 @@
+//! Halves of one epoch, made once an experiment.
+
+use crate::error::Result;
+use crate::pipeline::{Key, StepStore};
+use crate::project::{Epoch, Project};
+use crate::split;
+use stonewise_core::progress::Progress;
+use stonewise_io::cameras::{find_photos, read_cameras};
+
+/// The project of the two halves of an epoch, with the settings and the part of the whole; nothing moved between them.
+///
+/// Made by [`crate::split()`], or taken from the store where an earlier run of the experiment made them.
+pub(super) fn halves_of(
+    project: &Project,
+    epoch: &Epoch,
+    seed: u64,
+    store: &StepStore,
+    progress: &dyn Progress,
+) -> Result<Project> {
+    let mut digests = vec![store.digest(&epoch.cameras)?];
+    for cloud in &epoch.clouds {
+        digests.push(store.digest(cloud)?);
+    }
+    let photos = find_photos(&epoch.images, &read_cameras(&epoch.cameras)?)?.paths;
+    let key = Key::new(
+        "halves",
+        &(seed, photos, &epoch.masks),
+        &digests.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    let (dir, _) = store.step("halves", key, |dir| {
+        split::split(project, epoch, seed, dir.path(), progress).map(|_| ())
+    })?;
+    let halves = Project::read(&dir.file("stonewise.toml"))?;
+    Ok(Project {
+        settings: project.settings.clone(),
+        part: project.part.clone(),
+        ..halves
+    })
+}

@@ -1,0 +1,17 @@
+//! Experiments: what becomes of the results when parameters, masks, noise or motions change.
+//!
+//! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that what
+//! variants have in common is done once, and an interrupted experiment goes on where it stopped.
+
+mod halves;
+mod known_motion;
+mod paper;
+mod parallel;
+mod quiet;
+mod sensitivity;
+mod settings_with;
+mod tune;
+
+pub use paper::{Detail, PaperSurvey, PaperTables, paper};
+pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
+pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};

@@ -1,0 +1,242 @@
+//! The paper's experiment, section 4 and 5: one epoch split into halves, the second moved, every figure and table again.
+
+mod figures;
+mod page;
+mod segmentation;
+mod tables;
+
+pub use tables::{Detail, PaperTables};
+
+use crate::error::{Error, Result};
+use crate::experiment::halves::halves_of;
+use crate::experiment::known_motion::{KnownMotion, paper_motions};
+use crate::experiment::quiet::Quiet;
+use crate::pipeline::{Context, Keeps, StepStore, Until, first_stones, run_in};
+use crate::project::{Epoch, Estimator, Project, Settings};
+use crate::report::ResultSet;
+use crate::truth::outcome;
+use nalgebra::{Point3, Vector3};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use stonewise_core::change::{ChangeField, ChangePoint};
+use stonewise_core::evaluate::{MotionScore, StoneOutcome, score_change, score_stones};
+use stonewise_core::matching::MatchParams;
+use stonewise_core::progress::Progress;
+
+/// A survey whose first epoch is split, under the name of its scanner.
+#[derive(Clone, Debug)]
+pub struct PaperSurvey {
+    /// `TLS`, `UAV`, or what the caller calls it.
+    pub name: String,
+    /// The survey; only one epoch of it is used.
+    pub project: Project,
+}
+
+/// How the stones are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Method {
+    /// With the settings of the project.
+    Ours,
+    /// With the paper's matching and its estimator.
+    Paper,
+}
+
+impl Method {
+    const ALL: [Self; 2] = [Self::Ours, Self::Paper];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Ours => "stonewise",
+            Self::Paper => "the paper's estimator",
+        }
+    }
+
+    fn folder(self) -> &'static str {
+        match self {
+            Self::Ours => "stonewise",
+            Self::Paper => "paper",
+        }
+    }
+
+    fn settings(self, settings: &Settings) -> Settings {
+        let mut settings = settings.clone();
+        if self == Self::Paper {
+            settings.matching = MatchParams::paper();
+            settings.registration.estimator = Estimator::Gicp;
+        }
+        settings
+    }
+}
+
+/// One run: a survey, a motion, a method.
+pub(super) struct Case {
+    pub survey: String,
+    pub motion: KnownMotion,
+    pub method: Method,
+    pub results: ResultSet,
+    /// All stones.
+    pub stones: MotionScore,
+    /// M3C2 at its core points.
+    pub m3c2: MotionScore,
+    /// The same for the place that moves alone, where only a part does.
+    pub inside: Option<[MotionScore; 2]>,
+}
+
+/// A photo with the outlines of its stones, for the paper's figure 5.
+pub(super) struct Example {
+    pub photo: String,
+    pub instances: usize,
+    pub jpeg: Vec<u8>,
+}
+
+/// Does the whole experiment and writes `index.html`, `tables.md`, `table2.csv` and `figures/` into `out`.
+///
+/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points and photos; each
+/// half is labelled on its own; the points of the second are moved by the paper's translation, or by its bulge, after
+/// labelling; stones are matched and measured with the project's settings and again in the paper's way; M3C2 runs on the same
+/// clouds. The folder of each run holds its tables. An interrupted experiment goes on where it stopped.
+///
+/// Errors: no survey, no such epoch, or what stops a run.
+pub fn paper(
+    surveys: &[PaperSurvey],
+    epoch: Option<&str>,
+    seed: u64,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<PaperTables> {
+    let mut cases = Vec::new();
+    let mut example = None;
+    let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
+    for survey in surveys {
+        let epoch = epoch_of(&survey.project, epoch)?;
+        let halves = halves_of(&survey.project, epoch, seed, &store, progress)?;
+        let folder = out.join(file_name(&survey.name));
+        let context = Context::with_store(&halves, &folder, Arc::clone(&store), progress)?;
+        let motions = paper_motions(&first_stones(&context)?)?;
+        if example.is_none() {
+            example = segmentation::example(&context)?;
+        }
+        for motion in &motions {
+            for method in Method::ALL {
+                progress.begin(&format!("{}: {}, {}", survey.name, motion.name, method.name()), 1);
+                let folder = folder.join(format!("{}-{}", motion.name, method.folder()));
+                cases.extend(measure(
+                    survey, &halves, motion, method, &folder, &store, progress,
+                )?);
+                progress.advance(1);
+            }
+        }
+    }
+    if cases.is_empty() {
+        let message = "nothing to show: no survey was given, or no stone of one half was found in the other";
+        return Err(Error::Survey(message.to_owned()));
+    }
+    let tables = PaperTables::new(&cases);
+    page::write(&cases, example.as_ref(), &tables, out)?;
+    Ok(tables)
+}
+
+/// The epoch of this name, or the first.
+fn epoch_of<'a>(project: &'a Project, name: Option<&str>) -> Result<&'a Epoch> {
+    let epochs = &project.epochs;
+    let found = match name {
+        None => epochs.first(),
+        Some(name) => epochs.iter().find(|e| e.name == name),
+    };
+    let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+    found.ok_or_else(|| Error::Input {
+        path: project.path.clone(),
+        message: format!("no such epoch; there are: {}", names.join(", ")),
+    })
+}
+
+/// Measures one case; `None` where the method finds no stone of the first half in the second.
+fn measure(
+    survey: &PaperSurvey,
+    halves: &Project,
+    motion: &KnownMotion,
+    method: Method,
+    folder: &Path,
+    store: &Arc<StepStore>,
+    progress: &dyn Progress,
+) -> Result<Option<Case>> {
+    let mut project = halves.clone();
+    project.settings = method.settings(&project.settings);
+    project.epochs[1].motion = Some(motion.field.clone());
+    let quiet = Quiet(progress);
+    let context = Context::with_store(&project, folder, Arc::clone(store), &quiet)?;
+    match run_in(&context, Until::Compared) {
+        Err(Error::NoMatch { .. }) => return Ok(None),
+        outcome => outcome?,
+    };
+    let results = ResultSet::read(folder)?;
+    let scores = results
+        .evaluation
+        .as_ref()
+        .and_then(|e| Some((e.stones.clone()?, e.m3c2.clone()?)));
+    let (stones, m3c2) = scores.ok_or_else(|| Error::Input {
+        path: folder.join("evaluation.json"),
+        message: "holds no scores; remove its folder".to_owned(),
+    })?;
+    let inside = motion
+        .region
+        .map(|region| score_region(&results, motion, region, &project.settings));
+    Ok(Some(Case {
+        survey: survey.name.clone(),
+        motion: motion.clone(),
+        method,
+        results,
+        stones,
+        m3c2,
+        inside,
+    }))
+}
+
+/// Scores of the stones and of M3C2 within half a diameter of a place.
+fn score_region(
+    results: &ResultSet,
+    motion: &KnownMotion,
+    (centre, diameter_m): (Point3<f64>, f64),
+    settings: &Settings,
+) -> [MotionScore; 2] {
+    let near = |p: &Point3<f64>| (p - centre).norm() < 0.5 * diameter_m;
+    let normal = |id: u32| results.outlines.get(&id).map_or(Vector3::x(), |o| o.normal);
+    let outcomes: Vec<StoneOutcome> = results
+        .stones
+        .iter()
+        .filter(|row| near(&row.centroid))
+        .map(|row| outcome(row, normal(row.stone_id)))
+        .collect();
+    let truth = |p: &Point3<f64>| motion.field.displacement_at(p);
+    let stones = score_stones(&outcomes, truth, &settings.evaluation);
+    let points = results.distances.iter().filter(|p| near(&p.position));
+    let field = ChangeField {
+        points: points
+            .map(|p| ChangePoint {
+                position: p.position,
+                normal: p.normal.unwrap_or_else(Vector3::x),
+                distance_m: Some(p.distance_m),
+                detection_limit_m: Some(p.detection_limit_m),
+                spread_m: [None; 2],
+                counts: [0; 2],
+            })
+            .collect(),
+    };
+    let face = |p: &ChangePoint| results.facade.frame_at(&p.position).out;
+    [stones, score_change(&field, truth, face, &settings.evaluation)]
+}
+
+/// A name as a folder: letters, digits, dashes.
+fn file_name(name: &str) -> PathBuf {
+    let plain: String = name
+        .chars()
+        .map(|c| {
+            if c.is_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        })
+        .collect();
+    plain.into()
+}

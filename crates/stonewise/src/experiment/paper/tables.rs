@@ -1,0 +1,314 @@
+//! The paper's tables beside ours.
+
+use super::{Case, Method};
+use crate::error::Result;
+use crate::figure::fixed;
+use std::fmt::Write;
+use stonewise_core::evaluate::{Directions, ErrorStatistics, MotionScore};
+use stonewise_io::table::Table;
+
+/// What Table 2 of the paper says, RMSE in centimetres: in-plane (translation), out-of-plane (bulge).
+const PAPER: [(&str, &str, [f64; 2]); 4] = [
+    ("stones", "UAV", [1.0, 1.0]),
+    ("stones", "TLS", [0.5, 0.5]),
+    ("M3C2", "UAV", [3.2, 1.3]),
+    ("M3C2", "TLS", [3.8, 0.6]),
+];
+
+/// The tables of the experiment, as text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PaperTables {
+    /// The paper's parameters and those of our runs: parameter, paper, the paper's estimator here, stonewise.
+    pub parameters: Vec<Vec<String>>,
+    /// Method, survey, how many were estimated with either motion, RMSE in-plane per axis (translation) and out of plane
+    /// (bulge) in cm, the paper's two figures.
+    pub rmse: Vec<Vec<String>>,
+    /// All figures of every run, one row a method, survey, motion and region.
+    pub details: Vec<Detail>,
+}
+
+/// Figures of one method on one survey with one motion; lengths in metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Detail {
+    /// Method.
+    pub method: String,
+    /// Survey.
+    pub survey: String,
+    /// Motion.
+    pub motion: String,
+    /// Stones or core points that could have an estimate, and those that have one.
+    pub count: [usize; 2],
+    /// RMSE per axis in the plane, in the plane 2D, out of the plane, 3D.
+    pub rmse_m: [f64; 4],
+    /// Median and 95th percentile of the 3D error.
+    pub norm_m: [f64; 2],
+    /// Share of estimates beyond 1 cm.
+    pub outlier_rate: f64,
+    /// RMSE of always answering zero, as `rmse_m`.
+    pub zero_m: [f64; 4],
+}
+
+const DETAIL_HEAD: [&str; 13] = [
+    "method",
+    "survey",
+    "motion",
+    "estimated",
+    "in-plane per axis mm",
+    "in-plane 2D mm",
+    "out-of-plane mm",
+    "3D mm",
+    "median 3D mm",
+    "95 % 3D mm",
+    "beyond 1 cm",
+    "zero: in-plane per axis mm",
+    "zero: out-of-plane mm",
+];
+pub(super) const RMSE_HEAD: [&str; 8] = [
+    "method",
+    "survey",
+    "estimated, translation",
+    "estimated, bulge",
+    "in-plane cm",
+    "out-of-plane cm",
+    "paper: in-plane cm",
+    "paper: out-of-plane cm",
+];
+pub(super) const PARAMETER_HEAD: [&str; 4] =
+    ["parameter", "paper", "the paper's estimator here", "stonewise"];
+
+impl PaperTables {
+    pub(super) fn new(cases: &[Case]) -> Self {
+        Self {
+            parameters: parameters(cases),
+            rmse: rmse(cases),
+            details: cases.iter().flat_map(details).collect(),
+        }
+    }
+
+    /// Table 1, Table 2 and the details as Markdown.
+    pub fn markdown(&self) -> String {
+        let mut out = String::from("Table 1: parameters\n\n");
+        out += &markdown(&PARAMETER_HEAD, &self.parameters);
+        out += "\nTable 2: RMSE of detected and applied motions; in-plane: per axis, of the translation; out-of-plane: of the bulge\n\n";
+        out += &markdown(&RMSE_HEAD, &self.rmse);
+        out += "\nAll figures\n\n";
+        out += &markdown(&DETAIL_HEAD, &self.detail_rows());
+        out
+    }
+
+    pub(super) fn detail_head() -> &'static [&'static str] {
+        &DETAIL_HEAD
+    }
+
+    pub(super) fn detail_rows(&self) -> Vec<Vec<String>> {
+        let mm = |v: f64| fixed(1e3 * v, 2);
+        let row = |d: &Detail| {
+            let mut row = vec![d.method.clone(), d.survey.clone(), d.motion.clone()];
+            row.push(format!("{} of {}", d.count[1], d.count[0]));
+            row.extend(d.rmse_m.iter().chain(&d.norm_m).map(|v| mm(*v)));
+            row.push(format!("{} %", fixed(100.0 * d.outlier_rate, 1)));
+            row.extend([d.zero_m[0], d.zero_m[2]].map(mm));
+            row
+        };
+        self.details.iter().map(row).collect()
+    }
+
+    /// The details as a table of numbers, metres.
+    pub(super) fn csv(&self) -> Result<Table> {
+        let all = &self.details;
+        let mut table = Table::new();
+        let text = |of: &dyn Fn(&Detail) -> &String| all.iter().map(|d| of(d).clone()).collect::<Vec<_>>();
+        let real = |of: &dyn Fn(&Detail) -> f64| all.iter().map(of).collect::<Vec<f64>>();
+        table.push("method", text(&|d| &d.method))?;
+        table.push("survey", text(&|d| &d.survey))?;
+        table.push("motion", text(&|d| &d.motion))?;
+        table.push(
+            "expected",
+            all.iter().map(|d| d.count[0] as u32).collect::<Vec<_>>(),
+        )?;
+        table.push(
+            "estimated",
+            all.iter().map(|d| d.count[1] as u32).collect::<Vec<_>>(),
+        )?;
+        let directions = ["in_plane_per_axis", "in_plane_2d", "out_of_plane", "3d"];
+        for (i, direction) in directions.iter().enumerate() {
+            table.push(&format!("rmse_{direction}_m"), real(&|d| d.rmse_m[i]))?;
+            table.push(&format!("zero_{direction}_m"), real(&|d| d.zero_m[i]))?;
+        }
+        table.push("median_3d_m", real(&|d| d.norm_m[0]))?;
+        table.push("p95_3d_m", real(&|d| d.norm_m[1]))?;
+        table.push("outlier_rate", real(&|d| d.outlier_rate))?;
+        Ok(table)
+    }
+}
+
+fn parameters(cases: &[Case]) -> Vec<Vec<String>> {
+    let value = |method: Method, path: &[&str]| {
+        let case = cases.iter().find(|c| c.method == method)?;
+        let found = path
+            .iter()
+            .try_fold(&case.results.run["parameters"], |v, name| v.get(name))?;
+        Some(found.as_str().map_or_else(|| found.to_string(), str::to_owned))
+    };
+    let row = |name: &str, paper: &str, path: &[&str], factor: f64| {
+        let of = |method| {
+            let text = value(method, path).unwrap_or_else(|| "–".to_owned());
+            let number = text.parse::<f64>().map(|v| v * factor);
+            number.map_or(text, |v| format!("{}", (v * 1e6).round() / 1e6))
+        };
+        vec![
+            name.to_owned(),
+            paper.to_owned(),
+            of(Method::Paper),
+            of(Method::Ours),
+        ]
+    };
+    let mut rows = vec![
+        row(
+            "Ratio threshold, centroids",
+            "0.4",
+            &["matching", "max_ratio"],
+            1.0,
+        ),
+        row(
+            "Ratio threshold, surface",
+            "0.95",
+            &["matching", "min_area_ratio"],
+            1.0,
+        ),
+        row(
+            "Estimator",
+            "plane-to-plane ICP",
+            &["registration", "estimator"],
+            1.0,
+        ),
+        row("Buffer [cm]", "60", &["registration", "gicp", "buffer_m"], 100.0),
+    ];
+    if value(Method::Ours, &["registration", "estimator"]).as_deref() == Some("network")
+        && let Some(ours) = rows[3].last_mut()
+    {
+        "none: neighbours share".clone_into(ours);
+    }
+    rows
+}
+
+fn rmse(cases: &[Case]) -> Vec<Vec<String>> {
+    let mut surveys: Vec<&str> = Vec::new();
+    for case in cases {
+        if !surveys.contains(&case.survey.as_str()) {
+            surveys.push(&case.survey);
+        }
+    }
+    let cm = |score: Option<&ErrorStatistics>, of: fn(&ErrorStatistics) -> f64| -> String {
+        score.map_or("–".to_owned(), |s| fixed(100.0 * of(s), 2))
+    };
+    type Pick = fn(&Case) -> &MotionScore;
+    type Figure = fn(&ErrorStatistics) -> f64;
+    type Way<'a> = (String, Method, Pick, Figure, Option<&'a str>);
+    let ways: [Way; 4] = [
+        (
+            format!("stones, {}", Method::Ours.name()),
+            Method::Ours,
+            |c| &c.stones,
+            |s| s.rmse_m,
+            Some("stones"),
+        ),
+        (
+            format!("stones, {}", Method::Paper.name()),
+            Method::Paper,
+            |c| &c.stones,
+            |s| s.rmse_m,
+            Some("stones"),
+        ),
+        (
+            "M3C2".to_owned(),
+            Method::Ours,
+            |c| &c.m3c2,
+            |s| s.rmse_m,
+            Some("M3C2"),
+        ),
+        (
+            "zero predictor".to_owned(),
+            Method::Ours,
+            |c| &c.stones,
+            |s| s.zero_predictor_rmse_m,
+            None,
+        ),
+    ];
+    let mut rows = Vec::new();
+    for (name, method, pick, figure, paper) in ways {
+        for survey in &surveys {
+            let score = |motion: &str| {
+                let of = |c: &&Case| c.method == method && c.survey == *survey && c.motion.name == motion;
+                cases.iter().find(of).map(pick)
+            };
+            let in_plane = score("translation").and_then(|s| s.errors.in_plane_per_axis.as_ref());
+            let out = score("bulge").and_then(|s| s.errors.out_of_plane.as_ref());
+            let count = |motion| {
+                score(motion).map_or("–".to_owned(), |s| format!("{} of {}", s.estimated, s.expected))
+            };
+            let theirs = PAPER.iter().find(|(kind, scanner, _)| {
+                Some(*kind) == paper && survey.to_lowercase().contains(&scanner.to_lowercase())
+            });
+            let told = |i: usize| theirs.map_or("–".to_owned(), |(_, _, cm)| fixed(cm[i], 1));
+            rows.push(vec![
+                name.clone(),
+                (*survey).to_owned(),
+                count("translation"),
+                count("bulge"),
+                cm(in_plane, figure),
+                cm(out, figure),
+                told(0),
+                told(1),
+            ]);
+        }
+    }
+    rows
+}
+
+fn details(case: &Case) -> Vec<Detail> {
+    let detail = |method: &str, motion: String, score: &MotionScore| {
+        let of = |figure: fn(&ErrorStatistics) -> f64| {
+            let errors: &Directions = &score.errors;
+            [
+                &errors.in_plane_per_axis,
+                &errors.in_plane_2d,
+                &errors.out_of_plane,
+                &errors.norm_3d,
+            ]
+            .map(|s| s.as_ref().map_or(f64::NAN, figure))
+        };
+        Detail {
+            method: method.to_owned(),
+            survey: case.survey.clone(),
+            motion,
+            count: [score.expected, score.estimated],
+            rmse_m: of(|s| s.rmse_m),
+            norm_m: [of(|s| s.median_m)[3], of(|s| s.p95_m)[3]],
+            outlier_rate: score.outlier_rate.unwrap_or(f64::NAN),
+            zero_m: of(|s| s.zero_predictor_rmse_m),
+        }
+    };
+    let stones = format!("stones, {}", case.method.name());
+    let mut rows = vec![detail(&stones, case.motion.name.to_owned(), &case.stones)];
+    let with_m3c2 = case.method == Method::Ours;
+    if with_m3c2 {
+        rows.push(detail("M3C2", case.motion.name.to_owned(), &case.m3c2));
+    }
+    if let Some([stones_inside, m3c2_inside]) = &case.inside {
+        let name = format!("{}, inside it", case.motion.name);
+        rows.push(detail(&stones, name.clone(), stones_inside));
+        if with_m3c2 {
+            rows.push(detail("M3C2", name, m3c2_inside));
+        }
+    }
+    rows
+}
+
+fn markdown(head: &[&str], rows: &[Vec<String>]) -> String {
+    let mut out = format!("| {} |\n|{}\n", head.join(" | "), " --- |".repeat(head.len()));
+    for row in rows {
+        let _ = writeln!(out, "| {} |", row.join(" | "));
+    }
+    out
+}

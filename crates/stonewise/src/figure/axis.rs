@@ -1,0 +1,159 @@
+//! One axis of a plot: its range, its ticks, and where a value lies.
+
+/// An axis.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    pub label: String,
+    pub range: [f64; 2],
+    pub logarithmic: bool,
+}
+
+impl Axis {
+    /// An axis with equal steps; an empty range is widened.
+    pub(crate) fn linear(label: &str, range: [f64; 2]) -> Self {
+        let [low, high] = range;
+        let range = if high > low { range } else { [low - 0.5, low + 0.5] };
+        Self {
+            label: label.to_owned(),
+            range,
+            logarithmic: false,
+        }
+    }
+
+    /// A linear axis around values, with a margin of 4 %; `with_zero` takes zero in.
+    pub(crate) fn around(label: &str, values: impl IntoIterator<Item = f64>, with_zero: bool) -> Self {
+        let start = if with_zero {
+            [0.0, 0.0]
+        } else {
+            [f64::MAX, f64::MIN]
+        };
+        let [low, high] = values
+            .into_iter()
+            .filter(|v| v.is_finite())
+            .fold(start, |[low, high], v| [low.min(v), high.max(v)]);
+        if low > high {
+            return Self::linear(label, [0.0, 1.0]);
+        }
+        let margin = 0.04 * (high - low);
+        let below = if with_zero && low == 0.0 { 0.0 } else { margin };
+        Self::linear(label, [low - below, high + margin])
+    }
+
+    /// A logarithmic axis around positive values; others are left out.
+    pub(crate) fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let [low, high] = values
+            .into_iter()
+            .filter(|v| v.is_finite() && *v > 0.0)
+            .fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)]);
+        let range = if low > high {
+            [0.1, 10.0]
+        } else {
+            [low / 1.3, high * 1.3]
+        };
+        Self {
+            label: label.to_owned(),
+            range,
+            logarithmic: true,
+        }
+    }
+
+    /// Where a value lies: 0 at the low end, 1 at the high end; NaN where a logarithm has none.
+    pub(crate) fn share(&self, value: f64) -> f64 {
+        let [low, high] = self.range;
+        if self.logarithmic {
+            (value / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low)
+        }
+    }
+
+    /// Round values with their texts, about `wanted` of them.
+    pub(crate) fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+        if self.logarithmic {
+            self.decade_ticks(wanted)
+        } else {
+            self.even_ticks(wanted)
+        }
+    }
+
+    fn even_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+        let [low, high] = self.range;
+        let raw = (high - low) / wanted.max(1) as f64;
+        let decade = 10f64.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .map(|m| m * decade)
+            .into_iter()
+            .find(|s| *s >= raw * 0.999)
+            .unwrap_or(raw);
+        let decimals = (-step.log10() + 1e-9).ceil().max(0.0) as usize;
+        let (first, last) = (
+            (low / step - 1e-9).ceil() as i64,
+            (high / step + 1e-9).floor() as i64,
+        );
+        (first..=last)
+            .map(|i| {
+                let value = i as f64 * step;
+                (value, super::fixed(value, decimals))
+            })
+            .collect()
+    }
+
+    fn decade_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+        let [low, high] = self.range;
+        let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+        let with = |factors: &[f64]| {
+            let all = decades
+                .clone()
+                .flat_map(|d| factors.iter().map(move |f| f * 10f64.powi(d)));
+            all.filter(|v| (low..=high).contains(v)).collect::<Vec<_>>()
+        };
+        let fine = with(&[1.0, 2.0, 5.0]);
+        let chosen = if fine.len() <= wanted + 2 {
+            fine
+        } else {
+            with(&[1.0])
+        };
+        chosen
+            .into_iter()
+            .map(|v| {
+                let decimals = (-v.log10() + 1e-9).ceil().max(0.0) as usize;
+                (v, super::fixed(v, decimals))
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(axis: &Axis, wanted: usize) -> Vec<String> {
+        axis.ticks(wanted).into_iter().map(|t| t.1).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(
+            texts(&Axis::linear("", [0.0, 1.0]), 5),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(texts(&Axis::linear("", [-3.0, 12.0]), 3), ["0", "5", "10"]);
+        let decades = Axis::decades("", [0.05, 30.0]);
+        assert_eq!(texts(&decades, 4), ["0.1", "1", "10"]);
+        assert_eq!(texts(&Axis::decades("", [1.0, 8.0]), 5), ["1", "2", "5", "10"]);
+    }
+
+    #[test]
+    fn shares_run_from_end_to_end() {
+        let axis = Axis::linear("", [2.0, 4.0]);
+        assert_eq!(
+            (axis.share(2.0), axis.share(3.0), axis.share(4.0)),
+            (0.0, 0.5, 1.0)
+        );
+        let mut axis = Axis::decades("", [1.0]);
+        axis.range = [0.01, 100.0];
+        assert!((axis.share(1.0) - 0.5).abs() < 1e-12 && axis.share(-1.0).is_nan());
+        assert!(Axis::around("", [], true).range[1] > 0.0);
+        assert!(Axis::linear("", [1.0, 1.0]).range[1] > 1.0);
+    }
+}

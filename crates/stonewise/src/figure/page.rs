@@ -1,0 +1,170 @@
+//! A self-contained page of text, tables and pictures.
+
+use std::fmt::Write;
+
+/// A page that is being written, HTML.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Page {
+    title: String,
+    body: String,
+}
+
+const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;margin:1.5rem auto;padding:0 1rem;color:#222;\
+background:#fff}h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2rem}figure{margin:1rem 0;display:inline-block;\
+vertical-align:top;max-width:100%}figcaption{font-weight:600;margin-bottom:.3rem}p.note{color:#555;max-width:60rem}\
+table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.2rem .7rem;border-bottom:1px solid #ddd;text-align:right}\
+th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}.scroll{overflow-x:auto}\
+pre{background:#f4f4f4;padding:.7rem;overflow-x:auto}svg,img{max-width:100%;height:auto}tr.best td{background:#e8f3e8}";
+
+impl Page {
+    /// An empty page.
+    pub(crate) fn new(title: &str) -> Self {
+        Self {
+            title: title.to_owned(),
+            body: String::new(),
+        }
+    }
+
+    /// A heading.
+    pub(crate) fn heading(&mut self, text: &str) -> &mut Self {
+        let _ = writeln!(self.body, "<h2>{}</h2>", escape(text));
+        self
+    }
+
+    /// A paragraph of plain text.
+    pub(crate) fn note(&mut self, text: &str) -> &mut Self {
+        let _ = writeln!(self.body, "<p class=\"note\">{}</p>", escape(text));
+        self
+    }
+
+    /// Text as it is, in a box.
+    pub(crate) fn code(&mut self, text: &str) -> &mut Self {
+        let _ = writeln!(self.body, "<pre>{}</pre>", escape(text));
+        self
+    }
+
+    /// HTML that was made by [`table`] or a plot.
+    pub(crate) fn html(&mut self, html: &str) -> &mut Self {
+        let _ = writeln!(self.body, "{html}");
+        self
+    }
+
+    /// A picture (SVG or HTML) under its caption.
+    pub(crate) fn figure(&mut self, caption: &str, picture: &str) -> &mut Self {
+        let _ = writeln!(
+            self.body,
+            "<figure><figcaption>{}</figcaption>{picture}</figure>",
+            escape(caption)
+        );
+        self
+    }
+
+    /// The whole page.
+    pub(crate) fn finish(&self) -> String {
+        format!(
+            "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
+             content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head>\n<body><h1>{0}</h1>\n{1}</body></html>\n",
+            escape(&self.title),
+            self.body
+        )
+    }
+}
+
+/// A table of plain text; rows whose number is `best` stand out.
+pub(crate) fn table(head: &[&str], rows: &[Vec<String>], best: Option<usize>) -> String {
+    let mut out = String::from("<div class=\"scroll\"><table><thead><tr>");
+    for name in head {
+        let _ = write!(out, "<th>{}</th>", escape(name));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for (i, row) in rows.iter().enumerate() {
+        out.push_str(if best == Some(i) {
+            "<tr class=\"best\">"
+        } else {
+            "<tr>"
+        });
+        for cell in row {
+            let _ = write!(out, "<td>{}</td>", escape(cell));
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</tbody></table></div>");
+    out
+}
+
+/// A JPEG inside the page.
+pub(crate) fn jpeg_element(jpeg: &[u8], description: &str) -> String {
+    format!(
+        "<img alt=\"{}\" src=\"data:image/jpeg;base64,{}\">",
+        escape(description),
+        base64(jpeg)
+    )
+}
+
+/// Bytes as text (RFC 4648, section 4).
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for group in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            let digit = DIGITS[(bits >> (18 - 6 * i) & 63) as usize];
+            out.push(if i <= group.len() { char::from(digit) } else { '=' });
+        }
+    }
+    out
+}
+
+/// Makes any text harmless in HTML and SVG.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// A number with this many decimals; a dash where there is none.
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_harmless_and_numbers_read_well() {
+        let mut page = Page::new("<b>");
+        page.note("a < b").figure("\"x\"", "<svg/>");
+        let html = page.finish();
+        assert!(html.contains("&lt;b&gt;") && html.contains("a &lt; b") && html.contains("<svg/>"));
+        // The examples of RFC 4648, section 10.
+        for (plain, coded) in [
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(plain.as_bytes()), coded);
+        }
+        assert_eq!(fixed(-0.004, 2), "0.00");
+        assert_eq!(fixed(-1.5, 1), "\u{2212}1.5");
+        assert_eq!(fixed(f64::NAN, 1), "–");
+    }
+}

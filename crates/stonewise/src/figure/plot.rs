@@ -1,0 +1,374 @@
+//! One plot: axes and what lies between them, as an SVG element that needs nothing else.
+
+use super::page::escape;
+use super::{Axis, Ramp, fixed};
+use std::fmt::Write;
+
+/// A plot of a fixed size.
+#[derive(Clone, Debug)]
+pub(crate) struct Plot {
+    pub title: String,
+    pub x: Axis,
+    pub y: Axis,
+    /// Width and height of the whole picture, pixels.
+    pub size: [f64; 2],
+    pub items: Vec<Item>,
+    /// Colour scale to the right, with its label.
+    pub bar: Option<(Ramp, String)>,
+}
+
+/// Something drawn in data coordinates; `name` puts it into the legend.
+#[derive(Clone, Debug)]
+pub(crate) enum Item {
+    /// A line through points, with a mark at each where `marks` says so.
+    Line {
+        points: Vec<[f64; 2]>,
+        colour: String,
+        dashed: bool,
+        marks: bool,
+        name: String,
+    },
+    /// Round dots.
+    Dots {
+        points: Vec<[f64; 2]>,
+        colour: String,
+        radius_px: f64,
+        name: String,
+    },
+    /// Filled areas, each with its colour.
+    Areas(Vec<(Vec<[f64; 2]>, String)>),
+    /// A cross that marks a known truth, open in the middle so that points on it stay visible.
+    Cross([f64; 2]),
+}
+
+/// Room around the axes, pixels: left, top, right, bottom.
+const MARGIN: [f64; 4] = [58.0, 26.0, 14.0, 42.0];
+/// Room for the colour scale, pixels.
+const BAR_PX: f64 = 62.0;
+
+impl Plot {
+    /// An empty plot.
+    pub(crate) fn new(title: &str, x: Axis, y: Axis, size: [f64; 2]) -> Self {
+        Self {
+            title: title.to_owned(),
+            x,
+            y,
+            size,
+            items: Vec::new(),
+            bar: None,
+        }
+    }
+
+    /// An empty map of a wall, with equal scales, `width` pixels wide where the wall is not too tall for that.
+    pub(crate) fn map(title: &str, x: Axis, y: Axis, width: f64, bar: Option<(Ramp, String)>) -> Self {
+        let right = MARGIN[2] + if bar.is_some() { BAR_PX } else { 0.0 };
+        let (across, high) = (x.range[1] - x.range[0], y.range[1] - y.range[0]);
+        let scale = ((width - MARGIN[0] - right) / across).min(560.0 / high);
+        let size = [
+            across * scale + MARGIN[0] + right,
+            high * scale + MARGIN[1] + MARGIN[3],
+        ];
+        Self {
+            bar,
+            ..Self::new(title, x, y, size)
+        }
+    }
+
+    /// Adds something.
+    pub(crate) fn add(&mut self, item: Item) -> &mut Self {
+        self.items.push(item);
+        self
+    }
+
+    /// The SVG element, which is a file of its own too.
+    pub(crate) fn svg(&self) -> String {
+        let [width, height] = self.size;
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{}\" width=\"{width:.0}\" \
+             height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"system-ui,sans-serif\" font-size=\"12\">\
+             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>",
+            escape(&self.title)
+        );
+        self.draw_axes(&mut out);
+        let [left, top, right, bottom] = self.area();
+        let clip = format!("c{:x}", fingerprint(&self.title));
+        let _ = write!(
+            out,
+            "<clipPath id=\"{clip}\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\"/></clipPath>\
+             <g clip-path=\"url(#{clip})\">",
+            right - left,
+            bottom - top
+        );
+        self.items.iter().for_each(|item| self.draw(&mut out, item));
+        out.push_str("</g>");
+        self.draw_legend(&mut out);
+        self.draw_bar(&mut out);
+        out.push_str("</svg>");
+        out
+    }
+
+    /// Left, top, right, bottom of the axes, pixels.
+    fn area(&self) -> [f64; 4] {
+        let bar = if self.bar.is_some() { BAR_PX } else { 0.0 };
+        [
+            MARGIN[0],
+            MARGIN[1],
+            self.size[0] - MARGIN[2] - bar,
+            self.size[1] - MARGIN[3],
+        ]
+    }
+
+    fn px(&self, x: f64) -> f64 {
+        let [left, _, right, _] = self.area();
+        left + self.x.share(x) * (right - left)
+    }
+
+    fn py(&self, y: f64) -> f64 {
+        let [_, top, _, bottom] = self.area();
+        bottom - self.y.share(y) * (bottom - top)
+    }
+
+    fn draw_axes(&self, out: &mut String) {
+        let [left, top, right, bottom] = self.area();
+        let _ = write!(
+            out,
+            "<text x=\"{left:.1}\" y=\"{:.1}\" font-weight=\"600\">{}</text>",
+            top - 9.0,
+            escape(&self.title)
+        );
+        for (value, text) in self.x.ticks(((right - left) / 70.0) as usize) {
+            let x = self.px(value);
+            let _ = write!(
+                out,
+                "<path stroke=\"#e2e2e2\" d=\"M{x:.1} {top:.1}V{bottom:.1}\"/>\
+                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#444\">{text}</text>",
+                bottom + 15.0
+            );
+        }
+        for (value, text) in self.y.ticks((((bottom - top) / 40.0) as usize).max(2)) {
+            let y = self.py(value);
+            let _ = write!(
+                out,
+                "<path stroke=\"#e2e2e2\" d=\"M{left:.1} {y:.1}H{right:.1}\"/>\
+                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#444\">{text}</text>",
+                left - 6.0,
+                y + 4.0
+            );
+        }
+        let (middle_x, middle_y) = (0.5 * (left + right), 0.5 * (top + bottom));
+        let _ = write!(
+            out,
+            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"none\" stroke=\"#888\"/>\
+             <text x=\"{middle_x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
+             <text transform=\"translate(13 {middle_y:.1})rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            right - left,
+            bottom - top,
+            bottom + 34.0,
+            escape(&self.x.label),
+            escape(&self.y.label)
+        );
+    }
+
+    fn draw(&self, out: &mut String, item: &Item) {
+        let place = |p: &[f64; 2]| {
+            let (x, y) = (self.px(p[0]), self.py(p[1]));
+            (x.is_finite() && y.is_finite()).then_some((x, y))
+        };
+        match item {
+            Item::Line {
+                points,
+                colour,
+                dashed,
+                marks,
+                ..
+            } => {
+                let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
+                let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
+                let _ = write!(
+                    out,
+                    "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"{dash} d=\"{}\"/>",
+                    path(&places)
+                );
+                if *marks {
+                    circles(out, &places, colour, 3.0);
+                }
+            }
+            Item::Dots {
+                points,
+                colour,
+                radius_px,
+                ..
+            } => {
+                let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
+                circles(out, &places, colour, *radius_px);
+            }
+            Item::Areas(areas) => {
+                for (ring, colour) in areas {
+                    let mut places: Vec<(f64, f64)> = ring.iter().filter_map(place).collect();
+                    // Corners nearer than a pixel make the file large and cannot be seen.
+                    places.dedup_by(|b, a| (a.0 - b.0).hypot(a.1 - b.1) < 1.0);
+                    let _ = write!(out, "<path fill=\"{colour}\" d=\"{}Z\"/>", path(&places));
+                }
+            }
+            Item::Cross(p) => {
+                if let Some((x, y)) = place(p) {
+                    let _ = write!(
+                        out,
+                        "<path stroke=\"#000\" stroke-width=\"1.6\" d=\"M{:.1} {y:.1}h10m12 0h10M{x:.1} {:.1}v10m0 12v10\"/>",
+                        x - 16.0,
+                        y - 16.0
+                    );
+                }
+            }
+        }
+    }
+
+    fn draw_legend(&self, out: &mut String) {
+        let named: Vec<(&str, &str, bool)> = self
+            .items
+            .iter()
+            .filter_map(|item| match item {
+                Item::Line {
+                    name, colour, dashed, ..
+                } => Some((name.as_str(), colour.as_str(), *dashed)),
+                Item::Dots { name, colour, .. } => Some((name.as_str(), colour.as_str(), false)),
+                _ => None,
+            })
+            .filter(|(name, ..)| !name.is_empty())
+            .collect();
+        if named.is_empty() {
+            return;
+        }
+        let [left, top, ..] = self.area();
+        let longest = named.iter().map(|(n, ..)| n.chars().count()).max().unwrap_or(0) as f64;
+        let _ = write!(
+            out,
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#fff\" fill-opacity=\".8\"/>",
+            left + 4.0,
+            top + 4.0,
+            36.0 + 6.6 * longest,
+            6.0 + 16.0 * named.len() as f64
+        );
+        for (i, (name, colour, dashed)) in named.iter().enumerate() {
+            let y = top + 16.0 * (i as f64 + 1.0);
+            let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
+            let _ = write!(
+                out,
+                "<path stroke=\"{colour}\" stroke-width=\"3\"{dash} d=\"M{:.1} {y:.1}h18\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                left + 9.0,
+                left + 33.0,
+                y + 4.0,
+                escape(name)
+            );
+        }
+    }
+
+    fn draw_bar(&self, out: &mut String) {
+        const STEPS: usize = 40;
+        let Some((ramp, label)) = &self.bar else { return };
+        let [_, top, right, bottom] = self.area();
+        let (left, each) = (right + 12.0, (bottom - top) / STEPS as f64);
+        let [low, high] = ramp.range;
+        for i in 0..STEPS {
+            let colour = ramp.colour(low + (high - low) * (i as f64 + 0.5) / STEPS as f64);
+            let y = bottom - (i + 1) as f64 * each;
+            let _ = write!(
+                out,
+                "<path fill=\"{colour}\" d=\"M{left:.1} {y:.2}h12v{:.2}h-12z\"/>",
+                each + 0.5
+            );
+        }
+        let axis = Axis::linear("", ramp.range);
+        for (value, text) in axis.ticks((((bottom - top) / 40.0) as usize).max(2)) {
+            let y = bottom - axis.share(value) * (bottom - top);
+            let _ = write!(
+                out,
+                "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"#444\">{text}</text>",
+                left + 16.0,
+                y + 4.0
+            );
+        }
+        let _ = write!(
+            out,
+            "<text x=\"{left:.1}\" y=\"{:.1}\">{}</text>",
+            bottom + 15.0,
+            escape(label)
+        );
+    }
+}
+
+fn path(places: &[(f64, f64)]) -> String {
+    let mut d = String::new();
+    for (i, (x, y)) in places.iter().enumerate() {
+        let _ = write!(d, "{}{} {}", if i == 0 { "M" } else { "L" }, short(*x), short(*y));
+    }
+    d
+}
+
+fn circles(out: &mut String, places: &[(f64, f64)], colour: &str, radius_px: f64) {
+    let mut d = String::new();
+    for (x, y) in places {
+        let _ = write!(d, "M{} {}h0", short(*x), short(*y));
+    }
+    let _ = write!(
+        out,
+        "<path stroke=\"{colour}\" stroke-width=\"{:.1}\" stroke-linecap=\"round\" d=\"{d}\"/>",
+        2.0 * radius_px
+    );
+}
+
+/// A coordinate with a tenth of a pixel, a plain minus sign, and no empty decimals.
+fn short(v: f64) -> String {
+    let text = fixed(v, 1).replace('\u{2212}', "-");
+    text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
+}
+
+/// A number that belongs to a text: pictures on one page need ids of their own (FNV-1a).
+fn fingerprint(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| {
+        (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot() -> Plot {
+        Plot::new(
+            "t",
+            Axis::linear("x", [0.0, 10.0]),
+            Axis::linear("y", [0.0, 1.0]),
+            [472.0, 268.0],
+        )
+    }
+
+    #[test]
+    fn data_lie_where_the_axes_say() {
+        let mut p = plot();
+        p.add(Item::Dots {
+            points: vec![[0.0, 0.0], [10.0, 1.0], [f64::NAN, 0.5]],
+            colour: "#123456".into(),
+            radius_px: 2.0,
+            name: "n<".into(),
+        });
+        // 400 by 200 pixels between the axes, from (58, 26) on; y grows upwards.
+        let svg = p.svg();
+        assert!(svg.contains("M58 226h0M458 26h0\""), "{svg}");
+        assert!(svg.contains("n&lt;") && !svg.contains("NaN"));
+    }
+
+    #[test]
+    fn maps_have_equal_scales() {
+        let p = Plot::map(
+            "m",
+            Axis::linear("x", [0.0, 40.0]),
+            Axis::linear("y", [0.0, 20.0]),
+            900.0,
+            None,
+        );
+        let scale_x = p.px(1.0) - p.px(0.0);
+        let scale_y = p.py(0.0) - p.py(1.0);
+        assert!((scale_x - scale_y).abs() < 1e-9 && p.size[0] <= 900.5);
+    }
+}

@@ -1,0 +1,199 @@
+//! Experiments on a small simulated survey: what they find, against single runs and against what is known beforehand.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
+
+use nalgebra::Vector3;
+use std::fs;
+use std::path::Path;
+use stonewise::experiment::{
+    Influence, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
+};
+use stonewise::simulate::{SurveyParams, write_survey};
+use stonewise::{Part, Project, Until, run};
+use stonewise_core::evaluate::MotionField;
+use stonewise_core::progress::Silent;
+use stonewise_core::simulate::{PhotoParams, SceneParams, SurroundingsParams, TlsParams, WallParams};
+use tempfile::TempDir;
+
+/// A wall of a few dozen stones and four photos an epoch, whose halves still have two.
+fn survey() -> (TempDir, Project) {
+    let params = SurveyParams {
+        scene: SceneParams {
+            wall: WallParams {
+                width_m: 1.6,
+                height_m: 1.0,
+                ..WallParams::default()
+            },
+            surroundings: SurroundingsParams {
+                annex: false,
+                railing: false,
+                shrubs: 0,
+                ..SurroundingsParams::default()
+            },
+            tls: Some(TlsParams {
+                spacing_m: 0.008,
+                ..TlsParams::default()
+            }),
+            ..SceneParams::default()
+        },
+        photos: PhotoParams {
+            columns: 2,
+            rows: 2,
+            width: 500,
+            height: 400,
+            focal_px: 900.0,
+            distance_m: 5.0,
+            rendered: false,
+            ..PhotoParams::default()
+        },
+        ..SurveyParams::default()
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let written = write_survey(dir.path(), &params.seeded(3), &Silent).unwrap();
+    let project = Project::read(&written.project).unwrap();
+    (dir, project)
+}
+
+/// Cells of a column of a CSV file.
+fn column(path: &Path, name: &str) -> Vec<String> {
+    let all = fs::read_to_string(path).unwrap();
+    let mut lines = all.lines();
+    let at = lines.next().unwrap().split(',').position(|c| c == name).unwrap();
+    lines.map(|l| l.split(',').nth(at).unwrap().to_owned()).collect()
+}
+
+#[test]
+fn a_grid_finds_what_single_runs_find_and_resumes() {
+    let (dir, mut project) = survey();
+    project.epochs[1].motion = Some(MotionField::translation(Vector3::new(0.0, 0.01, 0.02)).unwrap());
+    project.settings.matching.min_overlap = 1.0;
+    let options = TuneOptions {
+        grid: [
+            "matching.min_area_ratio=0.9999,0.5",
+            "registration.border_noises=0..3..3",
+        ]
+        .map(|d| d.parse().unwrap())
+        .to_vec(),
+        ..TuneOptions::default()
+    };
+    let out = dir.path().join("tuned");
+    let tuned = tune(&project, &options, &out, &Silent).unwrap();
+    assert_eq!(tuned.points.len(), 4);
+    let table = out.join("tune.csv");
+    assert_eq!(
+        column(&table, "matching.min_area_ratio"),
+        ["0.9999", "0.9999", "0.5", "0.5"]
+    );
+    assert!(tuned.lines.contains("min_area_ratio = 0.5"), "{}", tuned.lines);
+    assert_eq!(
+        tuned.lines,
+        fs::read_to_string(out.join("recommended.toml")).unwrap()
+    );
+
+    // The last combination is the project's own: a run by itself must come to the same.
+    let alone = run(&project, &dir.path().join("alone"), Until::Registered, &Silent).unwrap();
+    let score = alone.pairs[0]
+        .evaluation
+        .as_ref()
+        .unwrap()
+        .stones
+        .as_ref()
+        .unwrap();
+    let (last, strict) = (&tuned.points[3], &tuned.points[1]);
+    let norm = score.errors.norm_3d.as_ref().unwrap();
+    assert!((last.errors.unwrap().rmse_m / norm.rmse_m - 1.0).abs() < 1e-9);
+    assert_eq!(last.measured, score.estimated as f64);
+    assert!(last.measured >= 10.0 && norm.rmse_m < 0.003, "{last:?}");
+    // Hardly any two faces agree to a ten-thousandth.
+    assert!(strict.matched < 0.5 * last.matched, "{strict:?}");
+
+    let (first, versions) = (fs::read(&table).unwrap(), out.join("work/register-2"));
+    let count = || fs::read_dir(&versions).unwrap().count();
+    let before = count();
+    tune(&project, &options, &out, &Silent).unwrap();
+    assert_eq!((fs::read(&table).unwrap(), count()), (first, before));
+}
+
+#[test]
+fn a_grid_says_what_cannot_be() {
+    let (dir, project) = survey();
+    let fail = |options: TuneOptions| {
+        let out = dir.path().join("tuned");
+        tune(&project, &options, &out, &Silent).unwrap_err().to_string()
+    };
+    let unknown = fail(TuneOptions {
+        grid: vec!["max_ratio=0.4".parse().unwrap()],
+        ..TuneOptions::default()
+    });
+    assert!(unknown.contains("matching.max_ratio"), "{unknown}");
+    let far = fail(TuneOptions {
+        part: Some(Part::between([100.0; 3], [101.0; 3])),
+        ..TuneOptions::default()
+    });
+    assert!(far.contains("no points in the part"), "{far}");
+}
+
+#[test]
+fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
+    let (dir, project) = survey();
+    let out = dir.path().join("paper");
+    let surveys = [PaperSurvey {
+        name: "TLS".to_owned(),
+        project,
+    }];
+    let tables = paper(&surveys, None, 1, &out, &Silent).unwrap();
+    let text = tables.markdown();
+    assert_eq!(text, fs::read_to_string(out.join("tables.md")).unwrap());
+    // The paper's own figures stand beside ours.
+    let row = text.lines().find(|l| l.starts_with("| M3C2 | TLS")).unwrap();
+    assert!(row.ends_with("| 3.8 | 0.6 |"), "{row}");
+    // The zero predictor of 2 cm and 5 cm, per axis: sqrt((2^2 + 5^2) / 2).
+    let zero = text
+        .lines()
+        .find(|l| l.starts_with("| zero predictor | TLS"))
+        .unwrap();
+    assert!(zero.contains(" | 3.81 | "), "{zero}");
+    let find = |method: &str, motion: &str| {
+        let found = tables
+            .details
+            .iter()
+            .find(|d| d.method == method && d.motion == motion);
+        found.unwrap().clone()
+    };
+    let ours = find("stones, stonewise", "translation");
+    assert!(ours.rmse_m[0] < 0.002 && ours.count[1] >= 10, "{ours:?}");
+    assert!(find("M3C2", "translation").rmse_m[0] > 0.02);
+    assert!(find("stones, stonewise", "bulge").rmse_m[2] < 0.001);
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    for piece in [
+        "Table 1", "Table 2", "Figure 5", "Figure 6", "Figure 7", "Figure 8", "Figure 9",
+    ] {
+        assert!(page.contains(piece), "{piece} is missing");
+    }
+    assert!(
+        !page.contains("src=\"http") && !page.contains("href="),
+        "the page needs other files"
+    );
+    assert!(out.join("figures/figure_6-tls-stonewise.svg").exists());
+    let unknown = paper(&surveys, Some("2031"), 1, &out, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(unknown.contains("epoch 1"), "{unknown}");
+}
+
+#[test]
+fn sensitivity_draws_a_curve_for_each_scanner() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = SensitivityOptions {
+        influences: vec![Influence::Overlap],
+        size_m: [1.5, 1.0],
+        seeds: 1,
+        with_paper: false,
+    };
+    let points = sensitivity(&options, dir.path(), &Silent).unwrap();
+    assert_eq!(points.len(), 12);
+    let all = points.iter().find(|p| p.x == 8.0 && p.scanner == "TLS").unwrap();
+    assert!(all.stones[0] > 3 && all.found_share() >= 0.9, "{all:?}");
+    assert!(all.rmse_m[0] < 0.003, "{all:?}");
+    assert_eq!(column(&dir.path().join("sensitivity.csv"), "value").len(), 12);
+    assert!(dir.path().join("overlap-uav-share.svg").exists() && dir.path().join("index.html").exists());
+}
