@@ -13,7 +13,7 @@ const TONES: usize = 1024;
 pub struct Camera {
     /// Mean of the photo after exposure, linear, 0.03 (dark) to 0.65 (washed out).
     pub exposure: f32,
-    /// Gains of red, green and blue, 0.75 to 1.3.
+    /// Gains of red, green and blue, 0.7 to 1.4.
     pub white_balance: [f32; 3],
     /// Standard deviation of the blur, pixels, 0.3 to 2.5.
     pub blur_px: f32,
@@ -36,12 +36,15 @@ pub struct Camera {
 impl Camera {
     /// A camera drawn at random, mostly decent; its blur leaves stones of `stone_px` pixels to be seen.
     pub(super) fn random(stone_px: f32, rng: &mut Rng) -> Self {
-        let tint = between(rng, 0.0, 0.08);
+        let tint = between(rng, 0.0, 0.06);
+        // From blue to amber, as by a wrong colour temperature.
+        let warmth = 0.1 * normal(rng);
         let moving = chance(rng, 0.12);
         let most_blur_px = (0.04 * stone_px).clamp(0.5, 2.5);
         Self {
             exposure: log_between(rng, 0.04, 0.6),
-            white_balance: [0, 1, 2].map(|_| (tint * normal(rng)).exp().clamp(0.75, 1.3)),
+            white_balance: [warmth, 0.0, -warmth]
+                .map(|gain| (gain + tint * normal(rng)).exp().clamp(0.7, 1.4)),
             blur_px: if chance(rng, 0.75) {
                 between(rng, 0.3, 0.9)
             } else {

@@ -82,7 +82,7 @@ pub struct FaceRelief {
 pub struct Mortar {
     /// Mean colour, linear.
     pub colour: [f32; 3],
-    /// Width of the joints in parts of the stones' size, 0.004 to 0.14; hairlines are 0 to 1 pixel.
+    /// Width of the joints in parts of the stones' size, 0.006 to 0.11; hairlines are 0 to 1 pixel.
     pub width: f32,
     /// Variation of the width from stone to stone, in parts of it, 0 to 0.7.
     pub width_spread: f32,
@@ -103,13 +103,13 @@ impl Material {
             1.0
         };
         let mut colours = vec![stone_colour(rng)];
-        for _ in 0..usize::from(chance(rng, 0.35)) + usize::from(chance(rng, 0.2)) {
+        for _ in 0..usize::from(chance(rng, 0.25)) + usize::from(chance(rng, 0.15)) {
             let other = mix(colours[0], stone_colour(rng), between(rng, 0.2, 1.0));
             colours.push(other);
         }
         Self {
             colours,
-            tone_spread: between(rng, 0.0, 0.35) * between(rng, 0.2, 1.0),
+            tone_spread: between(rng, 0.0, 0.35) * between(rng, 0.0, 1.0),
             hue_spread: between(rng, 0.0, 0.05) * between(rng, 0.0, 1.0),
             mottle: busy * between(rng, 0.0, 0.25) * between(rng, 0.2, 1.0),
             accent: busy * sometimes(rng, 0.5, 0.1, 0.8),
@@ -168,7 +168,7 @@ impl Mortar {
         let width = if hairline {
             between(rng, 0.0, 1.0) / stone_px
         } else {
-            log_between(rng, 0.008, 0.14).max(0.8 / stone_px)
+            log_between(rng, 0.006, 0.11).max(0.8 / stone_px)
         };
         let recess = match between(rng, 0.0, 1.0) {
             p if p < 0.3 => between(rng, -0.01, 0.005),

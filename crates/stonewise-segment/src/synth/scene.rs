@@ -10,7 +10,7 @@ use super::wall::{Ring, Wall};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Smallest and largest median size of a wall's stones, pixels; single stones are smaller and larger.
-const STONE_PX: [f32; 2] = [14.0, 320.0];
+const STONE_PX: [f32; 2] = [18.0, 320.0];
 
 /// A part of the photo and what fills it; later layers cover earlier ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +72,9 @@ pub enum Region {
 
 impl Region {
     fn mask(&self, canvas: &Canvas, rng: &mut Rng) -> Vec<bool> {
+        if *self == Self::Everywhere {
+            return vec![true; canvas.label.len()];
+        }
         let size = canvas.photo_size();
         let border = Field::isotropic(rng, Grain::Fractal, 80.0);
         let mut mask = Vec::with_capacity(canvas.label.len());

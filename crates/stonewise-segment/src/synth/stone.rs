@@ -6,7 +6,7 @@ use super::layout::Ring;
 /// How stones depart from their cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StoneShape {
-    /// Radius over which corners are rounded, in parts of the stone's size, 0 to 0.5.
+    /// Radius over which corners are rounded, in parts of the stone's size, 0.02 to 0.42.
     pub rounding: f32,
     /// Probability that a corner or a piece of an edge has broken off, per stone, 0 to 0.5.
     pub chips: f32,
@@ -23,7 +23,7 @@ impl StoneShape {
     pub(super) fn random(rng: &mut Rng, rubble: bool) -> Self {
         let rough = if rubble { 1.0 } else { between(rng, 0.0, 0.6) };
         Self {
-            rounding: rough * between(rng, 0.05, 0.5) + 0.02,
+            rounding: rough * between(rng, 0.02, 0.4) + 0.02,
             chips: between(rng, 0.0, 0.5) * between(rng, 0.0, 1.0),
             ragged: rough * between(rng, 0.0, 0.05) + between(rng, 0.0, 0.01),
             wander: rough * between(rng, 0.0, 0.1),
