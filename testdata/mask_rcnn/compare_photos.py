@@ -20,6 +20,8 @@ from torch.nn.functional import grid_sample
 from torchvision.models.detection import maskrcnn_resnet50_fpn
 
 LONGEST = 1600
+# Random weights also make masks of a pixel or two, about which overlap says nothing.
+LEAST_PIXELS = 100
 
 
 def calibrated(images):
@@ -103,9 +105,11 @@ def main(ours, out, photos):
             keep = torch.zeros_like(whole)
             keep[region] = True
             whole &= keep
-            ious.append(float((part & whole).sum() / max(1, int((part | whole).sum()))))
+            union = int((part | whole).sum())
+            if union >= LEAST_PIXELS:
+                ious.append(float((part & whole).sum()) / union)
         print(path.name, f"{len(mine)} ours, {len(theirs['labels'])} theirs, {missing} missing;",
-              {k: f"{v:.2g}" for k, v in worst.items()}, f"mask IoU: least {min(ious):.4f}, median {np.median(ious):.4f}")
+              {k: f"{v:.2g}" for k, v in worst.items()}, f"mask IoU of {len(ious)}: least {min(ious):.4f}, median {np.median(ious):.4f}")
 
 
 main(sys.argv[1], Path(sys.argv[2]), [Path(p) for p in sys.argv[3:]])
