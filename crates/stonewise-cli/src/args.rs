@@ -34,9 +34,11 @@ pub enum Command {
     /// Make two disjoint halves of one epoch, to test the method against a known motion.
     #[command(after_help = "Example:\n  stonewise split survey/stonewise.toml --seed 1 --out halves/")]
     Split(SplitArgs),
-    /// Bring the masks of every photo into one label image.
-    #[command(after_help = "Example:\n  stonewise segment survey/stonewise.toml --out results/")]
-    Segment(ProjectArgs),
+    /// Find the stones of photos; for a project, bring masks or found stones into one label image a photo.
+    #[command(after_help = "Examples:\n  stonewise segment photos/ --out stones/\n  \
+        stonewise segment photos/ --out stones/ --model training/model.safetensors --reference masks.json\n  \
+        stonewise segment survey/stonewise.toml --out results/")]
+    Segment(SegmentArgs),
     /// Teach the network that finds stones: a wall from a few labelled photos, or masonry in general from rendered ones.
     #[command(
         after_help = "Examples:\n  stonewise train --rendered --from none --minutes 60 --out training/\n\n\
@@ -150,15 +152,49 @@ pub struct CompareArgs {
     pub max_distance: f64,
 }
 
+/// Arguments of `segment`.
+#[derive(Debug, ClapArgs)]
+pub struct SegmentArgs {
+    /// A folder of photos, one photo, or a project file (which has its own parameters).
+    pub input: PathBuf,
+    /// Folder of the results; made if need be.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The network: `built-in`, or a file that `train` wrote.
+    #[arg(long, value_name = "FILE", default_value = "built-in")]
+    pub model: PathBuf,
+    /// Sizes at which photos are looked at, 1 = as they are.
+    #[arg(long, value_name = "S,...", value_delimiter = ',')]
+    pub scales: Option<Vec<f64>>,
+    /// Stones of which the network is less sure are left out, 0 to 1.
+    #[arg(long, value_name = "P")]
+    pub min_score: Option<f32>,
+    /// Masks to measure the result on: COCO json or a folder of label PNGs.
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+    /// Regions in which the reference is complete; everywhere when absent.
+    #[arg(long, value_name = "FILE", requires = "reference")]
+    pub valid: Option<PathBuf>,
+}
+
 /// Arguments of `train`.
 #[derive(Debug, ClapArgs)]
 pub struct TrainArgs {
     /// Learn from photos that are rendered on the way.
-    #[arg(long, required = true)]
+    #[arg(long, conflicts_with = "data", required_unless_present = "data")]
     pub rendered: bool,
-    /// Weights to start from: a file that `train` wrote, or `none`.
-    #[arg(long, value_name = "FILE|none")]
-    pub from: String,
+    /// Masks to learn from: COCO json or a folder of label PNGs.
+    #[arg(long, value_name = "FILE", requires = "images")]
+    pub data: Option<PathBuf>,
+    /// Folder of the photos that the masks name.
+    #[arg(long, value_name = "DIR")]
+    pub images: Option<PathBuf>,
+    /// Regions in which the masks are complete; everywhere when absent. Elsewhere a place without a mask may be a stone.
+    #[arg(long, value_name = "FILE", requires = "data")]
+    pub valid: Option<PathBuf>,
+    /// Weights to start from: `built-in`, a file that `train` wrote, or `none`.
+    #[arg(long, value_name = "WEIGHTS", default_value = "built-in")]
+    pub from: PathBuf,
     /// Folder of the checkpoint, the curves and the trained network (model.safetensors); made if need be.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -168,7 +204,7 @@ pub struct TrainArgs {
     /// How long the training lasts in all, minutes; --minutes when absent, else 30. The learning rate falls towards its end.
     #[arg(long, value_name = "M")]
     pub total_minutes: Option<f64>,
-    /// Parameters (TOML, every key optional); the defaults are in docs/src/method/segmentation.md.
+    /// Parameters (TOML, every key optional).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
 }

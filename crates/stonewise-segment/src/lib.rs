@@ -1,6 +1,9 @@
 //! Finds the stones of masonry in photos: Mask R-CNN (He et al. 2017), its training and its evaluation.
 
+pub mod augment;
 pub mod backend;
+mod built_in;
+pub mod dataset;
 mod detection;
 pub mod evaluation;
 pub mod model;
@@ -12,6 +15,7 @@ pub mod synth;
 pub mod tiling;
 pub mod train;
 
+pub use built_in::{Weights, open_model};
 pub use detection::{Detection, Detector, Patch};
 pub use sample::{Sample, SampleError};
 pub use segmentation::Segmentation;

@@ -1,11 +1,13 @@
 //! Everything that can stop a run.
 
 use crate::report::ReportError;
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::SurveyError;
 use stonewise_core::progress::Interrupted;
 use stonewise_core::registration::AdjustError;
 use stonewise_core::transfer::TransferError;
+use stonewise_segment::tiling::TilingError;
 
 /// Why a run, or a step of it, could not be done.
 #[derive(Debug, thiserror::Error)]
@@ -65,6 +67,9 @@ pub enum Error {
     /// Masks could not be read.
     #[error(transparent)]
     Masks(#[from] stonewise_io::masks::MaskError),
+    /// The network that finds stones could not be read.
+    #[error(transparent)]
+    Weights(#[from] stonewise_segment::model::WeightsError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] stonewise_io::image_io::ImageIoError),
@@ -91,6 +96,15 @@ pub enum Error {
 impl From<Interrupted> for Error {
     fn from(_: Interrupted) -> Self {
         Self::Interrupted
+    }
+}
+
+impl From<TilingError<Infallible>> for Error {
+    fn from(error: TilingError<Infallible>) -> Self {
+        match error {
+            TilingError::Interrupted(_) => Self::Interrupted,
+            TilingError::Detector(never) => match never {},
+        }
     }
 }
 

@@ -12,6 +12,8 @@ use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
 use stonewise_core::registration::{GicpParams, NetworkParams};
 use stonewise_core::transfer::{StoneParams, TransferParams};
+use stonewise_segment::Weights;
+use stonewise_segment::tiling::TilingOptions;
 use toml::Spanned;
 
 /// A checked project: paths exist, values are possible.
@@ -46,12 +48,33 @@ pub struct Epoch {
     pub motion: Option<MotionField>,
 }
 
+/// How stones are found in photos without masks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SegmentParams {
+    /// The network: `built-in`, or a file that `stonewise train` wrote.
+    pub model: PathBuf,
+    /// How photos are cut into tiles.
+    pub tiling: TilingOptions,
+}
+
+impl Default for SegmentParams {
+    fn default() -> Self {
+        Self {
+            model: PathBuf::from("built-in"),
+            tiling: TilingOptions::default(),
+        }
+    }
+}
+
 /// Parameters of all steps, one table each in the project file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// How clouds are cut.
     pub tiles: TileParams,
+    /// Stones in photos without masks.
+    pub segment: SegmentParams,
     /// Photo labels to points.
     pub transfer: TransferParams,
     /// The table of stones.
@@ -129,6 +152,8 @@ struct RawProject {
     #[serde(default)]
     tiles: TileParams,
     #[serde(default)]
+    segment: SegmentParams,
+    #[serde(default)]
     transfer: TransferParams,
     #[serde(default)]
     stones: StoneParams,
@@ -186,6 +211,7 @@ impl Project {
         }
         let settings = Settings {
             tiles: raw.tiles,
+            segment: source.segment(raw.segment)?,
             transfer: raw.transfer,
             stones: raw.stones,
             matching: raw.matching,
@@ -268,6 +294,19 @@ impl Source<'_> {
             masks: raw.masks.map(|m| self.existing(m)).transpose()?,
             motion: raw.motion,
         })
+    }
+
+    /// The network's file, like all paths, is relative to the project file.
+    fn segment(&self, mut params: SegmentParams) -> Result<SegmentParams> {
+        let at = |key: &str| self.text.find(key).unwrap_or(0);
+        if let Weights::File(file) = Weights::named(&params.model) {
+            let start = at("model");
+            params.model = self.existing(Spanned::new(start..start, file))?;
+        }
+        if let Some((key, what)) = params.tiling.impossible() {
+            return Err(self.error(at(key)..at(key), format!("{key} {what}")));
+        }
+        Ok(params)
     }
 
     /// The path relative to the project file, which must exist.

@@ -7,6 +7,7 @@ mod info;
 mod init;
 mod report;
 mod run;
+mod segment;
 mod simulate;
 mod split;
 mod train;
@@ -35,7 +36,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     }
     match args.command {
         Command::Run(args) => run::run(&args, Until::Reported, printer),
-        Command::Segment(args) => run::run(&args, Until::Segmented, printer),
+        Command::Segment(args) => segment::segment(args, printer),
         Command::Train(args) => train::train(&args, printer),
         Command::Label(args) => run::run(&args, Until::Labelled, printer),
         Command::Match(args) => run::run(&args, Until::Matched, printer),

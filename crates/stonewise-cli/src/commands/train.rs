@@ -7,10 +7,12 @@ use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use std::path::Path;
 use stonewise_segment::backend::{Training, device};
+use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
 use stonewise_segment::train::{
-    Rendered, Run, Start, Stop, Total, TrainParams, Trainer, model_path, open_training,
+    Rendered, Run, SampleSource, Start, Stop, Total, TrainParams, Trainer, model_path, open_training,
 };
+use stonewise_segment::{Sample, Weights};
 
 /// Rendered images on which a training is measured.
 const VALIDATION_IMAGES: u64 = 24;
@@ -35,9 +37,10 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
             training: None,
         },
     };
-    let start = match args.from.as_str() {
-        "none" => Start::Nothing(config.model),
-        file => Start::File(file.into()),
+    let start = if args.from == Path::new("none") {
+        Start::Nothing(config.model)
+    } else {
+        Start::Weights(Weights::named(&args.from))
     };
     std::fs::create_dir_all(&args.out).with_context(|| format!("making {}", args.out.display()))?;
     let total = args.total_minutes.map(Total::Minutes);
@@ -51,14 +54,24 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
             elapsed.steps
         ));
     }
-    let training = &trainer.config().training;
-    let source = Rendered {
+    let training = trainer.config().training.clone();
+    let (photos, source): (LabelledPhotos, PhotoCrops);
+    let rendered = Rendered {
         seed: training.seed,
         size_px: training.crop_px,
     };
-    let validation = source.validation(VALIDATION_IMAGES);
+    let (source, validation): (&dyn SampleSource, Vec<Sample>) = match (&args.data, &args.images) {
+        (Some(masks), Some(images)) => {
+            photos = LabelledPhotos::open(images, masks, args.valid.as_deref())?;
+            tell(&photos, printer);
+            source = PhotoCrops::new(&photos, training.augment.clone(), training.crop_px, training.seed);
+            let validation = source.validation()?;
+            (&source, validation)
+        }
+        _ => (&rendered, rendered.validation(VALIDATION_IMAGES)),
+    };
     let run = Run {
-        source: &source,
+        source,
         validation: &validation,
         out: &args.out,
         minutes: args.minutes,
@@ -79,6 +92,16 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
         Stop::Interrupted => bail!("interrupted; run the same command again to continue"),
     }
     Ok(Outcome::Done)
+}
+
+fn tell(photos: &LabelledPhotos, printer: &Printer) {
+    printer.log(&format!("{} photos with masks", photos.photos().len()));
+    if !photos.unlabelled().is_empty() {
+        printer.log(&format!(
+            "note: {} photos have no masks and are left out",
+            photos.unlabelled().len()
+        ));
+    }
 }
 
 fn read_config(path: &Path) -> Result<Config> {

@@ -17,28 +17,29 @@ pub struct CocoPhoto<'a> {
     pub instances: &'a [InstanceInfo],
 }
 
-/// Writes a COCO instances file with one category, `stone`.
+/// A COCO instances file with one category, `stone`, that grows photo by photo.
 ///
 /// Polygons run along pixel edges, so the file reads back to the same pixels; a mask with a hole, which COCO's polygons
 /// cannot hold, is written as compressed runs.
-///
-/// # Errors
-/// The file cannot be written.
-pub fn write_coco(path: &Path, photos: &[CocoPhoto<'_>]) -> Result<(), MaskError> {
-    let mut images = Vec::new();
-    let mut annotations = Vec::new();
-    for (index, photo) in photos.iter().enumerate() {
-        let image_id = index + 1;
-        images.push(json!({
+#[derive(Clone, Debug, Default)]
+pub struct CocoFile {
+    images: Vec<Value>,
+    annotations: Vec<Value>,
+}
+
+impl CocoFile {
+    /// Adds a photo; only the outlines of its masks stay in memory.
+    pub fn add(&mut self, photo: &CocoPhoto<'_>) {
+        let image_id = self.images.len() + 1;
+        self.images.push(json!({
             "id": image_id,
             "file_name": photo.file_name,
             "width": photo.labels.width(),
             "height": photo.labels.height(),
         }));
         for (label, rings) in label_outlines(photo.labels) {
-            let id = annotations.len() + 1;
             let mut annotation = annotation(photo.labels, label, &rings);
-            annotation["id"] = json!(id);
+            annotation["id"] = json!(self.annotations.len() + 1);
             annotation["image_id"] = json!(image_id);
             if let Some(info) = photo.instances.iter().find(|info| info.id == label) {
                 annotation["score"] = json!(info.score);
@@ -46,20 +47,37 @@ pub fn write_coco(path: &Path, photos: &[CocoPhoto<'_>]) -> Result<(), MaskError
                     annotation["stone_id"] = json!(stone);
                 }
             }
-            annotations.push(annotation);
+            self.annotations.push(annotation);
         }
     }
-    let file = json!({
-        "images": images,
-        "annotations": annotations,
-        "categories": [{ "id": 1, "name": "stone" }],
-    });
-    write_atomically(path, |partial| std::fs::write(partial, file.to_string())).map_err(|source| {
-        MaskError::Write {
-            path: path.to_owned(),
-            source,
-        }
-    })
+
+    /// Writes the file.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), MaskError> {
+        let file = json!({
+            "images": self.images,
+            "annotations": self.annotations,
+            "categories": [{ "id": 1, "name": "stone" }],
+        });
+        write_atomically(path, |partial| std::fs::write(partial, file.to_string())).map_err(|source| {
+            MaskError::Write {
+                path: path.to_owned(),
+                source,
+            }
+        })
+    }
+}
+
+/// Writes the masks of these photos as a [`CocoFile`].
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_coco(path: &Path, photos: &[CocoPhoto<'_>]) -> Result<(), MaskError> {
+    let mut file = CocoFile::default();
+    photos.iter().for_each(|photo| file.add(photo));
+    file.write(path)
 }
 
 fn annotation(labels: &LabelImage, label: u32, rings: &[Ring]) -> Value {

@@ -7,7 +7,7 @@ mod label_png;
 mod valid_regions;
 
 pub use coco::CocoMasks;
-pub use coco_write::{CocoPhoto, write_coco};
+pub use coco_write::{CocoFile, CocoPhoto, write_coco};
 pub use error::MaskError;
 pub use label_png::{LabelFolder, read_label_png, write_label_png};
 pub use valid_regions::ValidRegions;

@@ -12,6 +12,7 @@ mod pyramid;
 mod segment;
 
 pub use options::TilingOptions;
+pub(crate) use pyramid::at_scale;
 pub use segment::{TilingError, segment_photo};
 
 #[cfg(test)]

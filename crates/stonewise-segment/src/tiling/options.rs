@@ -54,19 +54,34 @@ impl TilingOptions {
         self.scales.iter().map(count).sum()
     }
 
-    /// The first value that cannot be, and what it must be.
-    pub fn impossible(&self) -> Option<&'static str> {
-        if self.tile_px < 64 {
-            Some("tile_px must be at least 64")
-        } else if 2 * self.overlap_px > self.tile_px {
-            Some("overlap_px must be at most half of tile_px")
-        } else if self.scales.is_empty() || !self.scales.iter().all(|s| (0.01..=4.0).contains(s)) {
-            Some("scales must be one or more numbers from 0.01 to 4")
-        } else if !(0.0..=1.0).contains(&self.min_score) || !(0.0..=1.0).contains(&self.min_new_share) {
-            Some("min_score and min_new_share are shares, 0 to 1")
-        } else {
-            None
-        }
+    /// The first key whose value cannot be, and what it must be.
+    pub fn impossible(&self) -> Option<(&'static str, &'static str)> {
+        let is_share = |v: f64| (0.0..=1.0).contains(&v);
+        let checks = [
+            (self.tile_px >= 64, "tile_px", "must be at least 64"),
+            (
+                2 * self.overlap_px <= self.tile_px,
+                "overlap_px",
+                "must be at most half of tile_px",
+            ),
+            (
+                !self.scales.is_empty() && self.scales.iter().all(|s| (0.01..=4.0).contains(s)),
+                "scales",
+                "must be one or more numbers from 0.01 to 4",
+            ),
+            (
+                is_share(f64::from(self.min_score)),
+                "min_score",
+                "is a share, 0 to 1",
+            ),
+            (
+                is_share(self.min_new_share),
+                "min_new_share",
+                "is a share, 0 to 1",
+            ),
+        ];
+        let wrong = checks.into_iter().find(|check| !check.0);
+        wrong.map(|(_, key, what)| (key, what))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::optimizer::AdamWParams;
 use super::schedule::{Schedule, Total};
+use crate::augment::AugmentParams;
 use crate::model::MaskRcnnConfig;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +33,8 @@ pub struct TrainParams {
     pub schedule: Schedule,
     /// The optimiser.
     pub optimizer: AdamWParams,
+    /// How images cut from labelled photos vary; rendered photos vary by themselves.
+    pub augment: AugmentParams,
     /// Minutes between checkpoints.
     pub checkpoint_minutes: f64,
     /// Steps between evaluations; 0 for none.
@@ -47,6 +50,7 @@ impl Default for TrainParams {
             accumulate: 4,
             schedule: Schedule::default(),
             optimizer: AdamWParams::default(),
+            augment: AugmentParams::default(),
             checkpoint_minutes: 5.0,
             evaluate_steps: 500,
         }

@@ -5,17 +5,18 @@ use super::error::TrainError;
 use super::params::{TrainConfig, TrainParams};
 use super::schedule::Total;
 use super::trainer::Trainer;
-use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend, load_model};
+use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend};
+use crate::{Weights, open_model};
 use burn::tensor::Device;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// What a training starts from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// Random weights of a network that looks like this.
     Nothing(MaskRcnnConfig),
-    /// The weights of a file.
-    File(PathBuf),
+    /// A network that has learnt before.
+    Weights(Weights),
 }
 
 /// How long a training lasts that does not say it, minutes: enough to learn a wall from a few labelled photos on two CPU cores.
@@ -58,7 +59,7 @@ pub fn open_training<B: TrainBackend>(
     }
     let model = match start {
         Start::Nothing(config) => MaskRcnn::init(config, training.seed, device)?,
-        Start::File(path) => load_model(path, device)?,
+        Start::Weights(weights) => open_model(weights, device)?,
     };
     let config = TrainConfig {
         model: model.config().clone(),

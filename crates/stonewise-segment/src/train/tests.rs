@@ -19,6 +19,7 @@ fn config() -> MaskRcnnConfig {
             ..light.backbone
         },
         fpn_channels: 8,
+        head_groups: Some(4),
         roi: RoiConfig {
             box_hidden: 16,
             mask_channels: vec![8],

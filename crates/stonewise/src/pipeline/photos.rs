@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
+use crate::pipeline::network::find_stones;
 use crate::pipeline::step::{Key, StepDir};
 use crate::project::Epoch;
 use crate::warnings::Warnings;
@@ -16,7 +17,9 @@ use stonewise_core::raster::LabelImage;
 use stonewise_io::cameras::{find_photos, read_cameras};
 use stonewise_io::masks::{InstanceInfo, MaskSource, read_label_png, write_label_png};
 
-const STEP: &str = "segment";
+pub(super) const STEP: &str = "segment";
+/// List of the photos that can vote, in the step's folder.
+pub(super) const PHOTOS: &str = "photos.json";
 
 /// A photo that can vote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,28 +60,26 @@ impl Segmented {
     }
 }
 
-/// Brings the masks of every photo of an epoch into one label image each.
+/// Brings the stones of every photo of an epoch into one label image each: from masks, where the epoch has them, else from the network.
 pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     let epoch = &context.project.epochs[number - 1];
-    let Some(masks) = &epoch.masks else {
-        return Err(Error::Survey(format!(
-            "epoch {:?} has no masks, and this version has no built-in model: add `masks = ...` (COCO json or a \
-             folder of 16-bit label PNGs) to the epoch in {}",
-            epoch.name,
-            context.project.path.display()
-        )));
+    let name = format!("{STEP}-{number}");
+    let step = match &epoch.masks {
+        None => find_stones(context, epoch, &name)?,
+        Some(masks) => {
+            let digests = [
+                context.digest(&epoch.cameras)?,
+                context.digest(masks)?,
+                listing(&epoch.images)?,
+            ];
+            let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
+            context.step(&name, key, |step, warnings| {
+                let photos = write_labels(context, epoch, masks, step, warnings)?;
+                write_json(&step.file(PHOTOS), &photos)
+            })?
+        }
     };
-    let digests = [
-        context.digest(&epoch.cameras)?,
-        context.digest(masks)?,
-        listing(&epoch.images)?,
-    ];
-    let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
-    let step = context.step(&format!("{STEP}-{number}"), key, |step, warnings| {
-        let photos = write_labels(context, epoch, masks, step, warnings)?;
-        write_json(&step.file("photos.json"), &photos)
-    })?;
-    let photos: Vec<VotingPhoto> = read_json(&step.file("photos.json"))?;
+    let photos: Vec<VotingPhoto> = read_json(&step.file(PHOTOS))?;
     let cameras = read_cameras(&epoch.cameras)?;
     let views = photos.iter().enumerate().filter_map(|(i, photo)| {
         let view = cameras.views.iter().find(|v| v.name == photo.camera)?;
@@ -138,24 +139,29 @@ fn write_labels(
             instances,
         });
     }
-    if photos.is_empty() {
-        let reasons: Vec<String> = warnings
-            .sorted()
-            .iter()
-            .map(|w| format!("{}: {}", w.subject, w.message))
-            .collect();
-        let message = format!(
-            "no photo of epoch {:?} can be used:\n  {}",
-            epoch.name,
-            reasons.join("\n  ")
-        );
-        return Err(Error::Survey(message));
-    }
+    check_any(&photos, epoch, warnings)?;
     Ok(photos)
 }
 
+/// An epoch of which no photo can be used cannot be measured.
+pub(super) fn check_any(photos: &[VotingPhoto], epoch: &Epoch, warnings: &Warnings) -> Result<()> {
+    if !photos.is_empty() {
+        return Ok(());
+    }
+    let reasons: Vec<String> = warnings
+        .sorted()
+        .iter()
+        .map(|w| format!("{}: {}", w.subject, w.message))
+        .collect();
+    Err(Error::Survey(format!(
+        "no photo of epoch {:?} can be used:\n  {}",
+        epoch.name,
+        reasons.join("\n  ")
+    )))
+}
+
 /// Views with their photos; whatever cannot be used is named.
-fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, PathBuf)>> {
+pub(super) fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, PathBuf)>> {
     let cameras = read_cameras(&epoch.cameras)?;
     let file = epoch.cameras.to_string_lossy();
     cameras
@@ -198,7 +204,7 @@ fn reason_without_camera(photo: &Path, skipped: &[(String, String)]) -> String {
     })
 }
 
-fn label_path(step: &StepDir, image: usize) -> PathBuf {
+pub(super) fn label_path(step: &StepDir, image: usize) -> PathBuf {
     step.file(format!("{image:05}.png"))
 }
 

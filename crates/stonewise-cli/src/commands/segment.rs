@@ -1,0 +1,102 @@
+//! `segment`.
+
+use crate::args::{ProjectArgs, SegmentArgs};
+use crate::commands::{Outcome, run};
+use crate::printer::Printer;
+use anyhow::{Result, bail};
+use std::io::Write;
+use stonewise::Until;
+use stonewise::segmentation::{FolderJob, MaskEvaluation, segment_folder};
+use stonewise_segment::Weights;
+use stonewise_segment::dataset::Reference;
+use stonewise_segment::evaluation::MaskScore;
+use stonewise_segment::tiling::TilingOptions;
+
+/// Segments photos, or the photos of a project.
+pub fn segment(args: SegmentArgs, printer: &Printer) -> Result<Outcome> {
+    if args
+        .input
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    {
+        let project = ProjectArgs {
+            project: args.input,
+            out: args.out,
+        };
+        return run::run(&project, Until::Segmented, printer);
+    }
+    let mut tiling = TilingOptions::default();
+    tiling.scales = args.scales.unwrap_or(tiling.scales);
+    tiling.min_score = args.min_score.unwrap_or(tiling.min_score);
+    if let Some((key, what)) = tiling.impossible() {
+        bail!("{key} {what}");
+    }
+    let reference = match &args.reference {
+        Some(masks) => Some(Reference::open(masks, args.valid.as_deref())?),
+        None => None,
+    };
+    let summary = segment_folder(
+        &FolderJob {
+            photos: &args.input,
+            out: &args.out,
+            weights: &Weights::named(&args.model),
+            tiling: &tiling,
+            reference: reference.as_ref(),
+        },
+        printer,
+    )?;
+    printer.finish();
+    for warning in &summary.warnings {
+        printer.log(&format!("skipped: {}: {}", warning.subject, warning.message));
+    }
+    printer.log(&format!(
+        "{} stones in {} photos; look at {}",
+        summary.stones,
+        summary.photos,
+        args.out.join("overlays").display()
+    ));
+    if let Some(evaluation) = &summary.evaluation {
+        write!(std::io::stdout(), "{}", table(evaluation))?;
+    }
+    Ok(if summary.warnings.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::SkippedInputs
+    })
+}
+
+/// Figures as a table, a photo a row.
+fn table(evaluation: &MaskEvaluation) -> String {
+    let width = evaluation
+        .photos
+        .iter()
+        .map(|p| p.photo.len())
+        .max()
+        .unwrap_or(0)
+        .max(5);
+    let mut text = format!(
+        "{:width$}  found  reference  right  precision  recall     F1   mIoU   AP50     AP\n",
+        "photo"
+    );
+    let rows = evaluation.photos.iter().map(|p| (p.photo.as_str(), &p.score));
+    for (name, score) in rows.chain([("total", &evaluation.total)]) {
+        text += &row(name, score, width);
+    }
+    text
+}
+
+fn row(name: &str, score: &MaskScore, width: usize) -> String {
+    let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    format!(
+        "{name:width$}  {:5}  {:9}  {:5}  {:>9}  {:>6}  {:>5}  {:>5}  {:>5}  {:>5}\n",
+        score.found,
+        score.references,
+        score.right,
+        share(score.precision),
+        share(score.recall),
+        share(score.f1),
+        share(score.mean_iou),
+        share(score.ap50),
+        share(score.ap)
+    )
+}

@@ -1,0 +1,58 @@
+//! The network that comes with the program.
+
+use crate::model::{MaskRcnn, ModelBackend, WeightsError, load_model, model_from_bytes};
+use burn::tensor::Device;
+use std::path::{Path, PathBuf};
+
+/// Weights trained on rendered photos, see docs/src/method/segmentation.md; `None` in a build that comes without.
+const BUILT_IN: Option<&[u8]> = None;
+/// What the built-in network is called where a file could be given.
+const NAME: &str = "built-in";
+
+/// Which network finds the stones.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// The one that comes with the program.
+    BuiltIn,
+    /// One of a file that `train` wrote.
+    File(PathBuf),
+}
+
+impl Weights {
+    /// The network of this name: `built-in`, or a file.
+    pub fn named(name: &Path) -> Self {
+        if name == Path::new(NAME) {
+            Self::BuiltIn
+        } else {
+            Self::File(name.to_owned())
+        }
+    }
+
+    /// All bytes of the network.
+    ///
+    /// # Errors
+    /// The file cannot be read, or this build comes without a network.
+    pub fn bytes(&self) -> Result<Vec<u8>, WeightsError> {
+        match self {
+            Self::BuiltIn => Ok(BUILT_IN.ok_or(WeightsError::NoBuiltIn)?.to_vec()),
+            Self::File(path) => std::fs::read(path).map_err(|source| WeightsError::File {
+                path: path.clone(),
+                source,
+            }),
+        }
+    }
+}
+
+/// The network, ready to run.
+///
+/// # Errors
+/// The file cannot be read or does not fit, or this build comes without a network.
+pub fn open_model<B: ModelBackend>(
+    weights: &Weights,
+    device: &Device<B>,
+) -> Result<MaskRcnn<B>, WeightsError> {
+    match weights {
+        Weights::BuiltIn => model_from_bytes(BUILT_IN.ok_or(WeightsError::NoBuiltIn)?, NAME, device),
+        Weights::File(path) => load_model(path, device),
+    }
+}

@@ -1,0 +1,144 @@
+//! Photos of a folder and the masks of a COCO file.
+
+use crate::{Sample, SampleError};
+use std::path::{Path, PathBuf};
+use stonewise_core::raster::{LabelImage, Raster};
+use stonewise_io::image_io::{ImageIoError, image_size, photos_in, read_rgb};
+use stonewise_io::masks::{MaskError, MaskSource, ValidRegions};
+
+/// Masks of photos, and where they are complete.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    masks: MaskSource,
+    valid: Option<ValidRegions>,
+}
+
+/// Photos whose stones have masks. They stay on disk until they are asked for.
+#[derive(Clone, Debug)]
+pub struct LabelledPhotos {
+    photos: Vec<PathBuf>,
+    unlabelled: Vec<PathBuf>,
+    reference: Reference,
+}
+
+/// Why labelled photos cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DatasetError {
+    /// A photo cannot be read.
+    #[error(transparent)]
+    Image(#[from] ImageIoError),
+    /// The masks cannot be read.
+    #[error(transparent)]
+    Masks(#[from] MaskError),
+    /// No photo of the folder has masks.
+    #[error("none of the {photos} photos in {} has masks in {}: the file names must be the same", folder.display(), masks.display())]
+    NoneLabelled {
+        /// Number of photos in the folder.
+        photos: usize,
+        /// The folder.
+        folder: PathBuf,
+        /// The masks.
+        masks: PathBuf,
+    },
+    /// Masks and photo do not fit.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+}
+
+impl Reference {
+    /// Opens masks (COCO json or a folder of label PNGs) and, where they are not complete everywhere, a file of valid regions.
+    ///
+    /// # Errors
+    /// A file cannot be read.
+    pub fn open(masks: &Path, valid: Option<&Path>) -> Result<Self, MaskError> {
+        Ok(Self {
+            masks: MaskSource::open(masks)?,
+            valid: valid.map(ValidRegions::open).transpose()?,
+        })
+    }
+
+    /// The stones of a photo of this size, and true where they are not complete; `None` for a photo without masks.
+    ///
+    /// A photo that the file of valid regions does not name is complete nowhere.
+    ///
+    /// # Errors
+    /// The masks are broken or made for another size.
+    pub fn of_photo(
+        &self,
+        photo: &Path,
+        width: u32,
+        height: u32,
+    ) -> Result<Option<(LabelImage, Raster<bool>)>, MaskError> {
+        let name = photo.to_string_lossy();
+        let Some(labelled) = self.masks.labels_for(&name, width, height)? else {
+            return Ok(None);
+        };
+        let ignore = match &self.valid {
+            None => Raster::filled(width, height, false),
+            Some(valid) => valid
+                .outside(&name, width, height)?
+                .unwrap_or_else(|| Raster::filled(width, height, true)),
+        };
+        Ok(Some((labelled.labels, ignore)))
+    }
+}
+
+impl LabelledPhotos {
+    /// Finds the photos below a folder that have masks. `valid`: where the masks are complete; everywhere if absent.
+    ///
+    /// # Errors
+    /// The folder or a file cannot be read, or no photo has masks.
+    pub fn open(folder: &Path, masks: &Path, valid: Option<&Path>) -> Result<Self, DatasetError> {
+        let reference = Reference::open(masks, valid)?;
+        let all = photos_in(folder)?;
+        let count = all.len();
+        let (mut photos, mut unlabelled) = (Vec::new(), Vec::new());
+        for photo in all {
+            let (width, height) = image_size(&photo)?;
+            match reference.of_photo(&photo, width, height)? {
+                Some(_) => photos.push(photo),
+                None => unlabelled.push(photo),
+            }
+        }
+        if photos.is_empty() {
+            return Err(DatasetError::NoneLabelled {
+                photos: count,
+                folder: folder.to_owned(),
+                masks: masks.to_owned(),
+            });
+        }
+        Ok(Self {
+            photos,
+            unlabelled,
+            reference,
+        })
+    }
+
+    /// The photos that have masks.
+    pub fn photos(&self) -> &[PathBuf] {
+        &self.photos
+    }
+
+    /// Photos of the folder without masks; they are left out.
+    pub fn unlabelled(&self) -> &[PathBuf] {
+        &self.unlabelled
+    }
+
+    /// A photo with its stones, see [`Reference::of_photo`].
+    ///
+    /// # Errors
+    /// The photo or its masks cannot be read.
+    pub fn read(&self, photo: &Path) -> Result<Sample, DatasetError> {
+        let image = read_rgb(photo)?;
+        let (width, height) = (image.width(), image.height());
+        let known = self.reference.of_photo(photo, width, height)?;
+        let (labels, ignore) = known.unwrap_or_else(|| {
+            (
+                Raster::filled(width, height, 0),
+                Raster::filled(width, height, true),
+            )
+        });
+        Ok(Sample::new(image, labels, ignore)?)
+    }
+}

@@ -1,0 +1,227 @@
+//! The stones of all photos of a folder, as files for people and labelling tools.
+
+use super::overlay::outlined;
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json, write_readable_json};
+use crate::pipeline::step::{Key, StepDir, path_digest};
+use crate::warnings::{Warning, Warnings};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use stonewise_core::progress::Progress;
+use stonewise_io::image_io::{image_size, photos_in, read_rgb, write_jpeg};
+use stonewise_io::masks::{CocoFile, CocoPhoto, InstanceInfo, read_label_png, write_label_png};
+use stonewise_segment::backend::{Compute, device};
+use stonewise_segment::dataset::Reference;
+use stonewise_segment::evaluation::{MaskScore, PhotoPairs, pair_masks};
+use stonewise_segment::model::StoneDetector;
+use stonewise_segment::tiling::{TilingOptions, segment_photo};
+use stonewise_segment::{Segmentation, Weights, open_model};
+
+const STEP: &str = "segment";
+/// Quality of the overlays.
+const JPEG_QUALITY: u8 = 85;
+
+/// Photos whose stones are wanted.
+#[derive(Clone, Copy, Debug)]
+pub struct FolderJob<'a> {
+    /// A folder of photos, or one photo.
+    pub photos: &'a Path,
+    /// Where results go; made if need be.
+    pub out: &'a Path,
+    /// The network.
+    pub weights: &'a Weights,
+    /// How photos are cut into tiles.
+    pub tiling: &'a TilingOptions,
+    /// Masks to measure the result on.
+    pub reference: Option<&'a Reference>,
+}
+
+/// What came out.
+#[derive(Clone, Debug)]
+pub struct FolderSummary {
+    /// Photos done.
+    pub photos: usize,
+    /// Stones in them.
+    pub stones: usize,
+    /// Photos that were left out, and why.
+    pub warnings: Vec<Warning>,
+    /// Figures, where there is a reference.
+    pub evaluation: Option<MaskEvaluation>,
+}
+
+/// Figures of photos against a reference.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaskEvaluation {
+    /// Each photo that the reference knows.
+    pub photos: Vec<PhotoScore>,
+    /// All of them together.
+    pub total: MaskScore,
+}
+
+/// Figures of one photo.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PhotoScore {
+    /// Its name in the folder.
+    pub photo: String,
+    /// The figures.
+    #[serde(flatten)]
+    pub score: MaskScore,
+}
+
+/// What is kept of a photo that is done, besides its label image.
+#[derive(Serialize, Deserialize)]
+struct Done {
+    digest: String,
+    scores: BTreeMap<u32, f32>,
+}
+
+/// Finds the stones of all photos of a folder and writes, in `out`:
+///
+/// - `labels/NAME.png`: stone of every pixel, 16 bits,
+/// - `overlays/NAME.jpg`: the photo with the outlines of its stones,
+/// - `masks.json`: all masks as a COCO instances file,
+/// - `evaluation.json`: figures, where there is a reference.
+///
+/// Masks belong to the pixels as the photo stores them. Photos that an interrupted call finished are taken over if photo, network
+/// and parameters are the same.
+///
+/// # Errors
+/// There is no photo, the network cannot be read, a file cannot be written, or the caller stopped it. A photo that cannot be read is a
+/// warning.
+pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<FolderSummary> {
+    let (root, photos) = photos_of(job.photos)?;
+    let network = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
+    let key = Key::new(STEP, job.tiling, &[&network]);
+    let step = StepDir::open(&job.out.join("work"), STEP, key)?;
+    let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?);
+    let warnings = Warnings::default();
+    let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
+    progress.begin("stones", photos.iter().map(tiles).sum());
+    let mut masks = CocoFile::default();
+    let (mut count, mut stones) = (0, 0);
+    let mut scores: Vec<(String, PhotoPairs)> = Vec::new();
+    for photo in &photos {
+        progress.check()?;
+        let name = photo.strip_prefix(&root).unwrap_or(photo);
+        let segmented = match taken_over(job, &step, photo, name)? {
+            Some(segmented) => {
+                progress.advance(tiles(photo));
+                segmented
+            }
+            None => {
+                let image = match read_rgb(photo) {
+                    Ok(image) => image,
+                    Err(error) => {
+                        warnings.skipped(STEP, photo.to_string_lossy(), error.to_string());
+                        continue;
+                    }
+                };
+                let segmented = segment_photo(&detector, &image, job.tiling, progress)?;
+                let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
+                write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
+                write_label_png(&label_path(job, name)?, &segmented.labels)?;
+                let done = Done {
+                    digest: path_digest(photo)?,
+                    scores: segmented.scores.clone(),
+                };
+                write_json(&file_in(step.path(), name, "json")?, &done)?;
+                segmented
+            }
+        };
+        count += 1;
+        stones += segmented.scores.len();
+        let name = name.to_string_lossy();
+        add_masks(&mut masks, &name, &segmented);
+        let (width, height) = (segmented.labels.width(), segmented.labels.height());
+        let known = match job.reference {
+            Some(reference) => reference.of_photo(photo, width, height)?,
+            None => None,
+        };
+        if let Some((reference, ignore)) = known {
+            scores.push((name.into_owned(), pair_masks(&segmented, &reference, &ignore)));
+        }
+    }
+    masks.write(&job.out.join("masks.json"))?;
+    let evaluation = job.reference.map(|_| evaluation(&scores));
+    if let Some(evaluation) = &evaluation {
+        write_readable_json(&job.out.join("evaluation.json"), evaluation)?;
+    }
+    Ok(FolderSummary {
+        photos: count,
+        stones,
+        warnings: warnings.sorted(),
+        evaluation,
+    })
+}
+
+/// The folder that names are relative to, and the photos.
+fn photos_of(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
+    if path.is_file() {
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        return Ok((folder, vec![path.to_path_buf()]));
+    }
+    let photos = photos_in(path)?;
+    if photos.is_empty() {
+        return Err(Error::Input {
+            path: path.to_path_buf(),
+            message: "no photo (JPEG or PNG) in this folder".to_owned(),
+        });
+    }
+    Ok((path.to_path_buf(), photos))
+}
+
+/// The result of an earlier call for the same photo.
+fn taken_over(job: &FolderJob, step: &StepDir, photo: &Path, name: &Path) -> Result<Option<Segmentation>> {
+    let (stamp, labels) = (file_in(step.path(), name, "json")?, label_path(job, name)?);
+    if !stamp.exists() || !labels.exists() {
+        return Ok(None);
+    }
+    let done: Done = read_json(&stamp)?;
+    if done.digest != path_digest(photo)? {
+        return Ok(None);
+    }
+    Ok(Some(Segmentation {
+        labels: read_label_png(&labels)?,
+        scores: done.scores,
+    }))
+}
+
+fn label_path(job: &FolderJob, name: &Path) -> Result<PathBuf> {
+    file_in(&job.out.join("labels"), name, "png")
+}
+
+/// A file named after a photo; makes the folders on the way.
+fn file_in(folder: &Path, name: &Path, extension: &str) -> Result<PathBuf> {
+    let path = folder.join(name).with_extension(extension);
+    let parent = path.parent().unwrap_or(folder);
+    fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
+    Ok(path)
+}
+
+fn add_masks(masks: &mut CocoFile, name: &str, segmented: &Segmentation) {
+    let info = |(&id, &score): (&u32, &f32)| InstanceInfo {
+        id,
+        score: f64::from(score),
+        stone_ref: None,
+    };
+    let instances: Vec<InstanceInfo> = segmented.scores.iter().map(info).collect();
+    masks.add(&CocoPhoto {
+        file_name: name,
+        labels: &segmented.labels,
+        instances: &instances,
+    });
+}
+
+fn evaluation(scores: &[(String, PhotoPairs)]) -> MaskEvaluation {
+    let photo = |(name, pairs): &(String, PhotoPairs)| PhotoScore {
+        photo: name.clone(),
+        score: MaskScore::of(std::slice::from_ref(pairs)),
+    };
+    let all: Vec<PhotoPairs> = scores.iter().map(|(_, pairs)| pairs.clone()).collect();
+    MaskEvaluation {
+        photos: scores.iter().map(photo).collect(),
+        total: MaskScore::of(&all),
+    }
+}
