@@ -1,8 +1,9 @@
 //! One stone from many candidates.
 
 use super::candidate::Candidate;
-use super::grid::Rect;
+use super::choice::choose;
 use super::options::TilingOptions;
+use super::overlap::{common_pixels, extent, intersection, pixels_in};
 use crate::{Patch, Segmentation};
 use std::collections::BTreeMap;
 use stonewise_core::raster::{LabelImage, Raster, connected_components};
@@ -10,18 +11,14 @@ use stonewise_core::raster::{LabelImage, Raster, connected_components};
 /// Two cut masks of neighbouring tiles are one stone if, where both tiles see, this share of the smaller lies in the larger.
 const SAME_STONE_SHARE: f64 = 0.5;
 
-/// Lays candidates on a photo from best to worst.
+/// Chooses among candidates and lays them on a photo from best to worst.
 ///
 /// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone, and come after all whole
 /// ones: only stones larger than the overlap at every scale are made of them. Of the rest the higher score wins, then the finer scale.
 pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &TilingOptions) -> Segmentation {
-    let (cut, mut all): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
-    all.extend(joined(cut));
-    all.sort_by(|a, b| {
-        (a.is_cut.cmp(&b.is_cut))
-            .then(b.score.total_cmp(&a.score))
-            .then((a.scale, a.mask.top, a.mask.left, a.area).cmp(&(b.scale, b.mask.top, b.mask.left, b.area)))
-    });
+    let (cut, whole): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
+    let mut all = choose(best_first(whole));
+    all.extend(choose(best_first(joined(cut))));
     let mut painted: LabelImage = Raster::filled(width, height, 0);
     let mut scores = Vec::new();
     for candidate in &all {
@@ -41,6 +38,13 @@ pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &Tili
         }
     }
     without_fragments(&painted, &scores, options.min_area_px)
+}
+
+/// Candidates in descending order of score, the finer scale first among equals.
+fn best_first(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    let place = |c: &Candidate| (c.scale, c.mask.top, c.mask.left, c.area);
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score).then(place(a).cmp(&place(b))));
+    candidates
 }
 
 /// The largest part of every stone, numbered by its first pixel in row order.
@@ -109,14 +113,12 @@ fn is_same_stone(a: &Candidate, b: &Candidate) -> bool {
     let Some(zone) = intersection(&a.tile, &b.tile) else {
         return false;
     };
-    let [in_a, in_b] = [a, b].map(|c| intersection(&zone, &extent(&c.mask)));
-    let (Some(in_a), Some(in_b)) = (in_a, in_b) else {
+    let parts = [a, b].map(|c| intersection(&zone, &extent(&c.mask)));
+    let [Some(in_a), Some(in_b)] = parts else {
         return false;
     };
-    let smaller = count(&in_a, |x, y| is_set(&a.mask, x, y)).min(count(&in_b, |x, y| is_set(&b.mask, x, y)));
-    let both = intersection(&in_a, &in_b).map_or(0, |part| {
-        count(&part, |x, y| is_set(&a.mask, x, y) && is_set(&b.mask, x, y))
-    });
+    let smaller = pixels_in(&a.mask, &in_a).min(pixels_in(&b.mask, &in_b));
+    let both = common_pixels(&a.mask, &b.mask);
     both > 0 && f64::from(both) >= SAME_STONE_SHARE * f64::from(smaller)
 }
 
@@ -141,40 +143,6 @@ fn union(members: &[&Candidate]) -> Candidate {
         all.score = all.score.max(member.score);
     }
     all
-}
-
-fn extent(mask: &Patch) -> Rect {
-    Rect {
-        left: mask.left,
-        top: mask.top,
-        width: mask.pixels.width(),
-        height: mask.pixels.height(),
-    }
-}
-
-fn intersection(a: &Rect, b: &Rect) -> Option<Rect> {
-    let (left, top) = (a.left.max(b.left), a.top.max(b.top));
-    let right = (a.left + a.width).min(b.left + b.width);
-    let bottom = (a.top + a.height).min(b.top + b.height);
-    (left < right && top < bottom).then(|| Rect {
-        left,
-        top,
-        width: right - left,
-        height: bottom - top,
-    })
-}
-
-/// Number of pixels of a rectangle for which something holds.
-fn count(part: &Rect, holds: impl Fn(u32, u32) -> bool) -> u32 {
-    let columns = part.left..part.left + part.width;
-    (part.top..part.top + part.height)
-        .map(|y| columns.clone().filter(|&x| holds(x, y)).count() as u32)
-        .sum()
-}
-
-/// Whether a pixel of the photo, which lies in the mask's extent, is set.
-fn is_set(mask: &Patch, x: u32, y: u32) -> bool {
-    mask.pixels.get(x - mask.left, y - mask.top) == Some(&true)
 }
 
 fn for_each_pixel(mask: &Patch, mut act: impl FnMut(u32, u32)) {
