@@ -122,7 +122,7 @@ pub struct StepDir {
 
 impl StepDir {
     /// Opens the folder of a step, emptied first if it was made under another key.
-    fn open(path: PathBuf, key: Key) -> Result<Self> {
+    pub fn open(path: PathBuf, key: Key) -> Result<Self> {
         let stamp = path.join("step.json");
         if fs::read_to_string(&stamp).ok().as_deref() != Some(key.as_str()) {
             if path.exists() {
@@ -169,7 +169,7 @@ fn file_digest(path: &Path) -> Result<String> {
 }
 
 /// Digest of a file, or of all files of a folder and below with their names.
-fn path_digest(path: &Path) -> Result<String> {
+pub fn path_digest(path: &Path) -> Result<String> {
     if !path.is_dir() {
         return file_digest(path);
     }

@@ -94,7 +94,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let (root, photos) = photos_of(job.photos)?;
     let network = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
     let key = Key::new(STEP, job.tiling, &[&network]);
-    let step = StepDir::open(&job.out.join("work"), STEP, key)?;
+    let step = StepDir::open(job.out.join("work").join(STEP), key)?;
     let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?);
     let warnings = Warnings::default();
     let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
