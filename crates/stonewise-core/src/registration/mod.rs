@@ -4,6 +4,7 @@
 //! stone by itself, with its surroundings.
 
 mod band;
+mod border;
 mod correlation;
 mod equations;
 mod excerpt;
@@ -21,6 +22,7 @@ mod sparse;
 mod survey;
 mod track;
 
+pub use border::inner_points;
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use hyper::VarianceComponents;
 pub use network::{AdjustError, adjust};

@@ -47,9 +47,13 @@ pub(super) fn report(
     let mut breaks = Vec::new();
     if let Some(field) = &field {
         let shared = network.shared_variances(params);
-        let loose = loose_stones(network, &terms, field, params);
+        let p_values = own_motion_tests(network, &terms, field, params);
+        let loose = loose_stones(network, &p_values, params);
         results = (0..terms.tight.len())
-            .map(|i| result(network, i, &terms, field, loose[i], &shared, params))
+            .map(|i| {
+                let tested = (p_values[i].unwrap_or(1.0), loose[i]);
+                result(network, i, &terms, field, tested, &shared, params)
+            })
             .collect();
         breaks = find_breaks(network, field, &loose);
     }
@@ -88,35 +92,49 @@ pub(super) fn report(
     }
 }
 
-/// Tests each stone against its neighbours, with the false discovery rate controlled (Benjamini & Hochberg 1995).
-///
-/// Significance alone is not enough: scans show departures of tenths of a millimetre that come from how stations
-/// overlap. A stone is loose if it also moved as loose stones do more probably than as its neighbours.
-fn loose_stones(network: &Network, terms: &Terms, field: &Field, params: &NetworkParams) -> Vec<bool> {
+/// Tests each stone against its neighbours: probability of so large a departure where it moves with them. `None` where its
+/// points say nothing.
+fn own_motion_tests(
+    network: &Network,
+    terms: &Terms,
+    field: &Field,
+    params: &NetworkParams,
+) -> Vec<Option<f64>> {
     let mut own = network.components.own_variances();
     // A bent face is not a loose stone: bending is left free.
     own[6..].iter_mut().for_each(|v| *v *= BENDING_SLACK);
     for (v, shared) in own.iter_mut().zip(network.shared_variances(params)) {
         *v += shared;
     }
-    let mut p_values: Vec<(f64, usize)> = (0..terms.tight.len())
-        .filter_map(|i| {
+    (0..terms.tight.len())
+        .map(|i| {
             let (misfit, freedom) = field::posterior(&terms.tight[i], &field.from_others[i], &own).misfit;
             let law = ChiSquared::new(freedom as f64).ok()?;
-            (freedom > 0 && network.survey.stones[i].usable).then(|| (1.0 - law.cdf(misfit), i))
+            (freedom > 0 && network.survey.stones[i].usable).then(|| law.sf(misfit))
         })
+        .collect()
+}
+
+/// Stones that are loose, with the false discovery rate controlled (Benjamini & Hochberg 1995).
+///
+/// Significance alone is not enough: scans show departures of tenths of a millimetre that come from how stations
+/// overlap. A stone is loose if it also moved as loose stones do more probably than as its neighbours.
+fn loose_stones(network: &Network, p_values: &[Option<f64>], params: &NetworkParams) -> Vec<bool> {
+    let mut sorted: Vec<(f64, usize)> = p_values
+        .iter()
+        .enumerate()
+        .filter_map(|(i, p)| Some(((*p)?, i)))
         .collect();
-    p_values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let tests = p_values.len() as f64;
-    let last = p_values
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let tests = sorted.len() as f64;
+    let last = sorted
         .iter()
         .enumerate()
         .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
-    let mut loose = vec![false; terms.tight.len()];
-    for (i, loose) in loose.iter_mut().enumerate() {
-        *loose = network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE;
-    }
-    for &(_, i) in p_values.iter().take(last.map_or(0, |k| k + 1)) {
+    let mut loose: Vec<bool> = (0..p_values.len())
+        .map(|i| network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE)
+        .collect();
+    for &(_, i) in sorted.iter().take(last.map_or(0, |k| k + 1)) {
         loose[i] |= network.beliefs.tight[i] < 0.5;
     }
     loose
@@ -127,14 +145,14 @@ fn result(
     i: usize,
     terms: &Terms,
     field: &Field,
-    loose: bool,
+    tested: (f64, bool),
     shared: &[f64; 9],
     params: &NetworkParams,
 ) -> PairResult {
     let stone = &network.survey.stones[i];
     let motion = match judge(network, i, params) {
         Some(failure) => Err(failure),
-        None => observable(motion(network, i, terms, field, loose, shared), params.max_sd_m),
+        None => observable(motion(network, i, terms, field, tested, shared), params.max_sd_m),
     };
     PairResult {
         first: stone.first,
@@ -199,7 +217,7 @@ fn motion(
     i: usize,
     terms: &Terms,
     field: &Field,
-    loose: bool,
+    (own_motion_p, loose): (f64, bool),
     shared: &[f64; 9],
 ) -> StoneMotion {
     let node = &network.graph.nodes[i];
@@ -229,6 +247,7 @@ fn motion(
         covariance,
         relative: displacement - expected,
         relative_covariance: covariance.fixed_view::<3, 3>(0, 0) + spread,
+        own_motion_p,
         loose,
         observability: observability(&terms.tight[i]),
         rmse_m: track(network, i).equations().map_or(f64::NAN, |e| e.rms_m),

@@ -5,7 +5,6 @@ mod clouds_out;
 mod compare;
 mod context;
 mod epoch_tiles;
-mod inner;
 mod label;
 mod matching;
 mod network;

@@ -1,7 +1,6 @@
 //! Points of matched stones, gathered from the tiles of two epochs into batches of neighbours on disk.
 
 use crate::error::{Error, Result};
-use crate::pipeline::inner::inner_points;
 use crate::pipeline::label::Labelled;
 use crate::pipeline::spill::{Spill, SpillBins};
 use crate::pipeline::step::StepDir;
@@ -12,7 +11,7 @@ use std::path::PathBuf;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{PairPoints, PairSource};
+use stonewise_core::registration::{PairPoints, PairSource, inner_points};
 use stonewise_core::stone::Stone;
 use stonewise_io::table::{Table, read_columns, write_parquet};
 

@@ -253,6 +253,7 @@ mod tests {
             rotation: Vector3::zeros(),
             covariance: Matrix6::identity() * (sigma * sigma),
             relative: Vector3::zeros(),
+            own_motion_p: 1.0,
             relative_covariance: Matrix3::identity(),
             loose: false,
             observability: 0.8,

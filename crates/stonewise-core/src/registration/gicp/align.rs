@@ -241,6 +241,7 @@ fn stone_motion(stone: &GicpStone, motion: &Motion, uncertainty: &Uncertainty) -
         rotation: motion.turn.scaled_axis(),
         covariance: uncertainty.covariance,
         relative: Vector3::zeros(),
+        own_motion_p: 1.0,
         relative_covariance: Matrix3::zeros(),
         loose: false,
         observability: uncertainty.observability,

@@ -12,7 +12,7 @@ const MAD_TO_VARIANCE: f64 = 1.4826 * 1.4826;
 /// A neighbour lies within this distance, metres.
 const FAR_M: f64 = 5.0;
 
-/// Fills in `relative`, `relative_covariance` and `loose` of every measured stone.
+/// Fills in `relative`, `relative_covariance`, `own_motion_p` and `loose` of every measured stone.
 ///
 /// `centroids`: first epoch, world, one per result. The motion that a stone should have is the median, axis by axis, of
 /// its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k times theirs), with the
@@ -41,7 +41,8 @@ pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>
         if let (Ok(motion), Some((difference, covariance))) = (&mut results[i].motion, found) {
             motion.relative = difference;
             motion.relative_covariance = covariance;
-            tests.push((p_value(&difference, &covariance), i));
+            motion.own_motion_p = p_value(&difference, &covariance);
+            tests.push((motion.own_motion_p, i));
         }
     }
     for i in discoveries(tests, params.false_discovery_rate) {

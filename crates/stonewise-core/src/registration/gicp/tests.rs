@@ -265,6 +265,7 @@ fn one_stone_among_still_ones_is_loose() {
                 rotation: Vector3::zeros(),
                 covariance: Matrix6::identity() * sigma * sigma,
                 relative: Vector3::zeros(),
+                own_motion_p: 1.0,
                 relative_covariance: Matrix3::zeros(),
                 loose: false,
                 observability: 1.0,

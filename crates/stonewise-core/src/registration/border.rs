@@ -1,8 +1,8 @@
 //! Points of a stone away from the border of its mask.
 
+use crate::cloud::GridIndex;
+use crate::geometry::{FaceFrame, OutlineParams, outline, signed_area};
 use nalgebra::{Point2, Point3, Vector3};
-use stonewise_core::cloud::GridIndex;
-use stonewise_core::geometry::{FaceFrame, OutlineParams, outline, signed_area};
 
 /// The border is at most this share of the square root of a stone's area, so that small stones keep a core.
 const LARGEST_SHARE: f64 = 0.12;
