@@ -13,6 +13,7 @@ pub mod report;
 pub mod segmentation;
 pub mod simulate;
 mod split;
+mod stable;
 mod truth;
 mod warnings;
 
@@ -22,5 +23,6 @@ pub use part::Part;
 pub use pipeline::{Comparison, PairSummary, Summary, Until, compare_clouds, run};
 pub use project::{Epoch, Project, RegistrationParams, SegmentParams, Settings, TileParams};
 pub use split::split;
+pub use stable::StableArea;
 pub use truth::evaluate_truth;
 pub use warnings::Warning;

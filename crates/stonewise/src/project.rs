@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::limits::impossible;
 use crate::part::Part;
+use crate::stable::StableArea;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::ops::Range;
@@ -122,6 +123,10 @@ pub struct RegistrationParams {
     pub estimator: Estimator,
     /// Standard deviation of the epochs' common registration, per axis, metres; it enters absolute uncertainty.
     pub epoch_error_m: f64,
+    /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs' registration.
+    /// It is reported apart and enters absolute uncertainty. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stable: Vec<StableArea>,
     /// Points nearer to the border of their stone than this many times their noise do not take part in the network
     /// adjustment. 3: their labels, and so their heights, depend on where the photos were taken; without this the whole
     /// wall of a UAV survey seems to move by 1 to 2 mm.
@@ -137,6 +142,7 @@ impl Default for RegistrationParams {
         Self {
             estimator: Estimator::default(),
             epoch_error_m: 0.0,
+            stable: Vec::new(),
             border_noises: 3.0,
             network: NetworkParams::default(),
             gicp: GicpParams::default(),

@@ -27,7 +27,14 @@ pub struct Exact {
 pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32, [[f64; 2]; 2]> {
     let scene = world.scene(0);
     let face = &scene.wall().face;
-    let middle = |stone: u32| Point3::from(world.wall.stones[stone as usize - 1].world_from_stone.translation.vector);
+    let middle = |stone: u32| {
+        Point3::from(
+            world.wall.stones[stone as usize - 1]
+                .world_from_stone
+                .translation
+                .vector,
+        )
+    };
     let mut rows: [BTreeMap<u32, Vec<(Point3<f64>, Vector3<f64>, f64)>>; 2] = Default::default();
     for (epoch, exact) in epochs.iter().enumerate() {
         let found: Vec<_> = exact
@@ -36,8 +43,12 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
             .filter_map(|(stone, p, cos)| {
                 let f = face.face_of(p);
                 let hit = scene.on_face(f.a, f.u)?;
-                matches!(hit.target, Target::Stone(k, _) if k as u32 + 1 == *stone)
-                    .then_some((*stone, *p, hit.normal, exact.weight / (sigma_m * sigma_m * cos)))
+                matches!(hit.target, Target::Stone(k, _) if k as u32 + 1 == *stone).then_some((
+                    *stone,
+                    *p,
+                    hit.normal,
+                    exact.weight / (sigma_m * sigma_m * cos),
+                ))
             })
             .collect();
         for (stone, p, n, w) in found {
@@ -66,7 +77,8 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
                 .filter(|&s| (middle(s) - c).norm() < WINDOW_M)
                 .collect();
             let sd = |members: &[u32]| -> Option<[f64; 2]> {
-                let covariance = information(&c, members, 0).try_inverse()? + information(&c, members, 1).try_inverse()?;
+                let covariance =
+                    information(&c, members, 0).try_inverse()? + information(&c, members, 1).try_inverse()?;
                 let local = frame * covariance.fixed_view::<3, 3>(0, 0) * frame.transpose();
                 Some([(local[(0, 0)] + local[(1, 1)]).sqrt(), local[(2, 2)].sqrt()])
             };

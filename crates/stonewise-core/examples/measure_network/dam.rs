@@ -49,6 +49,7 @@ fn read_truth(path: &Path, sensor: &str) -> BTreeMap<u32, Row> {
                 truth: Truth {
                     normal: vector("nx", "ny", "nz"),
                     displacement: vector("dx", "dy", "dz"),
+                    shared: vector("bgx", "bgy", "bgz"),
                     loose: f[column("loose")] > 0.5,
                     countable: f[column(&format!("vis_{sensor}"))] >= 0.35 && f[column("edge")] < 0.5,
                     spoilt: false,

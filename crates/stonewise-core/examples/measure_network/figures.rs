@@ -3,7 +3,7 @@
 use crate::trial::{Trial, mean};
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 use stonewise_core::geometry::FaceFrame;
-use stonewise_core::registration::Break;
+use stonewise_core::registration::{Break, PairPoints};
 use stonewise_core::stone::PairResult;
 
 /// Half-width of a 95 % interval, standard deviations.
@@ -70,7 +70,9 @@ pub fn figures(trial: &Trial, results: &[PairResult], breaks: &[Break], seconds:
         .map(|r| r.face * r.covariance * r.face.transpose())
         .collect();
     let coverage = std::array::from_fn(|a| {
-        share(rows.len(), |i| free[i][a].abs() <= Z95 * covariance[i][(a, a)].max(0.0).sqrt())
+        share(rows.len(), |i| {
+            free[i][a].abs() <= Z95 * covariance[i][(a, a)].max(0.0).sqrt()
+        })
     });
     let mut squares: Vec<f64> = free
         .iter()
@@ -107,6 +109,38 @@ pub fn figures(trial: &Trial, results: &[PairResult], breaks: &[Break], seconds:
     }
 }
 
+/// One line for each stone that is loose or called so.
+pub fn print_loose(trial: &Trial, pairs: &[PairPoints], results: &[PairResult]) {
+    for (result, pair) in results.iter().zip(pairs) {
+        let Some(truth) = trial.truth.get(&result.first.0).filter(|t| t.countable) else {
+            continue;
+        };
+        let called = result.motion.as_ref().is_ok_and(|m| m.loose);
+        if !truth.loose && !called {
+            continue;
+        }
+        let face = FaceFrame::from_normal(&truth.normal).face_from_world() * 1e3;
+        let bound = trial.bounds.get(&result.first.0).map_or([f64::NAN; 2], |b| b[0]);
+        let head = format!(
+            "      stone {:3} loose {:5} called {called:5}, {} points, bound {:.2?} mm, moved by itself {:5.1?}",
+            result.first.0,
+            truth.loose,
+            pair.points_first.len(),
+            bound.map(|b| b * 1e3),
+            (face * (truth.displacement - truth.shared)).as_slice()
+        );
+        match &result.motion {
+            Ok(m) => println!(
+                "{head}, found {:5.1?} +- {:.1?}, p {:.1e}",
+                (face * m.relative).as_slice(),
+                [0, 1, 2].map(|a| { (face * m.relative_covariance * face.transpose())[(a, a)].sqrt() }),
+                m.own_motion_p
+            ),
+            Err(e) => println!("{head}: {e}"),
+        }
+    }
+}
+
 fn row(trial: &Trial, result: &PairResult) -> Option<Row> {
     let truth = trial.truth.get(&result.first.0)?;
     let motion = result.motion.as_ref().ok()?;
@@ -139,7 +173,9 @@ fn without_datum(rows: &[Row]) -> Vec<Vector3<f64>> {
         g += j.transpose() * r.error;
     }
     let datum = h.cholesky().map_or_else(Vector6::zeros, |c| c.solve(&g));
-    rows.iter().map(|r| r.face * (r.error - design(r) * datum)).collect()
+    rows.iter()
+        .map(|r| r.face * (r.error - design(r) * datum))
+        .collect()
 }
 
 fn bounds(trial: &Trial) -> [f64; 4] {
@@ -167,7 +203,10 @@ fn crack(trial: &Trial, rows: &[Row], breaks: &[Break]) -> [f64; 4] {
     let across = breaks.iter().filter(is_across).count() as f64;
     // Heights, in steps of 5 cm, that lie between the ends of a break that crosses the crack.
     let heights = || rows.iter().map(|r| r.centroid.z);
-    let (low, high) = (heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max));
+    let (low, high) = (
+        heights().fold(f64::MAX, f64::min),
+        heights().fold(f64::MIN, f64::max),
+    );
     let steps = ((high - low) / 0.05) as usize;
     let spanned = share(steps, |k| {
         let z = low + 0.05 * (k as f64 + 0.5);

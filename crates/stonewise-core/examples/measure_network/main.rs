@@ -66,7 +66,11 @@ pub struct Options {
 
 impl Options {
     fn new(words: Vec<String>) -> Self {
-        let number = |key: &str| words.iter().find_map(|w| w.strip_prefix(key)?.parse::<f64>().ok());
+        let number = |key: &str| {
+            words
+                .iter()
+                .find_map(|w| w.strip_prefix(key)?.parse::<f64>().ok())
+        };
         Self {
             exact: words.iter().any(|w| w == "exact"),
             width_m: number("width=").unwrap_or(4.0),
@@ -93,7 +97,11 @@ impl Options {
     /// Parameters of the adjustment, with those that are set by words.
     pub fn network(&self) -> NetworkParams {
         let mut params = serde_json::to_value(NetworkParams::default()).unwrap();
-        for (key, value) in self.words.iter().filter_map(|w| w.strip_prefix("set:")?.split_once('=')) {
+        for (key, value) in self
+            .words
+            .iter()
+            .filter_map(|w| w.strip_prefix("set:")?.split_once('='))
+        {
             params[key] = value.parse().unwrap();
         }
         serde_json::from_value(params).unwrap()
@@ -109,7 +117,9 @@ fn main() {
     let options = Options::new(std::env::args().skip(1).collect());
     let sensors = options.chosen(&["tls", "uav"]);
     if let Some(stones) = options.number("scale=") {
-        sensors.iter().for_each(|s| scale::measure(s, stones as usize, &options));
+        sensors
+            .iter()
+            .for_each(|s| scale::measure(s, stones as usize, &options));
         return;
     }
     let seeds: Vec<u64> = match (options.has("dam"), options.number("seed=")) {
@@ -184,12 +194,20 @@ fn measure_network(trial: &Trial, source: &MemoryPairs, options: &Options) -> Fi
             report.cell_m * 1e3,
             report.correlation_factor,
             (report.common_motion * 1e3).as_slice(),
-            report.common_covariance.diagonal().map(|v| 1e3 * v.sqrt()).as_slice(),
+            report
+                .common_covariance
+                .diagonal()
+                .map(|v| 1e3 * v.sqrt())
+                .as_slice(),
             report.iterations,
             if report.converged { "" } else { ", NOT CONVERGED" }
         );
     }
-    figures(trial, &report.results, &report.breaks, seconds)
+    let found = figures(trial, &report.results, &report.breaks, seconds);
+    if options.has("each") {
+        figures::print_loose(trial, source.pairs(), &report.results);
+    }
+    found
 }
 
 /// Medians of the runs as one row.

@@ -6,7 +6,9 @@ use nalgebra::{Point3, Vector3};
 use stonewise_core::change::{M3c2Params, m3c2};
 use stonewise_core::cloud::{Cloud, GridIndex};
 use stonewise_core::geometry::FaceFrame;
-use stonewise_core::registration::{GicpBlock, GicpParams, GicpStone, MemoryPairs, align, relate_to_neighbours};
+use stonewise_core::registration::{
+    GicpBlock, GicpParams, GicpStone, MemoryPairs, align, relate_to_neighbours,
+};
 use stonewise_core::stone::PairResult;
 
 /// Every stone by plane-to-plane ICP with everything within 60 cm, joints and surroundings included.

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::evaluate::MotionField;
 use stonewise_core::simulate::{
-    Scan, SceneParams, TlsParams, UavParams, WallMotion, WallParams, World, seen_share, stone_truths,
+    Scan, SceneParams, SeenCells, TlsParams, UavParams, WallMotion, WallParams, World, stone_truths,
 };
 
 const CRACK_AT: f64 = 0.2;
@@ -21,13 +21,21 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
     };
     let first = scan(0);
     let truths = stone_truths(&world);
-    let mut seen = seen_share(&world, &truths, &first, 0);
+    let shares = |scan: &Scan, epoch: usize| {
+        let mut cells = SeenCells::new(&world, epoch);
+        cells.add(&truths, scan);
+        cells.shares(&truths)
+    };
+    let mut seen = shares(&first, 0);
     let (halves, exact) = if case.is_split() {
         let field = prescribed(case);
         let (one, two) = split(&first, seed);
         let mut moved = Stones::new();
         for (id, points) in two {
-            let rigid = world.motions.get((id as usize).wrapping_sub(1)).map(|m| m.second_from_first);
+            let rigid = world
+                .motions
+                .get((id as usize).wrapping_sub(1))
+                .map(|m| m.second_from_first);
             let there = points.into_iter().map(|p| match (&field, rigid) {
                 (Some(field), _) => field.apply(&p),
                 (None, Some(motion)) => motion * p,
@@ -38,7 +46,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         ([one, moved], [0, 1].map(|_| exact(&world, &first, 0, 2)))
     } else {
         let second = scan(1);
-        for (a, b) in seen.iter_mut().zip(seen_share(&world, &truths, &second, 1)) {
+        for (a, b) in seen.iter_mut().zip(shares(&second, 1)) {
             *a = a.min(b);
         }
         let exact = [exact(&world, &first, 0, 1), exact(&world, &second, 1, 1)];
@@ -47,7 +55,9 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
     let field = prescribed(case);
     let mut truth = BTreeMap::new();
     for ((t, motion), seen) in truths.iter().zip(&world.motions).zip(&seen) {
-        let Some(points) = halves[0].get(&t.id.0) else { continue };
+        let Some(points) = halves[0].get(&t.id.0) else {
+            continue;
+        };
         let c = mean(points);
         truth.insert(
             t.id.0,
@@ -57,6 +67,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
                     Some(field) => field.displacement_at(&c),
                     None => motion.second_from_first * c - c,
                 },
+                shared: t.shared,
                 loose: t.loose,
                 countable: !t.edge && *seen >= 0.35,
                 spoilt: false,
@@ -159,9 +170,14 @@ fn by_stone(scan: &Scan) -> Stones {
 fn split(scan: &Scan, seed: u64) -> (Stones, Stones) {
     let mut halves = (Stones::new(), Stones::new());
     for (i, &id) in scan.stone.iter().enumerate() {
-        let mut x = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
+        let mut x =
+            (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ seed.wrapping_mul(0xd1b5_4a32_d192_ed03);
         x = (x ^ (x >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let half = if (x >> 40) & 1 == 0 { &mut halves.0 } else { &mut halves.1 };
+        let half = if (x >> 40) & 1 == 0 {
+            &mut halves.0
+        } else {
+            &mut halves.1
+        };
         half.entry(id).or_default().push(scan.cloud.world(i));
     }
     halves

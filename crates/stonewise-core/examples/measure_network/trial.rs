@@ -18,6 +18,8 @@ pub struct Truth {
     pub normal: Vector3<f64>,
     /// Displacement of the epoch-1 centroid of the stone's points, metres.
     pub displacement: Vector3<f64>,
+    /// Displacement that it shares with its neighbours, metres.
+    pub shared: Vector3<f64>,
     pub loose: bool,
     /// Seen well enough in both epochs, and whole.
     pub countable: bool,
@@ -64,7 +66,10 @@ impl Trial {
                 let plane = Plane::fit(points)?.normal;
                 let normal = plane * plane.dot(&self.truth.get(&id)?.normal).signum();
                 let cloud = |points: &[Point3<f64>]| {
-                    let offsets = points.iter().map(|p| (p - centroid).cast::<f32>().into()).collect();
+                    let offsets = points
+                        .iter()
+                        .map(|p| (p - centroid).cast::<f32>().into())
+                        .collect();
                     Cloud::new(centroid, inner_points(offsets, &normal, border_noises))
                 };
                 Some(PairPoints {

@@ -9,8 +9,8 @@
 use super::equations::{Matrix9, Motion9};
 use super::graph::{Edge, Graph};
 use super::hyper::{BOUNDS, COUNT, VarianceComponents};
-use super::sparse::{BlockMatrix, BlockPattern, SelectedInverse};
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use super::sparse::{BlockFactor, BlockMatrix, BlockPattern, SelectedInverse};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
 /// A stone's normal equations `information * x = vector`, in its frame.
@@ -40,6 +40,8 @@ pub(super) struct Beliefs {
     pub tight: Vec<f64>,
     /// Weight of the tie, per edge: 1 whole, towards 0 broken.
     pub tie: Vec<f64>,
+    /// Per edge: a break of the wall lies between. The motion may jump there, its gradient goes on.
+    pub parted: Vec<bool>,
 }
 
 /// The mixture of loose stones.
@@ -63,6 +65,8 @@ pub(super) struct Field {
     pub state: Vec<Motion9>,
     /// Prediction of each stone's motion without its own points, in its frame.
     pub from_others: Vec<Prediction>,
+    /// Covariance of the field's mean over all stones, world, m^2.
+    pub mean_covariance: Matrix3<f64>,
     inverse: SelectedInverse,
 }
 
@@ -99,15 +103,22 @@ pub(super) fn motion_of_field(frame: &Matrix3<f64>) -> Matrix9 {
     a
 }
 
-/// Solves for the field. `None` only where memory or the numbers fail.
-pub(super) fn solve(
+/// The normal equations of the field, factored.
+struct Normal<'a> {
+    factor: BlockFactor<'a>,
+    state: Vec<Motion9>,
+    /// Each stone's information and vector about the field's motion in its frame, its own motion eliminated.
+    reduced: Vec<(Matrix9, Motion9, f64)>,
+}
+
+fn normal_equations<'a>(
     graph: &Graph,
-    pattern: &BlockPattern,
+    pattern: &'a BlockPattern,
     terms: &[StoneTerm],
     components: &VarianceComponents,
     loose: &LoosePrior,
     beliefs: &Beliefs,
-) -> Option<Field> {
+) -> Option<Normal<'a>> {
     let mut matrix = prior(graph, pattern, components, beliefs);
     let mut rhs = vec![Motion9::zeros(); terms.len()];
     let reduced = reduce(terms, components, loose, beliefs);
@@ -118,6 +129,27 @@ pub(super) fn solve(
     }
     let factor = pattern.factor(&matrix)?;
     let state = factor.solve(&rhs);
+    Some(Normal {
+        factor,
+        state,
+        reduced,
+    })
+}
+
+/// Solves for the field. `None` only where memory or the numbers fail.
+pub(super) fn solve(
+    graph: &Graph,
+    pattern: &BlockPattern,
+    terms: &[StoneTerm],
+    components: &VarianceComponents,
+    loose: &LoosePrior,
+    beliefs: &Beliefs,
+) -> Option<Field> {
+    let Normal {
+        factor,
+        state,
+        reduced,
+    } = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
     let inverse = factor.selected_inverse()?;
     let from_others = (0..terms.len())
         .into_par_iter()
@@ -133,10 +165,97 @@ pub(super) fn solve(
         })
         .collect();
     Some(Field {
+        mean_covariance: mean_covariance(&factor, terms.len()),
         state,
         from_others,
         inverse,
     })
+}
+
+/// Covariance of the mean displacement over all stones: w' A^-1 w with w = 1/n at every stone's displacement.
+fn mean_covariance(factor: &BlockFactor, stones: usize) -> Matrix3<f64> {
+    let share = 1.0 / stones.max(1) as f64;
+    let columns = [0, 1, 2].map(|c| {
+        let mut weight = Motion9::zeros();
+        weight[c] = share;
+        let solved = factor.solve(&vec![weight; stones]);
+        solved
+            .iter()
+            .map(|x| x.fixed_rows::<3>(0) * share)
+            .sum::<Vector3<f64>>()
+    });
+    let covariance = Matrix3::from_columns(&columns);
+    0.5 * (covariance + covariance.transpose())
+}
+
+/// A jump of the motion between two sides of the wall, beyond what the ties between them allow.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Jump {
+    /// Motion of the side that moved against the other, world, metres.
+    pub jump: Vector3<f64>,
+    /// Its square in units of its covariance: chi-square with three degrees of freedom where nothing jumped.
+    pub excess: f64,
+}
+
+/// Estimates, for each way to part the stones into two sides, the common jump of the stones marked `true`.
+///
+/// The jump is three more unknowns of the adjustment: with P the matrix of the field and Q the jump's columns, its information is
+/// R - Q' P^-1 Q, and P need not be factored again. Cost: three solves a way. `None` where the equations cannot be factored.
+pub(super) fn test_jumps(
+    graph: &Graph,
+    pattern: &BlockPattern,
+    terms: &[StoneTerm],
+    components: &VarianceComponents,
+    loose: &LoosePrior,
+    beliefs: &Beliefs,
+    sides: &[Vec<bool>],
+) -> Option<Vec<Jump>> {
+    let normal = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
+    let of_stone: Vec<(Matrix9, Motion9)> = normal
+        .reduced
+        .iter()
+        .zip(&graph.nodes)
+        .map(|((m, v, _), node)| {
+            let a = motion_of_field(&node.face_from_world);
+            (a.transpose() * m * a, a.transpose() * v)
+        })
+        .collect();
+    let test = |side: &Vec<bool>| {
+        let moved = || (0..side.len()).filter(|&i| side[i]);
+        let solved = [0, 1, 2].map(|c| {
+            let column = |i: usize| of_stone[i].0.column(c) * f64::from(u8::from(side[i]));
+            normal
+                .factor
+                .solve(&(0..side.len()).map(column).collect::<Vec<_>>())
+        });
+        let mut information = Matrix3::zeros();
+        let mut vector = Vector3::zeros();
+        for i in moved() {
+            let (m, v) = &of_stone[i];
+            information += m.fixed_view::<3, 3>(0, 0);
+            vector += (v - m * normal.state[i]).fixed_rows::<3>(0);
+            for (c, column) in solved.iter().enumerate() {
+                let known = m.fixed_rows::<3>(0) * column[i];
+                let mut target = information.column_mut(c);
+                target -= known;
+            }
+        }
+        let information = 0.5 * (information + information.transpose());
+        match information.cholesky() {
+            Some(factor) => {
+                let jump = factor.solve(&vector);
+                Jump {
+                    jump,
+                    excess: jump.dot(&vector),
+                }
+            }
+            None => Jump {
+                jump: Vector3::zeros(),
+                excess: 0.0,
+            },
+        }
+    };
+    Some(sides.par_iter().map(test).collect())
 }
 
 /// Takes a stone's own information back out of the field at the stone.
@@ -254,7 +373,7 @@ pub(super) fn tie_strain(graph: &Graph, field: &Field, components: &VarianceComp
         .enumerate()
         .map(|(e, edge)| {
             parts.map(|part| {
-                let blocks = tie_blocks(edge, &part);
+                let blocks = tie_blocks(edge, &part, false);
                 let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
                 let mean = (low.transpose() * blocks[0] * low + high.transpose() * blocks[2] * high)[0]
                     + 2.0 * (high.transpose() * blocks[1] * low)[0];
@@ -280,7 +399,11 @@ pub(super) fn learn_ties(
     // Ties outnumber stones: each holds a share of the field's nine freedoms, six of them in the face.
     let share = graph.nodes.len() as f64 / strain.len().max(1) as f64;
     let mut sums = [0.0; 3];
-    for (weight, s) in beliefs.tie.iter_mut().zip(&strain) {
+    for ((weight, s), parted) in beliefs.tie.iter_mut().zip(&strain).zip(&beliefs.parted) {
+        if *parted {
+            *weight = 1.0;
+            continue;
+        }
         *weight = (freedom + 9.0 * share) / (freedom + s[0] + s[1]);
         sums[0] += *weight * s[0] / (6.0 * share);
         sums[1] += *weight * s[1] / (3.0 * share);
@@ -367,20 +490,16 @@ fn deviance(
     loose: &LoosePrior,
     beliefs: &Beliefs,
 ) -> Option<f64> {
-    let mut matrix = prior(graph, pattern, components, beliefs);
-    let prior_log_det = pattern.factor(&matrix)?.log_det();
-    let mut rhs = vec![Motion9::zeros(); terms.len()];
-    let mut evidence = 0.0;
-    for (i, (m, v, c)) in reduce(terms, components, loose, beliefs).iter().enumerate() {
-        let a = motion_of_field(&graph.nodes[i].face_from_world);
-        matrix.diagonal[i] += a.transpose() * m * a;
-        rhs[i] = a.transpose() * v;
+    let prior_log_det = pattern
+        .factor(&prior(graph, pattern, components, beliefs))?
+        .log_det();
+    let normal = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
+    let (mut quadratic, mut evidence) = (0.0, 0.0);
+    for ((state, (_, v, c)), node) in normal.state.iter().zip(&normal.reduced).zip(&graph.nodes) {
+        quadratic += (motion_of_field(&node.face_from_world) * state).dot(v);
         evidence += c;
     }
-    let factor = pattern.factor(&matrix)?;
-    let state = factor.solve(&rhs);
-    let quadratic: f64 = state.iter().zip(&rhs).map(|(s, r)| s.dot(r)).sum();
-    Some(factor.log_det() - prior_log_det - quadratic - 2.0 * evidence)
+    Some(normal.factor.log_det() - prior_log_det - quadratic - 2.0 * evidence)
 }
 
 /// Eliminates each stone's own motion: information and vector about the field, and log evidence.
@@ -437,7 +556,7 @@ fn prior(
 ) -> BlockMatrix {
     let mut matrix = pattern.zeros();
     for (e, edge) in graph.edges.iter().enumerate() {
-        let [ll, hl, hh] = tie_blocks(edge, components);
+        let [ll, hl, hh] = tie_blocks(edge, components, beliefs.parted[e]);
         let w = beliefs.tie[e];
         matrix.diagonal[edge.low] += ll * w;
         matrix.diagonal[edge.high] += hh * w;
@@ -457,13 +576,16 @@ fn prior(
     matrix
 }
 
-/// Information of one whole tie: low-low, high-low, high-high.
-fn tie_blocks(edge: &Edge, components: &VarianceComponents) -> [Matrix9; 3] {
+/// Information of one tie: low-low, high-low, high-high; of a parted one only the gradients are tied.
+fn tie_blocks(edge: &Edge, components: &VarianceComponents, parted: bool) -> [Matrix9; 3] {
     let length = edge.length_m;
-    let level = in_and_out(
-        &edge.face_from_world,
-        components.drift.map(|q| q * q * length.powi(3) / 12.0),
-    );
+    let level = match parted {
+        true => Matrix3::zeros(),
+        false => in_and_out(
+            &edge.face_from_world,
+            components.drift.map(|q| q * q * length.powi(3) / 12.0),
+        ),
+    };
     let slope = in_and_out(&edge.face_from_world, components.drift.map(|q| q * q * length));
     let half = edge.step.map(|s| -0.5 * s);
     let low = [-1.0, half[0], half[1]];
@@ -491,5 +613,131 @@ fn tie_blocks(edge: &Edge, components: &VarianceComponents) -> [Matrix9; 3] {
 /// World information of a vector with these variances in the face and out of it.
 fn in_and_out(face_from_world: &Matrix3<f64>, variance: [f64; 2]) -> Matrix3<f64> {
     let [i, o] = variance.map(|v| (1.0 / v).min(STIFFEST));
-    face_from_world.transpose() * Matrix3::from_diagonal(&nalgebra::Vector3::new(i, i, o)) * face_from_world
+    face_from_world.transpose() * Matrix3::from_diagonal(&Vector3::new(i, i, o)) * face_from_world
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::graph::Place;
+    use nalgebra::{DMatrix, DVector, Point3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// A jump and its excess, from the whole matrix with three more unknowns, densely.
+    fn dense_jump(
+        matrix: &BlockMatrix,
+        graph: &Graph,
+        of_stone: &[(Matrix9, Motion9)],
+        side: &[bool],
+    ) -> Jump {
+        let n = graph.nodes.len();
+        let mut whole = DMatrix::<f64>::zeros(9 * n + 3, 9 * n + 3);
+        let mut rhs = DVector::<f64>::zeros(9 * n + 3);
+        for (i, d) in matrix.diagonal.iter().enumerate() {
+            whole.view_mut((9 * i, 9 * i), (9, 9)).copy_from(d);
+        }
+        for (e, edge) in graph.edges.iter().enumerate() {
+            let block = &matrix.edges[e];
+            whole
+                .view_mut((9 * edge.high, 9 * edge.low), (9, 9))
+                .copy_from(block);
+            whole
+                .view_mut((9 * edge.low, 9 * edge.high), (9, 9))
+                .copy_from(&block.transpose());
+        }
+        for (i, (m, v)) in of_stone.iter().enumerate() {
+            rhs.rows_mut(9 * i, 9).copy_from(v);
+            if side[i] {
+                let mut corner = whole.view_mut((9 * n, 9 * n), (3, 3));
+                corner += m.fixed_view::<3, 3>(0, 0);
+                whole
+                    .view_mut((9 * i, 9 * n), (9, 3))
+                    .copy_from(&m.fixed_columns::<3>(0));
+                whole
+                    .view_mut((9 * n, 9 * i), (3, 9))
+                    .copy_from(&m.fixed_rows::<3>(0));
+                let mut tail = rhs.rows_mut(9 * n, 3);
+                tail += v.fixed_rows::<3>(0);
+            }
+        }
+        let inverse = whole.try_inverse().unwrap();
+        let solution = &inverse * rhs;
+        let jump = Vector3::new(solution[9 * n], solution[9 * n + 1], solution[9 * n + 2]);
+        let covariance: Matrix3<f64> = inverse.fixed_view::<3, 3>(9 * n, 9 * n).into_owned();
+        Jump {
+            jump,
+            excess: jump.dot(&covariance.try_inverse().map_or(jump, |i| i * jump)),
+        }
+    }
+
+    #[test]
+    fn a_jump_is_that_of_an_adjustment_with_three_more_unknowns() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let places: Vec<Place> = (0..12)
+            .map(|k| Place {
+                centroid: Point3::new(
+                    0.01 * f64::from(k % 3),
+                    0.3 * f64::from(k % 4),
+                    0.2 * f64::from(k / 4),
+                ),
+                normal: Vector3::new(1.0, 0.1, 0.2).normalize(),
+                weight: 100.0,
+            })
+            .collect();
+        let graph = Graph::new(&places, 2);
+        let edges: Vec<_> = graph.edges.iter().map(|e| (e.low, e.high)).collect();
+        let pattern = BlockPattern::new(places.len(), &edges).unwrap();
+        let terms: Vec<StoneTerm> = places
+            .iter()
+            .map(|_| {
+                let m = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+                StoneTerm {
+                    information: (m * m.transpose() + Matrix9::identity()) * 1e5,
+                    vector: Motion9::from_fn(|_, _| rng.random_range(-1.0..1.0)) * 1e3,
+                    constant: 0.0,
+                }
+            })
+            .collect();
+        let components = VarianceComponents::start();
+        let loose = LoosePrior {
+            share: 0.03,
+            move_m: 0.015,
+            turn_rad: 0.02,
+        };
+        let beliefs = Beliefs {
+            tight: vec![0.9; places.len()],
+            tie: vec![1.0; edges.len()],
+            parted: vec![false; edges.len()],
+        };
+        let side: Vec<bool> = (0..places.len()).map(|k| k % 4 >= 2).collect();
+        let found = test_jumps(
+            &graph,
+            &pattern,
+            &terms,
+            &components,
+            &loose,
+            &beliefs,
+            std::slice::from_ref(&side),
+        )
+        .unwrap()[0];
+        let mut matrix = prior(&graph, &pattern, &components, &beliefs);
+        let of_stone: Vec<(Matrix9, Motion9)> = reduce(&terms, &components, &loose, &beliefs)
+            .iter()
+            .zip(&graph.nodes)
+            .map(|((m, v, _), node)| {
+                let a = motion_of_field(&node.face_from_world);
+                (a.transpose() * m * a, a.transpose() * v)
+            })
+            .collect();
+        for (d, (m, _)) in matrix.diagonal.iter_mut().zip(&of_stone) {
+            *d += m;
+        }
+        let expected = dense_jump(&matrix, &graph, &of_stone, &side);
+        assert!((found.jump - expected.jump).norm() < 1e-9 + 1e-6 * expected.jump.norm());
+        assert!(
+            (found.excess / expected.excess - 1.0).abs() < 1e-6,
+            "{found:?} {expected:?}"
+        );
+    }
 }

@@ -5,7 +5,9 @@
 
 mod band;
 mod border;
+mod breaks;
 mod correlation;
+mod datum;
 mod equations;
 mod excerpt;
 mod field;
@@ -23,6 +25,7 @@ mod survey;
 mod track;
 
 pub use border::inner_points;
+pub use datum::DatumError;
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use hyper::VarianceComponents;
 pub use network::{AdjustError, adjust};

@@ -1,6 +1,7 @@
 //! The stone network adjustment: the motion of every matched stone, all stones together.
 
-use super::correlation::{correlation_factor, shared_variance, stone_factor};
+use super::breaks::{BreakLine, find_line};
+use super::correlation::{Correlation, shared_variance, stone_factor};
 use super::equations::{Equations, Layout, LocalPair, Matrix9, Motion9, equations};
 use super::excerpt::Excerpt;
 use super::field::{self, Beliefs, Field, LoosePrior, Posterior, StoneTerm};
@@ -14,6 +15,7 @@ use super::patch::SurfaceNoise;
 use super::sparse::BlockPattern;
 use super::survey::{self, Survey, survey};
 use super::track::Track;
+use crate::geometry::Bounds;
 use crate::progress::{Interrupted, Progress};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -44,6 +46,10 @@ const NOISE_AT: [usize; 3] = [0, 2, 4];
 const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
 const FIXED_FROM: usize = 10;
+/// Where the iteration goes on after a break was found.
+const RESUME_AT: usize = 5;
+/// Most breaks of the whole wall that are sought.
+const MAX_LINES: usize = 8;
 /// One stone in so many may still swing between two optima of its own when the network has settled.
 const RESTLESS: usize = 50;
 /// Lever by which an error shared by half a stone turns it, metres.
@@ -71,6 +77,8 @@ pub(super) struct Network {
     pub components: VarianceComponents,
     pub loose: LoosePrior,
     pub beliefs: Beliefs,
+    /// Lines along which the wall is broken.
+    pub lines: Vec<BreakLine>,
     /// Each stone moving with the field.
     pub tight: Vec<Track>,
     /// Each stone that may have moved on its own, doing so: its likelihood has several maxima, and what it says
@@ -78,7 +86,7 @@ pub(super) struct Network {
     pub free: Vec<Option<Track>>,
     /// Common translation about which the field is solved, world.
     pub common: Vector3<f64>,
-    pub correlation_factor: f64,
+    pub correlation: Correlation,
     /// How many unknowns each stone's own points determine.
     determined: Vec<f64>,
 }
@@ -97,26 +105,32 @@ pub fn adjust<S: PairSource>(
     let mut network = Network::new(survey, params).ok_or(AdjustError::Unsolvable { stones: 0 })?;
     let stones = network.tight.len();
     let unsolvable = AdjustError::Unsolvable { stones };
-    let mut iterations = 0;
+    let (mut stage, mut iterations, mut allowed) = (0, 0, params.max_iterations);
     let mut converged = stones == 0;
     let mut last = None;
-    while !converged && iterations < params.max_iterations {
+    while !converged && iterations < allowed {
         progress.begin("adjust", stones as u64);
-        if NOISE_AT.contains(&iterations) {
+        if iterations == stage && NOISE_AT.contains(&stage) {
             network.estimate_noise();
         }
         network.evaluate(source, progress)?;
         let terms = network.terms();
-        if COMPONENTS_AT.contains(&iterations) {
+        if COMPONENTS_AT.contains(&stage) {
             network.estimate_components(&terms);
         }
-        let Some(field) = network.solve(&terms, iterations < FIXED_FROM, params) else {
+        let Some(field) = network.solve(&terms, stage < FIXED_FROM, params) else {
             return Err(unsolvable);
         };
         let settled = network.step(&terms, &field, params);
-        converged = iterations >= FIXED_FROM && settled;
-        last = Some((terms, field));
+        converged = stage >= FIXED_FROM && settled;
+        stage += 1;
         iterations += 1;
+        if converged && network.lines.len() < MAX_LINES && network.part(&terms, &field) {
+            converged = false;
+            stage = RESUME_AT;
+            allowed = iterations + params.max_iterations;
+        }
+        last = Some((terms, field));
     }
     Ok(outcome::report(&network, last, params, iterations, converged))
 }
@@ -173,11 +187,13 @@ impl Network {
             beliefs: Beliefs {
                 tight: vec![1.0; places.len()],
                 tie: vec![1.0; edges.len()],
+                parted: vec![false; edges.len()],
             },
+            lines: Vec::new(),
             common: survey::middle(&start),
             free: vec![None; tight.len()],
             tight,
-            correlation_factor: 1.0,
+            correlation: Correlation::NONE,
             determined: vec![0.0; places.len()],
             survey,
             graph,
@@ -238,7 +254,7 @@ impl Network {
         let known: Vec<(&Equations, f64)> = (0..self.tight.len())
             .filter_map(|i| Some((self.tight[i].equations()?, self.determined[i])))
             .collect();
-        self.correlation_factor = correlation_factor(&known);
+        self.correlation = Correlation::of(&known);
         Ok(())
     }
 
@@ -271,25 +287,37 @@ impl Network {
         }
     }
 
-    /// Variances of errors that all points of a stone share, beyond what its own cells show: translation, rotation.
-    pub fn shared_variances(&self, params: &NetworkParams) -> [f64; 9] {
+    /// Variances of errors that all points of a stone share, beyond what its own cells show: translation, rotation. `octaves` of
+    /// length, from the size of a stone up: one against its neighbours, [`Self::octaves`] against another epoch.
+    pub fn shared_variances(&self, octaves: f64, params: &NetworkParams) -> [f64; 9] {
         let known: Vec<&Equations> = self.tight.iter().filter_map(Track::equations).collect();
-        let shared = shared_variance(&known, self.correlation_factor);
+        let shared = shared_variance(&known, &self.correlation);
         let noise = self.noise.sigma_m;
         let bias = params.systematic_share.powi(2) * 0.5 * (noise[0].powi(2) + noise[1].powi(2));
         let turn = shared / (HALF_STONE_M * HALF_STONE_M);
-        [shared, shared, shared + bias, turn, turn, turn, 0.0, 0.0, 0.0]
+        let shift = octaves * shared;
+        [shift, shift, shift + bias, turn, turn, turn, 0.0, 0.0, 0.0]
+    }
+
+    /// Octaves of length between a stone and the wall, at least one.
+    pub fn octaves(&self) -> f64 {
+        let places = self.graph.nodes.iter().map(|n| n.centroid);
+        let extent_m = Bounds::of(places).map_or(0.0, |b| (b.max - b.min).norm());
+        let mut lengths: Vec<f64> = self.graph.edges.iter().map(|e| e.length_m).collect();
+        let step_m = survey::median(&mut lengths).unwrap_or(extent_m);
+        (extent_m / step_m.max(1e-3)).log2().max(0.0) + 1.0
     }
 
     /// Factor on a stone's variances, judged at the better of its motions.
     fn inflation(&self, i: usize) -> f64 {
+        let survey = self.correlation.factor();
         let own = [Some(&self.tight[i]), self.free[i].as_ref()]
             .into_iter()
             .flatten()
             .filter_map(Track::equations)
-            .map(|e| stone_factor(e, self.determined[i], self.correlation_factor))
+            .map(|e| stone_factor(e, self.determined[i], survey))
             .fold(f64::INFINITY, f64::min);
-        self.correlation_factor * if own.is_finite() { own } else { 1.0 }
+        survey * if own.is_finite() { own } else { 1.0 }
     }
 
     /// The common translation in a stone's frame.
@@ -323,6 +351,7 @@ impl Network {
                 &Beliefs {
                     tight: part.stones.iter().map(|&i| self.beliefs.tight[i]).collect(),
                     tie: part.edges.iter().map(|&e| self.beliefs.tie[e]).collect(),
+                    parted: part.edges.iter().map(|&e| self.beliefs.parted[e]).collect(),
                 },
             ),
         };
@@ -350,7 +379,7 @@ impl Network {
                     &field,
                     &self.components,
                     &self.loose,
-                    &self.shared_variances(params),
+                    &self.shared_variances(1.0, params),
                 );
                 self.disbelieve_the_blind(terms, &field, params);
                 field::learn_ties(
@@ -364,6 +393,29 @@ impl Network {
             }
         }
         Some(field)
+    }
+
+    /// Parts the wall along its most significant line; whether there is one.
+    fn part(&mut self, terms: &Terms, field: &Field) -> bool {
+        let test = |sides: &[Vec<bool>]| {
+            field::test_jumps(
+                &self.graph,
+                &self.pattern,
+                &terms.tight,
+                &self.components,
+                &self.loose,
+                &self.beliefs,
+                sides,
+            )
+        };
+        let Some(line) = find_line(&self.graph, field, &self.beliefs.parted, test) else {
+            return false;
+        };
+        for (parted, edge) in self.beliefs.parted.iter_mut().zip(&self.graph.edges) {
+            *parted |= line.side[edge.low] != line.side[edge.high];
+        }
+        self.lines.push(line);
+        true
     }
 
     /// Lets stones whose own points hardly know their motion move with the field: few noisy points have optima far away

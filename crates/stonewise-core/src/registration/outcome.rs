@@ -2,6 +2,7 @@
 
 use super::equations::Motion9;
 use super::field::{self, Field, StoneTerm};
+use super::graph::Edge;
 use super::network::{Network, Terms};
 use super::params::{Break, NetworkParams, NetworkReport};
 use super::track::Track;
@@ -45,8 +46,9 @@ pub(super) fn report(
     };
     let mut results = Vec::new();
     let mut breaks = Vec::new();
+    let mut common_covariance = Matrix3::zeros();
     if let Some(field) = &field {
-        let shared = network.shared_variances(params);
+        let shared = network.shared_variances(network.octaves(), params);
         let p_values = own_motion_tests(network, &terms, field, params);
         let loose = loose_stones(network, &p_values, params);
         results = (0..terms.tight.len())
@@ -56,6 +58,10 @@ pub(super) fn report(
             })
             .collect();
         breaks = find_breaks(network, field, &loose);
+        let own = network.components.own_variances();
+        let variance: f64 = (0..3).map(|k| own[k] + shared[k]).fold(0.0, f64::max);
+        common_covariance =
+            field.mean_covariance + Matrix3::identity() * (variance / results.len().max(1) as f64);
     }
     let moved: Vec<Vector3<f64>> = results
         .iter()
@@ -67,12 +73,7 @@ pub(super) fn report(
                 .map(|m| m.displacement)
         })
         .collect();
-    let n = moved.len().max(1) as f64;
-    let common_motion = moved.iter().sum::<Vector3<f64>>() / n;
-    let scatter: Matrix3<f64> = moved
-        .iter()
-        .map(|d| (d - common_motion) * (d - common_motion).transpose())
-        .sum();
+    let common_motion = moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64;
     NetworkReport {
         loose: results
             .iter()
@@ -82,10 +83,10 @@ pub(super) fn report(
         sigma_m: network.noise.sigma_m,
         roughness_m: network.noise.tau_m,
         cell_m: network.layout.cell_m,
-        correlation_factor: network.correlation_factor,
+        correlation_factor: network.correlation.factor(),
         components: network.components,
         common_motion,
-        common_covariance: scatter / (n * (n - 1.0).max(1.0)),
+        common_covariance,
         iterations,
         converged,
         breaks,
@@ -103,7 +104,7 @@ fn own_motion_tests(
     let mut own = network.components.own_variances();
     // A bent face is not a loose stone: bending is left free.
     own[6..].iter_mut().for_each(|v| *v *= BENDING_SLACK);
-    for (v, shared) in own.iter_mut().zip(network.shared_variances(params)) {
+    for (v, shared) in own.iter_mut().zip(network.shared_variances(1.0, params)) {
         *v += shared;
     }
     (0..terms.tight.len())
@@ -191,7 +192,7 @@ fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFa
         return Some(MotionFailure::NotConverged);
     };
     let cells = e.differences.len() as f64;
-    let limit = BAD_CELL * network.correlation_factor;
+    let limit = BAD_CELL * network.correlation.factor();
     let bad = e.differences.iter().filter(|d| **d > limit).count() as f64 / cells.max(1.0);
     let share = if network.beliefs.tight[i] < 0.5 {
         BAD_SHARE_LOOSE
@@ -269,25 +270,36 @@ fn observability(term: &StoneTerm) -> f64 {
     }
 }
 
-/// Broken ties between stones that are not loose, with a jump far beyond what a whole tie allows.
+/// Ties between stones that are not loose, over which the field jumps: those that a line of break parts, and single ones that broke
+/// with a jump far beyond what a whole tie allows.
 fn find_breaks(network: &Network, field: &Field, loose: &[bool]) -> Vec<Break> {
     let drift = network.components.drift;
+    let is_broken = |e: usize, edge: &Edge, jump: &Vector3<f64>| {
+        if network.beliefs.parted[e] {
+            return network.lines.iter().any(|line| {
+                let sign =
+                    f64::from(u8::from(line.side[edge.high])) - f64::from(u8::from(line.side[edge.low]));
+                sign * jump.dot(&line.jump) > 0.5 * line.jump.norm_squared()
+            });
+        }
+        let local = edge.face_from_world * jump;
+        let [inside, outside] = drift.map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
+        let excess = local.xy().norm_squared() / inside.powi(2) + (local.z / outside).powi(2);
+        network.beliefs.tie[e] < BROKEN && excess > BREAK_EXCESS
+    };
     network
         .graph
         .edges
         .iter()
-        .zip(&network.beliefs.tie)
-        .filter(|(edge, tie)| **tie < BROKEN && !loose[edge.low] && !loose[edge.high])
-        .filter_map(|(edge, _)| {
+        .enumerate()
+        .filter(|(_, edge)| !loose[edge.low] && !loose[edge.high])
+        .filter_map(|(e, edge)| {
             let (low, high) = (&field.state[edge.low], &field.state[edge.high]);
             let part = |state: &Motion9, k: usize| state.fixed_rows::<3>(k).into_owned();
             let mean_gradient = |k: usize| 0.5 * (part(low, k) + part(high, k));
             let explained = mean_gradient(3) * edge.step[0] + mean_gradient(6) * edge.step[1];
             let jump = part(high, 0) - part(low, 0) - explained;
-            let local = edge.face_from_world * jump;
-            let [inside, outside] = drift.map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
-            let excess = local.xy().norm_squared() / inside.powi(2) + (local.z / outside).powi(2);
-            (excess > BREAK_EXCESS).then(|| Break {
+            is_broken(e, edge, &jump).then(|| Break {
                 from: network.survey.stones[edge.low].first,
                 to: network.survey.stones[edge.high].first,
                 jump,

@@ -88,7 +88,7 @@ pub struct NetworkReport {
     pub components: VarianceComponents,
     /// Mean motion of all stones, world, metres: a check of the datum.
     pub common_motion: Vector3<f64>,
-    /// Covariance of the mean motion, m^2, without registration error of the epochs.
+    /// Covariance of the mean motion, m^2, stones correlated as the field has them; without registration error of the epochs.
     pub common_covariance: Matrix3<f64>,
     /// Iterations made.
     pub iterations: usize,

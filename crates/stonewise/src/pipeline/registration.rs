@@ -1,6 +1,6 @@
 //! The motion of every matched stone.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
@@ -9,9 +9,11 @@ use crate::pipeline::pairs::DiskPairs;
 use crate::pipeline::step::Key;
 use crate::pipeline::windows::align_windows;
 use crate::project::Estimator;
+use crate::stable::StableArea;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
-use stonewise_core::registration::{NetworkReport, adjust};
+use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::registration::{DatumError, NetworkReport, adjust};
 use stonewise_core::stone::PairResult;
 
 /// Motions of a pair of epochs.
@@ -21,6 +23,8 @@ pub struct Registered {
     pub results: Vec<PairResult>,
     /// What the estimator says about itself: noise, datum, breaks.
     pub summary: serde_json::Value,
+    /// What the project's stable areas say of the epochs' registration; `None` without such areas.
+    pub datum: Option<DatumError>,
 }
 
 /// Measures the motion of every matched stone.
@@ -40,7 +44,7 @@ pub fn register(
         &[first.key.as_str(), second.key.as_str()],
     );
     let step = context.step(&format!("register-{number}"), key, |step, _| {
-        let registered = match params.estimator {
+        let mut registered = match params.estimator {
             Estimator::Network => {
                 let pairs = DiskPairs::gather(
                     first,
@@ -66,9 +70,69 @@ pub fn register(
                 )?)
             }
         };
+        registered.datum = datum_error(context, first, second)?;
+        registered.summary["stable_areas"] = json!(registered.datum);
         write_json(&step.file("motions.json"), &registered)
     })?;
-    read_json(&step.file("motions.json"))
+    let registered: Registered = read_json(&step.file("motions.json"))?;
+    tell_datum(context, number, &registered);
+    Ok(registered)
+}
+
+/// The registration error of two epochs, where the project names areas that did not move.
+fn datum_error(context: &Context, first: &Labelled, second: &Labelled) -> Result<Option<DatumError>> {
+    let params = &context.project.settings.registration;
+    let boxes = params.stable.iter().filter_map(StableArea::bounds);
+    let Some(region) = boxes.reduce(|a, b| a.union(&b)) else {
+        return Ok(None);
+    };
+    let mut clouds = Vec::new();
+    for (epoch, margin_m) in [(first, 0.0), (second, params.gicp.max_distance_m)] {
+        let mut stable = Cloud::new(region.centre(), Vec::new());
+        for area in &params.stable {
+            let Some(bounds) = area.bounds() else { continue };
+            let near = epoch.tiled.tiles.load_region(&bounds.grown(margin_m))?;
+            let inside = (0..near.len()).map(|i| near.world(i));
+            let kept = inside.filter(|p| margin_m > 0.0 || area.contains(p));
+            stable.append(&Cloud::from_world(region.centre(), kept));
+        }
+        clouds.push(stable);
+    }
+    DatumError::of(&clouds[0], &clouds[1], &params.gicp)
+        .map(Some)
+        .map_err(|reason| {
+            Error::Survey(format!(
+                "[[registration.stable]]: the stable areas do not show the epochs' registration: {reason}; name areas with \
+                 points in both epochs and faces in three directions"
+            ))
+        })
+}
+
+/// Says how the stones moved in common, and what the stable areas seem to have done.
+fn tell_datum(context: &Context, number: usize, registered: &Registered) {
+    let epoch = &context.project.epochs[number - 1].name;
+    let text = |mean: [f64; 3], variance: [f64; 3]| {
+        let parts = mean.iter().zip(variance);
+        let parts: Vec<String> = parts
+            .map(|(m, v)| format!("{:.2} +- {:.2}", 1e3 * m, 1e3 * v.max(0.0).sqrt()))
+            .collect();
+        format!("x {}, y {}, z {} mm", parts[0], parts[1], parts[2])
+    };
+    let read = |key: &str| serde_json::from_value::<Vec<f64>>(registered.summary[key].clone()).ok();
+    if let (Some(m), Some(c)) = (read("common_motion_m"), read("common_motion_covariance_m2"))
+        && m.len() == 3
+        && c.len() == 9
+    {
+        let common = text([m[0], m[1], m[2]], [c[0], c[4], c[8]]);
+        let message = format!("common motion of all stones (a check of the datum): {common}");
+        context.warnings.notice("register", epoch, message);
+    }
+    if let Some(datum) = &registered.datum {
+        let c = datum.covariance.diagonal();
+        let shift = text(datum.shift.into(), [c[0], c[1], c[2]]);
+        let message = format!("registration error from the stable areas: {shift}");
+        context.warnings.notice("register", epoch, message);
+    }
 }
 
 fn of_network(mut report: NetworkReport) -> Registered {
@@ -90,6 +154,7 @@ fn of_network(mut report: NetworkReport) -> Registered {
     Registered {
         results: report.results,
         summary,
+        datum: None,
     }
 }
 
@@ -101,5 +166,9 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
         "measured": measured.clone().count(),
         "loose": measured.filter(|m| m.loose).count(),
     });
-    Registered { results, summary }
+    Registered {
+        results,
+        summary,
+        datum: None,
+    }
 }

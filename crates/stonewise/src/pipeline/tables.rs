@@ -31,7 +31,7 @@ pub fn stone_rows(
 ) -> Vec<StoneRow> {
     let error_m = context.project.settings.registration.epoch_error_m;
     // Both epochs carry the error of their registration.
-    let registration = Matrix3::identity() * (2.0 * error_m * error_m);
+    let stated = Matrix3::identity() * (2.0 * error_m * error_m);
     let partners: BTreeMap<_, _> = second.stones.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<_, _> = matched.report.outcomes.iter().copied().collect();
     let motions: BTreeMap<_, _> = registered.results.iter().map(|r| (r.first, r)).collect();
@@ -41,12 +41,16 @@ pub fn stone_rows(
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
+        let found = registered
+            .datum
+            .as_ref()
+            .map(|d| d.mean_square_at(&stone.centroid));
         Some(StoneRow::new(
             stone,
             outcome,
             partner,
             motions.get(&stone.id).copied(),
-            &registration,
+            &(stated + found.unwrap_or_else(Matrix3::zeros)),
         ))
     };
     first.stones.iter().filter_map(row).collect()
