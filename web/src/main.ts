@@ -4,10 +4,13 @@ import { readReport } from "./data.ts";
 import { el } from "./dom.ts";
 import { quantities } from "./quantities.ts";
 import { Store } from "./store.ts";
+import { enliven } from "./views/charts.ts";
 import { legend } from "./views/legend.ts";
+import { stoneList } from "./views/list.ts";
 import { WallMap } from "./views/map.ts";
 import { Photos } from "./views/photos.ts";
 import { profile } from "./views/profile.ts";
+import { WallScene } from "./views/scene.ts";
 import { Sections } from "./views/sections.ts";
 import { StonePanel } from "./views/stone.ts";
 import { toolbar } from "./views/toolbar.ts";
@@ -22,14 +25,32 @@ async function start(): Promise<void> {
   });
   const shown = quantities(report);
   const map = new WallMap(report, store, shown);
+  const pictures = el("div", { class: "pictures" }, map.element);
+  let scene: WallScene | null = null;
+  const showScene = () => {
+    const inSpace = store.get().view === "scene";
+    try {
+      if (inSpace) scene ??= new WallScene(report, store, shown);
+    } catch (error) {
+      pictures.append(el("p", { class: "note no-scene" }, `This browser shows no 3D graphics (WebGL): ${String(error)}`));
+    }
+    if (scene && !scene.element.isConnected) pictures.append(scene.element);
+    if (scene) scene.element.hidden = !inSpace;
+    map.element.hidden = inSpace;
+  };
+  store.on((state, before) => {
+    if (state.view !== before.view) showScene();
+  });
   const panel = new StonePanel(report, store, new Photos(report), new Sections(report), (stone, upright) =>
     store.set({ profile: map.lineThrough(stone, upright) }));
   place.append(
-    toolbar(report, store, shown, () => map),
+    toolbar(report, store, shown, () => (store.get().view === "scene" && scene ? scene : map)),
     legend(report, store, shown),
-    el("div", { class: "views" }, el("div", { class: "pictures" }, map.element), panel.element),
+    el("div", { class: "views" }, pictures, panel.element),
     profile(report, store),
+    stoneList(report, store),
   );
+  enliven(report, store);
   place.hidden = false;
   for (const link of document.querySelectorAll<HTMLAnchorElement>("a[data-stone]")) {
     const stone = report.indexOfId.get(Number(link.dataset["stone"]));

@@ -9,21 +9,24 @@ import { fileURLToPath } from "node:url";
 import { launch, open } from "./browser.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
-let browser, folder;
+/** Folder of made reports (`200` and `10000`), to test without cargo. */
+const given = process.env["REPORTS"];
+let browser, folder = given;
 
 before(async () => {
+  browser = await launch();
+  if (given) return;
   folder = mkdtempSync(join(tmpdir(), "stonewise-report-"));
   execFileSync("cargo", ["build", "-q", "-p", "stonewise", "--example", "sample_report"], { cwd: root, stdio: "inherit" });
   const target = process.env["CARGO_TARGET_DIR"] ?? join(root, "target");
   for (const stones of [200, 10_000]) {
     execFileSync(join(target, "debug/examples/sample_report"), [String(stones), join(folder, String(stones))]);
   }
-  browser = await launch();
 });
 
 after(async () => {
   await browser?.close();
-  rmSync(folder, { recursive: true, force: true });
+  if (!given) rmSync(folder, { recursive: true, force: true });
 });
 
 const report = (stones) => join(folder, String(stones), "report/index.html");
@@ -103,6 +106,69 @@ for (const stones of [200, 10_000]) {
       for (const what of ["level", "upright", "\u2192", "58"]) assert.ok(reached.has(what), `${what} not reached`);
     });
 
+    test("a stone shows its photos with outlines, and its points before and after alignment", async () => {
+      await page.fill("#search", "42");
+      await page.waitForSelector(".photos canvas[data-drawn]");
+      await page.waitForFunction(() => document.querySelectorAll(".photos canvas[data-drawn]").length === 2);
+      for (const k of [0, 1]) assert.ok((await colours(page, `.photos figure:nth-child(${k + 1}) canvas`)) >= 6);
+      const path = () => page.$eval(".sections .section-dots.b", (e) => e.getAttribute("d"));
+      await page.waitForSelector(".sections .section-dots.b");
+      const before = await path();
+      await page.check("#aligned");
+      await page.waitForFunction((d) => document.querySelector(".sections .section-dots.b").getAttribute("d") !== d, before);
+      await page.uncheck("#aligned");
+    });
+
+    test("the list sorts, filters and leads to a stone", async () => {
+      await page.click(".stone-list summary");
+      const first = () => page.textContent(".stone-list tbody tr:first-child td:nth-child(7)");
+      const largest = Number(await first());
+      await page.click(".stone-list th:nth-child(7) button");
+      assert.ok(Number(await first()) < largest);
+      await page.selectOption(".stone-list select", "not measured");
+      assert.match(await page.textContent(".stone-list tbody"), /unmatched|failed|unobservable/);
+      await page.click(".stone-list tbody tr:first-child a");
+      assert.match(await page.textContent(".stone-panel"), /Not measured/);
+      await page.click(".stone-list summary");
+    });
+
+    test("a dot of the scatter plot and a stone of a printed map lead to the stone", async () => {
+      for (const chart of ["svg[data-chart=in-plane]", "svg[data-map]"]) {
+        await page.focus(".wall-map canvas");
+        await page.keyboard.press("Escape");
+        await page.locator(chart).first().scrollIntoViewIfNeeded();
+        const box = await page.locator(chart).first().boundingBox();
+        // Search outwards from the middle until a stone is hit.
+        for (let k = 0; k < 200 && (await page.locator(".stone-panel h3").count()) === 0; k++) {
+          const [r, t] = [k * 0.6, k * 2.4];
+          await page.locator(chart).first().click({ position: { x: box.width * 0.5 + r * Math.cos(t), y: box.height * 0.45 + r * Math.sin(t) } });
+        }
+        assert.equal(await page.locator(".stone-panel h3").count(), 1, chart);
+      }
+    });
+
+    test("the 3D view draws stones, cloud, arrows and cameras, and moves them", async () => {
+      await page.click("#view-scene");
+      await page.waitForSelector(".wall-scene canvas[data-drawn]", { timeout: 60_000 });
+      await page.waitForSelector(".wall-scene[data-clouds='2']", { timeout: 60_000 });
+      const canvas = ".wall-scene canvas";
+      const drawn = async (act) => {
+        const frame = await page.getAttribute(canvas, "data-drawn");
+        await act();
+        await page.waitForFunction((f) => document.querySelector(".wall-scene canvas").dataset.drawn !== f, frame, { timeout: 60_000 });
+        return page.$eval(canvas, (c) => c.toDataURL());
+      };
+      assert.ok((await colours(page, canvas)) >= 6, "blank");
+      const still = await drawn(() => page.selectOption("#clouds", "none"));
+      const moved = await drawn(() => page.check("#moved"));
+      assert.notEqual(still, moved);
+      const cloud = await drawn(() => page.selectOption("#clouds", "after"));
+      assert.notEqual(cloud, moved);
+      const left = await drawn(() => page.click(".scene-controls >> text=left"));
+      assert.notEqual(left, cloud);
+      await page.click("#view-map");
+    });
+
     test("nothing went wrong, nothing was fetched", () => assert.deepEqual(trouble, []));
   });
 }
@@ -129,6 +195,7 @@ test("the page stands without scripts", async () => {
 
 test("10,000 stones: size, first paint and memory", async () => {
   const { page, close } = await open(browser, report(10_000));
+  await page.waitForFunction(() => performance.getEntriesByName("first-contentful-paint").length > 0);
   const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0].startTime);
   const ready = await page.evaluate(() => performance.now());
   const memory = await page.evaluate(() => performance.memory.usedJSHeapSize);

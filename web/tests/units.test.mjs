@@ -4,12 +4,13 @@ import { test } from "node:test";
 import { gzipSync } from "node:zlib";
 import { load } from "./load.mjs";
 
-const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store } =
+const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, movedBack } =
   await load(`
     export { Columns, unpack } from "./src/blocks.ts";
     export * from "./src/geometry.ts";
     export * from "./src/format.ts";
     export { Store } from "./src/store.ts";
+    export { movedBack } from "./src/views/sections.ts";
   `);
 
 test("columns come out of base64 of gzip, and missing values are NaN", async () => {
@@ -87,4 +88,15 @@ test("listeners hear of changes and of nothing else", () => {
   store.choose(3);
   assert.equal(calls, 2);
   assert.equal(store.get().follow, 1);
+});
+
+test("moving back undoes the rotation and displacement of a stone", () => {
+  const rotation = [0.002, -0.003, 0.004], move = [0.01, -0.005, 0.03];
+  const moved = (p) => rotate(p, rotation).map((v, k) => v + move[k]);
+  const [a, , n] = moved([0.15, 0, 0.01]);
+  const level = movedBack([a, n], 0, { move, rotation });
+  assert.ok(Math.hypot(level[0] - 0.15, level[1] - 0.01) < 5e-6);
+  const [, u, m] = moved([0, 0.12, -0.02]);
+  const upright = movedBack([u, m], 1, { move, rotation });
+  assert.ok(Math.hypot(upright[0] - 0.12, upright[1] + 0.02) < 5e-6);
 });

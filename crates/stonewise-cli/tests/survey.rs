@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used)] // a test that cannot go on must stop
 
 use assert_cmd::Command;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use stonewise_io::table::read_parquet;
 use tempfile::TempDir;
 
 /// A wall of a few dozen stones, small enough to be run many times.
@@ -108,6 +110,12 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
         "report/index.html",
         "run.json",
         "audit_epoch1.csv",
+        "stones.laz",
+        "stones.vtp",
+        "stones.gpkg",
+        "evidence/crops_1_000.jpg",
+        "evidence/sections_2.parquet",
+        "evidence/cloud_2.parquet",
     ];
     for file in files {
         assert!(out.path().join(file).exists(), "{file} is missing");
@@ -143,6 +151,61 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
         stones,
         "threads change the result"
     );
+
+    // The report is made of result files alone: without the work of the run, and without the survey.
+    let page = fs::read(alone.path().join("report/index.html")).unwrap();
+    fs::remove_dir_all(alone.path().join("work")).unwrap();
+    fs::remove_dir_all(alone.path().join("report")).unwrap();
+    stonewise().arg("report").arg(alone.path()).assert().success();
+    assert!(fs::read(alone.path().join("report/index.html")).unwrap() == page);
+}
+
+/// Middle of each stone's mask in the crops of an epoch, metres along and up from the middle of its window.
+fn mask_places(out: &Path, epoch: usize) -> BTreeMap<u32, [f64; 2]> {
+    let table = |stem: &str| read_parquet(&out.join(format!("evidence/{stem}_{epoch}.parquet"))).unwrap();
+    let (crops, outlines) = (table("crops"), table("crop_outlines"));
+    let side: f64 = crops.metadata("side_px").unwrap().parse().unwrap();
+    let ids = crops.required::<u32>("stone_id").unwrap();
+    let half: BTreeMap<u32, f64> = ids
+        .iter()
+        .copied()
+        .zip(crops.required("half_m").unwrap().iter().copied())
+        .collect();
+    let mut boxes: BTreeMap<u32, [f32; 4]> = BTreeMap::new();
+    let (x, y) = (
+        outlines.required::<f32>("x_px").unwrap(),
+        outlines.required::<f32>("y_px").unwrap(),
+    );
+    for (i, id) in outlines.required::<u32>("stone_id").unwrap().iter().enumerate() {
+        let b = boxes.entry(*id).or_insert([x[i], y[i], x[i], y[i]]);
+        *b = [b[0].min(x[i]), b[1].min(y[i]), b[2].max(x[i]), b[3].max(y[i])];
+    }
+    let place = |(id, b): (u32, [f32; 4])| {
+        let metres = |low: f32, high: f32| (f64::from(low + high) / 2.0 / side - 0.5) * 2.0 * half[&id];
+        (id, [metres(b[0], b[2]), -metres(b[1], b[3])])
+    };
+    boxes.into_iter().map(place).collect()
+}
+
+/// The photos did not move, the points of the second half did: in its crops, which show where the first half's stones
+/// were, every mask must lie farther by the motion.
+fn check_crops_show_the_motion(out: &Path) {
+    let (first, second) = (mask_places(out, 1), mask_places(out, 2));
+    let moved = |axis: usize| {
+        let mut all: Vec<f64> = first
+            .iter()
+            .filter_map(|(id, a)| Some(second.get(id)?[axis] - a[axis]))
+            .collect();
+        assert!(all.len() >= 10, "{} stones have a mask in both crops", all.len());
+        all.sort_by(f64::total_cmp);
+        all[all.len() / 2]
+    };
+    let (along, up) = (moved(0), moved(1));
+    // Boxes of masks of 800 x 600 photos: about a centimetre.
+    assert!(
+        (along - 0.02).abs() < 0.01 && (up - 0.05).abs() < 0.012,
+        "{along} {up}"
+    );
 }
 
 #[test]
@@ -162,6 +225,7 @@ fn a_known_motion_is_found_again_and_scored() {
     let out = tempfile::tempdir().unwrap();
     let (code, log) = run(halves.path(), out.path(), &[]);
     assert_eq!(code, 0, "{log}");
+    check_crops_show_the_motion(out.path());
     let text = fs::read_to_string(out.path().join("evaluation.json")).unwrap();
     let evaluation: serde_json::Value = serde_json::from_str(&text).unwrap();
     let errors = &evaluation["stones"]["errors"];

@@ -8,8 +8,9 @@ use serde_json::json;
 use std::fmt::Write;
 use std::path::Path;
 use stonewise::report::{
-    RowMotion, Status, StoneOutline, StoneRow, detection_limit_m, write_layers, write_outlines, write_report,
-    write_stones,
+    Crop, Cut, PosedPhoto, ReportError, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint,
+    crop_side_px, detection_limit_m, write_cameras, write_crops, write_layers, write_outlines, write_report,
+    write_sections, write_stones, write_thin_cloud,
 };
 use stonewise_core::geometry::FaceFrame;
 
@@ -29,6 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     write_stones(dir, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
     write_outlines(dir, &(0..stones).map(|i| wall.outline(i)).collect::<Vec<_>>())?;
     std::fs::write(dir.join("m3c2.csv"), wall.core_points())?;
+    wall.write_evidence(dir, stones)?;
     write_records(dir)?;
     write_report(dir)?;
     write_layers(dir)?;
@@ -144,6 +146,110 @@ impl Wall {
         }
     }
 
+    /// Crops, sections, clouds and cameras of both epochs.
+    fn write_evidence(&self, dir: &Path, stones: usize) -> Result<(), ReportError> {
+        let side = crop_side_px(stones, 160.0);
+        let points = (400_000 / stones.max(1)).clamp(40, 160);
+        let mut sections = Vec::new();
+        for i in 0..stones {
+            let d = self.motion(self.place(i), i);
+            for (later, cut) in [
+                (false, Cut::Level),
+                (false, Cut::Upright),
+                (true, Cut::Level),
+                (true, Cut::Upright),
+            ] {
+                sections.extend((0..points).map(|k| {
+                    let place =
+                        (k as f64 / points as f64 - 0.5) * if cut == Cut::Level { 0.38 } else { 0.22 };
+                    let relief = 0.006 * (place * 40.0 + i as f64).sin() + noise(i * 1000 + k, 8);
+                    let moved = if later {
+                        [d[usize::from(cut == Cut::Upright)], d.z]
+                    } else {
+                        [0.0; 2]
+                    };
+                    SectionPoint {
+                        stone_id: i as u32 + 1,
+                        is_later: later,
+                        cut,
+                        place_m: (place + moved[0]) as f32,
+                        out_m: (relief + moved[1]) as f32,
+                    }
+                }));
+            }
+        }
+        write_sections(dir, 2, &sections)?;
+        for epoch in [1, 2] {
+            let (crops, tiles): (Vec<Crop>, Vec<_>) = (0..stones).map(|i| self.crop(i, epoch, side)).unzip();
+            write_crops(dir, epoch, side, &crops, &tiles)?;
+            write_thin_cloud(dir, epoch, &self.thin_cloud(epoch))?;
+            write_cameras(dir, epoch, &self.cameras())?;
+        }
+        Ok(())
+    }
+
+    /// A grey stone in dark joints, a little lighter in the second epoch.
+    fn crop(&self, i: usize, epoch: usize, side: u32) -> (Crop, Vec<[u8; 3]>) {
+        let s = f64::from(side);
+        let (w, h) = (0.8 * s, 0.48 * s);
+        let [left, top] = [(s - w) / 2.0, (s - h) / 2.0];
+        let inside = |x: f64, y: f64| (left..left + w).contains(&x) && (top..top + h).contains(&y);
+        let tile = (0..side * side).map(|k| {
+            let (x, y) = (f64::from(k % side), f64::from(k / side));
+            // As rough as a photo of rock: about 0.15 bytes a pixel as JPEG.
+            let grain = (noise((k / 4) as usize + i * 7, 9) * 1.6e4) as i32;
+            let base = if inside(x, y) {
+                130 + 20 * epoch as i32 + (i % 40) as i32
+            } else {
+                60
+            };
+            [0, 6, 18].map(|tint| (base - tint + grain).clamp(0, 255) as u8)
+        });
+        let corner = |x: f64, y: f64| [x as f32, y as f32];
+        let ring = vec![
+            corner(left, top),
+            corner(left + w, top),
+            corner(left + w, top + h),
+            corner(left, top + h),
+        ];
+        let crop = Crop {
+            stone_id: i as u32 + 1,
+            photo: format!("<script>{}.jpg", i % 12),
+            half_m: 0.27,
+            rings: vec![ring],
+        };
+        (crop, tile.collect())
+    }
+
+    fn thin_cloud(&self, epoch: usize) -> Vec<ThinPoint> {
+        let point = |k: usize| {
+            let place = [
+                (noise(k, 10) * 1e3 + 0.5) * self.length_m,
+                (noise(k, 11) * 1e3 + 0.5) * self.height_m,
+            ];
+            let moved = self.motion(place, 1) * if epoch == 2 { 1.0 } else { 0.0 };
+            let shade = (150.0 + 40.0 * (place[0] * 3.0).sin()) as u8;
+            ThinPoint {
+                position: self.world(place) + self.frame.face_from_world().transpose() * moved,
+                colour: [shade, shade, shade - 12],
+                stone: 0,
+            }
+        };
+        (0..220_000).map(point).collect()
+    }
+
+    fn cameras(&self) -> Vec<PosedPhoto> {
+        let camera = |k: usize| PosedPhoto {
+            name: format!("<b>{k}.jpg"),
+            centre: self.world([self.length_m * (k as f64 + 0.5) / 12.0, self.height_m / 2.0])
+                + self.frame.out * 8.0,
+            axis: -self.frame.out,
+            right: self.frame.along * 0.5,
+            down: -self.frame.up * 0.35,
+        };
+        (0..12).map(camera).collect()
+    }
+
     /// `m3c2.csv`, a core point every 10 cm.
     fn core_points(&self) -> String {
         let mut csv = String::from("x,y,z,NormalX,NormalY,NormalZ,m3c2_distance,m3c2_uncertainty\n");
@@ -171,6 +277,7 @@ fn noise(i: usize, salt: u64) -> f64 {
 fn write_records(dir: &Path) -> std::io::Result<()> {
     let run = json!({
         "version": "0.0.0",
+        "crs": { "epsg": 25832, "name": "ETRS89 / UTM zone 32N", "wkt": "" },
         "project": { "name": "Sample </title><script>alert(1)</script> wall" },
         "epochs": [{ "name": "2025 <b>", "photos": 12, "points": 1_000_000, "stones": 200 },
                    { "name": "2026", "photos": 12, "points": 1_000_000, "stones": 200 }],

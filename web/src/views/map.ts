@@ -12,6 +12,9 @@ const ARROW_PX = 46;
 const ARROW_SPACING_PX = 16;
 /** Opacity of what is below its detection limit. */
 const FADED = 0.28;
+/** Outline of what moves unlike its neighbours. */
+const LIGHT = "#ffffff";
+const DARK = "#14181c";
 /** Half the edge of an M3C2 square, metres. */
 const CHANGE_HALF_M = 0.026;
 
@@ -286,7 +289,11 @@ export class WallMap {
     const width = Math.max(0.8, Math.min(2, 0.02 * this.#view.scale));
     const fine = this.#view.scale > 40 || all;
     for (const i of this.#visible()) {
-      if (loose[i]) this.#outline(i, ink, width + 0.6);
+      if (loose[i]) {
+        // Dark on light, so that it shows on every fill and on every ground.
+        this.#outline(i, LIGHT, width + 3);
+        this.#outline(i, DARK, width + 0.6);
+      }
       else if (fine) {
         this.#pen.globalAlpha = 0.35;
         this.#outline(i, ink, 0.5);

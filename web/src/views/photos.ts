@@ -1,13 +1,156 @@
-// Photo crops of a stone in both epochs, with the outline of its mask.
+// Photo crops of a stone in both epochs, rectified to its face, with the outline of its mask.
 
-import type { Report } from "../data.ts";
+import { fromBase64, type Columns } from "../blocks.ts";
+import type { CropDocument, Report } from "../data.ts";
+import { el } from "../dom.ts";
+import { fixed } from "../format.ts";
+
+/** Shortest time between the pictures of a blink, milliseconds. */
+const BLINK_MS = 700;
+
+/** One epoch's crops. */
+interface Epoch {
+  readonly document: CropDocument;
+  /** Place of a stone's crop, by the stone's index. */
+  readonly places: ReadonlyMap<number, number>;
+  readonly columns: Columns;
+  readonly half: Float64Array;
+  readonly ring: Float64Array;
+  readonly pictures: Promise<HTMLImageElement>[];
+}
 
 /** Crops of the report. */
 export class Photos {
-  constructor(readonly report: Report) {}
+  readonly #report: Report;
+  readonly #epochs: [Promise<Epoch | null>, Promise<Epoch | null>] | null;
+  #blinking = 0;
+
+  constructor(report: Report) {
+    this.#report = report;
+    this.#epochs = report.document.crops.some((c) => c !== null) ? [this.#open(0), this.#open(1)] : null;
+  }
 
   /** The card of a stone; `null` where the report has no crops. */
-  of(_stone: number): Node | null {
-    return null;
+  of(stone: number): Node | null {
+    window.clearInterval(this.#blinking);
+    if (!this.#epochs) return null;
+    const canvases = [this.#canvas(), this.#canvas()] as const;
+    const captions = [el("figcaption", { class: "note" }), el("figcaption", { class: "note" })] as const;
+    const outline = el("input", { type: "checkbox", checked: true });
+    const blink = el("input", { type: "checkbox" });
+    const draw = (swapped = false) =>
+      void Promise.all(([0, 1] as const).map((epoch) => this.#draw(stone, epoch, canvases[swapped && epoch === 0 ? 1 - epoch : epoch], captions[epoch], outline.checked)));
+    outline.addEventListener("change", () => draw());
+    blink.addEventListener("change", () => {
+      window.clearInterval(this.#blinking);
+      void this.#blink(stone, blink.checked, canvases[0], captions, outline);
+    });
+    draw();
+    return el("div", { class: "card photos" }, el("h4", {}, "Photos, seen straight onto the stone"),
+      el("div", { class: "pair" }, ...([0, 1] as const).map((k) => el("figure", {}, canvases[k], captions[k]))),
+      el("p", { class: "choices" }, el("label", {}, outline, " outline of the mask"), el("label", {}, blink, " blink before and after")));
   }
+
+  #canvas(): HTMLCanvasElement {
+    return el("canvas", { width: 340, height: 340, role: "img", "aria-label": "photo crop" });
+  }
+
+  /** Shows both epochs in turns in the first place. */
+  async #blink(stone: number, on: boolean, canvas: HTMLCanvasElement, captions: readonly [HTMLElement, HTMLElement], outline: HTMLInputElement): Promise<void> {
+    await this.#draw(stone, 0, canvas, captions[0], outline.checked);
+    if (!on) return;
+    let epoch: 0 | 1 = 0;
+    this.#blinking = window.setInterval(() => {
+      epoch = epoch === 0 ? 1 : 0;
+      void this.#draw(stone, epoch, canvas, captions[0], outline.checked);
+      if (!canvas.isConnected) window.clearInterval(this.#blinking);
+    }, BLINK_MS);
+  }
+
+  async #open(epoch: 0 | 1): Promise<Epoch | null> {
+    const document = this.#report.document.crops[epoch];
+    const columns = await this.#report.block(`crops${epoch + 1}`);
+    if (!document || !columns) return null;
+    const stones = columns.integers("stone");
+    return {
+      document,
+      places: new Map(Array.from(stones, (stone, place) => [stone, place])),
+      columns,
+      half: columns.numbers("half"),
+      ring: columns.numbers("ring"),
+      pictures: [],
+    };
+  }
+
+  async #draw(stone: number, epoch: 0 | 1, canvas: HTMLCanvasElement, caption: HTMLElement, outlined: boolean): Promise<void> {
+    const pen = canvas.getContext("2d")!;
+    const crops = await this.#epochs![epoch];
+    const place = crops?.places.get(stone);
+    const name = this.#report.document.epochs[epoch];
+    if (!crops || place === undefined) {
+      pen.clearRect(0, 0, canvas.width, canvas.height);
+      caption.textContent = `${name}: no photo`;
+      return;
+    }
+    const { side, perRow, photos } = crops.document;
+    const picture = await this.#picture(crops, epoch, Math.floor(place / (perRow * perRow)));
+    const slot = place % (perRow * perRow), size = canvas.width;
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.imageSmoothingQuality = "high";
+    pen.drawImage(picture, (slot % perRow) * side, Math.floor(slot / perRow) * side, side, side, 0, 0, size, size);
+    if (outlined) this.#outline(pen, crops, place, size / side);
+    scaleBar(pen, size, crops.half[place]!);
+    caption.textContent = `${name}: ${photos[crops.columns.integers("photo")[place]!] ?? ""}`;
+    canvas.dataset["drawn"] = String(stone);
+  }
+
+  #outline(pen: CanvasRenderingContext2D, crops: Epoch, place: number, scale: number): void {
+    const ringsEnd = crops.columns.integers("ringsEnd"), ringEnd = crops.columns.integers("ringEnd");
+    pen.beginPath();
+    for (let r = place === 0 ? 0 : ringsEnd[place - 1]!; r < ringsEnd[place]!; r++) {
+      // Curves through the middles of the edges: the outline of a mask has steps of a pixel, which mean nothing.
+      const from = r === 0 ? 0 : ringEnd[r - 1]!, n = ringEnd[r]! - from;
+      const vertex = (k: number): [number, number] => [crops.ring[2 * (from + (k % n))]! * scale, crops.ring[2 * (from + (k % n)) + 1]! * scale];
+      const middle = (k: number): [number, number] => {
+        const [x0, y0] = vertex(k), [x1, y1] = vertex(k + 1);
+        return [(x0 + x1) / 2, (y0 + y1) / 2];
+      };
+      pen.moveTo(...middle(0));
+      for (let k = 1; k <= n; k++) pen.quadraticCurveTo(...vertex(k), ...middle(k));
+      pen.closePath();
+    }
+    pen.lineJoin = "round";
+    pen.strokeStyle = "#000a";
+    pen.lineWidth = 5;
+    pen.stroke();
+    pen.strokeStyle = "#ffe25a";
+    pen.lineWidth = 2.2;
+    pen.stroke();
+  }
+
+  /** A picture of crops, decoded once. */
+  #picture(crops: Epoch, epoch: 0 | 1, number: number): Promise<HTMLImageElement> {
+    return (crops.pictures[number] ??= (async () => {
+      const element = document.getElementById(`crops-${epoch + 1}-${number}`);
+      const url = URL.createObjectURL(new Blob([fromBase64(element?.textContent ?? "")], { type: "image/jpeg" }));
+      element?.remove();
+      const picture = new Image();
+      picture.src = url;
+      await picture.decode();
+      URL.revokeObjectURL(url);
+      return picture;
+    })());
+  }
+}
+
+/** A bar of a round length in the lower left corner. `half`: metres from the middle to the edge. */
+function scaleBar(pen: CanvasRenderingContext2D, size: number, half: number): void {
+  const metres = [0.5, 0.2, 0.1, 0.05, 0.02].find((m) => m < 0.8 * half) ?? 0.01;
+  const length = (metres / (2 * half)) * size;
+  pen.fillStyle = "#000c";
+  pen.fillRect(10, size - 34, length + 12, 26);
+  pen.fillStyle = "#fff";
+  pen.fillRect(16, size - 15, length, 3);
+  pen.font = "15px system-ui, sans-serif";
+  pen.fillText(`${fixed(metres * 100, 0)} cm`, 16, size - 19);
 }

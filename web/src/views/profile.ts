@@ -1,4 +1,4 @@
-// Motions along a line: every stone that the line crosses is a step with its 95 % band.
+// Motions along a line: every stone that the line crosses is a straight piece with its 95 % band.
 
 import { type Report, isMeasured, ringOf } from "../data.ts";
 import { button, el, svg } from "../dom.ts";
@@ -26,6 +26,17 @@ export function stepsAlong(report: Report, line: Line): Step[] {
     for (const [from, to] of crossings(ringOf(stones, stone), line)) steps.push({ stone, from, to });
   }
   return steps.sort((p, q) => p.from - q.from);
+}
+
+/**
+ * Motion of a stone at a place of the wall, metres: that of its centroid and what its rotation adds, d + r x p.
+ * `axis`: 0 along, 1 up, 2 out.
+ */
+export function motionAt(report: Report, stone: number, axis: 0 | 1 | 2, a: number, u: number): number {
+  const { stones } = report;
+  const [da, du] = [a - stones.a[stone]!, u - stones.u[stone]!];
+  const [ra, ru, rn] = stones.rotation.map((r) => r[stone]!) as [number, number, number];
+  return stones.move[axis][stone]! + [-rn * du, rn * da, ra * du - ru * da][axis]!;
 }
 
 /** Distances from the line's start, and values in metres, of core points near a line. */
@@ -68,7 +79,7 @@ function charts(report: Report, store: Store, line: Line): Node[] {
   const measured = steps.filter((s) => isMeasured(report.stones, s.stone));
   const head = el("p", { class: "profile-head" },
     el("b", {}, `Profile over ${fixed(length, 2)} m, ${new Set(measured.map((s) => s.stone)).size} measured stones`),
-    " Lines: motion of each stone; bands: 95 % of its component. ",
+    " Lines: motion of each stone, its rotation included; bands: 95 % of the component at its centroid. ",
     report.change.a.length ? "Dots: M3C2 near the line. " : "",
     button("close", "close the profile", () => store.set({ profile: null })));
   return [head, ...([2, 0, 1] as const).map((axis) => chart(report, store, line, length, steps, axis))];
@@ -82,6 +93,10 @@ function chart(report: Report, store: Store, line: Line, length: number, steps: 
     const [v, s] = [stones.move[axis][stone]! * 1e3, QUANTILE * stones.sigma[axis][stone]! * 1e3];
     return [v - s, v + s];
   });
+  const place = (m: number): [number, number] => {
+    const t = m / length;
+    return [line.a1 + t * (line.a2 - line.a1), line.u1 + t * (line.u2 - line.u1)];
+  };
   const sorted = change.map((c) => c.distance * 1e3).sort((p, q) => p - q);
   bounds.push(0, ...[0.05, 0.95].map((q) => sorted[Math.floor(q * (sorted.length - 1))] ?? 0));
   let [low, high] = [Math.min(...bounds), Math.max(...bounds)];
@@ -108,11 +123,12 @@ function chart(report: Report, store: Store, line: Line, length: number, steps: 
   for (const { stone, from, to } of steps) {
     const [v, s] = [stones.move[axis][stone]! * 1e3, QUANTILE * stones.sigma[axis][stone]! * 1e3];
     const [x0, x1] = [x(from), x(to)];
+    const [v0, v1] = [from, to].map((m) => motionAt(report, stone, axis, ...place(m)) * 1e3) as [number, number];
     const mark = Number.isNaN(v)
       ? svg("rect", { class: "hatch", x: x0, y: top, width: x1 - x0, height: height - top - bottom })
       : svg("g", { class: "step" },
-        svg("rect", { class: "band", x: x0, y: y(v + s), width: x1 - x0, height: Math.max(1, y(v - s) - y(v + s)) }),
-        svg("path", { class: "line", d: `M${x0} ${y(v)}H${x1}` }),
+        svg("path", { class: "band", d: `M${x0} ${y(v0 + s)}L${x1} ${y(v1 + s)}V${y(v1 - s)}L${x0} ${y(v0 - s)}z` }),
+        svg("path", { class: "line", d: `M${x0} ${y(v0)}L${x1} ${y(v1)}` }),
         svg("rect", { class: "catch", x: x0, y: top, width: x1 - x0, height: height - top - bottom }));
     mark.append(svg("title", {}, `Stone ${stones.id[stone]}: ${Number.isNaN(v) ? "not measured" : `${signedMm(v / 1e3)} \u00b1 ${fixed(s, 2)} mm`}`));
     mark.addEventListener("pointerenter", () => store.set({ hover: stone }));

@@ -53,9 +53,10 @@ export class StonePanel {
     }
     const { stones } = this.#report;
     const parts: (Node | null)[] = [this.#head(stone)];
-    if (isMeasured(stones, stone)) parts.push(this.#numbers(stone), this.#ellipsoid(stone));
-    else parts.push(this.#failure(stone));
-    parts.push(this.#photos.of(stone), this.#sections.of(stone), this.#neighbours(stone), this.#quality(stone));
+    const measured = isMeasured(stones, stone);
+    parts.push(measured ? this.#numbers(stone) : this.#failure(stone), this.#photos.of(stone), this.#sections.of(stone));
+    if (measured) parts.push(this.#ellipsoid(stone));
+    parts.push(this.#neighbours(stone), this.#quality(stone));
     this.element.replaceChildren(...parts.filter((part) => part !== null));
   }
 
@@ -121,12 +122,15 @@ export class StonePanel {
     const d = stones.move.map((v) => v[stone]!) as [number, number, number];
     const reach = Math.sqrt(CHI2_3_95 * Math.max(c[0]![0]!, c[1]![1]!, c[2]![2]!));
     const extent = 1.15 * Math.max(...d.map(Math.abs), 1e-5) + reach;
-    const plot = (x: 0 | 2, label: string) => vectorPlot(label, [d[x], d[1]], [c[x]![x]!, c[x]![1]!, c[1]![1]!], extent, x === 2 ? "out" : "along");
+    // An ellipsoid far smaller than the motion would be a dot.
+    const larger = [1, 10, 100].find((f) => (f * reach) / extent > 0.08) ?? 1000;
+    const plot = (x: 0 | 2, label: string) =>
+      vectorPlot(label, [d[x], d[1]], [c[x]![x]!, c[x]![1]!, c[1]![1]!], extent, larger, x === 2 ? "out" : "along");
     const { values, vectors } = eigen3(c);
     const axes = values.map((v, k) => `${mm(Math.sqrt(CHI2_3_95 * Math.max(0, v)))} mm ${direction(vectors[k]!)}`);
     return el("div", { class: "card" }, el("h4", {}, "Error ellipsoid (95 %)"),
       el("div", { class: "pair" }, plot(0, "from the front"), plot(2, "from the side")),
-      el("p", { class: "note" }, `Half axes: ${axes.join(", ")}. Least observable direction seen to ${percent(stones.observability[stone]!)} by the stone's own points.`));
+      el("p", { class: "note" }, `${larger > 1 ? `Ellipsoid drawn ${larger} times larger than the motion. ` : ""}Half axes: ${axes.join(", ")}. Least observable direction seen to ${percent(stones.observability[stone]!)} by the stone's own points.`));
   }
 
   #neighbours(stone: number): Node | null {
@@ -197,10 +201,10 @@ function direction(vector: readonly number[]): string {
 }
 
 /** A vector from the origin and the ellipse of its error around its tip. `c`: xx, xy, yy in m^2. */
-function vectorPlot(title: string, [x, y]: [number, number], c: [number, number, number], extent: number, axis: string): Node {
+function vectorPlot(title: string, [x, y]: [number, number], c: [number, number, number], extent: number, larger: number, axis: string): Node {
   const size = 170, middle = size / 2, scale = (middle - 14) / extent;
   const { major, minor, turn } = ellipse(...c);
-  const factor = Math.sqrt(CHI2_3_95) * scale;
+  const factor = Math.sqrt(CHI2_3_95) * scale * larger;
   const [px, py] = [middle + x * scale, middle - y * scale];
   const length = Math.hypot(px - middle, py - middle) || 1;
   const head = Math.min(7, 0.5 * length) / length, [bx, by] = [(px - middle) * head, (py - middle) * head];

@@ -11,7 +11,7 @@ pub fn report(args: &ReportArgs, printer: &Printer) -> Result<Outcome> {
     stonewise::report::write_layers(&args.results)?;
     let results = args.results.display();
     printer.log(&format!(
-        "wrote {results}/report/index.html, stones.gpkg, stones.geojson and stones.ply"
+        "wrote {results}/report/index.html, stones.gpkg, stones.geojson, stones.vtp and stones.ply"
     ));
     Ok(Outcome::Done)
 }

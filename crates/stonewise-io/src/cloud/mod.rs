@@ -1,6 +1,7 @@
 //! Point clouds of every usual format in, results out.
 
 mod chunk;
+mod coloured;
 mod e57_file;
 mod error;
 mod export;
@@ -17,6 +18,7 @@ mod text;
 mod whole;
 
 pub use chunk::{PointChunk, ReadSummary};
+pub use coloured::{ColouredPoints, write_coloured_laz};
 pub use error::CloudError;
 pub use format::CloudFormat;
 pub use info::{CloudInfo, Scan, cloud_info};

@@ -11,8 +11,8 @@ use std::path::Path;
 
 /// Writes a layer as a feature collection, one feature a line, coordinates rounded to 0.1 mm.
 ///
-/// RFC 7946 wants longitude and latitude; local and projected frames have none, so coordinates are those of the layer
-/// and readers must be told (QGIS asks). A feature with too few or infinite vertices has geometry null.
+/// RFC 7946 wants longitude and latitude; coordinates here are those of the layer. A layer with a reference system says
+/// so in the member `crs` of the format's 2008 version; of a local frame readers must be told (QGIS asks). A feature with too few or infinite vertices has geometry null.
 ///
 /// # Errors
 /// Lengths differ, or the file cannot be written; an earlier file is kept then.
@@ -20,9 +20,17 @@ pub fn write_geojson(path: &Path, layer: &Layer) -> Result<(), LayerError> {
     check(layer)?;
     write_atomically(path, |partial| {
         let mut out = BufWriter::new(File::create(partial)?);
+        // The member "crs" of the format before RFC 7946, which GDAL and QGIS still read.
+        let crs = layer.crs.as_ref().map_or(String::new(), |c| {
+            let name = format!("urn:ogc:def:crs:EPSG::{}", c.epsg);
+            format!(
+                "\"crs\":{},",
+                json!({ "type": "name", "properties": { "name": name } })
+            )
+        });
         writeln!(
             out,
-            "{{\"type\":\"FeatureCollection\",\"name\":{},\"features\":[",
+            "{{\"type\":\"FeatureCollection\",\"name\":{},{crs}\"features\":[",
             json!(layer.name)
         )?;
         for row in 0..layer.vertices.len() {
@@ -86,7 +94,7 @@ mod tests {
             title: String::new(),
             description: String::new(),
             geometry: Geometry::Polygon,
-            crs: None,
+            crs: super::super::Crs::parse("EPSG:25832"),
             attributes,
             vertices: vec![
                 vec![p(0.0, 0.0, 9.0), p(1.0, 0.0, 9.0), p(1.0, 1.000_04, 9.0)],
@@ -101,6 +109,7 @@ mod tests {
         let expected =
             json!({"type": "Polygon", "coordinates": [[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]]]});
         assert_eq!(value["features"][0]["geometry"], expected);
+        assert_eq!(value["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::25832");
         assert_eq!(value["features"][0]["properties"]["d_out"], json!(0.25));
         assert_eq!(
             value["features"][1],

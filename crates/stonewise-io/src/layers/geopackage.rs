@@ -110,9 +110,15 @@ fn fill(path: &Path, layers: &[Layer], last_change: &str) -> rusqlite::Result<()
 fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::Result<()> {
     let srs = layer.crs.as_ref().map_or(UNDEFINED_CARTESIAN, |c| c.epsg);
     if let Some(crs) = &layer.crs {
+        // A definition is mandatory; readers look a code of the EPSG up by themselves.
+        let definition = if crs.wkt.is_empty() {
+            "undefined"
+        } else {
+            crs.wkt.as_str()
+        };
         file.execute(
             "INSERT OR IGNORE INTO gpkg_spatial_ref_sys VALUES (?1, ?2, 'EPSG', ?2, ?3, NULL)",
-            params![crs.name, crs.epsg, crs.wkt],
+            params![crs.name, crs.epsg, definition],
         )?;
     }
     let name = &layer.name;

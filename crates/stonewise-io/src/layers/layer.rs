@@ -1,5 +1,6 @@
 //! What a layer holds.
 
+use super::Crs;
 use crate::table::Table;
 use nalgebra::Point3;
 
@@ -35,17 +36,6 @@ pub enum Geometry {
     LineStringZ,
     /// An open line, z dropped.
     LineString,
-}
-
-/// A coordinate reference system of the EPSG register.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Crs {
-    /// EPSG code.
-    pub epsg: i32,
-    /// Name.
-    pub name: String,
-    /// Definition as WKT 1 or WKT 2.
-    pub wkt: String,
 }
 
 /// A style of a layer, as QGIS keeps it.

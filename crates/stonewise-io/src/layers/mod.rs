@@ -1,11 +1,16 @@
-//! Layers of features for geographic information systems: GeoPackage and GeoJSON. Only writing.
+//! Layers of features for other programs: GeoPackage and GeoJSON for geographic information systems, VTK for ParaView.
+//! Only writing.
 
+mod crs;
 mod geojson;
 mod geometry;
 mod geopackage;
 mod layer;
 mod schema;
+mod vtk;
 
+pub use crs::Crs;
 pub use geojson::write_geojson;
 pub use geopackage::{LayerError, write_geopackage};
-pub use layer::{Crs, Geometry, Layer, LayerStyle};
+pub use layer::{Geometry, Layer, LayerStyle};
+pub use vtk::{PolyData, write_vtp};

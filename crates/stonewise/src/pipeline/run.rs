@@ -5,6 +5,8 @@ use crate::files::write_readable_json;
 use crate::pipeline::clouds_out::write_clouds;
 use crate::pipeline::compare::compare;
 use crate::pipeline::context::Context;
+use crate::pipeline::evidence::write_evidence;
+use crate::pipeline::face_cloud::write_face_cloud;
 use crate::pipeline::label::{Labelled, label};
 use crate::pipeline::matching::find_partners;
 use crate::pipeline::photos::{Segmented, segment};
@@ -15,7 +17,7 @@ use crate::pipeline::series::write_series;
 use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_stone_outlines};
 use crate::pipeline::tiled::{Tiled, tile_epoch};
 use crate::project::Project;
-use crate::report::{StoneRow, write_layers, write_report, write_stones_named};
+use crate::report::{StoneRow, read_outlines, write_layers, write_report, write_stones_named};
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use serde_json::json;
@@ -119,6 +121,11 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         write_run_record(context, &photos, &labelled)?;
         return Ok(summary(context, pairs));
     }
+    let outlines = read_outlines(&context.out)?;
+    let rows: Vec<&[StoneRow]> = pairs.iter().map(|pair| pair.rows.as_slice()).collect();
+    context.timed("evidence", || {
+        write_evidence(context, &photos, &labelled, &outlines, &rows)
+    })?;
     for number in epochs {
         let rows = if number == 1 {
             pairs.first().map(|pair| pair.rows.as_slice())
@@ -126,6 +133,9 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
             None
         };
         write_clouds(context, number, &labelled[number - 1], rows)?;
+    }
+    if let Some(rows) = rows.first() {
+        context.timed("face cloud", || write_face_cloud(context, &labelled[0], rows))?;
     }
     write_series(context, &pairs)?;
     write_run_record(context, &photos, &labelled)?;

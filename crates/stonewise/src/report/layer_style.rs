@@ -94,6 +94,53 @@ pub(super) fn arrow_style() -> LayerStyle {
     }
 }
 
+/// Lines coloured by a column in metres, legend in millimetres; thin and grey where the column is empty.
+pub(super) fn line_style(name: &str, column: &str, scale: Scale) -> LayerStyle {
+    let (low, high) = scale.range_m();
+    let edge = |i: i32| low + (high - low) * f64::from(i) / f64::from(CLASSES);
+    let (mut rules, mut symbols) = (String::new(), String::new());
+    let mut add = |key: i32, filter: &str, label: &str, colour: &str, width: &str| {
+        let (filter, label) = (escape(filter), escape(label));
+        let _ = write!(
+            rules,
+            r#"<rule key="r{key}" symbol="{key}" filter="{filter}" label="{label}"/>"#
+        );
+        let line = options(&[
+            ("line_color", colour),
+            ("line_width", width),
+            ("line_width_unit", "MM"),
+            ("capstyle", "round"),
+        ]);
+        let _ = write!(
+            symbols,
+            r#"<symbol type="line" name="{key}" alpha="1" clip_to_extent="1" force_rhr="0"><layer class="SimpleLine" enabled="1" locked="0" pass="0">{line}</layer></symbol>"#
+        );
+    };
+    for class in 0..CLASSES {
+        let (from, to) = (edge(class), edge(class + 1));
+        let range = match class {
+            0 => format!("\"{column}\" < {to}"),
+            c if c == CLASSES - 1 => format!("\"{column}\" >= {from}"),
+            _ => format!("\"{column}\" >= {from} AND \"{column}\" < {to}"),
+        };
+        let [r, g, b] = scale.colour(scale.step((from + to) / 2.0)).0;
+        let label = format!("{:.2} to {:.2} mm", from * 1e3, to * 1e3);
+        add(class, &range, &label, &format!("{r},{g},{b},255"), "0.9");
+    }
+    add(
+        CLASSES,
+        &format!("\"{column}\" IS NULL"),
+        "not measured",
+        "150,148,142,255",
+        "0.2",
+    );
+    LayerStyle {
+        name: name.into(),
+        description: format!("lines by {column}"),
+        qml: document(&rules, &symbols, 1),
+    }
+}
+
 /// A style of rules; `kind` is QGIS's number of the geometry: 1 lines, 2 polygons.
 fn document(rules: &str, symbols: &str, kind: u8) -> String {
     format!(

@@ -1,8 +1,9 @@
 //! Results as layers for the tools that engineers already use.
 
 use super::column_notes::column_notes;
-use super::draw::{Scale, component_limit_m, nice_scale_m};
-use super::layer_style::{arrow_style, stone_style};
+use super::draw::{Scale, component_limit_m, component_limit_of, nice_scale_m};
+use super::joints::{Joint, JointMotion, joints};
+use super::layer_style::{arrow_style, line_style, stone_style};
 use super::stone_table::stone_table;
 use super::summary::Summary;
 use super::{ReportError, ResultSet, RowMotion, StoneRow};
@@ -11,14 +12,22 @@ use serde_json::Value;
 use std::path::Path;
 use stonewise_core::geometry::{FaceFrame, triangulate};
 use stonewise_io::atomic::write_atomically;
-use stonewise_io::layers::{Crs, Geometry, Layer, LayerStyle, write_geojson, write_geopackage};
+use stonewise_io::layers::{
+    Crs, Geometry, Layer, LayerStyle, PolyData, write_geojson, write_geopackage, write_vtp,
+};
 use stonewise_io::mesh_ply::{ColouredMesh, write_coloured_mesh};
 use stonewise_io::table::{Table, TableError};
 
-/// Makes `stones.gpkg`, `stones.geojson`, `stones.ply` and `stones.csv-metadata.json` from the result files in `dir`.
+/// Colour of what was not measured.
+const UNKNOWN: [u8; 3] = [150; 3];
+
+/// Makes `stones.gpkg`, `stones.geojson`, `stones.vtp`, `displacements.vtp`, `stones.ply` and `stones.csv-metadata.json` from
+/// the result files in `dir`.
 ///
-/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), and their displacements as
-/// exaggerated lines in both (`displacements`, `displacements_facade`), each with styles for QGIS. The PLY is a mesh
+/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their displacements as
+/// exaggerated lines in both (`displacements`, `displacements_facade`), and the joints between them (`joints`,
+/// `joints_facade`), each with styles for QGIS. The VTK files hold the stones as polygons and their centroids with the
+/// displacements as vectors, for ParaView. The PLY is a mesh
 /// of the stones' faces, coloured by the out-of-plane displacement, with all components as scalars. The sidecar names
 /// the unit and meaning of every column of stones.csv (W3C CSV on the Web). With more than two epochs, the GeoPackage
 /// has the layers of the third against the first as `stones_2` and so on; the other files are of the second epoch.
@@ -42,9 +51,15 @@ pub fn write_layers(dir: &Path) -> Result<(), ReportError> {
     if let Some(world) = layers.first() {
         write_geojson(&dir.join("stones.geojson"), world)?;
     }
+    for (name, data) in [
+        ("stones.vtp", face_polygons(&results)),
+        ("displacements.vtp", centroids(&results, &facts)),
+    ] {
+        let path = dir.join(name);
+        write_vtp(&path, &data).map_err(ReportError::io("writing polygons", &path))?;
+    }
     let mesh = dir.join("stones.ply");
-    write_coloured_mesh(&mesh, &face_mesh(&results, &facts))
-        .map_err(ReportError::io("writing the mesh", &mesh))?;
+    write_coloured_mesh(&mesh, &face_mesh(&results)).map_err(ReportError::io("writing the mesh", &mesh))?;
     let notes = dir.join("stones.csv-metadata.json");
     write_atomically(&notes, |partial| std::fs::write(partial, column_notes()))
         .map_err(ReportError::io("writing the notes on columns", &notes))
@@ -90,6 +105,7 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
         })
     };
     let factor = exaggeration(results, facts);
+    let all_joints = joints(results);
     let moved: Vec<(&StoneRow, &RowMotion)> = facts
         .measured
         .iter()
@@ -137,7 +153,7 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
             "displacements",
             "Displacements",
             Geometry::LineStringZ,
-            crs,
+            crs.clone(),
             moved.iter().map(arrow).collect(),
         )?,
         lines(
@@ -147,7 +163,71 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
             None,
             moved.iter().map(unrolled_arrow).collect(),
         )?,
+        joint_layer(
+            &numbered("joints"),
+            &titled("Joints"),
+            Geometry::LineStringZ,
+            crs,
+            &all_joints,
+            results,
+            |j| j.world.to_vec(),
+        )?,
+        joint_layer(
+            &numbered("joints_facade"),
+            &titled("Joints, unrolled"),
+            Geometry::LineString,
+            None,
+            &all_joints,
+            results,
+            |j| j.line.map(flat).to_vec(),
+        )?,
     ])
+}
+
+/// The joints as lines; their motions are empty where a stone was not measured.
+fn joint_layer(
+    name: &str,
+    title: &str,
+    geometry: Geometry,
+    crs: Option<Crs>,
+    joints: &[Joint],
+    results: &ResultSet,
+    line: impl Fn(&Joint) -> Vec<Point3<f64>>,
+) -> Result<Layer, TableError> {
+    let mut table = Table::new();
+    for (k, column) in ["stone_1", "stone_2"].into_iter().enumerate() {
+        let id = |j: &Joint| results.stones[j.stones[k]].stone_id;
+        table.push(column, joints.iter().map(id).collect::<Vec<u32>>())?;
+    }
+    table.push("width", joints.iter().map(|j| j.width_m).collect::<Vec<f64>>())?;
+    let of = |pick: fn(&JointMotion) -> f64| -> Vec<Option<f64>> {
+        joints.iter().map(|j| j.motion.as_ref().map(pick)).collect()
+    };
+    table.push("opening", of(|m| m.opening_m))?;
+    table.push("sliding", of(|m| m.sliding_m))?;
+    table.push("step_out", of(|m| m.step_m))?;
+    table.push("sigma_opening", of(|m| m.opening_sigma_m))?;
+    let significant = joints
+        .iter()
+        .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
+    table.push("significant", significant.collect::<Vec<Option<u8>>>())?;
+    let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
+    Ok(Layer {
+        name: name.to_owned(),
+        title: title.to_owned(),
+        description:
+            "joints between neighbouring stones; opening across, sliding along, step out of the face, metres"
+                .into(),
+        geometry,
+        crs,
+        attributes: table,
+        vertices: joints.iter().map(line).collect(),
+        styles: vec![line_style(
+            "Joint opening",
+            "opening",
+            Scale::Diverging(nice_scale_m(openings)),
+        )],
+    })
 }
 
 fn styles(facts: &Summary) -> Vec<LayerStyle> {
@@ -217,9 +297,91 @@ fn crs(run: &Value) -> Option<Crs> {
     })
 }
 
+/// The colours of the out-of-plane displacement, on the scale of the report.
+pub struct FaceColours(Scale);
+
+impl FaceColours {
+    /// The scale of these rows.
+    pub fn new(rows: &[StoneRow]) -> Self {
+        let motions = rows.iter().filter_map(|r| r.motion.as_ref());
+        Self(Scale::Diverging(component_limit_of(motions)))
+    }
+
+    /// Colour of a stone; grey where its motion is not known.
+    pub fn of(&self, row: Option<&StoneRow>) -> [u8; 3] {
+        let motion = row.and_then(|r| r.motion.as_ref());
+        motion.map_or(UNKNOWN, |m| self.0.colour(self.0.step(m.face.z)).0)
+    }
+}
+
+/// One of the vectors of a motion.
+type VectorOf = fn(&RowMotion) -> nalgebra::Vector3<f64>;
+
+/// Numbers and vectors of all stones, as the VTK files have them.
+fn attributes(data: &mut PolyData, stones: &[&StoneRow]) {
+    let mut scalar = |name: &str, of: &dyn Fn(&StoneRow) -> f64| {
+        data.scalars
+            .push((name.to_owned(), stones.iter().map(|s| of(s)).collect()));
+    };
+    let motion = |of: fn(&RowMotion) -> f64| move |s: &StoneRow| s.motion.as_ref().map_or(f64::NAN, of);
+    scalar("stone_id", &|s| f64::from(s.stone_id));
+    scalar("area_m2", &|s| s.area_m2);
+    scalar("confidence", &|s| s.confidence);
+    scalar("status", &|s| f64::from(s.status as u8));
+    scalar("d_along", &motion(|m| m.face.x));
+    scalar("d_up", &motion(|m| m.face.y));
+    scalar("d_out", &motion(|m| m.face.z));
+    scalar("norm", &motion(|m| m.displacement.norm()));
+    scalar("lod95", &motion(|m| m.detection_limit_m));
+    scalar("significant", &motion(|m| f64::from(u8::from(m.significant))));
+    scalar("loose", &motion(|m| f64::from(u8::from(m.loose))));
+    let vectors: [(&str, VectorOf); 3] = [
+        ("displacement", |m| m.displacement),
+        ("rotation", |m| m.rotation),
+        ("against_neighbours", |m| m.relative),
+    ];
+    for (name, of) in vectors {
+        let vector = |s: &&StoneRow| s.motion.as_ref().map_or([f64::NAN; 3], |m| of(m).into());
+        data.vectors
+            .push((name.to_owned(), stones.iter().map(vector).collect()));
+    }
+}
+
+/// The stones' outlines as polygons.
+fn face_polygons(results: &ResultSet) -> PolyData {
+    let mut data = PolyData::default();
+    let mut drawn = Vec::new();
+    for stone in &results.stones {
+        if let Some(outline) = results.outlines.get(&stone.stone_id) {
+            let first = data.points.len() as u32;
+            data.polygons
+                .push((first..first + outline.ring.len() as u32).collect());
+            data.points.extend(&outline.ring);
+            drawn.push(stone);
+        }
+    }
+    attributes(&mut data, &drawn);
+    data
+}
+
+/// The centroids of the measured stones, for arrows.
+fn centroids(results: &ResultSet, facts: &Summary) -> PolyData {
+    let finite = |s: &&StoneRow| s.centroid.iter().all(|v| v.is_finite());
+    let stones: Vec<&StoneRow> = facts.measured.iter().map(|(s, _)| *s).filter(finite).collect();
+    let mut data = PolyData {
+        points: stones.iter().map(|s| s.centroid).collect(),
+        ..PolyData::default()
+    };
+    // A file without stones has no arrays at all.
+    if !results.stones.is_empty() {
+        attributes(&mut data, &stones);
+    }
+    data
+}
+
 /// Faces of all stones as triangles, coloured by the out-of-plane displacement; grey where it was not measured.
-fn face_mesh(results: &ResultSet, facts: &Summary) -> ColouredMesh {
-    let scale = Scale::Diverging(component_limit_m(facts));
+fn face_mesh(results: &ResultSet) -> ColouredMesh {
+    let colours = FaceColours::new(&results.stones);
     let names = ["stone_id", "d_along", "d_up", "d_out", "norm", "lod95"];
     let mut mesh = ColouredMesh {
         scalars: names.map(|n| (n.to_owned(), Vec::new())).to_vec(),
@@ -241,7 +403,7 @@ fn face_mesh(results: &ResultSet, facts: &Summary) -> ColouredMesh {
             .extend(triangulate(&flat).iter().map(|t| t.map(|i| first + i as u32)));
         mesh.vertices.extend(&outline.ring);
         let motion = stone.motion.as_ref();
-        let colour = motion.map_or([150; 3], |m| scale.colour(scale.step(m.face.z)).0);
+        let colour = colours.of(Some(stone));
         mesh.colours.extend(outline.ring.iter().map(|_| colour));
         let of = |pick: fn(&RowMotion) -> f64| motion.map_or(f64::NAN, pick) as f32;
         let values = [
@@ -280,6 +442,8 @@ mod tests {
             "stones.geojson",
             "stones.ply",
             "stones.csv-metadata.json",
+            "stones.vtp",
+            "displacements.vtp",
         ];
         let bytes = || {
             write_layers(folder.path()).unwrap();
@@ -303,7 +467,7 @@ mod tests {
         let layers = layers(&results, &facts).unwrap();
         assert_eq!(
             layers.iter().map(|l| l.vertices.len()).collect::<Vec<_>>(),
-            [24, 24, 20, 20]
+            [24, 24, 20, 20, 38, 38]
         );
         let factor = exaggeration(&results, &facts);
         assert!(factor >= 10.0);
@@ -331,7 +495,9 @@ mod tests {
                 "stones_2",
                 "stones_facade_2",
                 "displacements_2",
-                "displacements_facade_2"
+                "displacements_facade_2",
+                "joints_2",
+                "joints_facade_2"
             ]
         );
         write_layers(folder.path()).unwrap();

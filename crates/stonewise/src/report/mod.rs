@@ -5,6 +5,7 @@ mod column_notes;
 mod comparison;
 mod draw;
 mod error;
+mod evidence;
 mod facade;
 mod joints;
 mod layer_style;
@@ -22,10 +23,14 @@ mod testing;
 
 pub use change_points::DistancePoint;
 pub use error::ReportError;
+pub use evidence::{
+    Crop, Cut, EVIDENCE_DIR, Evidence, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras,
+    write_crops, write_sections, write_thin_cloud,
+};
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};
-pub use layers::write_layers;
-pub use outlines::{OUTLINES_FILE, StoneOutline, write_outlines};
+pub use layers::{FaceColours, write_layers};
+pub use outlines::{OUTLINES_FILE, StoneOutline, read_outlines, write_outlines};
 pub use report_file::write_report;
 pub use result_set::ResultSet;
 pub use stone_row::{RowMotion, Status, StoneRow, detection_limit_m};

@@ -78,7 +78,7 @@ pub fn write_outlines(dir: &Path, outlines: &[StoneOutline]) -> Result<(), Repor
 ///
 /// # Errors
 /// The file is damaged or of a later version.
-pub(super) fn read_outlines(dir: &Path) -> Result<BTreeMap<u32, StoneOutline>, ReportError> {
+pub fn read_outlines(dir: &Path) -> Result<BTreeMap<u32, StoneOutline>, ReportError> {
     let path = dir.join(OUTLINES_FILE);
     let text = match std::fs::read(&path) {
         Ok(text) => text,

@@ -3,7 +3,7 @@
 use super::change_points::{DistancePoint, read_distance_points};
 use super::outlines::{StoneOutline, read_outlines};
 use super::stone_table::read_stones;
-use super::{Facade, ReportError, RowMotion, StoneRow};
+use super::{Evidence, Facade, ReportError, RowMotion, StoneRow};
 use nalgebra::{Matrix3, Point2, Vector3};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -31,8 +31,10 @@ pub struct ResultSet {
     pub run: Value,
     /// `registration.json`; null where the file is missing.
     pub registration: Value,
-    /// Decisions about mask instances, by epoch and kind, from `audit_epochN.csv`.
-    pub decisions: Vec<BTreeMap<String, usize>>,
+    /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance, stones, share, points.
+    pub decisions: Vec<Vec<Vec<String>>>,
+    /// Excerpts of the survey; empty where the folder is missing.
+    pub evidence: Evidence,
     /// The unrolled wall.
     pub facade: Facade,
 }
@@ -71,6 +73,7 @@ impl ResultSet {
             run: read_json(&dir.join("run.json"))?.unwrap_or(Value::Null),
             registration: read_json(&dir.join(of_pair("registration", pair, "json")))?.unwrap_or(Value::Null),
             decisions: read_decisions(dir)?,
+            evidence: Evidence::read(dir, pair + 1)?,
         })
     }
 
@@ -144,8 +147,8 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, ReportError>
     }
 }
 
-/// Rows of `audit_epoch1.csv`, `audit_epoch2.csv`, ... counted by their first cell, the kind of decision.
-fn read_decisions(dir: &Path) -> Result<Vec<BTreeMap<String, usize>>, ReportError> {
+/// Rows of `audit_epoch1.csv`, `audit_epoch2.csv`, ... without the head, as cells.
+fn read_decisions(dir: &Path) -> Result<Vec<Vec<Vec<String>>>, ReportError> {
     let mut epochs = Vec::new();
     loop {
         let path = dir.join(format!("audit_epoch{}.csv", epochs.len() + 1));
@@ -154,15 +157,42 @@ fn read_decisions(dir: &Path) -> Result<Vec<BTreeMap<String, usize>>, ReportErro
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(epochs),
             Err(e) => return Err(ReportError::io("reading results", path)(e)),
         };
-        let mut kinds = BTreeMap::new();
-        for kind in text
-            .lines()
-            .skip(1)
-            .filter_map(|l| l.split(',').next())
-            .filter(|k| !k.is_empty())
-        {
-            *kinds.entry(kind.to_owned()).or_insert(0) += 1;
+        epochs.push(
+            text.lines()
+                .skip(1)
+                .map(cells)
+                .filter(|c| !c[0].is_empty())
+                .collect(),
+        );
+    }
+}
+
+/// Cells of a line of CSV; quoted cells may hold commas and doubled quotes (RFC 4180).
+fn cells(line: &str) -> Vec<String> {
+    let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
+    let mut rest = line.chars().peekable();
+    while let Some(c) = rest.next() {
+        match c {
+            '"' if quoted && rest.peek() == Some(&'"') => {
+                rest.next();
+                cell.push('"');
+            }
+            '"' => quoted = !quoted,
+            ',' if !quoted => all.push(std::mem::take(&mut cell)),
+            c => cell.push(c),
         }
-        epochs.push(kinds);
+    }
+    all.push(cell);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quoted_cells_keep_their_commas() {
+        assert_eq!(cells(r#"a,"b, ""c""",,d"#), ["a", "b, \"c\"", "", "d"]);
+        assert_eq!(cells(""), [""]);
     }
 }

@@ -39,6 +39,11 @@ impl LazWriter {
         })
     }
 
+    /// The file that errors name.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
     /// Appends whole point records.
     pub fn write(&mut self, records: Vec<u8>) -> Result<(), CloudError> {
         if records.is_empty() {

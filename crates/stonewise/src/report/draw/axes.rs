@@ -22,6 +22,15 @@ impl Axes {
         self.area[1] + self.area[3] - (y - self.y[0]) / (self.y[1] - self.y[0]) * self.area[3]
     }
 
+    /// Ranges and area as the attribute `data-axes`, by which the page's program finds what lies under the pointer.
+    pub(crate) fn attribute(&self) -> String {
+        let [left, top, width, height] = self.area;
+        format!(
+            r#"data-axes="{:.6} {:.6} {:.6} {:.6} {left:.2} {top:.2} {width:.2} {height:.2}""#,
+            self.x[0], self.x[1], self.y[0], self.y[1]
+        )
+    }
+
     /// Ground, grid lines, tick labels and axis labels. Draw before the data.
     pub(crate) fn draw(&self, out: &mut String, x_label: &str, y_label: &str) {
         let [left, top, width, height] = self.area;

@@ -12,7 +12,10 @@ pub(crate) struct Series<'a> {
 }
 
 /// A square scatter plot with equal scales, millimetres; `cross` marks a known truth, `diagonal` the line y = x.
+///
+/// `key`: what the page's program calls the plot; empty where its points are no stones.
 pub(crate) fn scatter(
+    key: &str,
     title: &str,
     labels: [&str; 2],
     series: &[Series],
@@ -25,8 +28,13 @@ pub(crate) fn scatter(
         y: limits_mm[1],
         area: [52.0, 8.0, 320.0, 320.0],
     };
+    let live = if key.is_empty() {
+        String::new()
+    } else {
+        format!(r#" data-chart="{key}" {}"#, axes.attribute())
+    };
     let mut out = format!(
-        r#"<svg role="img" aria-label="{}" viewBox="0 0 384 370">"#,
+        r#"<svg role="img" aria-label="{}" viewBox="0 0 384 370"{live}>"#,
         escape(title)
     );
     axes.draw(&mut out, labels[0], labels[1]);

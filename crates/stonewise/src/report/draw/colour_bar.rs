@@ -3,6 +3,7 @@
 use super::axes::ticks;
 use super::colour::{Rgb, diverging, sequential};
 use super::text::number;
+use crate::report::RowMotion;
 use crate::report::statistics::{Sorted, nice_above};
 use crate::report::summary::Summary;
 use std::fmt::Write;
@@ -102,10 +103,19 @@ pub(crate) fn nice_scale_m(values: impl IntoIterator<Item = f64>) -> f64 {
     nice_above(Sorted::new(values).quantile(0.98).unwrap_or(0.0) * 1e3) / 1e3
 }
 
-/// End of the scale that components share: covers 98 % of them, and the typical detection limit; metres.
+/// End of the scale that components share, metres.
 pub(crate) fn component_limit_m(facts: &Summary) -> f64 {
-    let components = facts.components.iter().flat_map(|c| c.values()).map(|v| v.abs());
-    nice_scale_m(components).max(nice_above(facts.limits.median().unwrap_or(0.0) * 1e3) / 1e3)
+    component_limit_of(facts.measured.iter().map(|(_, m)| *m))
+}
+
+/// The same for any motions: covers 98 % of their components, and their typical detection limit.
+pub(crate) fn component_limit_of<'a>(motions: impl Iterator<Item = &'a RowMotion> + Clone) -> f64 {
+    let components = motions
+        .clone()
+        .flat_map(|m| [m.face.x, m.face.y, m.face.z])
+        .map(f64::abs);
+    let limits = Sorted::new(motions.map(|m| m.detection_limit_m));
+    nice_scale_m(components).max(nice_above(limits.median().unwrap_or(0.0) * 1e3) / 1e3)
 }
 
 /// Colours of both kinds of scale, from the lowest to the highest step.

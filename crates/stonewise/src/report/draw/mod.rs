@@ -11,7 +11,7 @@ mod stone_map;
 mod text;
 
 pub(crate) use chart::{Series, histogram, scatter};
-pub(crate) use colour_bar::{Scale, colours, component_limit_m, nice_scale_m};
+pub(crate) use colour_bar::{Scale, colours, component_limit_m, component_limit_of, nice_scale_m};
 pub(crate) use distance_map::distance_map;
-pub(crate) use stone_map::{MapLayout, MapPicture, stone_map};
+pub(crate) use stone_map::{MapLayout, MapPicture, joint_map, stone_map};
 pub(crate) use text::{count, escape, mm, mm_or_dash, number, percent};

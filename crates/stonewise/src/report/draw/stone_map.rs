@@ -13,6 +13,8 @@ use std::fmt::Write;
 const MARGIN: [f64; 4] = [48.0, 8.0, 66.0, 40.0];
 /// Tallest wall, pixels.
 const MAX_HEIGHT: f64 = 640.0;
+/// Shortest step of an outline, tenths of a pixel.
+const MIN_STEP: i64 = 4;
 /// Length of the longest arrow, and least distance between arrows, pixels.
 const ARROW_PX: f64 = 34.0;
 const ARROW_SPACING_PX: f64 = 14.0;
@@ -99,10 +101,11 @@ impl<'a> MapLayout<'a> {
     /// Opening tag of a picture of this layout.
     pub(crate) fn open(&self, title: &str) -> String {
         format!(
-            r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}">"#,
+            r#"<svg role="img" aria-label="{}" viewBox="0 0 {:.0} {:.0}" data-map {}>"#,
             escape(title),
             self.width,
-            self.height
+            self.height,
+            self.axes.attribute()
         )
     }
 
@@ -125,6 +128,46 @@ impl<'a> MapLayout<'a> {
             self.height - MARGIN[1] - MARGIN[3],
         );
     }
+}
+
+/// The joints, coloured by how much they open (metres), as one SVG element; `joints`: line, opening, whether it is
+/// significant.
+pub(crate) fn joint_map(
+    layout: &MapLayout,
+    title: &str,
+    joints: &[([Point2<f64>; 2], f64, bool)],
+    scale: Scale,
+) -> String {
+    let mut out = layout.open(title);
+    layout.draw_axes(&mut out);
+    let all = layout.paths.concat();
+    let _ = write!(
+        out,
+        r#"<g transform="scale(.1)"><path class="plain" d="{all}"/></g>"#
+    );
+    let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
+    for (line, opening, significant) in joints {
+        let [x0, y0, x1, y1] = [
+            layout.axes.px(line[0].x),
+            layout.axes.py(line[0].y),
+            layout.axes.px(line[1].x),
+            layout.axes.py(line[1].y),
+        ];
+        let path = groups.entry((*significant, scale.step(*opening))).or_default();
+        let _ = write!(path, "M{x0:.1} {y0:.1}L{x1:.1} {y1:.1}");
+    }
+    let width = (layout.stone_px * 0.09).clamp(0.8, 4.0);
+    for ((shown, step), path) in groups {
+        let class = if shown { "joint" } else { "joint faded" };
+        let _ = write!(
+            out,
+            r#"<path class="{class}" stroke="{}" stroke-width="{width:.1}" d="{path}"/>"#,
+            scale.colour(step)
+        );
+    }
+    layout.draw_bar(&mut out, scale);
+    out.push_str("</svg>");
+    out
 }
 
 /// The map as one SVG element.
@@ -169,7 +212,8 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
         let width = (layout.stone_px * 0.8).clamp(4.0, 18.0);
         let _ = write!(
             out,
-            r#"<path class="loose" stroke-width="{width:.0}" d="{loose}"/>"#
+            r#"<path class="loose edge" stroke-width="{:.0}" d="{loose}"/><path class="loose" stroke-width="{width:.0}" d="{loose}"/>"#,
+            2.2 * width
         );
     }
     out.push_str("</g>");
@@ -202,7 +246,8 @@ fn path(ring: &[Point2<f64>], axes: &Axes) -> String {
     for p in &ring[1..] {
         let next = to_px(p);
         let (dx, dy) = (next.0 - last.0, next.1 - last.1);
-        if (dx, dy) == (0, 0) {
+        // Below what the eye or a printer resolves; walls of thousands of stones get lighter by a third.
+        if dx * dx + dy * dy < MIN_STEP * MIN_STEP {
             continue;
         }
         let space = if steps > 0 && dx >= 0 { " " } else { "" };

@@ -7,9 +7,12 @@ use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
+/// Rows of a list of decisions at most.
+const MAX_DECISIONS: usize = 150;
+
 /// Decisions about masks, the adjustment, and everything in run.json, warnings first.
 pub(super) fn audit(results: &ResultSet) -> String {
-    let mut more = decisions(&results.decisions);
+    let mut more = String::new();
     if results.registration.is_object() {
         more.push_str(&details(
             "Adjustment of the motions (registration.json)",
@@ -18,7 +21,9 @@ pub(super) fn audit(results: &ResultSet) -> String {
     }
     let run = &results.run;
     let Value::Object(entries) = run else {
-        let body = format!("<p>There is no run.json beside the results.</p>{more}");
+        let counts = decision_counts(&results.decisions);
+        more.push_str(&decision_lists(&results.decisions));
+        let body = format!("<p>There is no run.json beside the results.</p>{counts}{more}");
         return section("audit", "Audit", &body);
     };
     let mut out = warnings(
@@ -26,9 +31,13 @@ pub(super) fn audit(results: &ResultSet) -> String {
             .and_then(Value::as_array)
             .map_or(&[], Vec::as_slice),
     );
-    out.push_str(&more);
+    out.push_str(&decision_counts(&results.decisions));
     for (key, value) in entries.iter().filter(|(k, _)| *k != "warnings") {
         match value {
+            Value::Null => {}
+            Value::Array(items) if key == "steps" => {
+                out.push_str(&details("Steps, times and memory", &steps(items)))
+            }
             Value::Object(_) | Value::Array(_) => out.push_str(&details(&words(key), &tree(value))),
             _ => {
                 let _ = write!(
@@ -40,26 +49,96 @@ pub(super) fn audit(results: &ResultSet) -> String {
             }
         }
     }
+    out.push_str(&more);
+    out.push_str(&decision_lists(&results.decisions));
     section("audit", "Audit", &out)
 }
 
+/// What was done, how long it took, and the highest memory up to its end.
+fn steps(items: &[Value]) -> String {
+    let number = |item: &Value, key: &str, unit: f64| {
+        item.get(key)
+            .and_then(Value::as_f64)
+            .map_or("\u{2013}".into(), |v| self::number(v / unit, 1))
+    };
+    let row = |item: &Value| {
+        let resumed = item.get("resumed").and_then(Value::as_bool) == Some(true);
+        vec![
+            escape(item.get("step").and_then(Value::as_str).unwrap_or("")),
+            number(item, "seconds", 1.0),
+            number(item, "peak_memory_bytes", 1e6),
+            if resumed { "taken from an earlier run" } else { "" }.into(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = items.iter().map(row).collect();
+    table(&["step", "seconds", "highest memory MB", ""], &rows, 1)
+}
+
 /// How many mask instances were merged, split, dropped, by epoch.
-fn decisions(epochs: &[BTreeMap<String, usize>]) -> String {
-    let kinds: BTreeSet<&String> = epochs.iter().flat_map(BTreeMap::keys).collect();
+fn decision_counts(epochs: &[Vec<Vec<String>>]) -> String {
+    let counted: Vec<BTreeMap<&str, usize>> = epochs
+        .iter()
+        .map(|rows| {
+            let mut kinds = BTreeMap::new();
+            rows.iter()
+                .for_each(|row| *kinds.entry(row[0].as_str()).or_insert(0) += 1);
+            kinds
+        })
+        .collect();
+    let kinds: BTreeSet<&str> = counted.iter().flat_map(|k| k.keys().copied()).collect();
     if kinds.is_empty() {
         return String::new();
     }
     let mut head = vec!["decision of the majority of the photos".to_owned()];
     head.extend((1..=epochs.len()).map(|e| format!("epoch {e}")));
-    let row = |kind: &&String| {
+    let row = |kind: &&str| {
         let mut row = vec![escape(&words(kind))];
-        row.extend(epochs.iter().map(|e| count(e.get(*kind).copied().unwrap_or(0))));
+        row.extend(counted.iter().map(|e| count(e.get(*kind).copied().unwrap_or(0))));
         row
     };
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     format!(
-        "<h3>Decisions about mask instances</h3>{}<p class=\"note\">One row each in audit_epoch1.csv, audit_epoch2.csv.</p>",
+        "<h3>Decisions about mask instances</h3>{}",
         table(&head, &kinds.iter().map(row).collect::<Vec<_>>(), 1)
+    )
+}
+
+/// Which instances were merged, split, dropped.
+fn decision_lists(epochs: &[Vec<Vec<String>>]) -> String {
+    epochs
+        .iter()
+        .zip(1..)
+        .map(|(rows, number)| decision_list(rows, number))
+        .collect()
+}
+
+/// The decisions of one epoch, one a row.
+fn decision_list(rows: &[Vec<String>], number: usize) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let text = |row: &Vec<String>| {
+        let mut cells: Vec<String> = row.iter().map(|c| escape(c)).collect();
+        cells.resize(6, String::new());
+        cells[0] = escape(&words(&row[0]));
+        cells
+    };
+    let shown: Vec<Vec<String>> = rows.iter().take(MAX_DECISIONS).map(text).collect();
+    let rest = if rows.len() > MAX_DECISIONS {
+        format!(
+            "<p class=\"note\">{MAX_DECISIONS} of {}; all are in audit_epoch{number}.csv.</p>",
+            count(rows.len())
+        )
+    } else {
+        String::new()
+    };
+    let head = ["decision", "photo", "instance", "stones", "share", "points"];
+    details(
+        &format!(
+            "Merged, split and dropped masks of epoch {number} ({})",
+            count(rows.len())
+        ),
+        &format!("{}{rest}", table(&head, &shown, 2)),
     )
 }
 

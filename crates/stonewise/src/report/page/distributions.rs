@@ -43,23 +43,23 @@ pub(super) fn distributions(
         format!("{} {what}.{truth}", count(n))
     };
     let labels = ["along (mm)", "up (mm)"];
-    let plot = |title: &str, class, points: &Vec<[f64; 2]>| {
+    let plot = |key, title: &str, class, points: &Vec<[f64; 2]>| {
         let series = [Series {
             class,
             points: points.clone(),
         }];
-        scatter(title, labels, &series, limits, truth_mm, false)
+        scatter(key, title, labels, &series, limits, truth_mm, false)
     };
     grid.push_str(&figure(
         "In-plane motion of the stones",
-        &plot("stones", "a", &stones),
+        &plot("in-plane", "stones", "a", &stones),
         &note(stones.len(), "stones"),
     ));
     if !vectors.is_empty() {
         let text = note(vectors.len(), "core points; vector = distance times normal");
         grid.push_str(&figure(
             "In-plane part of M3C2",
-            &plot("M3C2", "b", &vectors),
+            &plot("", "M3C2", "b", &vectors),
             &text,
         ));
     }
@@ -78,6 +78,7 @@ pub(super) fn distributions(
             points: pairs,
         }];
         let picture = scatter(
+            "out-of-plane",
             "out of plane",
             ["stone, out (mm)", "M3C2 (mm)"],
             &series,

@@ -4,10 +4,11 @@
 //! of packed columns ([`Block`]), so that a wall of 10,000 stones stays small and opens at once.
 
 use super::block::Block;
+use super::excerpts;
 use super::{epoch_names, known_translation_mm};
 use crate::report::comparison::Comparison;
 use crate::report::draw::{colours, component_limit_m};
-use crate::report::joints::{Joint, joints};
+use crate::report::joints::Joint;
 use crate::report::statistics::{Sorted, nice_above};
 use crate::report::summary::Summary;
 use crate::report::{ReportError, ResultSet, RowMotion, Status, StoneRow};
@@ -34,15 +35,16 @@ pub(super) fn data(
     results: &ResultSet,
     facts: &Summary,
     compared: &Comparison,
+    joints: &[Joint],
 ) -> Result<String, ReportError> {
-    let joints = joints(results);
-    let blocks = [
+    let mut blocks = vec![
         ("stones", stones(results, compared)),
-        ("joints", joint_block(&joints)),
+        ("joints", joint_block(joints)),
         ("change", change(results)),
     ];
+    blocks.extend(excerpts::blocks(results, &origin(results)));
     let mut lists = Map::new();
-    let mut texts = String::new();
+    let mut texts = excerpts::pictures(results);
     for (name, block) in blocks {
         let (columns, text) = block
             .finish()
@@ -53,7 +55,7 @@ pub(super) fn data(
             "<script type=\"text/plain\" id=\"block-{name}\">{text}</script>"
         );
     }
-    let document = document(results, facts, &joints, lists).to_string();
+    let document = document(results, facts, joints, lists).to_string();
     // Inside a script element only the end tag could do harm; no "<" is left at all.
     let document = document.replace('<', "\\u003c");
     Ok(format!(
@@ -84,8 +86,8 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         },
         "truth": known_translation_mm(results),
         "blocks": blocks,
-        "cameras": [],
-        "crops": [null, null],
+        "cameras": excerpts::cameras(results, &origin(results)),
+        "crops": excerpts::crops(results),
     })
 }
 

@@ -3,10 +3,10 @@
 use super::explorer::PLACE;
 use super::html::{figure, section};
 use crate::report::draw::{
-    MapLayout, MapPicture, Scale, component_limit_m, distance_map, mm, nice_scale_m, stone_map,
+    MapLayout, MapPicture, Scale, component_limit_m, distance_map, joint_map, mm, nice_scale_m, stone_map,
 };
 use crate::report::summary::Summary;
-use crate::report::{ResultSet, StoneRow};
+use crate::report::{Joint, ResultSet, StoneRow};
 
 /// What the marks in the maps mean.
 const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>significant at 95 %</span>\
@@ -14,7 +14,7 @@ const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>signi
     <span><i class=\"key hatched\"></i>not measured</span><span><i class=\"key ring\"></i>moves unlike its neighbours</span></p>";
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
-pub(super) fn maps(results: &ResultSet, facts: &Summary) -> String {
+pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> String {
     let layout = MapLayout::new(results);
     let shared = Scale::Diverging(component_limit_m(facts));
     let beyond = facts
@@ -54,6 +54,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary) -> String {
             "Core points, along the normal; same scale. Faded: below its LoD95.",
         ));
     }
+    grid.push_str(&opening_map(&layout, joints));
     grid.push_str(&magnitude_maps(&layout, facts));
     let wide = if layout.is_wide() { " wide" } else { "" };
     let note = if beyond > 0 {
@@ -68,47 +69,67 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary) -> String {
     section("maps", "Maps", &body)
 }
 
-fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
+/// How joints open and close; empty where no joint has both its stones measured.
+fn opening_map(layout: &MapLayout, joints: &[Joint]) -> String {
+    let moved: Vec<_> = joints
+        .iter()
+        .filter_map(|j| j.motion.map(|m| (j.line, m.opening_m, m.is_significant())))
+        .collect();
+    if moved.is_empty() {
+        return String::new();
+    }
+    let scale = Scale::Diverging(nice_scale_m(moved.iter().map(|(_, opening, _)| opening.abs())));
+    let title = "Joint opening";
+    let note = "Motion of neighbouring stones apart, across their joint: red opens, blue closes; a scale of its own. Faded: less \
+                than its 95 % uncertainty.";
+    figure(title, &joint_map(layout, title, &moved, scale), note)
+}
+
+/// How far the stones moved, for the summary: lengths and in-plane arrows.
+pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
+    let layout = MapLayout::new(results);
     let norm = |s: &StoneRow| s.motion.as_ref().map(|m| m.displacement.norm());
+    let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
+    let title = "Length of the motion, with in-plane arrows";
+    let picture = MapPicture {
+        title,
+        value: &norm,
+        scale: Scale::Sequential(nice_scale_m(norms)),
+        fade: true,
+        arrows: true,
+        loose: false,
+    };
+    let note = "Arrows: in-plane part of significant motions, thinned where they would touch. Pale: not significant; hatched: not \
+                measured.";
+    let class = if layout.is_wide() { "lead wide" } else { "lead" };
+    format!(
+        "<div class=\"{class}\">{}</div>",
+        figure(title, &stone_map(&layout, &picture), note)
+    )
+}
+
+fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
     let limit = |s: &StoneRow| s.motion.as_ref().map(|m| m.detection_limit_m);
     let relative = |s: &StoneRow| s.motion.as_ref().map(|m| m.relative.norm());
-    let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
     let relatives = facts.measured.iter().map(|(_, m)| m.relative.norm());
     let limits = facts.limits.values().iter().copied();
-    let draw = |title: &str,
-                note: &str,
-                value: &dyn Fn(&StoneRow) -> Option<f64>,
-                limit_m: f64,
-                fade,
-                arrows,
-                loose| {
+    let draw = |title: &str, note: &str, value: &dyn Fn(&StoneRow) -> Option<f64>, limit_m: f64, loose| {
         let picture = MapPicture {
             title,
             value,
             scale: Scale::Sequential(limit_m),
-            fade,
-            arrows,
+            fade: false,
+            arrows: false,
             loose,
         };
         figure(title, &stone_map(layout, &picture), note)
     };
     let mut out = String::new();
     out.push_str(&draw(
-        "Length of the motion, with in-plane arrows",
-        "Arrows: in-plane part of significant motions, thinned where they would touch.",
-        &norm,
-        nice_scale_m(norms),
-        true,
-        true,
-        false,
-    ));
-    out.push_str(&draw(
         "Motion against the neighbours",
         "Length of the difference to what the neighbours predict.",
         &relative,
         nice_scale_m(relatives),
-        false,
-        false,
         true,
     ));
     let note = format!(
@@ -120,8 +141,6 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         &note,
         &limit,
         nice_scale_m(limits),
-        false,
-        false,
         false,
     ));
     out

@@ -4,14 +4,17 @@ mod audit;
 mod block;
 mod distributions;
 mod evaluation;
+mod excerpts;
 mod explorer;
 mod html;
 mod maps;
 mod method;
 mod overview;
+mod survey;
 
 use super::comparison::compare;
 use super::draw::escape;
+use super::joints::joints;
 use super::summary::Summary;
 use super::{ReportError, ResultSet};
 use serde_json::Value;
@@ -51,11 +54,11 @@ pub(super) fn page_name(pair: usize) -> String {
 /// None in practice: compressing in memory does not fail.
 pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     let facts = Summary::new(results);
-    let compared = compare(results);
+    let (compared, joints) = (compare(results), joints(results));
     let mut body = String::new();
     body.push_str(&overview::summary(results, &facts));
     if !results.stones.is_empty() {
-        body.push_str(&maps::maps(results, &facts));
+        body.push_str(&maps::maps(results, &facts, &joints));
         body.push_str(&overview::tables(results, &facts));
     }
     if !facts.measured.is_empty() {
@@ -82,7 +85,7 @@ pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     let data = if results.stones.is_empty() {
         String::new()
     } else {
-        explorer::data(results, &facts, &compared)?
+        explorer::data(results, &facts, &compared, &joints)?
     };
     let body = format!(
         "<body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
@@ -136,7 +139,7 @@ fn cover(results: &ResultSet) -> String {
         .map(|e| format!("Epochs <b>{e}</b>"))
         .into_iter()
         .collect();
-    for (key, word) in [("finished", "finished"), ("version", "stonewise")] {
+    for (key, word) in [("finished_at", "finished"), ("version", "stonewise")] {
         if let Some(text) = run.get(key).and_then(Value::as_str) {
             facts.push(format!("{word} <b>{}</b>", escape(text)));
         }
@@ -146,11 +149,12 @@ fn cover(results: &ResultSet) -> String {
         let name = epochs(run, pair).unwrap_or_else(|| format!("epoch {}", pair + 1));
         format!("<a href=\"{}\">{name}</a>", page_name(pair))
     }));
-    if facts.is_empty() {
+    let line = if facts.is_empty() {
         String::new()
     } else {
         format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
-    }
+    };
+    format!("{line}{}", survey::survey(results))
 }
 
 /// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.

@@ -1,10 +1,11 @@
 //! The summary and the tables of stones.
 
 use super::html::{details, section, table};
+use super::maps::motion_map;
 use crate::report::draw::{count, escape, mm, mm_or_dash, number, percent};
 use crate::report::statistics::Sorted;
 use crate::report::summary::{FALSE_ALARMS, Summary};
-use crate::report::{ResultSet, RowMotion, StoneRow};
+use crate::report::{ResultSet, RowMotion, Status, StoneRow};
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -14,11 +15,15 @@ const MAX_ROWS: usize = 25;
 /// What moved, how many, where, how sure.
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     let mut out = tiles(facts);
-    out.push_str("<ul class=\"findings\">");
+    out.push_str("<div class=\"statement\"><ul class=\"findings\">");
     for sentence in sentences(results, facts) {
         let _ = write!(out, "<li>{sentence}</li>");
     }
     out.push_str("</ul>");
+    if !facts.measured.is_empty() {
+        out.push_str(&motion_map(results, facts));
+    }
+    out.push_str("</div>");
     section("summary", "Summary", &out)
 }
 
@@ -100,13 +105,24 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
         ),
     });
     if facts.not_measured() > 0 {
-        out.push(format!(
-            "{} stones ({}) were not measured; the reasons are in the table of outcomes, the stones are hatched in the maps.",
-            count(facts.not_measured()),
-            percent(facts.not_measured(), facts.stones)
-        ));
+        out.push(not_measured(facts));
     }
     out
+}
+
+/// How many stones have no motion, and why.
+fn not_measured(facts: &Summary) -> String {
+    let reasons = facts
+        .by_status
+        .iter()
+        .filter(|(status, _)| *status != Status::Ok)
+        .map(|(status, stones)| format!("{} because {}", count(stones.len()), escape(status.meaning())));
+    format!(
+        "{} stones ({}) were not measured, hatched in the maps: {}.",
+        count(facts.not_measured()),
+        percent(facts.not_measured(), facts.stones),
+        reasons.collect::<Vec<_>>().join("; ")
+    )
 }
 
 fn significance(facts: &Summary) -> String {
@@ -158,7 +174,7 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
     let lists: String = facts
         .by_status
         .iter()
-        .filter(|(s, _)| *s != crate::report::Status::Ok)
+        .filter(|(s, _)| *s != Status::Ok)
         .map(id_list)
         .collect();
     if !lists.is_empty() {
@@ -262,7 +278,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
     )
 }
 
-fn id_list((status, stones): &(crate::report::Status, Vec<&StoneRow>)) -> String {
+fn id_list((status, stones): &(Status, Vec<&StoneRow>)) -> String {
     let ids: Vec<String> = stones.iter().map(|s| s.stone_id.to_string()).collect();
     format!(
         "<h4><code>{status}</code>: {}</h4><p class=\"ids\">{}</p>",

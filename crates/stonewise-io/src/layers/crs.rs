@@ -1,0 +1,152 @@
+//! Coordinate reference systems as point clouds name them.
+
+/// A coordinate reference system of the EPSG register.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Crs {
+    /// EPSG code.
+    pub epsg: i32,
+    /// Name.
+    pub name: String,
+    /// Definition as WKT 1 or WKT 2; empty where only the code is known.
+    pub wkt: String,
+}
+
+impl Crs {
+    /// The system that a text names: WKT 1 or 2 with the authority's code, or `EPSG:25832`.
+    ///
+    /// Of a compound system without a code of its own, the horizontal part counts. `None` where the text holds no EPSG
+    /// code: a local frame.
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        if let Some(code) = text.strip_prefix("EPSG:") {
+            let epsg = code.trim().parse().ok()?;
+            return Some(Self {
+                epsg,
+                name: text.to_owned(),
+                wkt: String::new(),
+            });
+        }
+        let root = Node::parse(text)?;
+        let crs = if root.code().is_some() {
+            &root
+        } else {
+            root.children.iter().find(|c| c.code().is_some() && c.is_crs())?
+        };
+        Some(Self {
+            epsg: crs.code()?,
+            name: crs.name()?,
+            wkt: crs.text.to_owned(),
+        })
+    }
+}
+
+/// One `KEYWORD[...]` of well-known text.
+struct Node<'a> {
+    keyword: &'a str,
+    /// The whole of it.
+    text: &'a str,
+    /// Quoted texts and bare values, without the quotes.
+    values: Vec<&'a str>,
+    children: Vec<Node<'a>>,
+}
+
+impl<'a> Node<'a> {
+    /// Reads a node and all below it; `None` where brackets or quotes do not match.
+    fn parse(text: &'a str) -> Option<Self> {
+        let (node, rest) = Self::take(text)?;
+        rest.trim().is_empty().then_some(node)
+    }
+
+    fn take(text: &'a str) -> Option<(Self, &'a str)> {
+        let open = text.find(['[', '('])?;
+        let mut node = Self {
+            keyword: text[..open].trim(),
+            text,
+            values: Vec::new(),
+            children: Vec::new(),
+        };
+        let mut rest = text[open + 1..].trim_start();
+        loop {
+            if let Some(quoted) = rest.strip_prefix('"') {
+                let end = quoted.find('"')?;
+                node.values.push(&quoted[..end]);
+                rest = quoted[end + 1..].trim_start();
+            } else {
+                let end = rest.find([',', ']', ')', '[', '('])?;
+                if rest[end..].starts_with(['[', '(']) {
+                    let (child, after) = Self::take(rest)?;
+                    node.children.push(child);
+                    rest = after.trim_start();
+                } else {
+                    node.values.push(rest[..end].trim());
+                    rest = &rest[end..];
+                }
+            }
+            if let Some(after) = rest.strip_prefix(',') {
+                rest = after.trim_start();
+            } else {
+                let after = rest.strip_prefix([']', ')'])?;
+                node.text = &text[..text.len() - after.len()];
+                return Some((node, after));
+            }
+        }
+    }
+
+    /// The EPSG code of its own AUTHORITY (WKT 1) or ID (WKT 2).
+    fn code(&self) -> Option<i32> {
+        let own = |c: &&Node| matches!(c.keyword.to_ascii_uppercase().as_str(), "AUTHORITY" | "ID");
+        let id = self.children.iter().find(own)?;
+        let is_epsg = id.values.first().is_some_and(|v| v.eq_ignore_ascii_case("EPSG"));
+        is_epsg.then(|| id.values.get(1)?.parse().ok()).flatten()
+    }
+
+    fn name(&self) -> Option<String> {
+        self.values.first().map(|&v| v.to_owned())
+    }
+
+    fn is_crs(&self) -> bool {
+        let keyword = self.keyword.to_ascii_uppercase();
+        ["PROJCS", "PROJCRS", "GEOGCS", "GEOGCRS", "GEODCRS", "BOUNDCRS"].contains(&keyword.as_str())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UTM: &str = r#"PROJCS["ETRS89 / UTM zone 32N",GEOGCS["ETRS89",DATUM["European",SPHEROID["GRS 1980",6378137,298.257222101]],
+        AUTHORITY["EPSG","4258"]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],UNIT["metre",1],AUTHORITY["EPSG","25832"]]"#;
+
+    #[test]
+    fn the_code_is_the_systems_own_and_not_that_of_its_parts() {
+        let crs = Crs::parse(UTM).unwrap();
+        assert_eq!((crs.epsg, crs.name.as_str()), (25832, "ETRS89 / UTM zone 32N"));
+        assert_eq!(crs.wkt, UTM);
+        let wkt2 = r#"PROJCRS["NAD83 / Texas", BASEGEOGCRS["NAD83", ID["EPSG",4269]], CS[Cartesian,2], ID["EPSG",2277]]"#;
+        assert_eq!(Crs::parse(wkt2).unwrap().epsg, 2277);
+        assert_eq!(Crs::parse("EPSG:31467").unwrap().epsg, 31467);
+    }
+
+    #[test]
+    fn the_horizontal_part_of_a_compound_system_counts() {
+        let compound = format!(
+            r#"COMPD_CS["both",{UTM},VERT_CS["DHHN2016",VERT_DATUM["x",2005],AUTHORITY["EPSG","7837"]]]"#
+        );
+        let crs = Crs::parse(&compound).unwrap();
+        assert_eq!(crs.epsg, 25832);
+        assert_eq!(crs.wkt, UTM);
+    }
+
+    #[test]
+    fn local_frames_and_broken_texts_have_none() {
+        for text in [
+            r#"LOCAL_CS["dam frame",UNIT["metre",1]]"#,
+            "",
+            "PROJCS[\"open\"",
+            "EPSG:",
+            "PROJCS[\"a\"]]",
+        ] {
+            assert_eq!(Crs::parse(text), None, "{text}");
+        }
+    }
+}

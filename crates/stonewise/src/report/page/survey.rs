@@ -1,0 +1,86 @@
+//! The survey data of the cover: what was measured with what.
+
+use super::html::{details, table};
+use crate::report::ResultSet;
+use crate::report::draw::{count, escape};
+use serde_json::Value;
+use std::path::Path;
+
+/// A table of the epochs, folded on the screen and open on the printed cover; empty where run.json has none.
+pub(super) fn survey(results: &ResultSet) -> String {
+    let Some(epochs) = results.run.get("epochs").and_then(Value::as_array) else {
+        return String::new();
+    };
+    let compared = [0, results.pair];
+    let chosen: Vec<&Value> = compared.iter().filter_map(|e| epochs.get(*e)).collect();
+    let number = |epoch: &Value, key: &str| {
+        let value = epoch.get(key).and_then(Value::as_u64);
+        value.map_or("\u{2013}".into(), |v| {
+            count(usize::try_from(v).unwrap_or(usize::MAX))
+        })
+    };
+    let row = |what: &str, cell: &dyn Fn(&Value) -> String| {
+        let mut row = vec![what.to_owned()];
+        row.extend(chosen.iter().map(|e| cell(e)));
+        row
+    };
+    let rows = vec![
+        row("point clouds", &|e| files(e.get("clouds"))),
+        row("points", &|e| number(e, "points")),
+        row("camera file", &|e| files(e.get("cameras"))),
+        row("photos used", &|e| number(e, "photos")),
+        row("masks", &|e| files(e.get("masks"))),
+        row("stones found", &|e| number(e, "stones")),
+        row("known motion put in", &known_motion),
+    ];
+    let heads: Vec<String> = chosen
+        .iter()
+        .map(|e| e.get("name").and_then(Value::as_str).unwrap_or("").to_owned())
+        .collect();
+    let mut head = vec!["epoch"];
+    head.extend(heads.iter().map(String::as_str));
+    let columns = head.len();
+    let crs = results
+        .run
+        .get("crs")
+        .and_then(|c| c.get("name"))
+        .and_then(Value::as_str);
+    let frame = crs.map_or("the survey's own local frame, metres".into(), escape);
+    details(
+        "Survey data",
+        &format!(
+            "{}<p class=\"note\">Coordinates: {frame}.</p>",
+            table(&head, &rows, columns)
+        ),
+    )
+}
+
+/// Names and sizes of one input or a list of them.
+fn files(value: Option<&Value>) -> String {
+    let one = |input: &Value| {
+        let path = input.get("path").and_then(Value::as_str)?;
+        let name = Path::new(path)
+            .file_name()
+            .map_or(path.into(), |n| n.to_string_lossy());
+        let size = input.get("bytes").and_then(Value::as_u64);
+        let size = size.map_or(String::new(), |b| format!(" ({:.1}\u{a0}MB)", b as f64 / 1e6));
+        Some(format!("{}{size}", escape(&name)))
+    };
+    let list: Vec<String> = match value {
+        Some(Value::Array(items)) => items.iter().filter_map(one).collect(),
+        Some(item) => one(item).into_iter().collect(),
+        None => Vec::new(),
+    };
+    if list.is_empty() {
+        "\u{2013}".into()
+    } else {
+        list.join("<br>")
+    }
+}
+
+fn known_motion(epoch: &Value) -> String {
+    match epoch.get("motion") {
+        None | Some(Value::Null) => "none".into(),
+        Some(motion) => escape(&motion.to_string()),
+    }
+}
