@@ -16,6 +16,8 @@ type Clouds = "none" | "before" | "after" | "both";
 
 /** Patches stand this far before the plane of their stone, so that its relief does not hide them, metres. */
 const LIFT_M = 0.02;
+/** Beyond so many stones outlines are left out and edges are not smoothed: they would be finer than a pixel. */
+const MANY_STONES = 3000;
 /** How far cameras are drawn in front of their centres, metres. */
 const CAMERA_M = 0.5;
 
@@ -66,7 +68,7 @@ export class WallScene {
       tabindex: 0, role: "application",
       "aria-label": "The wall in space. Drag turns, right drag or arrow keys move, the wheel zooms. Buttons below give fixed views.",
     });
-    this.#renderer = new WebGLRenderer({ canvas, antialias: true, preserveDrawingBuffer: true });
+    this.#renderer = new WebGLRenderer({ canvas, antialias: report.stones.count <= MANY_STONES, preserveDrawingBuffer: true });
     this.#controls = new OrbitControls(this.#camera, canvas);
     this.#controls.listenToKeyEvents(canvas);
     this.#controls.addEventListener("change", () => this.redraw());
@@ -184,7 +186,7 @@ export class WallScene {
         for (const corner of triangle) places.push(...world[corner]!);
         owners.push(i);
       }
-      world.forEach((p, k) => lines.push(...p, ...world[(k + 1) % world.length]!));
+      if (stones.count <= MANY_STONES) world.forEach((p, k) => lines.push(...p, ...world[(k + 1) % world.length]!));
     }
     this.#firstVertex.push(places.length / 3);
     this.#base = new Float32Array(places);
@@ -204,7 +206,7 @@ export class WallScene {
     const shafts = new BufferGeometry();
     shafts.setAttribute("position", new BufferAttribute(new Float32Array(6 * stones.count), 3));
     this.#shafts = new LineSegments(shafts, new LineBasicMaterial());
-    this.#heads = new InstancedMesh(new ConeGeometry(0.018, 0.06, 8), new MeshBasicMaterial(), stones.count);
+    this.#heads = new InstancedMesh(new ConeGeometry(0.018, 0.06, 6, 1, true), new MeshBasicMaterial(), stones.count);
     this.#shafts.frustumCulled = this.#heads.frustumCulled = false;
     this.#scene.add(this.#shafts, this.#heads);
   }
