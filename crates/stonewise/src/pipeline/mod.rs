@@ -8,7 +8,6 @@ mod crs;
 mod epoch_tiles;
 mod evidence;
 mod face_cloud;
-mod inner;
 mod label;
 mod matching;
 mod network;
