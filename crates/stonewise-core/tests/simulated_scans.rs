@@ -328,9 +328,11 @@ fn incidence_follows_from_where_the_station_stands() {
             n += 1.0;
         }
         assert!(n > 2000.0, "{n}");
-        // Relief turns faces towards and away from the beam alike, and hides a little of the latter.
+        // Relief, facets and rounded edges turn faces by some 20 degrees: seen square on that costs a few hundredths of the
+        // cosine, seen at an angle faces turn towards the beam as well as away.
+        let ratio = stated / plane;
         assert!(
-            (stated / n - plane / n).abs() < 0.06,
+            (0.88..1.2).contains(&ratio),
             "{low}: {} and {}",
             stated / n,
             plane / n

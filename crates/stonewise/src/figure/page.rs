@@ -1,5 +1,7 @@
 //! A self-contained page of text, tables and pictures.
 
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
 
 /// A page that is being written, HTML.
@@ -97,23 +99,8 @@ pub(crate) fn jpeg_element(jpeg: &[u8], description: &str) -> String {
     format!(
         "<img alt=\"{}\" src=\"data:image/jpeg;base64,{}\">",
         escape(description),
-        base64(jpeg)
+        STANDARD.encode(jpeg)
     )
-}
-
-/// Bytes as text (RFC 4648, section 4).
-fn base64(bytes: &[u8]) -> String {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for group in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for i in 0..4 {
-            let digit = DIGITS[(bits >> (18 - 6 * i) & 63) as usize];
-            out.push(if i <= group.len() { char::from(digit) } else { '=' });
-        }
-    }
-    out
 }
 
 /// Makes any text harmless in HTML and SVG.
@@ -154,15 +141,6 @@ mod tests {
         page.note("a < b").figure("\"x\"", "<svg/>");
         let html = page.finish();
         assert!(html.contains("&lt;b&gt;") && html.contains("a &lt; b") && html.contains("<svg/>"));
-        // The examples of RFC 4648, section 10.
-        for (plain, coded) in [
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foo", "Zm9v"),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(plain.as_bytes()), coded);
-        }
         assert_eq!(fixed(-0.004, 2), "0.00");
         assert_eq!(fixed(-1.5, 1), "\u{2212}1.5");
         assert_eq!(fixed(f64::NAN, 1), "–");

@@ -113,7 +113,7 @@ impl Plot {
         [
             MARGIN[0],
             MARGIN[1],
-            self.size[0] - MARGIN[2] - bar,
+            self.size[0] - MARGIN[2] - bar - self.legend_px(),
             self.size[1] - MARGIN[3],
         ]
     }
@@ -223,40 +223,34 @@ impl Plot {
         }
     }
 
+    /// Name, colour and dash of what belongs into the legend.
+    fn named(&self) -> Vec<(&str, &str, bool)> {
+        let entries = self.items.iter().filter_map(|item| match item {
+            Item::Line {
+                name, colour, dashed, ..
+            } => Some((name.as_str(), colour.as_str(), *dashed)),
+            Item::Dots { name, colour, .. } => Some((name.as_str(), colour.as_str(), false)),
+            _ => None,
+        });
+        entries.filter(|(name, ..)| !name.is_empty()).collect()
+    }
+
+    /// Room for the legend to the right of the axes, pixels.
+    fn legend_px(&self) -> f64 {
+        let longest = self.named().iter().map(|(name, ..)| name.chars().count()).max();
+        longest.map_or(0.0, |n| 36.0 + 6.6 * n as f64)
+    }
+
     fn draw_legend(&self, out: &mut String) {
-        let named: Vec<(&str, &str, bool)> = self
-            .items
-            .iter()
-            .filter_map(|item| match item {
-                Item::Line {
-                    name, colour, dashed, ..
-                } => Some((name.as_str(), colour.as_str(), *dashed)),
-                Item::Dots { name, colour, .. } => Some((name.as_str(), colour.as_str(), false)),
-                _ => None,
-            })
-            .filter(|(name, ..)| !name.is_empty())
-            .collect();
-        if named.is_empty() {
-            return;
-        }
-        let [left, top, ..] = self.area();
-        let longest = named.iter().map(|(n, ..)| n.chars().count()).max().unwrap_or(0) as f64;
-        let _ = write!(
-            out,
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#fff\" fill-opacity=\".8\"/>",
-            left + 4.0,
-            top + 4.0,
-            36.0 + 6.6 * longest,
-            6.0 + 16.0 * named.len() as f64
-        );
-        for (i, (name, colour, dashed)) in named.iter().enumerate() {
-            let y = top + 16.0 * (i as f64 + 1.0);
+        let [_, top, right, _] = self.area();
+        let left = right + 12.0 + if self.bar.is_some() { BAR_PX } else { 0.0 };
+        for (i, (name, colour, dashed)) in self.named().iter().enumerate() {
+            let y = top + 16.0 * (i as f64 + 0.5);
             let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
             let _ = write!(
                 out,
-                "<path stroke=\"{colour}\" stroke-width=\"3\"{dash} d=\"M{:.1} {y:.1}h18\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                left + 9.0,
-                left + 33.0,
+                "<path stroke=\"{colour}\" stroke-width=\"3\"{dash} d=\"M{left:.1} {y:.1}h18\"/><text x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                left + 23.0,
                 y + 4.0,
                 escape(name)
             );
@@ -339,7 +333,8 @@ mod tests {
             "t",
             Axis::linear("x", [0.0, 10.0]),
             Axis::linear("y", [0.0, 1.0]),
-            [472.0, 268.0],
+            // 472 and the room for a legend of two letters.
+            [521.2, 268.0],
         )
     }
 

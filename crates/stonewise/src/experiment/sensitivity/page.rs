@@ -50,7 +50,7 @@ fn error_plot(influence: Influence, scanner: &str, points: &[&SensitivityPoint])
         &format!("{}, {scanner}: error", influence.word()),
         x_axis(influence, points),
         Axis::decades("RMSE, 3D (mm)", values),
-        [470.0, 300.0],
+        [540.0, 290.0],
     );
     curves(&mut plot, points, |p| 1e3 * p.rmse_m[0]);
     plot
@@ -61,7 +61,7 @@ fn share_plot(influence: Influence, scanner: &str, points: &[&SensitivityPoint])
         &format!("{}, {scanner}: stones measured", influence.word()),
         x_axis(influence, points),
         Axis::linear("share of the stones", [0.0, 1.05]),
-        [470.0, 300.0],
+        [540.0, 290.0],
     );
     curves(&mut plot, points, SensitivityPoint::found_share);
     plot

@@ -90,7 +90,7 @@ fn scatter(tuned: &Tuned) -> Plot {
         "RMSE against stones measured",
         Axis::around("stones measured", all.iter().map(|p| p[0]), false),
         Axis::decades("RMSE, 3D (mm)", all.iter().map(|p| p[1])),
-        [640.0, 400.0],
+        [760.0, 400.0],
     );
     plot.add(Item::Dots {
         points: all,
