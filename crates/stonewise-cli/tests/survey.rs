@@ -385,9 +385,15 @@ fn init_writes_a_project_that_runs_need_no_change_in() {
         assert!(text.contains(expected), "{expected} is not in\n{text}");
     }
     stonewise().arg("init").arg(survey.path()).assert().code(1);
+    // Without masks a network is needed.
+    let with_model = format!("{text}\n[segment]\nmodel = \"missing.safetensors\"\n");
+    fs::write(survey.path().join("stonewise.toml"), with_model).unwrap();
     let out = tempfile::tempdir().unwrap();
     let (code, log) = run(survey.path(), out.path(), &[]);
-    assert!(code == 1 && log.contains("has no masks"), "{log}");
+    assert!(
+        code == 1 && log.contains("no such file") && log.contains("missing.safetensors"),
+        "{log}"
+    );
 }
 
 #[test]

@@ -58,6 +58,20 @@ impl Default for TrainParams {
 }
 
 impl TrainParams {
+    /// For a network that has learnt before: a lower learning rate keeps what it knows, and fewer steps are enough.
+    pub fn fine_tuning() -> Self {
+        let from_scratch = Self::default();
+        Self {
+            schedule: Schedule {
+                learning_rate: from_scratch.schedule.learning_rate / 3.0,
+                warmup_steps: 50,
+                ..from_scratch.schedule
+            },
+            evaluate_steps: 100,
+            ..from_scratch
+        }
+    }
+
     /// Images of one step.
     pub fn images_per_step(&self) -> usize {
         self.batch * self.accumulate

@@ -53,7 +53,10 @@ pub fn open_training<B: TrainBackend>(
         }
         return Ok(trainer);
     }
-    let training = params.unwrap_or_default();
+    let training = params.unwrap_or_else(|| match start {
+        Start::Nothing(_) => TrainParams::default(),
+        Start::Weights(_) => TrainParams::fine_tuning(),
+    });
     if let Some(problem) = training.impossible() {
         return Err(TrainError::Data(problem));
     }
