@@ -54,7 +54,8 @@ mod tests {
         std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
         let decisions = "event,photo,instance\nmerged_instance,<script>.jpg,4\nmerged_instance,b.jpg,5\n";
         std::fs::write(folder.path().join("audit_epoch1.csv"), decisions).unwrap();
-        std::fs::write(folder.path().join("registration.json"), r#"{"converged": false}"#).unwrap();
+        std::fs::write(folder.path().join("registration.json"), r#"{"converged": false, "stable_areas": {"shift": [0.0012, 0, -0.003], "points": [1200, 1300],
+                "covariance": [1e-6,0,0,0,0,0, 0,4e-6,0,0,0,0, 0,0,1e-6,0,0,0, 0,0,0,1,0,0, 0,0,0,0,1,0, 0,0,0,0,0,1]}}"#).unwrap();
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(&path).unwrap();
         assert_eq!(
@@ -123,6 +124,7 @@ mod tests {
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
         assert!(html.contains("before it settled"));
+        assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         let html = written(&html);
         assert!(

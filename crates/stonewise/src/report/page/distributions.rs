@@ -158,13 +158,45 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
     let body = format!(
         "<p>Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
          error of that registration; only stable points outside the wall can tell. Stones that did not move significantly should \
-         scatter around zero. {entered}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
+         scatter around zero. {entered}</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
          deviation of normally distributed values. {} stones in all, {} not significant.</p>",
+        stable_areas(&results.registration),
         table(&head, &rows, 1),
         count(facts.measured.len()),
         count(still.len())
     );
     section("datum", "Datum check", &body)
+}
+
+/// What the areas that the project calls stable say about the registration.
+fn stable_areas(registration: &serde_json::Value) -> String {
+    let Some(areas) = registration.get("stable_areas").filter(|a| a.is_object()) else {
+        return "The project names no stable areas ([[registration.stable]]), so this report cannot tell the two apart.".into();
+    };
+    let numbers = |key: &str| -> Vec<f64> {
+        let list = areas.get(key).and_then(serde_json::Value::as_array);
+        list.map_or(Vec::new(), |l| {
+            l.iter().filter_map(serde_json::Value::as_f64).collect()
+        })
+    };
+    let (shift, covariance, points) = (numbers("shift"), numbers("covariance"), numbers("points"));
+    let part = |(k, name): (usize, &str)| {
+        // A 6 x 6 matrix in one list: its diagonal lies 7 apart.
+        let sigma = covariance.get(7 * k).map(|v| v.max(0.0).sqrt());
+        format!(
+            "{name} {} \u{b1} {} mm",
+            mm_or_dash(shift.get(k).copied()),
+            mm_or_dash(sigma)
+        )
+    };
+    let parts: Vec<String> = ["x", "y", "z"].into_iter().enumerate().map(part).collect();
+    let counts: Vec<String> = points.iter().map(|n| count(*n as usize)).collect();
+    format!(
+        "<b>Stable areas</b> ({} points) seem to have moved by {} (one standard deviation, world axes). That is an error of the \
+         registration: it is counted in every uncertainty, and not taken out of the displacements.",
+        counts.join(" and "),
+        parts.join(", ")
+    )
 }
 
 /// The first number of this name anywhere in a document.
