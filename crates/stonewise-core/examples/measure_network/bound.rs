@@ -20,6 +20,9 @@ pub struct Exact {
     pub weight: f64,
 }
 
+/// By stone: places, normals and weights of an epoch's points.
+type Facets = BTreeMap<u32, Vec<(Point3<f64>, Vector3<f64>, f64)>>;
+
 /// Per stone: standard deviations (in the face 2D, out of it) of the stone alone and of its window, metres.
 ///
 /// `sigma_m`: range noise on a surface met square on; it grows with 1/sqrt(cos incidence), and its part along the
@@ -35,7 +38,7 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
                 .vector,
         )
     };
-    let mut rows: [BTreeMap<u32, Vec<(Point3<f64>, Vector3<f64>, f64)>>; 2] = Default::default();
+    let mut rows: [Facets; 2] = Default::default();
     for (epoch, exact) in epochs.iter().enumerate() {
         let found: Vec<_> = exact
             .points
