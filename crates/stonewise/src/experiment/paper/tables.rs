@@ -200,7 +200,7 @@ fn rmse(cases: &[Case]) -> Vec<Vec<String>> {
         }
     }
     let cm = |score: Option<&ErrorStatistics>, of: fn(&ErrorStatistics) -> f64| -> String {
-        score.map_or("–".to_owned(), |s| fixed(100.0 * of(s), 2))
+        score.map_or("–".to_owned(), |s| fixed(100.0 * of(s), 3))
     };
     type Pick = fn(&Case) -> &MotionScore;
     type Figure = fn(&ErrorStatistics) -> f64;
