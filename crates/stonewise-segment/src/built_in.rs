@@ -4,8 +4,8 @@ use crate::model::{MaskRcnn, ModelBackend, WeightsError, load_model, model_from_
 use burn::tensor::Device;
 use std::path::{Path, PathBuf};
 
-/// Weights trained on rendered photos, see docs/src/method/segmentation.md; `None` in a build that comes without.
-const BUILT_IN: Option<&[u8]> = None;
+/// Weights trained on rendered photos, see docs/src/method/segmentation.md.
+const BUILT_IN: &[u8] = include_bytes!("../weights/built-in.safetensors");
 /// What the built-in network is called where a file could be given.
 const NAME: &str = "built-in";
 
@@ -31,10 +31,10 @@ impl Weights {
     /// All bytes of the network.
     ///
     /// # Errors
-    /// The file cannot be read, or this build comes without a network.
+    /// The file cannot be read.
     pub fn bytes(&self) -> Result<Vec<u8>, WeightsError> {
         match self {
-            Self::BuiltIn => Ok(BUILT_IN.ok_or(WeightsError::NoBuiltIn)?.to_vec()),
+            Self::BuiltIn => Ok(BUILT_IN.to_vec()),
             Self::File(path) => std::fs::read(path).map_err(|source| WeightsError::File {
                 path: path.clone(),
                 source,
@@ -46,13 +46,13 @@ impl Weights {
 /// The network, ready to run.
 ///
 /// # Errors
-/// The file cannot be read or does not fit, or this build comes without a network.
+/// The file cannot be read or does not fit.
 pub fn open_model<B: ModelBackend>(
     weights: &Weights,
     device: &Device<B>,
 ) -> Result<MaskRcnn<B>, WeightsError> {
     match weights {
-        Weights::BuiltIn => model_from_bytes(BUILT_IN.ok_or(WeightsError::NoBuiltIn)?, NAME, device),
+        Weights::BuiltIn => model_from_bytes(BUILT_IN, NAME, device),
         Weights::File(path) => load_model(path, device),
     }
 }

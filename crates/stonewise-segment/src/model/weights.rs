@@ -42,11 +42,6 @@ pub enum WeightsError {
         /// What went wrong.
         source: SafeTensorError,
     },
-    /// Only files can be used.
-    #[error(
-        "this build of stonewise comes without a built-in network: name a file that `stonewise train` wrote"
-    )]
-    NoBuiltIn,
     /// The file does not say what the network looks like.
     #[error("{name} does not say what its network looks like: {problem}")]
     Config {

@@ -12,7 +12,7 @@ pub struct TilingOptions {
     pub tile_px: u32,
     /// Least overlap of two tiles, pixels of their scale. A stone up to this size is whole in one of them.
     pub overlap_px: u32,
-    /// Sizes at which the photo is looked at, 1 = as it is.
+    /// Sizes at which the photo is looked at, 1 = as it is; see [`Self::scales_for`].
     pub scales: Vec<f64>,
     /// Masks with a lower score are dropped.
     pub min_score: f32,
@@ -45,13 +45,26 @@ impl TilingOptions {
         }
     }
 
+    /// The sizes at which a photo of `width` x `height` pixels is looked at. A smaller size is for stones that no tile of the larger sizes
+    /// shows whole, so it is left out where one tile of a larger size shows the whole photo.
+    pub fn scales_for(&self, width: u32, height: u32) -> Vec<f64> {
+        let in_one_tile = |&scale: &f64| scaled(width.max(height), scale) <= self.tile_px;
+        let is_needed = |scale: &f64| {
+            !self
+                .scales
+                .iter()
+                .any(|larger| larger > scale && in_one_tile(larger))
+        };
+        self.scales.iter().copied().filter(is_needed).collect()
+    }
+
     /// Number of tiles of a photo of this size, all scales together.
     pub fn tile_count(&self, width: u32, height: u32) -> u64 {
-        let count = |&scale: &f64| {
+        let count = |scale: f64| {
             let tiles = |size| origins(scaled(size, scale), self.tile_px, self.overlap_px).len() as u64;
             tiles(width) * tiles(height)
         };
-        self.scales.iter().map(count).sum()
+        self.scales_for(width, height).into_iter().map(count).sum()
     }
 
     /// The first key whose value cannot be, and what it must be.
@@ -88,4 +101,26 @@ impl TilingOptions {
 /// A length at another scale, pixels, at least 1.
 pub(super) fn scaled(size: u32, scale: f64) -> u32 {
     ((f64::from(size) * scale).round() as u32).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TilingOptions;
+
+    #[test]
+    fn smaller_sizes_are_for_what_no_tile_shows_whole() {
+        let options = TilingOptions::default();
+        assert_eq!(options.scales_for(300, 500), [1.0]);
+        assert_eq!(options.scales_for(640, 641), [1.0, 0.5]);
+        assert_eq!(options.scales_for(1500, 1000), [1.0, 0.5, 0.25]);
+        let coarse = TilingOptions {
+            scales: vec![0.25],
+            ..options
+        };
+        assert_eq!(
+            coarse.scales_for(300, 500),
+            [0.25],
+            "what was asked for alone is kept"
+        );
+    }
 }

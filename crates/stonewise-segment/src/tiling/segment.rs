@@ -34,7 +34,8 @@ pub fn segment_photo<D: Detector>(
     progress: &dyn Progress,
 ) -> Result<Segmentation, TilingError<D::Error>> {
     let mut candidates: Vec<Candidate> = Vec::new();
-    for (index, &scale) in options.scales.iter().enumerate() {
+    let scales = options.scales_for(photo.width(), photo.height());
+    for (index, &scale) in scales.iter().enumerate() {
         let image = at_scale(photo, scale);
         let scaling = Scaling {
             index,
