@@ -38,7 +38,7 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
         },
     };
     let start = if args.from == Path::new("none") {
-        Start::Nothing(config.model)
+        Start::Nothing(Box::new(config.model))
     } else {
         Start::Weights(Weights::named(&args.from))
     };

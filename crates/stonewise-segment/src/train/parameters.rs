@@ -150,7 +150,7 @@ impl<B: Backend> ModuleMapper<B> for Replacer<'_> {
         let path = self.path.join(".");
         let (id, tensor, mapper) = param.consume();
         let tensor = match self.values.get(&path) {
-            Some(data) if data.shape == tensor.shape().into() => {
+            Some(data) if data.shape == tensor.shape() => {
                 let trained = tensor.is_require_grad();
                 Tensor::from_data(data.clone(), &tensor.device()).set_require_grad(trained)
             }

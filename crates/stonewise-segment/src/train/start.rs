@@ -14,7 +14,7 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// Random weights of a network that looks like this.
-    Nothing(MaskRcnnConfig),
+    Nothing(Box<MaskRcnnConfig>),
     /// A network that has learnt before.
     Weights(Weights),
 }
@@ -61,7 +61,7 @@ pub fn open_training<B: TrainBackend>(
         return Err(TrainError::Data(problem));
     }
     let model = match start {
-        Start::Nothing(config) => MaskRcnn::init(config, training.seed, device)?,
+        Start::Nothing(config) => MaskRcnn::init(config.as_ref(), training.seed, device)?,
         Start::Weights(weights) => open_model(weights, device)?,
     };
     let config = TrainConfig {

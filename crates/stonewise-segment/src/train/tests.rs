@@ -56,7 +56,7 @@ fn square(number: u64) -> Result<Sample, String> {
 }
 
 fn train(out: &Path, total: u64, until: u64) -> (Stop, Trainer<B>) {
-    let start = Start::Nothing(config());
+    let start = Start::Nothing(Box::new(config()));
     let total = Some(Total::Steps(total));
     let mut trainer =
         open_training::<B>(out, &start, Some(params()), total, None, &Default::default()).unwrap();
@@ -126,7 +126,7 @@ fn other_parameters_do_not_continue_a_training() {
     let out = tempfile::tempdir().unwrap();
     train(out.path(), 1, 100);
     let other = TrainParams { seed: 9, ..params() };
-    let start = Start::Nothing(config());
+    let start = Start::Nothing(Box::new(config()));
     let opened = open_training::<B>(out.path(), &start, Some(other), None, None, &Default::default());
     assert!(opened.err().unwrap().to_string().contains("other parameters"));
 }
@@ -142,7 +142,7 @@ fn a_training_that_diverges_stops_and_says_so() {
         },
         ..params()
     };
-    let start = Start::Nothing(config());
+    let start = Start::Nothing(Box::new(config()));
     let total = Some(Total::Steps(20));
     let mut trainer =
         open_training::<B>(out.path(), &start, Some(wild), total, None, &Default::default()).unwrap();
