@@ -85,7 +85,7 @@ impl Axis {
             .into_iter()
             .find(|s| *s >= raw * 0.999)
             .unwrap_or(raw);
-        let decimals = (-step.log10() + 1e-9).ceil().max(0.0) as usize;
+        let decimals = (-step.log10() - 1e-9).ceil().max(0.0) as usize;
         let (first, last) = (
             (low / step - 1e-9).ceil() as i64,
             (high / step + 1e-9).floor() as i64,
@@ -116,7 +116,7 @@ impl Axis {
         chosen
             .into_iter()
             .map(|v| {
-                let decimals = (-v.log10() + 1e-9).ceil().max(0.0) as usize;
+                let decimals = (-v.log10() - 1e-9).ceil().max(0.0) as usize;
                 (v, super::fixed(v, decimals))
             })
             .collect()
