@@ -1,5 +1,6 @@
 //! Masks as a poor segmentation would draw them.
 
+use crate::evaluate::LabelConfusion;
 use crate::raster::{LabelImage, Raster};
 use rand::seq::{IndexedRandom, SliceRandom};
 use rand::{RngExt, SeedableRng};
@@ -41,22 +42,9 @@ pub fn spoil_masks(labels: &LabelImage, error: MaskError, seed: u64) -> LabelIma
 /// Mean over the true instances of the largest IoU that any instance has with them, zero where none overlaps; `None`
 /// without true instances.
 pub fn mean_iou(labels: &LabelImage, truth: &LabelImage) -> Option<f64> {
-    let mut sizes: [BTreeMap<u32, f64>; 2] = Default::default();
-    let mut shared: BTreeMap<(u32, u32), f64> = BTreeMap::new();
-    for (&p, &t) in labels.data().iter().zip(truth.data()) {
-        *sizes[0].entry(p).or_default() += 1.0;
-        *sizes[1].entry(t).or_default() += 1.0;
-        if p != 0 && t != 0 {
-            *shared.entry((p, t)).or_default() += 1.0;
-        }
-    }
-    let mut best: BTreeMap<u32, f64> = sizes[1].keys().filter(|t| **t != 0).map(|t| (*t, 0.0)).collect();
-    for ((p, t), both) in shared {
-        let iou = both / (sizes[0][&p] + sizes[1][&t] - both);
-        let own = best.entry(t).or_default();
-        *own = own.max(iou);
-    }
-    (!best.is_empty()).then(|| best.values().sum::<f64>() / best.len() as f64)
+    let mut confusion = LabelConfusion::default();
+    confusion.extend(labels.data(), truth.data());
+    confusion.score_instances().mean_iou_all
 }
 
 fn relabelled(labels: &LabelImage, new: impl Fn(u32, u32, u32) -> u32) -> LabelImage {

@@ -414,7 +414,8 @@ impl<B: ModelBackend> StoneDetector<B> {
     /// Leaves out stones that score less, before their masks cost time.
     pub fn with_min_score(mut self, score: f32) -> Self {
         let threshold = &mut self.model.config.score_threshold;
-        *threshold = threshold.max(score);
+        // The network asks for more than its threshold; a stone that scores just this much stays.
+        *threshold = threshold.max(score.next_down());
         self
     }
 }

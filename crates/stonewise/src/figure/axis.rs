@@ -1,5 +1,7 @@
 //! One axis of a plot: its range, its ticks, and where a value lies.
 
+use crate::report::number;
+
 /// An axis.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
@@ -93,7 +95,7 @@ impl Axis {
         (first..=last)
             .map(|i| {
                 let value = i as f64 * step;
-                (value, super::fixed(value, decimals))
+                (value, number(value, decimals))
             })
             .collect()
     }
@@ -117,7 +119,7 @@ impl Axis {
             .into_iter()
             .map(|v| {
                 let decimals = (-v.log10() - 1e-9).ceil().max(0.0) as usize;
-                (v, super::fixed(v, decimals))
+                (v, number(v, decimals))
             })
             .collect()
     }

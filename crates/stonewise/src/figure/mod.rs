@@ -9,5 +9,5 @@ mod plot;
 
 pub(crate) use axis::Axis;
 pub(crate) use colour::{GREY, PALETTE, Ramp};
-pub(crate) use page::{Page, fixed, jpeg_element, table};
+pub(crate) use page::{Page, jpeg_element, table};
 pub(crate) use plot::{Item, Plot};

@@ -1,5 +1,6 @@
 //! A self-contained page of text, tables and pictures.
 
+use crate::report::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
@@ -103,37 +104,10 @@ pub(crate) fn jpeg_element(jpeg: &[u8], description: &str) -> String {
     )
 }
 
-/// Makes any text harmless in HTML and SVG.
-pub(crate) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            c => out.push(c),
-        }
-    }
-    out
-}
-
-/// A number with this many decimals; a dash where there is none.
-pub(crate) fn fixed(value: f64, decimals: usize) -> String {
-    if !value.is_finite() {
-        return "–".to_owned();
-    }
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-        Some(rest) => format!("\u{2212}{rest}"),
-        None => text,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::report::number;
 
     #[test]
     fn text_is_harmless_and_numbers_read_well() {
@@ -141,8 +115,8 @@ mod tests {
         page.note("a < b").figure("\"x\"", "<svg/>");
         let html = page.finish();
         assert!(html.contains("&lt;b&gt;") && html.contains("a &lt; b") && html.contains("<svg/>"));
-        assert_eq!(fixed(-0.004, 2), "0.00");
-        assert_eq!(fixed(-1.5, 1), "\u{2212}1.5");
-        assert_eq!(fixed(f64::NAN, 1), "–");
+        assert_eq!(number(-0.004, 2), "0.00");
+        assert_eq!(number(-1.5, 1), "\u{2212}1.5");
+        assert_eq!(number(f64::NAN, 1), "–");
     }
 }

@@ -1,7 +1,7 @@
 //! One plot: axes and what lies between them, as an SVG element that needs nothing else.
 
-use super::page::escape;
-use super::{Axis, Ramp, fixed};
+use super::{Axis, Ramp};
+use crate::report::{escape, number};
 use std::fmt::Write;
 
 /// A plot of a fixed size.
@@ -313,7 +313,7 @@ fn circles(out: &mut String, places: &[(f64, f64)], colour: &str, radius_px: f64
 
 /// A coordinate with a tenth of a pixel, a plain minus sign, and no empty decimals.
 fn short(v: f64) -> String {
-    let text = fixed(v, 1).replace('\u{2212}', "-");
+    let text = number(v, 1).replace('\u{2212}', "-");
     text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
 }
 

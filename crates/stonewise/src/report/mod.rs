@@ -22,6 +22,7 @@ mod summary;
 mod testing;
 
 pub use change_points::DistancePoint;
+pub(crate) use draw::{escape, number};
 pub use error::ReportError;
 pub use evidence::{
     Crop, Cut, EVIDENCE_DIR, Evidence, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras,

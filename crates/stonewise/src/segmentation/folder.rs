@@ -95,7 +95,8 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let network = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
     let key = Key::new(STEP, job.tiling, &[&network]);
     let step = StepDir::open(job.out.join("work").join(STEP), key)?;
-    let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?);
+    let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?)
+        .with_min_score(job.tiling.min_score);
     let warnings = Warnings::default();
     let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
     progress.begin("stones", photos.iter().map(tiles).sum());

@@ -2,7 +2,7 @@
 
 use super::{Case, Method};
 use crate::error::Result;
-use crate::figure::fixed;
+use crate::report::number;
 use std::fmt::Write;
 use stonewise_core::evaluate::{Directions, ErrorStatistics, MotionScore};
 use stonewise_io::table::Table;
@@ -101,12 +101,12 @@ impl PaperTables {
     }
 
     pub(super) fn detail_rows(&self) -> Vec<Vec<String>> {
-        let mm = |v: f64| fixed(1e3 * v, 2);
+        let mm = |v: f64| number(1e3 * v, 2);
         let row = |d: &Detail| {
             let mut row = vec![d.method.clone(), d.survey.clone(), d.motion.clone()];
             row.push(format!("{} of {}", d.count[1], d.count[0]));
             row.extend(d.rmse_m.iter().chain(&d.norm_m).map(|v| mm(*v)));
-            row.push(format!("{} %", fixed(100.0 * d.outlier_rate, 1)));
+            row.push(format!("{} %", number(100.0 * d.outlier_rate, 1)));
             row.extend([d.zero_m[0], d.zero_m[2]].map(mm));
             row
         };
@@ -200,7 +200,7 @@ fn rmse(cases: &[Case]) -> Vec<Vec<String>> {
         }
     }
     let cm = |score: Option<&ErrorStatistics>, of: fn(&ErrorStatistics) -> f64| -> String {
-        score.map_or("–".to_owned(), |s| fixed(100.0 * of(s), 3))
+        score.map_or("–".to_owned(), |s| number(100.0 * of(s), 3))
     };
     type Pick = fn(&Case) -> &MotionScore;
     type Figure = fn(&ErrorStatistics) -> f64;
@@ -250,7 +250,7 @@ fn rmse(cases: &[Case]) -> Vec<Vec<String>> {
             let theirs = PAPER.iter().find(|(kind, scanner, _)| {
                 Some(*kind) == paper && survey.to_lowercase().contains(&scanner.to_lowercase())
             });
-            let told = |i: usize| theirs.map_or("–".to_owned(), |(_, _, cm)| fixed(cm[i], 1));
+            let told = |i: usize| theirs.map_or("–".to_owned(), |(_, _, cm)| number(cm[i], 1));
             rows.push(vec![
                 name.clone(),
                 (*survey).to_owned(),

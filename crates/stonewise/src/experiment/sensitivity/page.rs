@@ -2,8 +2,9 @@
 
 use super::{Influence, SensitivityOptions, SensitivityPoint};
 use crate::error::Result;
-use crate::figure::{Axis, Item, PALETTE, Page, Plot, fixed, table};
+use crate::figure::{Axis, Item, PALETTE, Page, Plot, table};
 use crate::files::write_text;
+use crate::report::number;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 
@@ -119,10 +120,15 @@ fn figures(points: &[&SensitivityPoint]) -> String {
     let rows: Vec<Vec<String>> = points
         .iter()
         .map(|p| {
-            let mut row = vec![p.kind.clone(), p.scanner.clone(), p.method.clone(), fixed(p.x, 2)];
+            let mut row = vec![
+                p.kind.clone(),
+                p.scanner.clone(),
+                p.method.clone(),
+                number(p.x, 2),
+            ];
             row.push(format!("{} of {}", p.stones[1], p.stones[0]));
-            row.extend(p.rmse_m.iter().chain([&p.median_m]).map(|m| fixed(1e3 * m, 2)));
-            row.push(format!("{} %", fixed(100.0 * p.outlier_rate, 1)));
+            row.extend(p.rmse_m.iter().chain([&p.median_m]).map(|m| number(1e3 * m, 2)));
+            row.push(format!("{} %", number(100.0 * p.outlier_rate, 1)));
             row
         })
         .collect();

@@ -2,9 +2,10 @@
 
 use super::{Tuned, TunedPoint};
 use crate::error::Result;
-use crate::figure::{Axis, GREY, Item, PALETTE, Page, Plot, fixed, table};
+use crate::figure::{Axis, GREY, Item, PALETTE, Page, Plot, table};
 use crate::files::write_text;
 use crate::project::Project;
+use crate::report::number;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 
@@ -179,10 +180,10 @@ fn front_table(tuned: &Tuned) -> String {
         .map(|&i| {
             let point = &tuned.points[i];
             let mut row: Vec<String> = point.values.iter().map(text).collect();
-            row.push(fixed(point.measured, 0));
+            row.push(number(point.measured, 0));
             if let Some(e) = point.errors {
-                row.extend([e.rmse_m, e.in_plane_m, e.out_of_plane_m, e.p95_m].map(|m| fixed(1e3 * m, 2)));
-                row.push(format!("{} %", fixed(100.0 * e.outlier_rate, 1)));
+                row.extend([e.rmse_m, e.in_plane_m, e.out_of_plane_m, e.p95_m].map(|m| number(1e3 * m, 2)));
+                row.push(format!("{} %", number(100.0 * e.outlier_rate, 1)));
             }
             row
         })
