@@ -44,6 +44,10 @@ export interface ReportDocument {
     readonly rotation: number;
     readonly opening: number;
   };
+  /** Decimals that a millimetre of these motions is worth. */
+  readonly decimals: number;
+  /** Whether uncertainties hold the error of the registration of the epochs. */
+  readonly registrationKnown: boolean;
   /** Known in-plane translation (along, up), millimetres. */
   readonly truth: readonly [number, number] | null;
   readonly blocks: Readonly<Record<string, readonly ColumnEntry[]>>;
@@ -94,6 +98,8 @@ export interface Joints {
   readonly first: ArrayLike<number>;
   readonly second: ArrayLike<number>;
   readonly ends: readonly [Float64Array, Float64Array, Float64Array, Float64Array];
+  /** Its two ends in the world. */
+  readonly world: readonly [Three<Float64Array>, Three<Float64Array>];
   readonly width: Float64Array;
   readonly opening: Float64Array;
   readonly sliding: Float64Array;
@@ -180,11 +186,13 @@ function readStones(columns: Columns): Stones {
 
 function readJoints(columns: Columns): Joints {
   const first = columns.integers("first");
+  const world = (end: 1 | 2): Three<Float64Array> => [columns.numbers(`x${end}`), columns.numbers(`y${end}`), columns.numbers(`z${end}`)];
   return {
     count: first.length,
     first,
     second: columns.integers("second"),
     ends: [columns.numbers("a1"), columns.numbers("u1"), columns.numbers("a2"), columns.numbers("u2")],
+    world: [world(1), world(2)],
     width: columns.numbers("width"),
     opening: columns.numbers("opening"),
     sliding: columns.numbers("sliding"),

@@ -119,3 +119,8 @@ export function stoneColour(report: Report, quantity: Quantity, palette: Palette
 export function isFaded(report: Report, quantity: Quantity, fade: boolean, i: number): boolean {
   return fade && quantity.fades && !report.stones.significant[i];
 }
+
+/** Whether the opening of a joint differs from zero at 95 %; metres. */
+export function opens(opening: number, sigma: number): boolean {
+  return Math.abs(opening) > 1.96 * sigma;
+}

@@ -2,7 +2,7 @@
 
 import { type Report, isMeasured, norm } from "../data.ts";
 import { button, el } from "../dom.ts";
-import { count, fixed, percent, signedMm, mm } from "../format.ts";
+import { count, fixed, percent, signed } from "../format.ts";
 import type { Store } from "../store.ts";
 
 const ROWS = 40;
@@ -18,9 +18,10 @@ const FILTERS = ["all", "moved significantly", "unlike their neighbours", "below
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
-  const { stones, document: { statuses } } = report;
+  const { stones, document: { statuses, decimals } } = report;
+  const mm = (metres: number) => fixed(metres * 1e3, decimals);
   const move = (title: string, axis: 0 | 1 | 2): Column => ({
-    title, value: (i) => stones.move[axis][i]!, text: (i) => signedMm(stones.move[axis][i]!),
+    title, value: (i) => stones.move[axis][i]!, text: (i) => signed(stones.move[axis][i]! * 1e3, decimals),
   });
   const columns: readonly Column[] = [
     { title: "stone", value: (i) => stones.id[i]!, text: (i) => String(stones.id[i]) },

@@ -4,7 +4,7 @@ import { type Report, ringOf } from "../data.ts";
 import { css, el } from "../dom.ts";
 import { fixed, signedMm } from "../format.ts";
 import { Squares, contains } from "../geometry.ts";
-import { Palette, type Quantity, isFaded, stoneColour } from "../quantities.ts";
+import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Line, Store } from "../store.ts";
 
 /** Length of the longest arrow, least distance between arrows, pixels. */
@@ -275,7 +275,7 @@ export class WallMap {
     pen.lineWidth = Math.max(2.5 / this.#view.scale, 0.022);
     for (let i = 0; i < count; i++) {
       if (Number.isNaN(opening[i]!)) continue;
-      pen.globalAlpha = fade && Math.abs(opening[i]!) <= 1.96 * sigma[i]! ? 0.35 : 1;
+      pen.globalAlpha = fade && !opens(opening[i]!, sigma[i]!) ? 0.35 : 1;
       pen.strokeStyle = palette.of(opening[i]! * 1e3);
       pen.beginPath();
       pen.moveTo(a1[i]!, u1[i]!);
@@ -328,7 +328,7 @@ export class WallMap {
       arrow(pen, x, y, along[i]! * factor, -up[i]! * factor);
     }
     arrow(pen, 14, 18, ARROW_PX, 0);
-    this.#strokeTwice(ink, 1.4);
+    this.#strokeTwice(1.4);
     this.#label(14 + ARROW_PX + 8, 22, `${fixed(reference * 1e3, reference < 0.01 ? 1 : 0)} mm in-plane`, ink);
   }
 
@@ -337,19 +337,22 @@ export class WallMap {
     pen.beginPath();
     pen.moveTo(x + a1 * scale, y - u1 * scale);
     pen.lineTo(x + a2 * scale, y - u2 * scale);
-    this.#strokeTwice(ink, 1.8);
+    this.#strokeTwice(1.8);
     this.#label(x + a1 * scale + 5, y - u1 * scale - 6, "0 m", ink);
-    this.#label(x + a2 * scale + 5, y - u2 * scale - 6, `${fixed(Math.hypot(a2 - a1, u2 - u1), 1)} m`, ink);
+    // A label at the right edge goes inside.
+    const end = x + a2 * scale;
+    this.#label(end > this.#width - 45 ? this.#width - 45 : end + 5, y - u2 * scale - 6, `${fixed(Math.hypot(a2 - a1, u2 - u1), 1)} m`, ink);
   }
 
-  #strokeTwice(ink: string, width: number): void {
+  /** Dark on light, so that it shows on every fill and on every ground. */
+  #strokeTwice(width: number): void {
     const pen = this.#pen;
     pen.lineJoin = pen.lineCap = "round";
-    pen.strokeStyle = css("--panel");
+    pen.strokeStyle = LIGHT;
     pen.lineWidth = width + 2.4;
-    pen.globalAlpha = 0.75;
+    pen.globalAlpha = 0.8;
     pen.stroke();
-    pen.strokeStyle = ink;
+    pen.strokeStyle = DARK;
     pen.lineWidth = width;
     pen.globalAlpha = 1;
     pen.stroke();

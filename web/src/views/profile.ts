@@ -9,6 +9,8 @@ import type { Line, Store } from "../store.ts";
 const QUANTILE = 1.96;
 /** M3C2 core points within this distance of the line are shown, metres. */
 const CHANGE_REACH_M = 0.08;
+/** Narrowest and widest chart, pixels; wider pages enlarge it, narrower ones shrink it. */
+const WIDTH_PX = [420, 1180] as const;
 const NAMES = ["along", "up", "out"] as const;
 
 /** A stone under the line: from and to, metres from the line's start. */
@@ -58,7 +60,7 @@ export function profile(report: Report, store: Store): HTMLElement {
   const draw = () => {
     const line = store.get().profile;
     element.hidden = line === null;
-    if (line) element.replaceChildren(...charts(report, store, line));
+    if (line) element.replaceChildren(...charts(report, store, line, Math.min(WIDTH_PX[1], Math.max(WIDTH_PX[0], element.clientWidth))));
     else element.replaceChildren();
   };
   let waiting = false;
@@ -73,7 +75,7 @@ export function profile(report: Report, store: Store): HTMLElement {
   return element;
 }
 
-function charts(report: Report, store: Store, line: Line): Node[] {
+function charts(report: Report, store: Store, line: Line, width: number): Node[] {
   const steps = stepsAlong(report, line);
   const length = Math.hypot(line.a2 - line.a1, line.u2 - line.u1);
   const measured = steps.filter((s) => isMeasured(report.stones, s.stone));
@@ -82,12 +84,12 @@ function charts(report: Report, store: Store, line: Line): Node[] {
     " Lines: motion of each stone, its rotation included; bands: 95 % of the component at its centroid. ",
     report.change.a.length ? "Dots: M3C2 near the line. " : "",
     button("close", "close the profile", () => store.set({ profile: null })));
-  return [head, ...([2, 0, 1] as const).map((axis) => chart(report, store, line, length, steps, axis))];
+  return [head, ...([2, 0, 1] as const).map((axis) => chart(report, store, line, width, length, steps, axis))];
 }
 
-function chart(report: Report, store: Store, line: Line, length: number, steps: readonly Step[], axis: 0 | 1 | 2): Node {
+function chart(report: Report, store: Store, line: Line, width: number, length: number, steps: readonly Step[], axis: 0 | 1 | 2): Node {
   const { stones } = report;
-  const width = 1180, height = axis === 2 ? 190 : 130, left = 58, right = 12, top = 8, bottom = axis === 1 ? 30 : 18;
+  const height = axis === 2 ? 190 : 130, left = 58, right = 12, top = 8, bottom = axis === 1 ? 30 : 18;
   const change = axis === 2 ? changeAlong(report, line) : [];
   const bounds = steps.filter((s) => isMeasured(stones, s.stone)).flatMap(({ stone }) => {
     const [v, s] = [stones.move[axis][stone]! * 1e3, QUANTILE * stones.sigma[axis][stone]! * 1e3];
@@ -106,7 +108,7 @@ function chart(report: Report, store: Store, line: Line, length: number, steps: 
   const y = (v: number) => top + ((high - v) / (high - low)) * (height - top - bottom);
   const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${NAMES[axis]}, millimetres, along the line` });
   const add = (...nodes: Node[]) => picture.append(...nodes);
-  const yTicks = ticks(low, high, axis === 2 ? 5 : 3), xTicks = ticks(0, length, 12);
+  const yTicks = ticks(low, high, axis === 2 ? 5 : 3), xTicks = ticks(0, length, width / 95);
   for (const t of yTicks) {
     add(svg("path", { class: t === 0 ? "zero" : "grid", d: `M${left} ${y(t)}H${width - right}` }),
       svg("text", { x: left - 6, y: y(t) + 4, "text-anchor": "end" }, fixed(t, decimalsOf(yTicks))));

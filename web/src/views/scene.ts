@@ -9,7 +9,7 @@ import { type Report, isMeasured, norm } from "../data.ts";
 import { button, css, el } from "../dom.ts";
 import { fixed, mm } from "../format.ts";
 import { faceAxes } from "../geometry.ts";
-import { Palette, type Quantity, isFaded, stoneColour } from "../quantities.ts";
+import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Store } from "../store.ts";
 
 type Clouds = "none" | "before" | "after" | "both";
@@ -18,6 +18,8 @@ type Clouds = "none" | "before" | "after" | "both";
 const LIFT_M = 0.02;
 /** Beyond so many stones outlines are left out and edges are not smoothed: they would be finer than a pixel. */
 const MANY_STONES = 3000;
+/** Half the width of a joint's ribbon, in square roots of the median stone's area. */
+const RIBBON = 0.035;
 /** How far cameras are drawn in front of their centres, metres. */
 const CAMERA_M = 0.5;
 
@@ -52,6 +54,8 @@ export class WallScene {
   #edges!: LineSegments<BufferGeometry, LineBasicMaterial>;
   #shafts!: LineSegments<BufferGeometry, LineBasicMaterial>;
   #heads!: InstancedMesh<ConeGeometry, MeshBasicMaterial>;
+  #ribbons!: Mesh<BufferGeometry, MeshBasicMaterial>;
+  #panelElement!: HTMLElement;
   #frusta: LineSegments | null = null;
   readonly #cameras: NamedPlace[] = [];
   readonly #clouds: [Points | null, Points | null] = [null, null];
@@ -76,9 +80,11 @@ export class WallScene {
     this.#survey();
     this.#buildPatches();
     this.#buildArrows();
+    this.#buildRibbons();
     this.#buildCameras();
     this.#exaggeration = this.#usualExaggeration();
-    this.element = el("div", { class: "wall-scene" }, canvas, this.#tip, this.#panel());
+    this.#panelElement = this.#panel();
+    this.element = el("div", { class: "wall-scene" }, canvas, this.#tip, this.#panelElement);
     this.#listen(canvas);
     store.on(() => this.#recolour());
     new ResizeObserver(() => this.#resize()).observe(this.element);
@@ -119,7 +125,11 @@ export class WallScene {
     if (from === "left") direction.multiplyScalar(0.35).addScaledVector(along, -1);
     if (from === "right") direction.multiplyScalar(0.35).addScaledVector(along, 1);
     if (from === "above") direction.multiplyScalar(0.5).add(new Vector3(0, 0, 1));
-    const distance = this.#radius / Math.tan((this.#camera.fov * Math.PI) / 360) / Math.min(1, this.#camera.aspect) * 0.88;
+    const { clientWidth: width, clientHeight: height } = this.element;
+    // The controls cover the lower part of the picture: the wall takes what is left.
+    const free = height > 0 ? Math.max(0.4, 1 - (this.#panelElement.offsetHeight + 16) / height) : 1;
+    const distance = this.#radius / Math.tan((this.#camera.fov * Math.PI) / 360) / Math.min(free, this.#camera.aspect) * 0.88;
+    if (height > 0) this.#camera.setViewOffset(width, height, 0, ((1 - free) / 2) * height, width, height);
     this.#camera.position.copy(this.#middle).addScaledVector(direction.normalize(), distance);
     this.#controls.target.copy(this.#middle);
     this.#controls.update();
@@ -211,6 +221,40 @@ export class WallScene {
     this.#scene.add(this.#shafts, this.#heads);
   }
 
+  /** Joints as flat ribbons in the face, shown with their opening. */
+  #buildRibbons(): void {
+    const { stones, joints } = this.#report;
+    const areas = Float64Array.from(stones.area).sort();
+    const half = RIBBON * Math.sqrt(areas[areas.length >> 1] ?? 0.04);
+    const places = new Float32Array(18 * joints.count);
+    const [p, q, side] = [new Vector3(), new Vector3(), new Vector3()];
+    for (let i = 0; i < joints.count; i++) {
+      const normal = new Vector3(...stones.normal.map((v) => v[joints.first[i]!]!));
+      p.set(...(joints.world[0].map((v) => v[i]!) as [number, number, number])).addScaledVector(normal, 1.5 * LIFT_M);
+      q.set(...(joints.world[1].map((v) => v[i]!) as [number, number, number])).addScaledVector(normal, 1.5 * LIFT_M);
+      side.copy(q).sub(p).cross(normal).setLength(half);
+      const corners = [p.clone().add(side), p.clone().sub(side), q.clone().add(side), q.clone().sub(side)];
+      [0, 1, 2, 2, 1, 3].forEach((corner, k) => places.set(corners[corner]!.toArray(), 18 * i + 3 * k));
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(places, 3));
+    geometry.setAttribute("color", new BufferAttribute(new Float32Array(places.length), 3));
+    this.#ribbons = new Mesh(geometry, new MeshBasicMaterial({ vertexColors: true, side: DoubleSide }));
+    this.#ribbons.frustumCulled = this.#ribbons.visible = false;
+    this.#scene.add(this.#ribbons);
+  }
+
+  #recolourRibbons(palette: Palette, fade: boolean, ground: Color): void {
+    const { count, opening, sigma } = this.#report.joints;
+    const colours = this.#ribbons.geometry.getAttribute("color") as BufferAttribute;
+    for (let i = 0; i < count; i++) {
+      const value = opening[i]!, colour = new Color(Number.isNaN(value) ? ground : palette.of(value * 1e3));
+      if (fade && !opens(value, sigma[i]!)) colour.lerp(ground, 0.65);
+      for (let k = 0; k < 6; k++) colours.setXYZ(6 * i + k, colour.r, colour.g, colour.b);
+    }
+    colours.needsUpdate = true;
+  }
+
   #buildCameras(): void {
     const places: number[] = [];
     for (const camera of this.#report.document.cameras) {
@@ -284,8 +328,15 @@ export class WallScene {
     }
     place.needsUpdate = shafts.needsUpdate = this.#heads.instanceMatrix.needsUpdate = true;
     this.#patches.geometry.computeBoundingSphere();
-    this.#edges.visible = this.#shown.stones && !this.#after;
+    this.#showInPlace();
     this.redraw();
+  }
+
+  /** Edges and joints do not move with the stones. */
+  #showInPlace(): void {
+    const shown = this.#shown.stones && !this.#after;
+    this.#edges.visible = shown;
+    this.#ribbons.visible = shown && this.#store.get().quantity === "opening";
   }
 
   #recolour(): void {
@@ -303,6 +354,7 @@ export class WallScene {
       for (let v = this.#firstVertex[i]!; v < this.#firstVertex[i + 1]!; v++) colours.setXYZ(v, colour.r, colour.g, colour.b);
     }
     colours.needsUpdate = true;
+    if (key === "opening") this.#recolourRibbons(palette, fade, plain);
     const ink = new Color(css("--ink"));
     this.#scene.background = ground;
     for (const material of [this.#shafts.material, this.#heads.material, this.#edges.material]) material.color.copy(ink);
@@ -314,7 +366,7 @@ export class WallScene {
   #show(): void {
     const { clouds, stones, arrows, cameras } = this.#shown;
     this.#patches.visible = stones;
-    this.#edges.visible = stones && !this.#after;
+    this.#showInPlace();
     this.#shafts.visible = this.#heads.visible = arrows;
     if (this.#frusta) this.#frusta.visible = cameras;
     if (this.#clouds[0]) this.#clouds[0].visible = clouds === "before" || clouds === "both";

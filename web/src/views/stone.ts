@@ -2,7 +2,7 @@
 
 import { type Report, type Stones, covariance, isMeasured, norm } from "../data.ts";
 import { button, el, svg } from "../dom.ts";
-import { count, DASH, fixed, mm, percent, signedMm } from "../format.ts";
+import { count, DASH, fixed, mm, percent, signed, signedMm } from "../format.ts";
 import { eigen3, ellipse } from "../geometry.ts";
 import type { Store } from "../store.ts";
 import type { Photos } from "./photos.ts";
@@ -100,19 +100,22 @@ export class StonePanel {
   }
 
   #numbers(stone: number): Node {
-    const { stones } = this.#report;
+    const { stones, document: { decimals, registrationKnown } } = this.#report;
+    const mm = (metres: number) => fixed(metres * 1e3, decimals), signedMm = (metres: number) => signed(metres * 1e3, decimals);
     const cell = (text: string) => el("td", { class: "n" }, text);
     const row = (k: 0 | 1 | 2) =>
       el("tr", {}, el("th", { scope: "row" }, AXES[k]),
         cell(signedMm(stones.move[k][stone]!)), cell(`\u00b1 ${mm(QUANTILE * stones.sigma[k][stone]!)}`),
         cell(signedMm(stones.relative[k][stone]!)), cell(signedMrad(stones.rotation[k][stone]!)));
-    return el("table", { class: "numbers" },
+    const table = el("table", { class: "numbers" },
       el("thead", {}, el("tr", {}, ...["", "motion mm", "95 %", "against neighbours mm", "rotation mrad"].map((text, i) =>
         el("th", { scope: "col", ...(i ? { class: "n" } : {}) }, text)))),
       el("tbody", {}, row(0), row(1), row(2),
         el("tr", { class: "sum" }, el("th", { scope: "row" }, "length"), cell(mm(norm(stones.move, stone))),
           cell(`LoD ${mm(stones.limit[stone]!)}`), cell(mm(norm(stones.relative, stone))),
           cell(fixed(norm(stones.rotation, stone) * 1e3, 2)))));
+    return registrationKnown ? table : el("div", {}, table,
+      el("p", { class: "note" }, "95 % and LoD hold against other stones: the error of the epochs' registration is not known."));
   }
 
   /** The displacement with the projections of its 95 % ellipsoid, from the front and from the side. */
@@ -121,9 +124,10 @@ export class StonePanel {
     const c = covariance(stones, stone);
     const d = stones.move.map((v) => v[stone]!) as [number, number, number];
     const reach = Math.sqrt(CHI2_3_95 * Math.max(c[0]![0]!, c[1]![1]!, c[2]![2]!));
-    const extent = 1.15 * Math.max(...d.map(Math.abs), 1e-5) + reach;
+    const longest = 1.1 * Math.max(...d.map(Math.abs), 1e-5);
     // An ellipsoid far smaller than the motion would be a dot.
-    const larger = [1, 10, 100].find((f) => (f * reach) / extent > 0.08) ?? 1000;
+    const larger = [1, 10, 100].find((f) => f * reach > 0.08 * longest) ?? 1000;
+    const extent = longest + larger * reach;
     const plot = (x: 0 | 2, label: string) =>
       vectorPlot(label, [d[x], d[1]], [c[x]![x]!, c[x]![1]!, c[1]![1]!], extent, larger, x === 2 ? "out" : "along");
     const { values, vectors } = eigen3(c);

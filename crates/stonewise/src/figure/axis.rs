@@ -1,6 +1,6 @@
 //! One axis of a plot: its range, its ticks, and where a value lies.
 
-use crate::report::number;
+use super::text::number;
 
 /// An axis.
 #[derive(Clone, Debug)]
@@ -11,10 +11,14 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// An axis with equal steps; an empty range is widened.
+    /// An axis with equal steps; an empty range is widened, and one that is not finite is 0 to 1.
     pub(crate) fn linear(label: &str, range: [f64; 2]) -> Self {
         let [low, high] = range;
-        let range = if high > low { range } else { [low - 0.5, low + 0.5] };
+        let range = match (high - low).is_finite() {
+            true if high > low => range,
+            true => [low - 0.5, low + 0.5],
+            false => [0.0, 1.0],
+        };
         Self {
             label: label.to_owned(),
             range,
@@ -69,6 +73,11 @@ impl Axis {
         }
     }
 
+    /// Whether a value lies between the ends, or on one.
+    pub(crate) fn holds(&self, value: f64) -> bool {
+        self.range[0] <= value && value <= self.range[1]
+    }
+
     /// Round values with their texts, about `wanted` of them.
     pub(crate) fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
         if self.logarithmic {
@@ -80,24 +89,14 @@ impl Axis {
 
     fn even_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
         let [low, high] = self.range;
-        let raw = (high - low) / wanted.max(1) as f64;
-        let decade = 10f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .map(|m| m * decade)
-            .into_iter()
-            .find(|s| *s >= raw * 0.999)
-            .unwrap_or(raw);
-        let decimals = (-step.log10() - 1e-9).ceil().max(0.0) as usize;
+        let step = nice_above((high - low) / wanted.max(1) as f64);
         let (first, last) = (
             (low / step - 1e-9).ceil() as i64,
             (high / step + 1e-9).floor() as i64,
         );
-        (first..=last)
-            .map(|i| {
-                let value = i as f64 * step;
-                (value, number(value, decimals))
-            })
-            .collect()
+        let decimals = decimals_of(step);
+        let tick = |i: i64| (i as f64 * step, number(i as f64 * step, decimals));
+        (first..=last).map(tick).collect()
     }
 
     fn decade_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
@@ -125,6 +124,29 @@ impl Axis {
     }
 }
 
+/// The smallest of 1, 2, 2.5, 5 times a power of ten that is at least `value`; 1 for values that are not positive.
+pub(crate) fn nice_above(value: f64) -> f64 {
+    if !value.is_finite() || value <= 0.0 {
+        return 1.0;
+    }
+    let power = 10f64.powf(value.log10().floor());
+    let steps = [1.0, 2.0, 2.5, 5.0, 10.0];
+    steps
+        .into_iter()
+        .map(|s| s * power)
+        .find(|s| *s >= value * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
+}
+
+/// Decimals that multiples of a step need, six at most.
+fn decimals_of(step: f64) -> usize {
+    let whole = |d: &i32| {
+        let scaled = step * 10f64.powi(*d);
+        (scaled - scaled.round()).abs() <= 1e-6
+    };
+    (0..6).find(whole).unwrap_or(6) as usize
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +162,9 @@ mod tests {
             ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
         );
         assert_eq!(texts(&Axis::linear("", [-3.0, 12.0]), 3), ["0", "5", "10"]);
+        assert_eq!(texts(&Axis::linear("", [-1.0, 4.2]), 5), ["0", "2", "4"]);
+        assert_eq!(texts(&Axis::linear("", [0.0, 0.5]), 2), ["0.00", "0.25", "0.50"]);
+        assert_eq!(texts(&Axis::linear("", [f64::NAN, 1.0]), 1), ["0", "1"]);
         let decades = Axis::decades("", [0.05, 30.0]);
         assert_eq!(texts(&decades, 4), ["0.1", "1", "10"]);
         assert_eq!(texts(&Axis::decades("", [1.0, 8.0]), 5), ["1", "2", "5", "10"]);
@@ -157,5 +182,20 @@ mod tests {
         assert!((axis.share(1.0) - 0.5).abs() < 1e-12 && axis.share(-1.0).is_nan());
         assert!(Axis::around("", [], true).range[1] > 0.0);
         assert!(Axis::linear("", [1.0, 1.0]).range[1] > 1.0);
+    }
+
+    #[test]
+    fn nice_numbers_are_not_below() {
+        for (value, nice) in [
+            (0.7, 1.0),
+            (1.0, 1.0),
+            (1.1, 2.0),
+            (21.0, 25.0),
+            (260.0, 500.0),
+            (0.0, 1.0),
+        ] {
+            assert_eq!(nice_above(value), nice);
+        }
+        assert_eq!(nice_above(f64::NAN), 1.0);
     }
 }

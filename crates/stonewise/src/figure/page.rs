@@ -1,6 +1,6 @@
 //! A self-contained page of text, tables and pictures.
 
-use crate::report::escape;
+use super::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
@@ -107,7 +107,7 @@ pub(crate) fn jpeg_element(jpeg: &[u8], description: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::number;
+    use crate::figure::number;
 
     #[test]
     fn text_is_harmless_and_numbers_read_well() {

@@ -1,7 +1,6 @@
 //! One plot: axes and what lies between them, as an SVG element that needs nothing else.
 
-use super::{Axis, Ramp};
-use crate::report::{escape, number};
+use super::{Axes, Axis, Ramp, colour_bar, escape, number, sequential};
 use std::fmt::Write;
 
 /// A plot of a fixed size.
@@ -45,6 +44,11 @@ pub(crate) enum Item {
 const MARGIN: [f64; 4] = [58.0, 26.0, 14.0, 42.0];
 /// Room for the colour scale, pixels.
 const BAR_PX: f64 = 62.0;
+/// Steps of the colour scale.
+const BAR_STEPS: u32 = 40;
+/// Looks of axes and bar, inside the picture so that it is a file of its own.
+const STYLE: &str = "<style>text{fill:#444}.ground{fill:none;stroke:#888}.grid{stroke:#e2e2e2}.frame{fill:none;stroke:#888;\
+                     stroke-width:.6}.label,.title{fill:#000}.title{font-weight:600}</style>";
 
 impl Plot {
     /// An empty plot.
@@ -86,140 +90,41 @@ impl Plot {
         let mut out = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" role=\"img\" aria-label=\"{}\" width=\"{width:.0}\" \
              height=\"{height:.0}\" viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"system-ui,sans-serif\" font-size=\"12\">\
-             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>",
-            escape(&self.title)
+             {STYLE}<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\
+             <text class=\"title\" x=\"{:.1}\" y=\"{:.1}\">{0}</text>",
+            escape(&self.title),
+            MARGIN[0],
+            MARGIN[1] - 9.0,
         );
-        self.draw_axes(&mut out);
-        let [left, top, right, bottom] = self.area();
+        let axes = self.axes();
+        axes.draw(&mut out);
+        let [left, top, width, height] = axes.area;
         let clip = format!("c{:x}", fingerprint(&self.title));
         let _ = write!(
             out,
-            "<clipPath id=\"{clip}\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\"/></clipPath>\
-             <g clip-path=\"url(#{clip})\">",
-            right - left,
-            bottom - top
+            "<clipPath id=\"{clip}\"><rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/></clipPath>\
+             <g clip-path=\"url(#{clip})\">"
         );
-        self.items.iter().for_each(|item| self.draw(&mut out, item));
+        self.items.iter().for_each(|item| draw(&axes, &mut out, item));
         out.push_str("</g>");
-        self.draw_legend(&mut out);
-        self.draw_bar(&mut out);
+        self.draw_legend(&axes, &mut out);
+        self.draw_bar(&axes, &mut out);
         out.push_str("</svg>");
         out
     }
 
-    /// Left, top, right, bottom of the axes, pixels.
-    fn area(&self) -> [f64; 4] {
+    /// The axes inside the margins, the bar and the legend.
+    fn axes(&self) -> Axes {
         let bar = if self.bar.is_some() { BAR_PX } else { 0.0 };
-        [
-            MARGIN[0],
-            MARGIN[1],
-            self.size[0] - MARGIN[2] - bar - self.legend_px(),
-            self.size[1] - MARGIN[3],
-        ]
-    }
-
-    fn px(&self, x: f64) -> f64 {
-        let [left, _, right, _] = self.area();
-        left + self.x.share(x) * (right - left)
-    }
-
-    fn py(&self, y: f64) -> f64 {
-        let [_, top, _, bottom] = self.area();
-        bottom - self.y.share(y) * (bottom - top)
-    }
-
-    fn draw_axes(&self, out: &mut String) {
-        let [left, top, right, bottom] = self.area();
-        let _ = write!(
-            out,
-            "<text x=\"{left:.1}\" y=\"{:.1}\" font-weight=\"600\">{}</text>",
-            top - 9.0,
-            escape(&self.title)
-        );
-        for (value, text) in self.x.ticks(((right - left) / 70.0) as usize) {
-            let x = self.px(value);
-            let _ = write!(
-                out,
-                "<path stroke=\"#e2e2e2\" d=\"M{x:.1} {top:.1}V{bottom:.1}\"/>\
-                 <text x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#444\">{text}</text>",
-                bottom + 15.0
-            );
-        }
-        for (value, text) in self.y.ticks((((bottom - top) / 40.0) as usize).max(2)) {
-            let y = self.py(value);
-            let _ = write!(
-                out,
-                "<path stroke=\"#e2e2e2\" d=\"M{left:.1} {y:.1}H{right:.1}\"/>\
-                 <text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#444\">{text}</text>",
-                left - 6.0,
-                y + 4.0
-            );
-        }
-        let (middle_x, middle_y) = (0.5 * (left + right), 0.5 * (top + bottom));
-        let _ = write!(
-            out,
-            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"none\" stroke=\"#888\"/>\
-             <text x=\"{middle_x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text transform=\"translate(13 {middle_y:.1})rotate(-90)\" text-anchor=\"middle\">{}</text>",
-            right - left,
-            bottom - top,
-            bottom + 34.0,
-            escape(&self.x.label),
-            escape(&self.y.label)
-        );
-    }
-
-    fn draw(&self, out: &mut String, item: &Item) {
-        let place = |p: &[f64; 2]| {
-            let (x, y) = (self.px(p[0]), self.py(p[1]));
-            (x.is_finite() && y.is_finite()).then_some((x, y))
-        };
-        match item {
-            Item::Line {
-                points,
-                colour,
-                dashed,
-                marks,
-                ..
-            } => {
-                let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
-                let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
-                let _ = write!(
-                    out,
-                    "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"{dash} d=\"{}\"/>",
-                    path(&places)
-                );
-                if *marks {
-                    circles(out, &places, colour, 3.0);
-                }
-            }
-            Item::Dots {
-                points,
-                colour,
-                radius_px,
-                ..
-            } => {
-                let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
-                circles(out, &places, colour, *radius_px);
-            }
-            Item::Areas(areas) => {
-                for (ring, colour) in areas {
-                    let mut places: Vec<(f64, f64)> = ring.iter().filter_map(place).collect();
-                    // Corners nearer than a pixel make the file large and cannot be seen.
-                    places.dedup_by(|b, a| (a.0 - b.0).hypot(a.1 - b.1) < 1.0);
-                    let _ = write!(out, "<path fill=\"{colour}\" d=\"{}Z\"/>", path(&places));
-                }
-            }
-            Item::Cross(p) => {
-                if let Some((x, y)) = place(p) {
-                    let _ = write!(
-                        out,
-                        "<path stroke=\"#000\" stroke-width=\"1.6\" d=\"M{:.1} {y:.1}h10m12 0h10M{x:.1} {:.1}v10m0 12v10\"/>",
-                        x - 16.0,
-                        y - 16.0
-                    );
-                }
-            }
+        Axes {
+            x: self.x.clone(),
+            y: self.y.clone(),
+            area: [
+                MARGIN[0],
+                MARGIN[1],
+                self.size[0] - MARGIN[0] - MARGIN[2] - bar - self.legend_px(),
+                self.size[1] - MARGIN[1] - MARGIN[3],
+            ],
         }
     }
 
@@ -241,9 +146,9 @@ impl Plot {
         longest.map_or(0.0, |n| 36.0 + 6.6 * n as f64)
     }
 
-    fn draw_legend(&self, out: &mut String) {
-        let [_, top, right, _] = self.area();
-        let left = right + 12.0 + if self.bar.is_some() { BAR_PX } else { 0.0 };
+    fn draw_legend(&self, axes: &Axes, out: &mut String) {
+        let [left, top, width, _] = axes.area;
+        let left = left + width + 12.0 + if self.bar.is_some() { BAR_PX } else { 0.0 };
         for (i, (name, colour, dashed)) in self.named().iter().enumerate() {
             let y = top + 16.0 * (i as f64 + 0.5);
             let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
@@ -257,37 +162,68 @@ impl Plot {
         }
     }
 
-    fn draw_bar(&self, out: &mut String) {
-        const STEPS: usize = 40;
+    fn draw_bar(&self, axes: &Axes, out: &mut String) {
         let Some((ramp, label)) = &self.bar else { return };
-        let [_, top, right, bottom] = self.area();
-        let (left, each) = (right + 12.0, (bottom - top) / STEPS as f64);
-        let [low, high] = ramp.range;
-        for i in 0..STEPS {
-            let colour = ramp.colour(low + (high - low) * (i as f64 + 0.5) / STEPS as f64);
-            let y = bottom - (i + 1) as f64 * each;
+        let [left, top, width, height] = axes.area;
+        let colour = |i: u32| sequential((f64::from(i) + 0.5) / f64::from(BAR_STEPS));
+        let colours: Vec<_> = (0..BAR_STEPS).map(colour).collect();
+        let axis = Axis::linear(label, ramp.range);
+        colour_bar(out, [left + width + 12.0, top, height], &colours, &axis);
+    }
+}
+
+/// Draws an item in the data's coordinates.
+fn draw(axes: &Axes, out: &mut String, item: &Item) {
+    let place = |p: &[f64; 2]| {
+        let (x, y) = (axes.px(p[0]), axes.py(p[1]));
+        (x.is_finite() && y.is_finite()).then_some((x, y))
+    };
+    match item {
+        Item::Line {
+            points,
+            colour,
+            dashed,
+            marks,
+            ..
+        } => {
+            let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
+            let dash = if *dashed { " stroke-dasharray=\"5 4\"" } else { "" };
             let _ = write!(
                 out,
-                "<path fill=\"{colour}\" d=\"M{left:.1} {y:.2}h12v{:.2}h-12z\"/>",
-                each + 0.5
+                "<path fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.8\"{dash} d=\"{}\"/>",
+                path(&places)
             );
+            if *marks {
+                circles(out, &places, colour, 3.0);
+            }
         }
-        let axis = Axis::linear("", ramp.range);
-        for (value, text) in axis.ticks((((bottom - top) / 40.0) as usize).max(2)) {
-            let y = bottom - axis.share(value) * (bottom - top);
-            let _ = write!(
-                out,
-                "<text x=\"{:.1}\" y=\"{:.1}\" fill=\"#444\">{text}</text>",
-                left + 16.0,
-                y + 4.0
-            );
+        Item::Dots {
+            points,
+            colour,
+            radius_px,
+            ..
+        } => {
+            let places: Vec<(f64, f64)> = points.iter().filter_map(place).collect();
+            circles(out, &places, colour, *radius_px);
         }
-        let _ = write!(
-            out,
-            "<text x=\"{left:.1}\" y=\"{:.1}\">{}</text>",
-            bottom + 15.0,
-            escape(label)
-        );
+        Item::Areas(areas) => {
+            for (ring, colour) in areas {
+                let mut places: Vec<(f64, f64)> = ring.iter().filter_map(place).collect();
+                // Corners nearer than a pixel make the file large and cannot be seen.
+                places.dedup_by(|b, a| (a.0 - b.0).hypot(a.1 - b.1) < 1.0);
+                let _ = write!(out, "<path fill=\"{colour}\" d=\"{}Z\"/>", path(&places));
+            }
+        }
+        Item::Cross(p) => {
+            if let Some((x, y)) = place(p) {
+                let _ = write!(
+                    out,
+                    "<path stroke=\"#000\" stroke-width=\"1.6\" d=\"M{:.1} {y:.1}h10m12 0h10M{x:.1} {:.1}v10m0 12v10\"/>",
+                    x - 16.0,
+                    y - 16.0
+                );
+            }
+        }
     }
 }
 
@@ -362,8 +298,8 @@ mod tests {
             900.0,
             None,
         );
-        let scale_x = p.px(1.0) - p.px(0.0);
-        let scale_y = p.py(0.0) - p.py(1.0);
+        let scale_x = p.axes().px(1.0) - p.axes().px(0.0);
+        let scale_y = p.axes().py(0.0) - p.axes().py(1.0);
         assert!((scale_x - scale_y).abs() < 1e-9 && p.size[0] <= 900.5);
     }
 }

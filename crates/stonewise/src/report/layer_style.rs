@@ -1,6 +1,7 @@
 //! Styles of layers for QGIS.
 
-use super::draw::{Scale, escape};
+use super::draw::Scale;
+use crate::figure::escape;
 use std::fmt::Write;
 use stonewise_io::layers::LayerStyle;
 

@@ -3,6 +3,7 @@
 mod change_points;
 mod column_notes;
 mod comparison;
+mod datum;
 mod draw;
 mod error;
 mod evidence;
@@ -22,7 +23,6 @@ mod summary;
 mod testing;
 
 pub use change_points::DistancePoint;
-pub(crate) use draw::{escape, number};
 pub use error::ReportError;
 pub use evidence::{
     Crop, Cut, EVIDENCE_DIR, Evidence, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras,

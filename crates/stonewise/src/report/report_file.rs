@@ -119,7 +119,7 @@ mod tests {
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
         assert_eq!(
             html.matches("<svg role=\"img\"").count(),
-            8 + 3 + 3,
+            9 + 3 + 3,
             "maps, histograms, scatter plots"
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));

@@ -37,20 +37,6 @@ impl Sorted {
     }
 }
 
-/// The smallest of 1, 2, 2.5, 5 times a power of ten that is at least `value`; 1 for values that are not positive.
-pub(crate) fn nice_above(value: f64) -> f64 {
-    if !value.is_finite() || value <= 0.0 {
-        return 1.0;
-    }
-    let power = 10f64.powf(value.log10().floor());
-    let steps = [1.0, 2.0, 2.5, 5.0, 10.0];
-    steps
-        .into_iter()
-        .map(|s| s * power)
-        .find(|s| *s >= value * (1.0 - 1e-9))
-        .unwrap_or(10.0 * power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -63,20 +49,5 @@ mod tests {
         assert_eq!(sorted.quantile(1.0), Some(4.0));
         assert_eq!(sorted.nmad(), Some(1.4826));
         assert_eq!(Sorted::new([]).nmad(), None);
-    }
-
-    #[test]
-    fn nice_numbers_are_not_below() {
-        for (value, nice) in [
-            (0.7, 1.0),
-            (1.0, 1.0),
-            (1.1, 2.0),
-            (21.0, 25.0),
-            (260.0, 500.0),
-            (0.0, 1.0),
-        ] {
-            assert_eq!(nice_above(value), nice);
-        }
-        assert_eq!(nice_above(f64::NAN), 1.0);
     }
 }

@@ -1,8 +1,8 @@
 //! The facts that the report states in words.
 
-use super::draw::number;
 use super::statistics::Sorted;
 use super::{ResultSet, RowMotion, Status, StoneRow};
+use crate::figure::number;
 use nalgebra::Point2;
 
 /// Share of stones at rest that the 95 % test calls significant.
@@ -25,6 +25,9 @@ pub(crate) struct Summary<'a> {
     pub components: [Sorted; 3],
     /// Where nine tenths of the significant stones lie: (along, up) from and to, metres.
     pub region: Option<[Point2<f64>; 2]>,
+    /// The least of the largest tenth of the significant motions, metres, and where nine tenths of those lie; `None` for
+    /// few stones.
+    pub strongest: Option<(f64, [Point2<f64>; 2])>,
 }
 
 impl<'a> Summary<'a> {
@@ -59,6 +62,7 @@ impl<'a> Summary<'a> {
                 .filter(|(_, s)| !s.is_empty())
                 .collect(),
             region: region(results, &significant),
+            strongest: strongest(results, &significant),
             loose: pick(|m| m.loose, |m| m.relative.norm()),
             limits: Sorted::new(measured.iter().map(|(_, m)| m.detection_limit_m)),
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
@@ -74,16 +78,36 @@ impl<'a> Summary<'a> {
         self.significant.len() as f64 > expected + 3.0 * (expected * (1.0 - FALSE_ALARMS)).sqrt().max(1.0)
     }
 
-    /// Millimetres for tables: one decimal, two where the typical detection limit is below 1 mm.
+    /// Decimals of a millimetre in tables: one, two where the typical detection limit is below 1 mm.
+    pub(crate) fn decimals(&self) -> usize {
+        if self.limits.median().is_some_and(|l| l < 1e-3) {
+            2
+        } else {
+            1
+        }
+    }
+
+    /// Millimetres for tables.
     pub(crate) fn mm(&self, metres: f64) -> String {
-        let fine = self.limits.median().is_some_and(|l| l < 1e-3);
-        number(metres * 1e3, if fine { 2 } else { 1 })
+        number(metres * 1e3, self.decimals())
     }
 
     /// Number of stones without a motion.
     pub(crate) fn not_measured(&self) -> usize {
         self.stones - self.measured.len()
     }
+}
+
+/// A tenth of the significant stones must be at least so many to have a place of their own.
+const LEAST_STRONGEST: usize = 5;
+
+fn strongest(
+    results: &ResultSet,
+    significant: &[(&StoneRow, &RowMotion)],
+) -> Option<(f64, [Point2<f64>; 2])> {
+    let tenth = &significant[..significant.len() / 10];
+    let least = tenth.last().filter(|_| tenth.len() >= LEAST_STRONGEST)?;
+    Some((least.1.displacement.norm(), region(results, tenth)?))
 }
 
 fn region(results: &ResultSet, significant: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {

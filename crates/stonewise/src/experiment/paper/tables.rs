@@ -2,7 +2,7 @@
 
 use super::{Case, Method};
 use crate::error::Result;
-use crate::report::number;
+use crate::figure::number;
 use std::fmt::Write;
 use stonewise_core::evaluate::{Directions, ErrorStatistics, MotionScore};
 use stonewise_io::table::Table;

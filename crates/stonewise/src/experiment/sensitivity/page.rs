@@ -2,9 +2,9 @@
 
 use super::{Influence, SensitivityOptions, SensitivityPoint};
 use crate::error::Result;
+use crate::figure::number;
 use crate::figure::{Axis, Item, PALETTE, Page, Plot, table};
 use crate::files::write_text;
-use crate::report::number;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 

@@ -2,10 +2,10 @@
 
 use super::{Tuned, TunedPoint};
 use crate::error::Result;
+use crate::figure::number;
 use crate::figure::{Axis, GREY, Item, PALETTE, Page, Plot, table};
 use crate::files::write_text;
 use crate::project::Project;
-use crate::report::number;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 

@@ -1,7 +1,6 @@
 //! Scatter plots and histograms.
 
-use super::axes::Axes;
-use super::text::{escape, number};
+use crate::figure::{Axes, Axis, escape, number};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
@@ -24,8 +23,8 @@ pub(crate) fn scatter(
     diagonal: bool,
 ) -> String {
     let axes = Axes {
-        x: limits_mm[0],
-        y: limits_mm[1],
+        x: Axis::linear(labels[0], limits_mm[0]),
+        y: Axis::linear(labels[1], limits_mm[1]),
         area: [52.0, 8.0, 320.0, 320.0],
     };
     let live = if key.is_empty() {
@@ -37,12 +36,13 @@ pub(crate) fn scatter(
         r#"<svg role="img" aria-label="{}" viewBox="0 0 384 370"{live}>"#,
         escape(title)
     );
-    axes.draw(&mut out, labels[0], labels[1]);
+    axes.draw(&mut out);
     if let Some(zero) = zero_lines(&axes) {
         let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);
     }
     if diagonal {
-        let (low, high) = (axes.x[0].max(axes.y[0]), axes.x[1].min(axes.y[1]));
+        let ([x0, x1], [y0, y1]) = (axes.x.range, axes.y.range);
+        let (low, high) = (x0.max(y0), x1.min(y1));
         let [x0, y0, x1, y1] = [axes.px(low), axes.py(low), axes.px(high), axes.py(high)];
         let _ = write!(
             out,
@@ -81,15 +81,15 @@ pub(crate) fn histogram(title: &str, label: &str, values_mm: &[f64], limits_mm: 
     }
     let highest = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let axes = Axes {
-        x: limits_mm,
-        y: [0.0, highest * 1.08],
+        x: Axis::linear(label, limits_mm),
+        y: Axis::linear("stones", [0.0, highest * 1.08]),
         area: [52.0, 8.0, 320.0, 150.0],
     };
     let mut out = format!(
         r#"<svg role="img" aria-label="{}" viewBox="0 0 384 200">"#,
         escape(title)
     );
-    axes.draw(&mut out, label, "stones");
+    axes.draw(&mut out);
     let mut path = String::new();
     for (i, n) in bars.iter().enumerate().filter(|(_, n)| **n > 0) {
         let [a, b] = [i, i + 1].map(|i| axes.px(limits_mm[0] + span * i as f64 / BARS as f64));
@@ -115,10 +115,10 @@ pub(crate) fn histogram(title: &str, label: &str, values_mm: &[f64], limits_mm: 
 fn zero_lines(axes: &Axes) -> Option<String> {
     let [left, top, width, height] = axes.area;
     let mut d = String::new();
-    if axes.x[0] < 0.0 && 0.0 < axes.x[1] {
+    if axes.x.holds(0.0) {
         let _ = write!(d, "M{:.1} {top}v{height}", axes.px(0.0));
     }
-    if axes.y[0] < 0.0 && 0.0 < axes.y[1] {
+    if axes.y.holds(0.0) {
         let _ = write!(d, "M{left} {:.1}h{width}", axes.py(0.0));
     }
     (!d.is_empty()).then_some(d)
@@ -128,8 +128,7 @@ fn zero_lines(axes: &Axes) -> Option<String> {
 fn dots(points: &[[f64; 2]], axes: &Axes) -> String {
     let mut seen = BTreeSet::new();
     for [x, y] in points {
-        let inside = axes.x[0] <= *x && *x <= axes.x[1] && axes.y[0] <= *y && *y <= axes.y[1];
-        if inside {
+        if axes.x.holds(*x) && axes.y.holds(*y) {
             seen.insert((
                 (axes.px(*x) * 2.0).round() as i64,
                 (axes.py(*y) * 2.0).round() as i64,

@@ -1,12 +1,9 @@
 //! Colour scales with their bar.
 
-use super::axes::ticks;
-use super::colour::{Rgb, diverging, sequential};
-use super::text::number;
+use crate::figure::{Axis, Rgb, colour_bar, diverging, nice_above, sequential};
 use crate::report::RowMotion;
-use crate::report::statistics::{Sorted, nice_above};
+use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
-use std::fmt::Write;
 
 /// Steps of colour to either side of zero, or of a sequential scale.
 const STEPS: i32 = 24;
@@ -58,43 +55,20 @@ impl Scale {
         value_m.abs() > self.limit_m()
     }
 
-    /// An upright bar with ticks in millimetres; needs 55 pixels to the right.
-    pub(crate) fn draw_bar(self, out: &mut String, left: f64, top: f64, height: f64) {
-        let limit_mm = self.limit_m() * 1e3;
-        let (first, low) = match self {
-            Self::Diverging(_) => (-STEPS, -limit_mm),
-            Self::Sequential(_) => (0, 0.0),
+    /// Colours from the lowest to the highest step.
+    fn colours(self) -> Vec<Rgb> {
+        let first = match self {
+            Self::Diverging(_) => -STEPS,
+            Self::Sequential(_) => 0,
         };
-        let n = f64::from(STEPS - first + 1);
-        for step in first..=STEPS {
-            let y = top + height * (1.0 - f64::from(step - first + 1) / n);
-            let (colour, each) = (self.colour(step), height / n + 0.5);
-            let _ = write!(
-                out,
-                r#"<path fill="{colour}" d="M{left:.1} {y:.2}h12v{each:.2}h-12z"/>"#
-            );
-        }
-        let _ = write!(
-            out,
-            r#"<path class="frame" d="M{left:.1} {top:.1}h12v{height:.1}h-12z"/>"#
-        );
-        let (ticks, decimals) = ticks([low, limit_mm], ((height / 30.0) as usize).max(2));
-        for tick in ticks {
-            let y = top + height * (1.0 - (tick - low) / (limit_mm - low));
-            let label = number(tick, decimals);
-            let _ = write!(
-                out,
-                r#"<path class="frame" d="M{:.1} {y:.1}h4"/><text x="{:.1}" y="{:.1}">{label}</text>"#,
-                left + 12.0,
-                left + 19.0,
-                y + 4.0
-            );
-        }
-        let _ = write!(
-            out,
-            r#"<text class="label" x="{left:.1}" y="{:.1}">mm</text>"#,
-            top + height + 15.0
-        );
+        (first..=STEPS).map(|step| self.colour(step)).collect()
+    }
+
+    /// An upright bar with ticks in thousandths, which `unit` names; needs 55 pixels to the right.
+    pub(crate) fn draw_bar(self, out: &mut String, unit: &str, [left, top, height]: [f64; 3]) {
+        let (low, high) = self.range_m();
+        let axis = Axis::linear(unit, [low * 1e3, high * 1e3]);
+        colour_bar(out, [left, top, height], &self.colours(), &axis);
     }
 }
 
@@ -120,8 +94,8 @@ pub(crate) fn component_limit_of<'a>(motions: impl Iterator<Item = &'a RowMotion
 
 /// Colours of both kinds of scale, from the lowest to the highest step.
 pub(crate) fn colours() -> [Vec<String>; 2] {
-    let all = |scale: Scale, first: i32| (first..=STEPS).map(|s| scale.colour(s).to_string()).collect();
-    [all(Scale::Diverging(1.0), -STEPS), all(Scale::Sequential(1.0), 0)]
+    [Scale::Diverging(1.0), Scale::Sequential(1.0)]
+        .map(|scale| scale.colours().iter().map(Rgb::to_string).collect())
 }
 
 #[cfg(test)]

@@ -7,26 +7,34 @@ use crate::report::statistics::Sorted;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-/// Least edge of a square of the map, pixels.
-const MIN_CELL_PX: f64 = 2.0;
+/// Bounds of the edge of a square of the map, pixels.
+const CELL_PX: [f64; 2] = [2.0, 12.0];
+/// Edge of a square in typical distances between neighbouring core points.
+const CELL_SPACINGS: f64 = 1.3;
+/// How often empty squares between filled ones take their neighbours' median.
+const FILLS: usize = 3;
 
 /// Medians of the core points' distances in squares, as one SVG element; `None` without core points.
 ///
 /// Faded squares: the median distance is below the median detection limit.
 pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale) -> Option<String> {
     let [left, top, width, height] = layout.axes.area;
-    // About one core point a square where points are sparse.
-    let spacing = (width * height / results.distances.len().max(1) as f64).sqrt();
-    let cell = (1.2 * spacing).clamp(MIN_CELL_PX, 12.0);
+    let inside: Vec<(f64, f64, usize)> = results
+        .distances
+        .iter()
+        .enumerate()
+        .filter_map(|(i, point)| {
+            let place = results.facade.place(&point.position);
+            let (x, y) = (layout.axes.px(place.x) - left, layout.axes.py(place.y) - top);
+            ((0.0..width).contains(&x) && (0.0..height).contains(&y)).then_some((x, y, i))
+        })
+        .collect();
+    let cell = (CELL_SPACINGS * spacing(&inside, width * height)).clamp(CELL_PX[0], CELL_PX[1]);
     let mut cells: BTreeMap<(i64, i64), (Vec<f64>, Vec<f64>)> = BTreeMap::new();
-    for point in &results.distances {
-        let place = results.facade.place(&point.position);
-        let (x, y) = (layout.axes.px(place.x) - left, layout.axes.py(place.y) - top);
-        if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
-            let entry = cells.entry(((y / cell) as i64, (x / cell) as i64)).or_default();
-            entry.0.push(point.distance_m);
-            entry.1.push(point.detection_limit_m);
-        }
+    for (x, y, i) in inside {
+        let entry = cells.entry(((y / cell) as i64, (x / cell) as i64)).or_default();
+        entry.0.push(results.distances[i].distance_m);
+        entry.1.push(results.distances[i].detection_limit_m);
     }
     if cells.is_empty() {
         return None;
@@ -37,7 +45,7 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
             medians.insert(place, [distance, Sorted::new(limits).median().unwrap_or(0.0)]);
         }
     }
-    fill_gaps(&mut medians);
+    (0..FILLS).for_each(|_| fill_gaps(&mut medians));
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
     for ((row, column), [distance, limit]) in medians {
         let shown = distance.abs() > limit;
@@ -48,16 +56,26 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
         let _ = write!(path, "M{x} {y}h{w}v{h}h-{w}z");
     }
     let mut out = layout.open("M3C2 distance");
-    layout.draw_axes(&mut out);
+    layout.axes.draw(&mut out);
     out.push_str(r#"<g transform="scale(.1)" shape-rendering="crispEdges">"#);
     for ((shown, step), path) in groups {
         let class = if shown { "" } else { r#" class="faded""# };
         let _ = write!(out, r#"<path{class} fill="{}" d="{path}"/>"#, scale.colour(step));
     }
     out.push_str("</g>");
-    layout.draw_bar(&mut out, scale);
+    layout.draw_bar(&mut out, scale, "mm");
     out.push_str("</svg>");
     Some(out)
+}
+
+/// Typical distance between core points, pixels: the root of the area that a point has, where there are points.
+fn spacing(points: &[(f64, f64, usize)], area: f64) -> f64 {
+    let coarse = 4.0 * (area / points.len().max(1) as f64).sqrt();
+    let filled: BTreeSet<(i64, i64)> = points
+        .iter()
+        .map(|(x, y, _)| ((x / coarse) as i64, (y / coarse) as i64))
+        .collect();
+    (filled.len() as f64 * coarse * coarse / points.len().max(1) as f64).sqrt()
 }
 
 /// Gives empty squares between filled ones the median of their neighbours: core points on a grid of their own leave

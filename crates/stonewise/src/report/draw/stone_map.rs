@@ -1,9 +1,8 @@
 //! The unrolled wall with its stones coloured by a quantity.
 
-use super::axes::Axes;
 use super::colour_bar::Scale;
-use super::text::{escape, mm};
-use crate::report::statistics::{Sorted, nice_above};
+use crate::figure::{Axes, Axis, escape, mm, nice_above};
+use crate::report::statistics::Sorted;
 use crate::report::{ResultSet, StoneRow};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,8 +34,10 @@ pub(crate) struct MapLayout<'a> {
 /// What a map shows.
 pub(crate) struct MapPicture<'a> {
     pub title: &'a str,
-    /// Value of a stone, metres; `None` where it has none.
+    /// Value of a stone, metres or radians; `None` where it has none.
     pub value: &'a dyn Fn(&StoneRow) -> Option<f64>,
+    /// Name of a thousandth of it: "mm", "mrad".
+    pub unit: &'a str,
     pub scale: Scale,
     /// Fade stones whose motion is not significant.
     pub fade: bool,
@@ -69,9 +70,15 @@ impl<'a> MapLayout<'a> {
         let width = if size.x > 2.0 * size.y { 1240.0 } else { 620.0 };
         let scale = ((width - MARGIN[0] - MARGIN[2]) / size.x).min(MAX_HEIGHT / size.y);
         let area = [MARGIN[0], MARGIN[1], size.x * scale, size.y * scale];
+        // A long label does not fit beside a low wall.
+        let up = if area[3] < 110.0 {
+            "up (m)"
+        } else {
+            "up the face (m)"
+        };
         let axes = Axes {
-            x: [low.x, low.x + size.x],
-            y: [low.y, low.y + size.y],
+            x: Axis::linear("along the wall (m)", [low.x, low.x + size.x]),
+            y: Axis::linear(up, [low.y, low.y + size.y]),
             area,
         };
         let (width, height) = (
@@ -109,23 +116,16 @@ impl<'a> MapLayout<'a> {
         )
     }
 
-    /// Draws the axes; a long label does not fit beside a low wall.
-    pub(crate) fn draw_axes(&self, out: &mut String) {
-        let up = if self.axes.area[3] < 110.0 {
-            "up (m)"
-        } else {
-            "up the face (m)"
-        };
-        self.axes.draw(out, "along the wall (m)", up);
-    }
-
-    /// Draws the colour bar to the right of the wall.
-    pub(crate) fn draw_bar(&self, out: &mut String, scale: Scale) {
+    /// Draws the colour bar to the right of the wall; `unit`: of a thousandth.
+    pub(crate) fn draw_bar(&self, out: &mut String, scale: Scale, unit: &str) {
         scale.draw_bar(
             out,
-            self.axes.area[0] + self.axes.area[2] + 12.0,
-            MARGIN[1],
-            self.height - MARGIN[1] - MARGIN[3],
+            unit,
+            [
+                self.axes.area[0] + self.axes.area[2] + 12.0,
+                MARGIN[1],
+                self.height - MARGIN[1] - MARGIN[3],
+            ],
         );
     }
 }
@@ -139,7 +139,7 @@ pub(crate) fn joint_map(
     scale: Scale,
 ) -> String {
     let mut out = layout.open(title);
-    layout.draw_axes(&mut out);
+    layout.axes.draw(&mut out);
     let all = layout.paths.concat();
     let _ = write!(
         out,
@@ -165,7 +165,7 @@ pub(crate) fn joint_map(
             scale.colour(step)
         );
     }
-    layout.draw_bar(&mut out, scale);
+    layout.draw_bar(&mut out, scale, "mm");
     out.push_str("</svg>");
     out
 }
@@ -173,7 +173,7 @@ pub(crate) fn joint_map(
 /// The map as one SVG element.
 pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     let mut out = layout.open(picture.title);
-    layout.draw_axes(&mut out);
+    layout.axes.draw(&mut out);
     out.push_str(r#"<g transform="scale(.1)">"#);
     // Stones of one colour are one path: fewer elements, smaller file.
     let mut groups: BTreeMap<(bool, i32), String> = BTreeMap::new();
@@ -220,7 +220,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     if picture.arrows {
         draw_arrows(layout, &mut out);
     }
-    layout.draw_bar(&mut out, picture.scale);
+    layout.draw_bar(&mut out, picture.scale, picture.unit);
     out.push_str("</svg>");
     out
 }
@@ -298,7 +298,7 @@ fn draw_arrows(layout: &MapLayout, out: &mut String) {
     let reference = arrow([left, bottom], [ARROW_PX, 0.0]);
     let _ = write!(
         out,
-        r#"<path class="arrow halo" d="{shafts}"/><path class="arrow" d="{shafts}{reference}"/><text x="{:.1}" y="{:.1}">{} mm in-plane</text>"#,
+        r#"<path class="arrow halo" d="{shafts}{reference}"/><path class="arrow" d="{shafts}{reference}"/><text x="{:.1}" y="{:.1}">{} mm in-plane</text>"#,
         left + ARROW_PX + 8.0,
         bottom + 4.0,
         mm(reference_m)

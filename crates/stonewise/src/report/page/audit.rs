@@ -1,8 +1,8 @@
 //! Where the numbers come from: warnings, parameters, digests, times.
 
 use super::html::{details, section, table};
+use crate::figure::{count, escape, number};
 use crate::report::ResultSet;
-use crate::report::draw::{count, escape, number};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -1,9 +1,11 @@
 //! Histograms, in-plane scatter, stones against M3C2, and the datum check.
 
 use super::html::{figure, section, table};
+use crate::figure::{count, mm, mm_or_dash};
 use crate::report::ResultSet;
 use crate::report::comparison::Comparison;
-use crate::report::draw::{Series, count, histogram, mm_or_dash, scatter};
+use crate::report::datum::Datum;
+use crate::report::draw::{Series, histogram, scatter};
 use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
 
@@ -145,22 +147,12 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         "not significant: median mm",
         "not significant: NMAD mm",
     ];
-    let error = find_number(&results.run, "epoch_error_m");
-    let entered = error.map_or(
-        "The error of the registration is not stated in run.json.".into(),
-        |e| {
-            format!(
-                "Registration error taken into account: {} mm per axis and epoch.",
-                mm_or_dash(Some(e))
-            )
-        },
-    );
     let body = format!(
         "<p>Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
          error of that registration; only stable points outside the wall can tell. Stones that did not move significantly should \
-         scatter around zero. {entered}</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
+         scatter around zero.</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
          deviation of normally distributed values. {} stones in all, {} not significant.</p>",
-        stable_areas(&results.registration),
+        registration(&Datum::of(&results.run, &results.registration)),
         table(&head, &rows, 1),
         count(facts.measured.len()),
         count(still.len())
@@ -168,45 +160,31 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
     section("datum", "Datum check", &body)
 }
 
-/// What the areas that the project calls stable say about the registration.
-fn stable_areas(registration: &serde_json::Value) -> String {
-    let Some(areas) = registration.get("stable_areas").filter(|a| a.is_object()) else {
-        return "The project names no stable areas ([[registration.stable]]), so this report cannot tell the two apart.".into();
-    };
-    let numbers = |key: &str| -> Vec<f64> {
-        let list = areas.get(key).and_then(serde_json::Value::as_array);
-        list.map_or(Vec::new(), |l| {
-            l.iter().filter_map(serde_json::Value::as_f64).collect()
-        })
-    };
-    let (shift, covariance, points) = (numbers("shift"), numbers("covariance"), numbers("points"));
-    let part = |(k, name): (usize, &str)| {
-        // A 6 x 6 matrix in one list: its diagonal lies 7 apart.
-        let sigma = covariance.get(7 * k).map(|v| v.max(0.0).sqrt());
-        format!(
-            "{name} {} \u{b1} {} mm",
-            mm_or_dash(shift.get(k).copied()),
-            mm_or_dash(sigma)
-        )
-    };
-    let parts: Vec<String> = ["x", "y", "z"].into_iter().enumerate().map(part).collect();
-    let counts: Vec<String> = points.iter().map(|n| count(*n as usize)).collect();
-    format!(
-        "<b>Stable areas</b> ({} points) seem to have moved by {} (one standard deviation, world axes). That is an error of the \
-         registration: it is counted in every uncertainty, and not taken out of the displacements.",
-        counts.join(" and "),
-        parts.join(", ")
-    )
-}
-
-/// The first number of this name anywhere in a document.
-fn find_number(value: &serde_json::Value, key: &str) -> Option<f64> {
-    match value {
-        serde_json::Value::Object(map) => map
-            .get(key)
-            .and_then(serde_json::Value::as_f64)
-            .or_else(|| map.values().find_map(|v| find_number(v, key))),
-        serde_json::Value::Array(items) => items.iter().find_map(|v| find_number(v, key)),
-        _ => None,
+/// What is known about the registration, in words.
+fn registration(datum: &Datum) -> String {
+    match datum {
+        Datum::Unknown => "<b>The error of the registration is not known.</b> The project names no stable areas \
+            (<code>[[registration.stable]]</code>) and states no error (<code>epoch_error_m</code>), so no uncertainty in this report \
+            holds it: intervals and limits are right for motions of stones against each other, and too short for motions against \
+            the ground."
+            .into(),
+        Datum::Stated(error) => format!(
+            "The project states a registration error of {} mm per axis and epoch; every uncertainty holds it.",
+            mm(*error)
+        ),
+        Datum::StableAreas { shift_m, sigma_m, points } => {
+            let parts: Vec<String> = ["x", "y", "z"]
+                .into_iter()
+                .zip(shift_m.iter().zip(sigma_m))
+                .map(|(axis, (shift, sigma))| format!("{axis} {} \u{b1} {} mm", mm(*shift), mm(*sigma)))
+                .collect();
+            let counts: Vec<String> = points.iter().map(|n| count(*n)).collect();
+            format!(
+                "<b>Stable areas</b> ({} points) seem to have moved by {} (one standard deviation, world axes). That is an error of \
+                 the registration: it is counted in every uncertainty, and not taken out of the displacements.",
+                counts.join(" and "),
+                parts.join(", ")
+            )
+        }
     }
 }

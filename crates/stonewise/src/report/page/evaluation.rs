@@ -1,7 +1,7 @@
 //! Results against a known truth.
 
 use super::html::{details, section, table};
-use crate::report::draw::{count, escape, number};
+use crate::figure::{count, escape, number};
 use std::fmt::Write;
 use stonewise_core::evaluate::{Directions, ErrorStatistics, Evaluation, MotionScore};
 

@@ -6,10 +6,12 @@
 use super::block::Block;
 use super::excerpts;
 use super::{epoch_names, known_translation_mm};
+use crate::figure::nice_above;
 use crate::report::comparison::Comparison;
+use crate::report::datum::Datum;
 use crate::report::draw::{colours, component_limit_m};
 use crate::report::joints::Joint;
-use crate::report::statistics::{Sorted, nice_above};
+use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
 use crate::report::{ReportError, ResultSet, RowMotion, Status, StoneRow};
 use nalgebra::{Point2, Point3, Vector3};
@@ -39,7 +41,7 @@ pub(super) fn data(
 ) -> Result<String, ReportError> {
     let mut blocks = vec![
         ("stones", stones(results, compared)),
-        ("joints", joint_block(joints)),
+        ("joints", joint_block(joints, &origin(results))),
         ("change", change(results)),
     ];
     blocks.extend(excerpts::blocks(results, &origin(results)));
@@ -84,6 +86,8 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
             "rotation": limit(|m| m.rotation.norm()),
             "opening": nice_above(Sorted::new(openings).quantile(0.98).unwrap_or(0.0) * 1e3),
         },
+        "decimals": facts.decimals(),
+        "registrationKnown": Datum::of(&results.run, &results.registration) != Datum::Unknown,
         "truth": known_translation_mm(results),
         "blocks": blocks,
         "cameras": excerpts::cameras(results, &origin(results)),
@@ -190,13 +194,18 @@ fn motions(results: &ResultSet, block: &mut Block) {
     block.u8("loose", flag(|m| m.loose));
 }
 
-fn joint_block(joints: &[Joint]) -> Block {
+/// Joints with their ends on the unrolled wall and in the world.
+fn joint_block(joints: &[Joint], origin: &Point3<f64>) -> Block {
     let mut block = Block::default();
     block.u32("first", joints.iter().map(|j| j.stones[0] as u32));
     block.u32("second", joints.iter().map(|j| j.stones[1] as u32));
     for (k, end) in ["1", "2"].into_iter().enumerate() {
         block.i32(&format!("a{end}"), MILLIMETRE, joints.iter().map(|j| j.line[k].x));
         block.i32(&format!("u{end}"), MILLIMETRE, joints.iter().map(|j| j.line[k].y));
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let place = joints.iter().map(|j| j.world[k][axis] - origin[axis]);
+            block.i32(&format!("{name}{end}"), MILLIMETRE, place);
+        }
     }
     block.i16("width", TENTH_MM, joints.iter().map(|j| j.width_m));
     let of = |pick: fn(&crate::report::JointMotion) -> f64| {

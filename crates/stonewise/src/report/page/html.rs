@@ -1,6 +1,6 @@
 //! Small pieces of HTML.
 
-use crate::report::draw::escape;
+use crate::figure::escape;
 use std::fmt::Write;
 
 /// A table; cells are HTML already. Columns from `numbers_from` on are aligned as numbers.

@@ -2,8 +2,9 @@
 
 use super::explorer::PLACE;
 use super::html::{figure, section};
+use crate::figure::mm;
 use crate::report::draw::{
-    MapLayout, MapPicture, Scale, component_limit_m, distance_map, joint_map, mm, nice_scale_m, stone_map,
+    MapLayout, MapPicture, Scale, component_limit_m, distance_map, joint_map, nice_scale_m, stone_map,
 };
 use crate::report::summary::Summary;
 use crate::report::{Joint, ResultSet, StoneRow};
@@ -28,6 +29,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
         let picture = MapPicture {
             title,
             value: &value,
+            unit: "mm",
             scale: shared,
             fade: true,
             arrows: false,
@@ -94,6 +96,7 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let picture = MapPicture {
         title,
         value: &norm,
+        unit: "mm",
         scale: Scale::Sequential(nice_scale_m(norms)),
         fade: true,
         arrows: true,
@@ -113,11 +116,14 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
     let relative = |s: &StoneRow| s.motion.as_ref().map(|m| m.relative.norm());
     let relatives = facts.measured.iter().map(|(_, m)| m.relative.norm());
     let limits = facts.limits.values().iter().copied();
-    let draw = |title: &str, note: &str, value: &dyn Fn(&StoneRow) -> Option<f64>, limit_m: f64, loose| {
+    let turn = |s: &StoneRow| s.motion.as_ref().map(|m| m.rotation.norm());
+    let turns = facts.measured.iter().map(|(_, m)| m.rotation.norm());
+    let draw = |title: &str, note: &str, value: &dyn Fn(&StoneRow) -> Option<f64>, unit, limit, loose| {
         let picture = MapPicture {
             title,
             value,
-            scale: Scale::Sequential(limit_m),
+            unit,
+            scale: Scale::Sequential(limit),
             fade: false,
             arrows: false,
             loose,
@@ -129,6 +135,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         "Motion against the neighbours",
         "Length of the difference to what the neighbours predict.",
         &relative,
+        "mm",
         nice_scale_m(relatives),
         true,
     ));
@@ -140,8 +147,17 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         "Detection limit (LoD95)",
         &note,
         &limit,
+        "mm",
         nice_scale_m(limits),
         false,
+    ));
+    out.push_str(&draw(
+        "Rotation",
+        "Angle of the stone's turn.",
+        &turn,
+        "mrad",
+        nice_scale_m(turns),
+        true,
     ));
     out
 }

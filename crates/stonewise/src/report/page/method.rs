@@ -11,15 +11,16 @@ pub(super) fn method() -> String {
         <dt>Along, up, out</dt><dd>The stone's own face frame: horizontal in the face, to the right of a viewer who faces the wall; \
         up along the batter; out of the wall, towards the viewer.</dd>\
         <dt>Significant</dt><dd>d\u{2032}C<sup>\u{2212}1</sup>d exceeds 7.81, the 95 % quantile of chi-square with 3 degrees of \
-        freedom; C is the covariance of the displacement, registration error included. A stone at rest exceeds it in 5 % of the \
-        cases.</dd>\
+        freedom; C is the covariance of the displacement, registration error included where it is known (see the datum check). A stone at \
+        rest exceeds it in 5 % of the cases.</dd>\
         <dt>LoD95</dt><dd>The length beyond which a displacement of the same direction is significant.</dd>\
         <dt>Unlike its neighbours</dt><dd>The stone's motion differs from what its neighbours predict by more than noise explains; \
         false discoveries are controlled over all stones.</dd>\
         <dt>M3C2</dt><dd>Distance between the clouds along the local normal (Lague, Brodu &amp; Leroux 2013). It cannot see motion within \
         the face.</dd></dl>\
-        <p>Limits of the statement: displacements refer to the registration of the epochs, so a motion common to all stones may be an \
-        error of it. A stone is taken as rigid. Masks that merge or split stones spoil single rows; such pairs are reported as failed \
-        where they can be told. Values of stones that were not measured are unknown, not zero.</p>";
+        <p>Limits of the statement: displacements refer to the registration of the epochs, so a motion common to many stones - \
+        a shift, a tilt, a slow drift along the wall - may be an error of it, however small the limits of single stones are. A \
+        stone is taken as rigid. Masks that merge or split stones spoil single rows; such pairs are reported as failed where they \
+        can be told. Values of stones that were not measured are unknown, not zero.</p>";
     section("method", "Method, terms and limits", body)
 }

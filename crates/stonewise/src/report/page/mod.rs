@@ -13,10 +13,10 @@ mod overview;
 mod survey;
 
 use super::comparison::compare;
-use super::draw::escape;
 use super::joints::joints;
 use super::summary::Summary;
 use super::{ReportError, ResultSet};
+use crate::figure::escape;
 use serde_json::Value;
 
 #[cfg(test)]

@@ -2,10 +2,12 @@
 
 use super::html::{details, section, table};
 use super::maps::motion_map;
-use crate::report::draw::{count, escape, mm, mm_or_dash, number, percent};
+use crate::figure::{count, escape, mm, mm_or_dash, number, percent};
+use crate::report::datum::Datum;
 use crate::report::statistics::Sorted;
 use crate::report::summary::{FALSE_ALARMS, Summary};
 use crate::report::{ResultSet, RowMotion, Status, StoneRow};
+use nalgebra::Point2;
 use serde_json::Value;
 use std::fmt::Write;
 
@@ -14,9 +16,10 @@ const MAX_ROWS: usize = 25;
 
 /// What moved, how many, where, how sure.
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
-    let mut out = tiles(facts);
+    let datum = Datum::of(&results.run, &results.registration);
+    let mut out = tiles(facts, &datum);
     out.push_str("<div class=\"statement\"><ul class=\"findings\">");
-    for sentence in sentences(results, facts) {
+    for sentence in sentences(results, facts, &datum) {
         let _ = write!(out, "<li>{sentence}</li>");
     }
     out.push_str("</ul>");
@@ -27,7 +30,7 @@ pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     section("summary", "Summary", &out)
 }
 
-fn tiles(facts: &Summary) -> String {
+fn tiles(facts: &Summary, datum: &Datum) -> String {
     let tile =
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
     let share = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.stones));
@@ -46,7 +49,10 @@ fn tiles(facts: &Summary) -> String {
         tile(count(facts.loose.len()), "move unlike their neighbours"),
         tile(
             format!("{} <small>mm</small>", mm_or_dash(facts.limits.median())),
-            "typical detection limit (95 %, median)"
+            match datum {
+                Datum::Unknown => "typical detection limit (95 %, median), registration error not included",
+                _ => "typical detection limit (95 %, median), registration error included",
+            }
         ),
         tile(
             format!("{} <small>mm</small>", mm_or_dash(largest)),
@@ -55,7 +61,7 @@ fn tiles(facts: &Summary) -> String {
     )
 }
 
-fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
+fn sentences(results: &ResultSet, facts: &Summary, datum: &Datum) -> Vec<String> {
     if facts.measured.is_empty() {
         let lost = facts
             .by_status
@@ -64,20 +70,14 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
         let reasons = lost.collect::<Vec<_>>().join("; ");
         return vec![format!("<b>No stone was measured.</b> {reasons}")];
     }
-    let mut out = vec![significance(facts)];
+    let mut out = vec![significance(facts), registration(datum)];
     let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
     out.push(format!(
         "Common to all measured stones (median): <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
-         the wall. A common motion may also come from the registration of the epochs; see the datum check."
+         the wall."
     ));
-    if let Some([from, to]) = facts.region.filter(|_| facts.motion_is_proven()) {
-        out.push(format!(
-            "Nine tenths of the significant stones lie between {} and {} m along the wall and {} and {} m up the face.",
-            number(from.x, 1),
-            number(to.x, 1),
-            number(from.y, 1),
-            number(to.y, 1)
-        ));
+    if facts.motion_is_proven() {
+        out.extend(places(facts));
     }
     if let Some((stone, motion)) = facts.significant.first() {
         let place = results.facade.place(&stone.centroid);
@@ -108,6 +108,60 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
         out.push(not_measured(facts));
     }
     out
+}
+
+/// Where the motions are, all of them and the largest.
+fn places(facts: &Summary) -> Vec<String> {
+    let between = |[from, to]: [Point2<f64>; 2]| {
+        format!(
+            "between {} and {} m along the wall and {} and {} m up the face",
+            number(from.x, 1),
+            number(to.x, 1),
+            number(from.y, 1),
+            number(to.y, 1)
+        )
+    };
+    let mut out = Vec::new();
+    if 10 * facts.significant.len() >= 9 * facts.measured.len() {
+        out.push("Significant motions are found all over the measured wall.".into());
+    } else if let Some(region) = facts.region {
+        out.push(format!(
+            "Nine tenths of the significant stones lie {}.",
+            between(region)
+        ));
+    }
+    if let Some((least, region)) = facts.strongest {
+        out.push(format!(
+            "The largest tenth of the significant motions, {} mm and more, lies {}.",
+            mm(least),
+            between(region)
+        ));
+    }
+    out
+}
+
+/// What a motion that all stones share may be, and whether the uncertainties know.
+fn registration(datum: &Datum) -> String {
+    match datum {
+        Datum::Unknown => "<b>The error of the registration of the epochs is not known to this report</b> and is in no limit or interval: \
+            they hold for stones against each other. A shift, tilt or drift common to many stones may be an error of the registration; \
+            only stable areas outside the wall can tell (see the datum check)."
+            .into(),
+        Datum::Stated(error) => format!(
+            "Datum: the project states a registration error of {} mm per axis and epoch; limits and intervals hold it.",
+            mm(*error)
+        ),
+        Datum::StableAreas { shift_m, sigma_m, .. } => format!(
+            "Datum: the stable areas outside the wall seem to have moved by {} mm (\u{b1} {} mm), an error of the registration; limits \
+             and intervals hold it.",
+            mm(norm(shift_m)),
+            mm(norm(sigma_m))
+        ),
+    }
+}
+
+fn norm(v: &[f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 /// How many stones have no motion, and why.

@@ -1,8 +1,8 @@
 //! The survey data of the cover: what was measured with what.
 
 use super::html::{details, table};
+use crate::figure::{count, escape};
 use crate::report::ResultSet;
-use crate::report::draw::{count, escape};
 use serde_json::Value;
 use std::path::Path;
 
@@ -63,7 +63,7 @@ fn files(value: Option<&Value>) -> String {
             .file_name()
             .map_or(path.into(), |n| n.to_string_lossy());
         let size = input.get("bytes").and_then(Value::as_u64);
-        let size = size.map_or(String::new(), |b| format!(" ({:.1}\u{a0}MB)", b as f64 / 1e6));
+        let size = size.map_or(String::new(), |b| format!(" ({})", bytes(b)));
         Some(format!("{}{size}", escape(&name)))
     };
     let list: Vec<String> = match value {
@@ -78,9 +78,26 @@ fn files(value: Option<&Value>) -> String {
     }
 }
 
+/// A size of a file in the unit that suits it.
+fn bytes(value: u64) -> String {
+    let value = value as f64;
+    if value < 1e5 {
+        format!("{:.0}\u{a0}kB", (value / 1e3).max(1.0))
+    } else {
+        format!("{:.1}\u{a0}MB", value / 1e6)
+    }
+}
+
 fn known_motion(epoch: &Value) -> String {
     match epoch.get("motion") {
         None | Some(Value::Null) => "none".into(),
+        Some(Value::Object(parts)) => {
+            let parts = parts.iter().map(|(key, value)| match value.as_str() {
+                Some(text) if key == "kind" => text.to_owned(),
+                _ => format!("{key} {value}"),
+            });
+            escape(&parts.collect::<Vec<_>>().join(", "))
+        }
         Some(motion) => escape(&motion.to_string()),
     }
 }
