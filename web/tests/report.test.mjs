@@ -166,6 +166,9 @@ for (const stones of [200, 10_000]) {
       assert.notEqual(cloud, moved);
       const left = await drawn(() => page.click(".scene-controls >> text=left"));
       assert.notEqual(left, cloud);
+      const joints = await drawn(() => page.selectOption("#quantity", "opening"));
+      assert.notEqual(joints, left);
+      await page.selectOption("#quantity", "out");
       await page.click("#view-map");
     });
 

@@ -63,6 +63,8 @@ export class WallScene {
   #after = false;
   #shown: { clouds: Clouds; stones: boolean; arrows: boolean; cameras: boolean } = { clouds: "before", stones: true, arrows: true, cameras: false };
   #waiting = false;
+  /** Whether the view knows the size of its place. */
+  #placed = false;
 
   constructor(report: Report, store: Store, quantities: readonly Quantity[]) {
     this.#report = report;
@@ -458,12 +460,12 @@ export class WallScene {
   #resize(): void {
     const { clientWidth: w, clientHeight: h } = this.element;
     if (w === 0 || h === 0) return;
-    const first = this.#renderer.domElement.dataset["drawn"] === undefined;
     this.#renderer.setPixelRatio(Math.min(2, window.devicePixelRatio || 1));
     this.#renderer.setSize(w, h, false);
     this.#camera.aspect = w / h;
     this.#camera.updateProjectionMatrix();
-    if (first) this.look("front");
+    if (!this.#placed) this.look("front");
+    this.#placed = true;
     this.redraw();
   }
 }

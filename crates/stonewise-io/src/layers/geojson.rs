@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Writes a layer as a feature collection, one feature a line, coordinates rounded to 0.1 mm.
+/// Writes a layer as a feature collection, one feature a line, coordinates rounded to a micrometre.
 ///
 /// RFC 7946 wants longitude and latitude; coordinates here are those of the layer. A layer with a reference system says
 /// so in the member `crs` of the format's 2008 version; of a local frame readers must be told (QGIS asks). A feature with too few or infinite vertices has geometry null.
@@ -65,7 +65,7 @@ fn geometry(layer: &Layer, row: usize) -> Value {
     let place = |p: &nalgebra::Point3<f64>| {
         p.iter()
             .take(axes)
-            .map(|v| (v * 1e4).round() / 1e4)
+            .map(|v| (v * 1e6).round() / 1e6)
             .collect::<Vec<_>>()
     };
     let mut line: Vec<Vec<f64>> = vertices.iter().map(place).collect();

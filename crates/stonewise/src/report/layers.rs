@@ -6,7 +6,7 @@ use super::joints::{Joint, JointMotion, joints};
 use super::layer_style::{arrow_style, line_style, stone_style};
 use super::stone_table::stone_table;
 use super::summary::Summary;
-use super::{ReportError, ResultSet, RowMotion, StoneRow};
+use super::{ReportError, ResultSet, RowMotion, StoneOutline, StoneRow};
 use nalgebra::{Point2, Point3};
 use serde_json::Value;
 use std::path::Path;
@@ -74,7 +74,7 @@ fn layers(results: &ResultSet, facts: &Summary) -> Result<Vec<Layer>, TableError
         results
             .outlines
             .get(&s.stone_id)
-            .map_or(Vec::new(), |o| o.ring.clone())
+            .map_or(Vec::new(), StoneOutline::seen_from_above)
     };
     let flat = |p: Point2<f64>| Point3::new(p.x, p.y, 0.0);
     let facade = |s: &StoneRow| results.unrolled(s).into_iter().map(flat).collect();

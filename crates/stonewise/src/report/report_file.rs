@@ -124,6 +124,9 @@ mod tests {
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
         assert!(html.contains("before it settled"));
+        assert!(
+            html.contains("the stable areas outside the wall seem to have moved by 3.2 mm (\u{b1} 2.4 mm)")
+        );
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         let html = written(&html);

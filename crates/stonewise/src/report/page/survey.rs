@@ -1,9 +1,10 @@
 //! The survey data of the cover: what was measured with what.
 
 use super::html::{details, table};
-use crate::figure::{count, escape};
+use crate::figure::{count, escape, number};
 use crate::report::ResultSet;
 use serde_json::Value;
+use std::fmt::Write;
 use std::path::Path;
 
 /// A table of the epochs, folded on the screen and open on the printed cover; empty where run.json has none.
@@ -13,7 +14,7 @@ pub(super) fn survey(results: &ResultSet) -> String {
     };
     let compared = [0, results.pair];
     let chosen: Vec<&Value> = compared.iter().filter_map(|e| epochs.get(*e)).collect();
-    let number = |epoch: &Value, key: &str| {
+    let whole = |epoch: &Value, key: &str| {
         let value = epoch.get(key).and_then(Value::as_u64);
         value.map_or("\u{2013}".into(), |v| {
             count(usize::try_from(v).unwrap_or(usize::MAX))
@@ -26,11 +27,11 @@ pub(super) fn survey(results: &ResultSet) -> String {
     };
     let rows = vec![
         row("point clouds", &|e| files(e.get("clouds"))),
-        row("points", &|e| number(e, "points")),
+        row("points", &|e| whole(e, "points")),
         row("camera file", &|e| files(e.get("cameras"))),
-        row("photos used", &|e| number(e, "photos")),
+        row("photos used", &|e| whole(e, "photos")),
         row("masks", &|e| files(e.get("masks"))),
-        row("stones found", &|e| number(e, "stones")),
+        row("stones found", &|e| whole(e, "stones")),
         row("known motion put in", &known_motion),
     ];
     let heads: Vec<String> = chosen
@@ -88,16 +89,23 @@ fn bytes(value: u64) -> String {
     }
 }
 
+/// Kind of the motion and its numbers, metres.
 fn known_motion(epoch: &Value) -> String {
-    match epoch.get("motion") {
-        None | Some(Value::Null) => "none".into(),
-        Some(Value::Object(parts)) => {
-            let parts = parts.iter().map(|(key, value)| match value.as_str() {
-                Some(text) if key == "kind" => text.to_owned(),
-                _ => format!("{key} {value}"),
-            });
-            escape(&parts.collect::<Vec<_>>().join(", "))
-        }
-        Some(motion) => escape(&motion.to_string()),
+    let Some(Value::Object(parts)) = epoch.get("motion") else {
+        return "none".into();
+    };
+    let kind = parts.get("kind").and_then(Value::as_str).unwrap_or("motion");
+    let mut text = escape(kind);
+    for (key, value) in parts.iter().filter(|(key, _)| *key != "kind") {
+        let numbers: Vec<String> = match value {
+            Value::Array(items) => items.iter().map(metres).collect(),
+            value => vec![metres(value)],
+        };
+        let _ = write!(text, "; {} {}", escape(key), numbers.join(", "));
     }
+    text
+}
+
+fn metres(value: &Value) -> String {
+    number(value.as_f64().unwrap_or(f64::NAN), 3)
 }
