@@ -97,7 +97,7 @@ mod tests {
             crs: super::super::Crs::parse("EPSG:25832"),
             attributes,
             vertices: vec![
-                vec![p(0.0, 0.0, 9.0), p(1.0, 0.0, 9.0), p(1.0, 1.000_04, 9.0)],
+                vec![p(0.0, 0.0, 9.0), p(1.0, 0.0, 9.0), p(1.0, 1.000_000_4, 9.0)],
                 vec![],
             ],
             styles: Vec::new(),
