@@ -14,6 +14,8 @@ export interface Quantity {
   readonly scale: "diverging" | "sequential" | "outcomes";
   /** End of the scale, in `unit`. */
   readonly limit: number;
+  /** Start of a sequential scale, 0 unless given. */
+  readonly start?: number;
   /** Whether stones below their detection limit may be faded. */
   readonly fades: boolean;
   /** Decimals that the unit is worth. */
@@ -71,7 +73,7 @@ export function quantities(report: Report): readonly Quantity[] {
       value: (i) => (stones.move[2][i]! - stones.m3c2[i]!) * 1e3, note: "Out of the wall: the stone's motion less the median M3C2 distance on it.",
     },
     {
-      key: "confidence", label: "Confidence of the outline", unit: "%", scale: "sequential", limit: 100, fades: false, decimals: 0,
+      key: "confidence", label: "Confidence of the outline", unit: "%", scale: "sequential", start: 50, limit: 100, fades: false, decimals: 0,
       value: (i) => stones.confidence[i]! * 100, note: "Mean share of the photos' votes that the stone's points gave it.",
     },
     {
@@ -101,8 +103,8 @@ export class Palette {
 
   /** Colour of a value in the quantity's unit; values beyond the scale have its end's. */
   of(value: number): string {
-    const share = value / this.#quantity.limit;
-    const along = this.#quantity.scale === "diverging" ? (share + 1) / 2 : share;
+    const { scale, limit, start = 0 } = this.#quantity;
+    const along = scale === "diverging" ? (value / limit + 1) / 2 : (value - start) / (limit - start);
     const last = this.#colours.length - 1;
     return this.#colours[Math.round(Math.min(1, Math.max(0, along)) * last)]!;
   }

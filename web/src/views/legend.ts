@@ -30,7 +30,7 @@ function bar(report: Report, quantity: Quantity): Node {
   const stripe = el("i", { class: "stripe" });
   stripe.style.background = `linear-gradient(90deg, ${colours.join(", ")})`;
   const end = fixed(quantity.limit, quantity.limit < 1 ? 2 : quantity.limit < 10 && quantity.limit % 1 ? 1 : 0);
-  const [low, high] = quantity.scale === "diverging" ? [`\u2212${end}`, `+${end}`] : ["0", end];
+  const [low, high] = quantity.scale === "diverging" ? [`\u2212${end}`, `+${end}`] : [fixed(quantity.start ?? 0, 0), end];
   return el("span", { class: "colour-bar" }, el("b", {}, quantity.label), low, stripe, `${high} ${quantity.unit}`);
 }
 

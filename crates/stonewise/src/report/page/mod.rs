@@ -90,7 +90,8 @@ pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     let body = format!(
         "<body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
          <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
-         <path d=\"M0 0V60\" class=\"hatching\"/></pattern></defs></svg>\n\
+         <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+         <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n\
          <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
          <main>\n{body}</main>\n{data}",
         cover(results)
