@@ -281,6 +281,10 @@ pub struct PaperArgs {
     /// Width and height of the simulated section, metres.
     #[arg(long, value_name = "WxH", default_value = "10x5", value_parser = parse_size)]
     pub size: [f64; 2],
+    /// Measure with the paper's estimator, which takes seconds a stone, only in a part: x0,y0,z0,x1,y1,z1 (metres, world
+    /// frame), or WIDTHxHEIGHT in the middle of the wall, such as 3x3. Its rows count the stones of that part alone.
+    #[arg(long, value_name = "PART")]
+    pub paper_part: Option<String>,
 }
 
 /// Ready-made surveys.

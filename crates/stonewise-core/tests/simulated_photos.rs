@@ -3,8 +3,8 @@
 use stonewise_core::geometry::View;
 use stonewise_core::raster::LabelImage;
 use stonewise_core::simulate::{
-    PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views, plan_views, shown_part,
-    true_labels,
+    FacePoint, PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views, plan_views,
+    shown_part, true_labels,
 };
 
 fn params() -> (SceneParams, PhotoParams) {
@@ -96,6 +96,40 @@ fn a_part_of_the_wall_is_enough_for_a_photo_that_shows_no_more() {
     assert!(same * 1000 >= labels.data().len() * 999, "{same}");
     let photo = Studio::new(&world.scene(0), 3).photograph(view, &photos.sensor);
     assert_eq!(photo.labels, whole);
+}
+
+#[test]
+fn every_part_of_a_tall_wall_is_in_a_photo() {
+    let scene = SceneParams {
+        wall: WallParams {
+            width_m: 12.0,
+            height_m: 16.0,
+            course_m: 1.5,
+            ..WallParams::default()
+        },
+        ..SceneParams::default()
+    };
+    // A photo shows 5 x 4 m.
+    let photos = PhotoParams {
+        columns: 4,
+        rows: 6,
+        width: 500,
+        height: 400,
+        focal_px: 400.0,
+        distance_m: 4.0,
+        ..PhotoParams::default()
+    };
+    let wall = World::new(&scene).wall;
+    let views = plan_views(&wall, &photos, 0, 1);
+    for k in 0..49 * 65 {
+        let (a, u) = (0.25 * f64::from(k % 49) - 6.0, 0.25 * f64::from(k / 49));
+        let place = wall.face.world_of(&FacePoint { a, u, n: 0.0 });
+        let inside = |view: &View| {
+            let pixel = view.project(&place)?.pixel;
+            (0.0 <= pixel[0] && pixel[0] < 500.0 && 0.0 <= pixel[1] && pixel[1] < 400.0).then_some(())
+        };
+        assert!(views.iter().any(|v| inside(v).is_some()), "{a} {u}");
+    }
 }
 
 #[test]

@@ -140,9 +140,11 @@ fn a_grid_says_what_cannot_be() {
 fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
     let (dir, project) = survey();
     let out = dir.path().join("paper");
+    let part = Part::in_the_middle(&project.epochs[0].clouds, [1.2, 0.8]).unwrap();
     let surveys = [PaperSurvey {
         name: "TLS".to_owned(),
         project,
+        paper_part: Some(part),
     }];
     let tables = paper(&surveys, None, 1, &out, &Silent).unwrap();
     let text = tables.markdown();
@@ -165,6 +167,11 @@ fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
     };
     let ours = find("stones, stonewise", "translation");
     assert!(ours.rmse_m[0] < 0.002 && ours.count[1] >= 10, "{ours:?}");
+    let theirs = find("stones, the paper's estimator", "translation");
+    assert!(
+        theirs.count[0] > 5 && theirs.count[0] < ours.count[0],
+        "{theirs:?}"
+    );
     assert!(find("M3C2", "translation").rmse_m[0] > 0.02);
     assert!(find("stones, stonewise", "bulge").rmse_m[2] < 0.001);
     let page = fs::read_to_string(out.join("index.html")).unwrap();

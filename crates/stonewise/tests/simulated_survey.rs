@@ -1,5 +1,6 @@
 //! A simulated survey on disk, read back with the readers that real surveys go through.
 
+use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -144,6 +145,58 @@ fn a_survey_reads_back_and_is_the_same_for_the_same_parameters() {
     }
 }
 
+/// Columns of a CSV file of numbers, by name.
+#[allow(clippy::unwrap_used, reason = "a test may fail here")]
+fn columns(path: &Path) -> BTreeMap<String, Vec<f64>> {
+    let text = fs::read_to_string(path).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let rows: Vec<Vec<&str>> = rows.lines().map(|l| l.split(',').collect()).collect();
+    let column = |i: usize| rows.iter().map(|r| r[i].parse().unwrap()).collect();
+    header
+        .split(',')
+        .enumerate()
+        .map(|(i, name)| (name.to_owned(), column(i)))
+        .collect()
+}
+
+#[test]
+fn stones_project_through_the_camera_files_onto_their_masks() {
+    let folder = tempfile::tempdir().unwrap();
+    let summary = write_survey(folder.path(), &tiny(), &Silent).unwrap();
+    let stones = columns(&summary.truth);
+    let (mut right, mut all) = (0, 0);
+    for epoch in [1, 2] {
+        let cameras = |name: &str| {
+            let path = folder.path().join(format!("truth/cameras_epoch{epoch}/{name}"));
+            read_cameras(&path).unwrap().views
+        };
+        let masks = folder.path().join(format!("truth/masks/epoch{epoch}_coco.json"));
+        let masks = MaskSource::open(&masks).unwrap();
+        for (metashape, colmap) in cameras("cameras_metashape.xml").iter().zip(cameras("colmap")) {
+            let name = format!("{}.jpg", metashape.name);
+            let known = masks.labels_for(&name, 240, 180).unwrap().unwrap();
+            for i in 0..stones["cx"].len() {
+                let moved = |c: &str, d: &str| stones[c][i] + f64::from(epoch - 1) * stones[d][i];
+                let centroid = Point3::new(moved("cx", "dx"), moved("cy", "dy"), moved("cz", "dz"));
+                let Some(seen) = metashape.project(&centroid) else {
+                    continue;
+                };
+                let other = colmap.project(&centroid).unwrap();
+                let apart = [0, 1].map(|k| (seen.pixel[k] - other.pixel[k]).abs());
+                assert!(apart[0].max(apart[1]) < 1e-4, "{name}: {apart:?} px");
+                let label = known.labels.at(seen.pixel).copied().unwrap_or(0);
+                let Some(mask) = known.instances.iter().find(|m| m.id == label) else {
+                    continue;
+                };
+                all += 1;
+                right += usize::from(mask.stone_ref == Some(stones["stone_id"][i] as u64));
+            }
+        }
+    }
+    // The others lie behind the annex or the shrubs.
+    assert!(all > 40 && right * 100 >= all * 95, "{right} of {all}");
+}
+
 /// Stops the work after some units.
 struct StopAfter(AtomicU64, u64);
 
@@ -158,20 +211,53 @@ impl Progress for StopAfter {
 }
 
 #[test]
-fn an_interrupted_survey_has_no_project_file_and_others_projects_stay() {
+fn an_interrupted_survey_goes_on_where_it_stopped_and_others_projects_stay() {
     let folder = tempfile::tempdir().unwrap();
     let params = SurveyParams {
         masks: MaskFiles::Png,
         ..tiny()
     };
-    let stopped = write_survey(folder.path(), &params, &StopAfter(AtomicU64::new(0), 3));
+    // The scans of the first epoch and one of its two photos.
+    let stopped = write_survey(folder.path(), &params, &StopAfter(AtomicU64::new(0), 2));
     assert!(
         matches!(stopped, Err(SimulateError::Interrupted(_))),
         "{stopped:?}"
     );
     assert!(!folder.path().join("stonewise.toml").exists());
+    let finished = ["epoch1/cloud_tls.laz", "epoch1/images/IMG_1001.jpg"];
+    let times = || {
+        finished.map(|name| {
+            let file = fs::metadata(folder.path().join(name)).unwrap();
+            file.modified().unwrap()
+        })
+    };
+    let before = times();
     write_survey(folder.path(), &params, &Silent).unwrap();
-    assert!(folder.path().join("stonewise.toml").exists());
+    assert_eq!(times(), before);
+    let at_once = tempfile::tempdir().unwrap();
+    write_survey(at_once.path(), &params, &Silent).unwrap();
+    let (mut first, mut second) = (BTreeMap::new(), BTreeMap::new());
+    files(folder.path(), &mut first, folder.path());
+    files(at_once.path(), &mut second, at_once.path());
+    assert_eq!(
+        first.keys().collect::<Vec<_>>(),
+        second.keys().collect::<Vec<_>>()
+    );
+    let differing: Vec<&String> = first
+        .keys()
+        .filter(|name| first[*name] != second[*name])
+        .collect();
+    assert!(differing.is_empty(), "{differing:?}");
+
+    // Other parameters begin anew.
+    let stopped = write_survey(folder.path(), &params, &StopAfter(AtomicU64::new(0), 2));
+    assert!(stopped.is_err());
+    let other = params.clone().seeded(5);
+    write_survey(folder.path(), &other, &Silent).unwrap();
+    assert_ne!(
+        fs::read(folder.path().join(finished[1])).unwrap(),
+        first[finished[1]]
+    );
 
     let own = tempfile::tempdir().unwrap();
     fs::write(own.path().join("stonewise.toml"), "mine").unwrap();

@@ -1,7 +1,7 @@
 //! `experiment`.
 
 use crate::args::{ExperimentCommand, PaperArgs, SensitivityArgs};
-use crate::commands::{Outcome, simulate};
+use crate::commands::{Outcome, part::part, simulate};
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
@@ -22,10 +22,15 @@ pub fn experiment(which: &ExperimentCommand, printer: &Printer) -> Result<Outcom
 
 /// The paper's experiment; its tables go to stdout.
 fn paper(args: &PaperArgs, printer: &Printer) -> Result<Outcome> {
-    let surveys = match args.surveys.as_slice() {
+    let mut surveys: Vec<PaperSurvey> = match args.surveys.as_slice() {
         [] => simulated(args, printer)?,
         given => given.iter().map(|s| survey(s)).collect::<Result<_>>()?,
     };
+    for survey in &mut surveys {
+        if let Some(text) = &args.paper_part {
+            survey.paper_part = Some(part("--paper-part", text, &survey.project)?);
+        }
+    }
     let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, &args.out, printer)?;
     printer.finish();
     write!(std::io::stdout(), "{}", tables.markdown())?;
@@ -65,6 +70,7 @@ fn survey(text: &str) -> Result<PaperSurvey> {
     Ok(PaperSurvey {
         name,
         project: Project::read_for_split(Path::new(path))?,
+        paper_part: None,
     })
 }
 
@@ -80,6 +86,7 @@ fn simulated(args: &PaperArgs, printer: &Printer) -> Result<Vec<PaperSurvey>> {
         Ok(PaperSurvey {
             name: name.to_owned(),
             project: Project::read_for_split(&folder.join(file))?,
+            paper_part: None,
         })
     };
     Ok(vec![

@@ -5,6 +5,7 @@ mod evaluate;
 mod experiment;
 mod info;
 mod init;
+mod part;
 mod report;
 mod run;
 mod segment;

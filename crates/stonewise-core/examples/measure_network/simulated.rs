@@ -23,7 +23,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
     let truths = stone_truths(&world);
     let shares = |scan: &Scan, epoch: usize| {
         let mut cells = SeenCells::new(&world, epoch);
-        cells.add(&truths, scan);
+        cells.add(scan);
         cells.shares(&truths)
     };
     let mut seen = shares(&first, 0);

@@ -50,20 +50,67 @@ impl Face {
     /// Where a world point lies in face coordinates.
     #[inline]
     pub fn face_of(&self, p: &Point3<f64>) -> FacePoint {
-        let (x, a) = if self.is_plane() {
-            (p.x, p.y)
+        self.face_and_out(p).0
+    }
+
+    /// Where a world point lies in face coordinates, and the outward normal of the face there.
+    #[inline]
+    pub fn face_and_out(&self, p: &Point3<f64>) -> (FacePoint, Vector3<f64>) {
+        let [c, s] = self.lean;
+        let (x, a, out) = if self.is_plane() {
+            (p.x, p.y, Vector3::new(c, 0.0, s))
         } else {
             let side = self.radius_m.signum();
-            let from_axis = (self.radius_m - p.x).hypot(p.y);
-            let angle = (p.y * side).atan2((self.radius_m - p.x) * side);
-            (self.radius_m - side * from_axis, angle * self.radius_m)
+            let (dx, dy) = (side * (self.radius_m - p.x), side * p.y);
+            // Not hypot, which guards against overflow at several times the cost.
+            let from_axis = (dx * dx + dy * dy).sqrt();
+            (
+                self.radius_m - side * from_axis,
+                dy.atan2(dx) * self.radius_m,
+                Vector3::new(c * dx / from_axis, -c * dy / from_axis, s),
+            )
         };
-        let [c, s] = self.lean;
-        FacePoint {
+        let at = FacePoint {
             a,
             u: c * p.z - s * x,
             n: c * x + s * p.z,
+        };
+        (at, out)
+    }
+
+    /// Distance along a ray at which it first comes down to `height_m` over the face; 0 where it starts there or lower, `None`
+    /// where it never does. `along` is a unit vector.
+    ///
+    /// Places of one height over a curved face lie on a cone about the axis of the plan: a quadratic equation.
+    pub fn come_down(&self, from: &Point3<f64>, along: &Vector3<f64>, height_m: f64) -> Option<f64> {
+        let (at, out) = self.face_and_out(from);
+        let above = at.n - height_m;
+        // A ray that starts there may seem to start a rounding error above.
+        if above <= 1e-9 {
+            return Some(0.0);
         }
+        if self.is_plane() {
+            let descent = -along.dot(&out);
+            return (descent > 1e-9).then(|| above / descent);
+        }
+        // The cone's signed radius at distance t is q + r t, the ray's distance from the axis in plan the root of
+        // (x - along.x t)^2 + (y + along.y t)^2.
+        let [c, s] = self.lean;
+        let (x, y) = (self.radius_m - from.x, from.y);
+        let (q, r) = (self.radius_m - (height_m - s * from.z) / c, s * along.z / c);
+        let square = along.x * along.x + along.y * along.y - r * r;
+        let half = y * along.y - x * along.x - q * r;
+        let rest = x * x + y * y - q * q;
+        let discriminant = half * half - square * rest;
+        if discriminant < 0.0 {
+            return None;
+        }
+        let k = -(half + half.signum() * discriminant.sqrt());
+        // The other half of the double cone is no face.
+        let valid = |t: f64| t.is_finite() && t >= 0.0 && (q + r * t) * self.radius_m > 0.0;
+        let mut roots = [k / square, rest / k];
+        roots.sort_by(f64::total_cmp);
+        roots.into_iter().find(|t| valid(*t))
     }
 
     /// The world point at face coordinates; inverse of [`Face::face_of`].
@@ -115,17 +162,6 @@ impl Face {
         }
     }
 
-    /// Outward normal of the face at `a`.
-    #[inline]
-    pub fn frame_out(&self, a: f64) -> Vector3<f64> {
-        let [c, s] = self.lean;
-        if self.is_plane() {
-            return Vector3::new(c, 0.0, s);
-        }
-        let (sin, cos) = (-a / self.radius_m).sin_cos();
-        Vector3::new(c * cos, c * sin, s)
-    }
-
     /// Pose of a flat patch that touches the face at (a, u): its x, y, z are along, up, out.
     pub fn world_from_patch(&self, a: f64, u: f64) -> Rigid3 {
         let frame = self.frame(a);
@@ -170,6 +206,21 @@ mod tests {
                 let met = face.meet(&from, &(target - from).normalize(), 50.0).unwrap();
                 assert!((met.a - a).abs() < 1e-6 && (met.u - u).abs() < 1e-6);
                 assert!(face.meet(&from, &face.frame(a).out, 50.0).is_none());
+                assert!((face.face_and_out(&from).1 - face.frame(a + 3.0).out).norm() < 1e-12);
+                for (height, along) in [
+                    (0.0, target - from),
+                    (0.4, target - from),
+                    (1.5, Vector3::new(-0.9, 0.4, 0.0)),
+                ] {
+                    let along = along.normalize();
+                    let t = face.come_down(&from, &along, height).unwrap();
+                    let n = |t: f64| face.face_of(&(from + along * t)).n;
+                    assert!((n(t) - height).abs() < 1e-9, "{radius} {height}: {}", n(t));
+                    assert!((0..100).all(|k| n(t * f64::from(k) / 100.0) > height));
+                }
+                assert_eq!(face.come_down(&from, &face.frame(a + 3.0).out, 1.0), None);
+                assert_eq!(face.come_down(&from, &Vector3::z(), 9.5), Some(0.0));
+                assert_eq!(face.come_down(&from, &-face.frame(a + 3.0).out, 9.0), Some(0.0));
             }
         }
     }

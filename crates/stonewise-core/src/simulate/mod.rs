@@ -31,10 +31,10 @@ pub use photo::{Photo, PhotoParams, Studio, disturb_views, plan_views, shown_par
 pub use props::{Material, Prop, SurroundingsParams, surroundings};
 pub use scan::{BeamParams, Scan};
 pub use scene::{Hit, Scene, Target};
-pub use surface::{HeightGrid, Surface};
+pub use surface::{HeightGrid, SampledFaces, Surface};
 pub use survey::{EpochScans, SceneParams, Sensor, World, scan_window, simulate_scans};
 pub use tls::{TlsParams, scan_terrestrial};
-pub use truth::{SeenCells, StoneTruth, photo_counts, stone_truths};
+pub use truth::{SeenCells, StoneTruth, shown_stones, stone_truths, window_truths};
 pub use uav::{UavParams, scan_airborne};
 pub use wall::{SimStone, Wall, WallParams};
 pub use window::Window;

@@ -24,11 +24,15 @@ impl Noise {
 
     /// Gradient noise at (x, y): about -1..1, mean zero, wavelength about 1, standard deviation about 0.3.
     pub fn at(&self, x: f64, y: f64) -> f64 {
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let (i, j) = (x0 as i64, y0 as i64);
-        let corner = |di: i64, dj: i64| {
-            let h = self.cell(i + di, j + dj);
+        let (i, j) = (floor(x), floor(y));
+        let (fx, fy) = (x - i as f64, y - j as f64);
+        let columns = [i, i + 1].map(|i| (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ self.seed);
+        let rows = [j, j + 1].map(|j| (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f));
+        let corner = |di: usize, dj: usize| {
+            let mut h = columns[di] ^ rows[dj];
+            h ^= h >> 29;
+            h = h.wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            h ^= h >> 32;
             // Gradients uniform in a square: cheap, and even enough once octaves are summed.
             let gx = (h & 0xffff) as f64 / 32768.0 - 1.0;
             let gy = ((h >> 16) & 0xffff) as f64 / 32768.0 - 1.0;
@@ -52,15 +56,12 @@ impl Noise {
         }
         sum
     }
+}
 
-    fn cell(&self, i: i64, j: i64) -> u64 {
-        let mut h = self.seed
-            ^ (i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-            ^ (j as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f);
-        h ^= h >> 29;
-        h = h.wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        h ^ (h >> 32)
-    }
+/// Largest whole number that is not above; without the call that `f64::floor` is on old processors.
+fn floor(v: f64) -> i64 {
+    let whole = v as i64;
+    whole - i64::from(whole as f64 > v)
 }
 
 /// A standard normal number (Box and Muller 1958).

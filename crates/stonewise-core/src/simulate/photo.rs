@@ -107,7 +107,11 @@ pub fn plan_views(wall: &Wall, params: &PhotoParams, epoch: usize, seed: u64) ->
             });
             // The picture stays on the section; a section smaller than the picture stays in its middle.
             let aim_a = within(a, [w[0], w[1]], 0.75 * seen);
-            let aim_u = within(u, [foot, w[3]], 0.75 * seen * aspect);
+            let aim_u = within(
+                foot + high * share(row, params.rows),
+                [foot, w[3]],
+                0.75 * seen * aspect,
+            );
             let at = face.world_of(&FacePoint {
                 a: aim_a + 0.15 * stray(),
                 u: aim_u + 0.15 * stray(),

@@ -36,6 +36,9 @@ pub enum Material {
 pub struct Prop {
     /// Its material.
     pub material: Material,
+    /// Middle and radius of a sphere that holds it, world frame, metres.
+    middle: Point3<f64>,
+    radius_m: f64,
     shape: Form,
 }
 
@@ -47,11 +50,7 @@ enum Form {
         max: Point3<f64>,
         box_from_world: Rigid3,
     },
-    Leaves {
-        middle: Point3<f64>,
-        radius_m: f64,
-        discs: Vec<Disc>,
-    },
+    Leaves(Vec<Disc>),
 }
 
 #[derive(Clone, Debug)]
@@ -89,6 +88,11 @@ impl Default for SurroundingsParams {
 impl Prop {
     /// Distance along the ray to the first hit within `limit`, and the outward normal there.
     pub fn trace(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<(f64, Vector3<f64>)> {
+        let to = self.middle - from;
+        let t = to.dot(along);
+        if to.norm_squared() - t * t > self.radius_m * self.radius_m || t - self.radius_m > limit {
+            return None;
+        }
         match &self.shape {
             Form::Box {
                 min,
@@ -99,21 +103,10 @@ impl Prop {
                 let (t, normal) = trace_box(&from, &along, min, max, limit)?;
                 Some((t, box_from_world.rotation.inverse() * normal))
             }
-            Form::Leaves {
-                middle,
-                radius_m,
-                discs,
-            } => {
-                let to = middle - from;
-                let t = to.dot(along);
-                if (to - along * t).norm_squared() > radius_m * radius_m || t - radius_m > limit {
-                    return None;
-                }
-                discs
-                    .iter()
-                    .filter_map(|d| trace_disc(from, along, d, limit))
-                    .min_by(|p, q| p.0.total_cmp(&q.0))
-            }
+            Form::Leaves(discs) => discs
+                .iter()
+                .filter_map(|d| trace_disc(from, along, d, limit))
+                .min_by(|p, q| p.0.total_cmp(&q.0)),
         }
     }
 
@@ -128,7 +121,7 @@ impl Prop {
                 let p = box_from_world * p;
                 (0..3).all(|i| min[i] < p[i] && p[i] < max[i])
             }
-            Form::Leaves { .. } => false,
+            Form::Leaves(_) => false,
         }
     }
 
@@ -144,11 +137,7 @@ impl Prop {
                 let nearest = p.coords.sup(&min.coords).inf(&max.coords);
                 (p.coords - nearest).norm() <= radius_m
             }
-            Form::Leaves {
-                middle,
-                radius_m: own,
-                ..
-            } => (middle - place).norm() <= radius_m + own,
+            Form::Leaves(_) => (self.middle - place).norm() <= radius_m + self.radius_m,
         }
     }
 }
@@ -162,12 +151,15 @@ struct Site<'a> {
 impl Site<'_> {
     /// Adds a box that stands at `a` along the wall; corners relative to the foot of the face there: x out, y along, z up.
     fn block(&mut self, material: Material, a: f64, min: [f64; 3], max: [f64; 3]) {
+        let (min, max, foot) = (Point3::from(min), Point3::from(max), self.foot(a));
         self.props.push(Prop {
             material,
+            middle: foot * nalgebra::center(&min, &max),
+            radius_m: 0.5 * (max - min).norm(),
             shape: Form::Box {
-                min: Point3::from(min),
-                max: Point3::from(max),
-                box_from_world: self.foot(a).inverse(),
+                min,
+                max,
+                box_from_world: foot.inverse(),
             },
         });
     }
@@ -293,11 +285,9 @@ fn shrub(foot: [f64; 2], radius_m: f64, rng: &mut ChaCha8Rng) -> Prop {
         .collect();
     Prop {
         material: Material::Leaf,
-        shape: Form::Leaves {
-            middle,
-            radius_m: 1.25 * radius_m,
-            discs,
-        },
+        middle,
+        radius_m: 1.25 * radius_m,
+        shape: Form::Leaves(discs),
     }
 }
 

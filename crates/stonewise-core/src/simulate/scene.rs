@@ -191,15 +191,15 @@ impl<'a> Scene<'a> {
     /// Marches along the ray to the wall's surface and then closes in on it to a micrometre.
     fn march(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<f64> {
         let face = &self.wall.face;
-        let mut t = self.enter_layer(from, along, limit)?;
+        let mut t = face.come_down(from, along, self.layer[1])?;
         let mut above: Option<(f64, f64)> = None;
         for _ in 0..200 {
             if t > limit {
                 return None;
             }
             let p = from + along * t;
-            let f = face.face_of(&p);
-            let descent = -along.dot(&face.frame_out(f.a));
+            let (f, out) = face.face_and_out(&p);
+            let descent = -along.dot(&out);
             if f.n < self.layer[0] || (f.n > self.layer[1] && descent <= 0.0) {
                 return None;
             }
@@ -216,33 +216,6 @@ impl<'a> Scene<'a> {
             above = Some((t, gap));
             let sideways = (1.0 - descent * descent).max(0.0).sqrt();
             t += (gap / (descent.max(0.0) + 1.1 * sideways)).max(4e-4);
-        }
-        None
-    }
-
-    /// Distance at which the ray comes into the layer that the wall's surface lies in.
-    fn enter_layer(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<f64> {
-        let face = &self.wall.face;
-        let mut t = 0.0;
-        for _ in 0..400 {
-            let f = face.face_of(&(from + along * t));
-            let above = f.n - self.layer[1];
-            if above <= 1e-6 {
-                return Some(t);
-            }
-            let descent = -along.dot(&face.frame_out(f.a));
-            // Height over the face changes by at most a metre a metre; on a plane its rate is known.
-            t += if face.is_plane() {
-                if descent <= 1e-9 {
-                    return None;
-                }
-                above / descent + 1e-7
-            } else {
-                above + 1e-6
-            };
-            if t > limit || t > 2000.0 {
-                return None;
-            }
         }
         None
     }

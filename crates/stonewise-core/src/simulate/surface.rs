@@ -3,9 +3,13 @@
 use crate::simulate::wall::{HIDDEN_M, Wall};
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Sample distance of a stone's face, metres: between samples the surface is bilinear, and that surface is the truth.
 const STONE_STEP_M: f64 = 0.0025;
+/// Sample distance of the waves that bend the layout, metres; the shortest of them are 22 mm long and a millimetre high.
+const LAYOUT_STEP_M: f64 = 0.005;
 /// Sample distance of the mortar, metres.
 const MORTAR_STEP_M: f64 = 0.004;
 
@@ -80,7 +84,7 @@ impl HeightGrid {
 #[derive(Clone, Debug)]
 pub struct Surface {
     /// Which stones of the wall, ascending, with their faces in their own frames.
-    pub stones: Vec<(usize, HeightGrid)>,
+    pub stones: Vec<(usize, Arc<HeightGrid>)>,
     /// Mortar over face coordinates, first epoch.
     pub mortar: HeightGrid,
     /// The window: smallest a, largest a, smallest u, largest u, metres.
@@ -89,16 +93,28 @@ pub struct Surface {
     pub top_m: f64,
 }
 
+/// Faces of stones that were sampled for one window and may be wanted for the next.
+#[derive(Clone, Debug, Default)]
+pub struct SampledFaces(BTreeMap<usize, Arc<HeightGrid>>);
+
 impl Surface {
-    /// Samples the wall in a window; the same for any number of threads.
-    pub fn new(wall: &Wall, window: [f64; 4]) -> Self {
+    /// Samples the wall in a window; the same for any number of threads. Faces that `sampled` holds are taken from there; it
+    /// is left with those of this window alone.
+    pub fn new(wall: &Wall, window: [f64; 4], sampled: &mut SampledFaces) -> Self {
         let reaches =
             |b: &[f64; 4]| b[0] <= window[1] && b[1] >= window[0] && b[2] <= window[3] && b[3] >= window[2];
         let inside: Vec<usize> = (0..wall.stones.len())
             .filter(|&i| reaches(&wall.stones[i].bounds))
             .collect();
-        let stones: Vec<(usize, HeightGrid)> =
-            inside.into_par_iter().map(|i| (i, stone_grid(wall, i))).collect();
+        let known = &sampled.0;
+        let stones: Vec<(usize, Arc<HeightGrid>)> = inside
+            .into_par_iter()
+            .map(|i| {
+                let face = known.get(&i).cloned();
+                (i, face.unwrap_or_else(|| Arc::new(stone_grid(wall, i))))
+            })
+            .collect();
+        sampled.0 = stones.iter().cloned().collect();
         let margin = 0.3;
         let around = [
             window[0] - margin,
@@ -126,7 +142,14 @@ fn stone_grid(wall: &Wall, i: usize) -> HeightGrid {
         u0 - margin - stone.middle[1],
         u1 + margin - stone.middle[1],
     ];
+    // The waves of the courses are slow: sampling them apart saves half of the time.
+    let waves = [0, 1].map(|axis| {
+        HeightGrid::sample(local, LAYOUT_STEP_M, |x, y| {
+            wall.wave(axis, stone.middle[0] + x, stone.middle[1] + y)
+        })
+    });
     HeightGrid::sample(local, STONE_STEP_M, |x, y| {
-        wall.stone_height(i, x, y).unwrap_or(HIDDEN_M)
+        let wave = waves.each_ref().map(|grid| grid.height(x, y).unwrap_or(0.0));
+        wall.stone_height(i, x, y, wave).unwrap_or(HIDDEN_M)
     })
 }

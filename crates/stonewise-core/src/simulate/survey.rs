@@ -5,7 +5,7 @@ use crate::simulate::noise::Noise;
 use crate::simulate::props::{Prop, SurroundingsParams, surroundings};
 use crate::simulate::scan::Scan;
 use crate::simulate::scene::Scene;
-use crate::simulate::surface::Surface;
+use crate::simulate::surface::{SampledFaces, Surface};
 use crate::simulate::tls::{TlsParams, scan_terrestrial};
 use crate::simulate::uav::{UavParams, scan_airborne};
 use crate::simulate::wall::{Wall, WallParams};
@@ -93,9 +93,7 @@ impl World {
 
     /// The scene of an epoch: 0 before the motion, 1 after it. The whole section, which a large dam is too large for.
     pub fn scene(&self, epoch: usize) -> Scene<'_> {
-        let whole = self
-            .whole
-            .get_or_init(|| Surface::new(&self.wall, self.wall.extent()));
+        let whole = self.whole.get_or_init(|| self.surface(self.wall.extent()));
         self.scene_of(whole, epoch)
     }
 
@@ -107,7 +105,12 @@ impl World {
 
     /// Samples the surface of a part of the section: smallest a, largest a, smallest u, largest u, metres.
     pub fn surface(&self, part: [f64; 4]) -> Surface {
-        Surface::new(&self.wall, part)
+        self.next_surface(part, &mut SampledFaces::default())
+    }
+
+    /// The same, where parts that overlap are sampled one after the other.
+    pub fn next_surface(&self, part: [f64; 4], sampled: &mut SampledFaces) -> Surface {
+        Surface::new(&self.wall, part, sampled)
     }
 
     /// Scans an epoch's scene with the sensors of the parameters; noise differs between epochs and sensors.
@@ -130,6 +133,9 @@ pub enum Sensor {
 }
 
 impl Sensor {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Tls, Self::Uav];
+
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {

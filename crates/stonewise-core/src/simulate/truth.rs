@@ -7,6 +7,7 @@ use crate::raster::LabelImage;
 use crate::simulate::deform::TrueMotion;
 use crate::simulate::scan::Scan;
 use crate::simulate::scene::{Scene, Target};
+use crate::simulate::surface::SampledFaces;
 use crate::simulate::survey::World;
 use crate::simulate::wall::SimStone;
 use crate::simulate::window::Window;
@@ -38,7 +39,7 @@ pub struct StoneTruth {
     pub edge: bool,
     /// Outward normal of the face.
     pub normal: Vector3<f64>,
-    /// Cells of its face, for [`seen_share`], as places in its own frame.
+    /// Cells of its face, for [`SeenCells::shares`], as places in its own frame.
     cells: BTreeSet<[i32; 2]>,
 }
 
@@ -47,27 +48,32 @@ const CELL_M: f64 = 0.025;
 /// Step of the raster on the face from which cells, areas and centroids are taken, metres.
 const STEP_M: f64 = 0.006;
 
-/// The truth of all stones, in the wall's order, a piece of the section at a time. Cost: about 40,000 rays a square metre.
+/// The truth of all stones, in the wall's order, a piece of the section at a time.
 pub fn stone_truths(world: &World) -> Vec<StoneTruth> {
     let extent = world.wall.extent();
     let mut truths = Vec::with_capacity(world.wall.stones.len());
+    let mut sampled = SampledFaces::default();
     for window in Window::cover(extent) {
-        // Stones belong to the piece that holds their middle, and are looked at as a whole.
-        let surface = world.surface(window.grown(LARGEST_STONE_M, extent));
-        let faces = face_samples(&world.scene_of(&surface, 0), &window);
-        let stones = world.wall.stones.iter().zip(&world.motions);
-        let inside = stones.filter(|(s, _)| window.holds(s.middle[0], s.middle[1]));
-        truths.extend(inside.map(|(stone, motion)| {
-            let samples = faces.get(&stone.id.0).map_or(&[][..], Vec::as_slice);
-            stone_truth(world, stone, motion, samples)
-        }));
+        let surface = world.next_surface(window.surroundings(extent), &mut sampled);
+        truths.extend(window_truths(world, &world.scene_of(&surface, 0), &window));
     }
     truths.sort_by_key(|t| t.id);
     truths
 }
 
-/// More than any stone reaches from its middle, metres.
-const LARGEST_STONE_M: f64 = 1.0;
+/// The truth of the stones whose middle lies in a piece of the section; `scene`: of its [`Window::surroundings`] before the
+/// motion. Cost: about 30,000 rays a square metre.
+pub fn window_truths(world: &World, scene: &Scene, window: &Window) -> Vec<StoneTruth> {
+    let faces = face_samples(scene, window);
+    let stones = world.wall.stones.iter().zip(&world.motions);
+    stones
+        .filter(|(s, _)| window.holds(s.middle[0], s.middle[1]))
+        .map(|(stone, motion)| {
+            let samples = faces.get(&stone.id.0).map_or(&[][..], Vec::as_slice);
+            stone_truth(world, stone, motion, samples)
+        })
+        .collect()
+}
 
 fn stone_truth(world: &World, stone: &SimStone, motion: &TrueMotion, samples: &[FaceSample]) -> StoneTruth {
     let mean = samples.iter().fold(Vector3::zeros(), |s, (p, _)| s + p.coords) / samples.len().max(1) as f64;
@@ -124,16 +130,13 @@ impl SeenCells {
     }
 
     /// Adds what a scan measured.
-    pub fn add(&mut self, truths: &[StoneTruth], scan: &Scan) {
+    pub fn add(&mut self, scan: &Scan) {
         for (i, &stone) in scan.stone.iter().enumerate().filter(|(_, s)| **s > 0) {
             let stone = stone as usize - 1;
             self.points[stone] += 1;
             let exact = scan.cloud.origin() + Vector3::from(scan.exact[i]).cast::<f64>();
             let local = self.to_stone[stone] * exact;
-            let cell = cell([local.x, local.y]);
-            if truths[stone].cells.contains(&cell) {
-                self.hit[stone].insert(cell);
-            }
+            self.hit[stone].insert(cell([local.x, local.y]));
         }
     }
 
@@ -144,20 +147,21 @@ impl SeenCells {
 
     /// Share of each stone's face that was measured, 0..1, in the wall's order.
     pub fn shares(&self, truths: &[StoneTruth]) -> Vec<f64> {
-        let share = |(t, h): (&StoneTruth, &BTreeSet<_>)| h.len() as f64 / t.cells.len().max(1) as f64;
+        let share = |(t, h): (&StoneTruth, &BTreeSet<_>)| {
+            h.intersection(&t.cells).count() as f64 / t.cells.len().max(1) as f64
+        };
         truths.iter().zip(&self.hit).map(share).collect()
     }
 }
 
-/// Adds one to each stone of which a photo shows at least `pixels` pixels; `counts` in the wall's order.
-pub fn photo_counts(labels: &LabelImage, pixels: u32, counts: &mut [u32]) {
+/// Stones of which a photo shows at least `pixels` pixels, ascending; `labels`: the stone's number at each pixel, 0 elsewhere.
+pub fn shown_stones(labels: &LabelImage, pixels: u32) -> Vec<u32> {
     let mut seen: BTreeMap<u32, u32> = BTreeMap::new();
     for &label in labels.data().iter().filter(|l| **l > 0) {
         *seen.entry(label).or_default() += 1;
     }
-    for (label, _) in seen.into_iter().filter(|(_, n)| *n >= pixels) {
-        counts[label as usize - 1] += 1;
-    }
+    seen.retain(|_, count| *count >= pixels);
+    seen.into_keys().collect()
 }
 
 impl StoneTruth {

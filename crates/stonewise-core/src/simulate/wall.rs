@@ -167,11 +167,12 @@ impl Wall {
         -(shallow + (deep - shallow) * slow) + rough
     }
 
-    /// Height of stone `i`'s surface at (x, y) of its own frame, metres; `None` where it is hidden in the mortar.
-    pub fn stone_height(&self, i: usize, x: f64, y: f64) -> Option<f64> {
+    /// Height of stone `i`'s surface at (x, y) of its own frame, metres; `None` where it is hidden in the mortar. `wave`: what
+    /// [`Wall::wave`] says about the place.
+    pub(super) fn stone_height(&self, i: usize, x: f64, y: f64, wave: [f64; 2]) -> Option<f64> {
         let stone = &self.stones[i];
         let (a, u) = (stone.middle[0] + x, stone.middle[1] + y);
-        let distance = stone.outline_distance(self, a, u);
+        let distance = stone.outline.distance(a + wave[0], u + wave[1]);
         let shape = &stone.shape;
         let edge = shape.edge_drop(distance);
         if edge > 0.1 {
@@ -197,14 +198,17 @@ impl Wall {
         self.stones[i].outline_distance(self, a, u)
     }
 
+    /// What bends the straight layout at a place on the face: layout coordinate along (0) or up (1) less face coordinate, metres.
+    pub(super) fn wave(&self, axis: usize, a: f64, u: f64) -> f64 {
+        let (noise, size) = (&self.warp[axis], self.params.course_m);
+        let wave = 0.62 * size * noise.octaves(a / WAVE_M, u / WAVE_M, 2, 0.5)
+            + 0.045 * size * noise.octaves(a / 0.09, u / 0.09, 3, 0.55);
+        [1.0, 1.15][axis] * wave
+    }
+
     /// Layout coordinates of a place on the face: the courses are straight there and wavy here.
     fn layout_of(&self, a: f64, u: f64) -> [f64; 2] {
-        let size = self.params.course_m;
-        let wave = |noise: &Noise| {
-            0.62 * size * noise.octaves(a / WAVE_M, u / WAVE_M, 2, 0.5)
-                + 0.045 * size * noise.octaves(a / 0.09, u / 0.09, 3, 0.55)
-        };
-        [a + wave(&self.warp[0]), u + 1.15 * wave(&self.warp[1])]
+        [a + self.wave(0, a, u), u + self.wave(1, a, u)]
     }
 
     /// Measures an outline on the face; `None` where nothing is left of it.

@@ -1,10 +1,10 @@
 //! Pieces of a section that are worked on one after the other, so that a dam of any size fits into memory.
 
-/// Edge of a piece, metres: its surface takes about 80 MB.
+/// Edge of a piece, metres: its surface takes about 90 MB.
 const WINDOW_M: f64 = 8.0;
-/// How much of the wall around a piece is there too, metres: what stands out by 5 cm hides no more than that under all but
-/// grazing beams.
-const AROUND_M: f64 = 0.6;
+/// How much of the wall around a piece is there too, metres: all of a stone whose middle lies in it, and, as what stands out by
+/// 5 cm hides no more than that under all but grazing beams, all that hides any of it.
+const AROUND_M: f64 = 1.0;
 
 /// A piece of a section.
 #[derive(Clone, Copy, Debug, PartialEq)]

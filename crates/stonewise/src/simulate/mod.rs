@@ -5,6 +5,7 @@ mod params;
 mod photos;
 mod project_file;
 mod truth;
+mod unfinished;
 mod write;
 
 pub use error::SimulateError;

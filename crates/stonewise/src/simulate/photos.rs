@@ -6,11 +6,13 @@ use crate::simulate::{MaskFiles, SimulateError, SurveyParams};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_core::simulate::{
-    Photo, Scene, SensorParams, Studio, disturb_views, photo_counts, plan_views, shown_part, true_labels,
+    Photo, SampledFaces, Scene, SensorParams, Studio, Wall, disturb_views, plan_views, shown_part,
+    shown_stones, true_labels,
 };
 use stonewise_io::cameras::{write_colmap, write_metashape};
 use stonewise_io::image_io::write_jpeg;
@@ -42,12 +44,19 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
     let whole = is_small.then(|| survey.world.surface(extent));
     let scene = whole.as_ref().map(|s| survey.world.scene_of(s, survey.epoch));
     let darkroom = scene.as_ref().map(|s| Darkroom::new(s, params, seed + 2));
-    for view in &exact {
+    let mut sampled = SampledFaces::default();
+    for (view, shown_part) in along_the_wall(wall, &exact) {
         survey.progress.check()?;
-        let photo = match (&darkroom, shown_part(wall, view)) {
+        let part = format!("{}.json", view.name);
+        if let Some(finished) = masks.folder.as_ref().and_then(|_| survey.unfinished.read(&part)) {
+            masks.take_up(view, &finished, &mut shown);
+            survey.progress.advance(1);
+            continue;
+        }
+        let photo = match (&darkroom, shown_part) {
             (Some(darkroom), _) => darkroom.photo(view),
             (None, Some(part)) => {
-                let surface = survey.world.surface(part);
+                let surface = survey.world.next_surface(part, &mut sampled);
                 let scene = survey.world.scene_of(&surface, survey.epoch);
                 Darkroom::new(&scene, params, seed + 2).photo(view)
             }
@@ -55,13 +64,26 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
         };
         let name = format!("{}.jpg", view.name);
         write_jpeg(&images.join(&name), &photo.image, params.jpeg_quality)?;
-        photo_counts(&photo.labels, SHOWN_PIXELS, &mut shown);
-        masks.add(view, photo.labels)?;
+        let shows = shown_stones(&photo.labels, SHOWN_PIXELS);
+        let finished = FinishedPhoto {
+            instances: masks.write(view, photo.labels)?,
+            shows,
+        };
+        survey.unfinished.write(&part, &finished)?;
+        masks.take_up(view, &finished, &mut shown);
         survey.progress.advance(1);
     }
     masks.finish()?;
     write_cameras(survey.folder, &exact, params, number, seed + 4)?;
     Ok(shown)
+}
+
+/// Views with the part of the wall that each shows, in such an order that most of one part is in the next.
+fn along_the_wall<'a>(wall: &Wall, views: &'a [View]) -> Vec<(&'a View, Option<[f64; 4]>)> {
+    let mut parts: Vec<_> = views.iter().map(|view| (view, shown_part(wall, view))).collect();
+    let from = |part: &Option<[f64; 4]>| part.map_or(f64::MAX, |p| p[0] + p[1]);
+    parts.sort_by(|(_, p), (_, q)| from(p).total_cmp(&from(q)));
+    parts
 }
 
 /// Takes photos of one scene, or their labels alone on grey where photos are not rendered.
@@ -122,6 +144,15 @@ fn write_cameras(
     Ok(())
 }
 
+/// What is known of a photo whose files are whole.
+#[derive(Serialize, Deserialize)]
+struct FinishedPhoto {
+    /// Stone and instance of each mask that was written.
+    instances: Vec<(u32, u32)>,
+    /// Stones of which it shows enough to count.
+    shows: Vec<u32>,
+}
+
 /// Masks for the project, with numbers that say nothing about the stone, and beside them which stone each one is.
 ///
 /// COCO json holds all photos of an epoch, so their labels stay in memory; label PNGs are written photo by photo, with a table
@@ -158,25 +189,33 @@ impl<'a> MaskWriter<'a> {
         })
     }
 
-    fn add(&mut self, view: &View, labels: LabelImage) -> Result<(), SimulateError> {
-        let name = format!("{}.jpg", view.name);
+    /// Writes a photo's masks or keeps them; gives back stone and instance of each that is written.
+    fn write(&mut self, view: &View, labels: LabelImage) -> Result<Vec<(u32, u32)>, SimulateError> {
         let Some(folder) = &self.folder else {
-            self.kept.push((name, labels));
-            return Ok(());
+            self.kept.push((format!("{}.jpg", view.name), labels));
+            return Ok(Vec::new());
         };
         let (shuffled, numbers) = shuffle(&labels, self.seed.wrapping_add(u64::from(view.image.0)));
         write_label_png(&folder.join(format!("{}.png", view.name)), &shuffled)?;
-        let known = numbers
-            .into_iter()
-            .map(|(stone, instance)| (name.clone(), instance, stone));
-        self.known.extend(known);
-        Ok(())
+        Ok(numbers)
     }
 
-    fn finish(self) -> Result<(), SimulateError> {
+    /// Notes what a photo shows; `shown`: number of photos that show each stone, in the wall's order.
+    fn take_up(&mut self, view: &View, photo: &FinishedPhoto, shown: &mut [u32]) {
+        let name = format!("{}.jpg", view.name);
+        let known = photo.instances.iter();
+        self.known
+            .extend(known.map(|&(stone, instance)| (name.clone(), instance, stone)));
+        for &stone in &photo.shows {
+            shown[stone as usize - 1] += 1;
+        }
+    }
+
+    fn finish(mut self) -> Result<(), SimulateError> {
         let number = self.survey.number();
         let truth = self.survey.folder.join("truth/masks");
         if self.folder.is_some() {
+            self.known.sort();
             let mut table = Table::new();
             table.push(
                 "photo",
@@ -189,6 +228,7 @@ impl<'a> MaskWriter<'a> {
                 &table,
             )?);
         }
+        self.kept.sort_by(|a, b| a.0.cmp(&b.0));
         let (names, labels): (Vec<String>, Vec<LabelImage>) = self.kept.into_iter().unzip();
         let known: Vec<Vec<InstanceInfo>> = labels.iter().map(true_instances).collect();
         write_coco(

@@ -1,24 +1,28 @@
 //! The truth of a simulated survey as files; never an input of the method.
 
 use crate::simulate::SimulateError;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
-use stonewise_core::simulate::StoneTruth;
+use stonewise_core::simulate::{Sensor, StoneTruth};
 use stonewise_io::table::{Table, TableError, write_csv};
 
 /// What was measured of each stone in one epoch, in the wall's order.
 pub struct Seen {
-    /// By terrestrial scanner and drone.
-    pub scans: [SeenByScan; 2],
+    /// By scanners.
+    pub scans: SeenByScans,
     /// Photos that show it.
     pub photos: Vec<u32>,
 }
 
-/// What a scan measured of each stone, in the wall's order.
-pub struct SeenByScan {
-    /// Points.
-    pub points: Vec<u32>,
-    /// Share of the face.
-    pub shares: Vec<f64>,
+/// What terrestrial scanner and drone measured of each stone, in the wall's order.
+#[derive(Serialize, Deserialize)]
+pub struct SeenByScans {
+    /// Points, those between the stones too.
+    pub total: usize,
+    /// Points of each stone.
+    pub points: [Vec<u32>; 2],
+    /// Share of the face of each.
+    pub shares: [Vec<f64>; 2],
 }
 
 /// A stone counts as shown in a photo from this many pixels on.
@@ -57,16 +61,17 @@ fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError
     for (axis, name) in ["nx", "ny", "nz"].iter().enumerate() {
         table.push(name, real(&|t| t.normal[axis]))?;
     }
-    for (sensor, name) in SENSORS.iter().enumerate() {
+    let sensors = || Sensor::ALL.iter().map(|s| s.name()).enumerate();
+    for (sensor, name) in sensors() {
         for (number, epoch) in (1..).zip(seen) {
-            table.push(&format!("n_{name}_{number}"), epoch.scans[sensor].points.clone())?;
+            table.push(&format!("n_{name}_{number}"), epoch.scans.points[sensor].clone())?;
         }
     }
     for (number, epoch) in (1..).zip(seen) {
         table.push(&format!("n_img_{number}"), epoch.photos.clone())?;
     }
-    for (sensor, name) in SENSORS.iter().enumerate() {
-        let least = |i: usize| seen.iter().map(|e| e.scans[sensor].shares[i]).fold(1.0, f64::min);
+    for (sensor, name) in sensors() {
+        let least = |i: usize| seen.iter().map(|e| e.scans.shares[sensor][i]).fold(1.0, f64::min);
         table.push(
             &format!("vis_{name}"),
             (0..truths.len()).map(least).collect::<Vec<f64>>(),
@@ -74,5 +79,3 @@ fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError
     }
     Ok(table)
 }
-
-const SENSORS: [&str; 2] = ["tls", "uav"];

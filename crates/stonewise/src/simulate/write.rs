@@ -2,14 +2,16 @@
 
 use crate::simulate::photos::write_photos;
 use crate::simulate::project_file::project_text;
-use crate::simulate::truth::{Seen, SeenByScan, write_stone_table};
+use crate::simulate::truth::{Seen, SeenByScans, write_stone_table};
+use crate::simulate::unfinished::Unfinished;
 use crate::simulate::{SimulateError, SurveyParams};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::Bounds;
 use stonewise_core::progress::Progress;
 use stonewise_core::simulate::{
-    FacePoint, Scan, SeenCells, Sensor, StoneTruth, Window, World, scan_window, stone_truths,
+    FacePoint, SampledFaces, Scan, SeenCells, Sensor, StoneTruth, Window, World, scan_window, stone_truths,
+    window_truths,
 };
 use stonewise_io::atomic::write_atomically;
 use stonewise_io::cloud::{ExtraColumn, ExtraType, PointSink, stream_points_laz};
@@ -41,7 +43,8 @@ pub struct SurveySummary {
 /// The section is worked on piece by piece and photo by photo: memory does not grow with the number of points. Masks as COCO
 /// json stay in memory until the epoch is done.
 ///
-/// Every file appears whole or not at all, and the project file last: without it the survey is not complete.
+/// Every file appears whole or not at all, and the project file last: without it the survey is not complete. An interrupted
+/// simulation goes on with the same parameters: clouds of an epoch, and photos whose masks are PNGs, are not made again.
 ///
 /// # Errors
 /// A parameter is impossible, the folder holds somebody's project, a file cannot be written, or the caller stops it.
@@ -52,32 +55,33 @@ pub fn write_survey(
 ) -> Result<SurveySummary, SimulateError> {
     params.check()?;
     prepare(folder)?;
+    let unfinished = Unfinished::open(folder, params)?;
     let photos = (params.photos.columns * params.photos.rows) as usize;
     let world = World::new(&params.scene);
-    let windows = Window::cover(world.wall.extent());
-    let truths = stone_truths(&world);
+    let mut truths = None;
     let (mut seen, mut points) = (Vec::new(), 0);
     for epoch in 0..params.epochs as usize {
         let survey = Survey {
             folder,
             world: &world,
-            windows: &windows,
-            truths: &truths,
             params,
             epoch,
+            unfinished: &unfinished,
             progress,
         };
-        let (scans, count) = survey.write_clouds()?;
-        points += count;
+        let scans = survey.scanned(&mut truths)?;
+        points += scans.total;
         seen.push(Seen {
             scans,
             photos: write_photos(&survey)?,
         });
     }
+    let truths = truths.unwrap_or_default();
     let truth = folder.join("truth/stones.csv");
     write_stone_table(&truth, &truths, &seen)?;
     write_text(&folder.join("simulation.toml"), &toml::to_string(params)?)?;
     let (project, project_uav) = write_projects(folder, params)?;
+    unfinished.remove()?;
     Ok(SurveySummary {
         project,
         project_uav,
@@ -92,11 +96,10 @@ pub fn write_survey(
 pub(super) struct Survey<'a> {
     pub folder: &'a Path,
     pub world: &'a World,
-    pub windows: &'a [Window],
-    pub truths: &'a [StoneTruth],
     pub params: &'a SurveyParams,
     /// 0 or 1.
     pub epoch: usize,
+    pub unfinished: &'a Unfinished,
     pub progress: &'a dyn Progress,
 }
 
@@ -131,30 +134,76 @@ impl Survey<'_> {
         self.epoch + 1
     }
 
-    /// Writes the clouds of both scanners and their truth; gives back what they saw, and the number of points.
-    fn write_clouds(&self) -> Result<([SeenByScan; 2], usize), SimulateError> {
+    /// The clouds of both scanners, written unless they are there; gives back what they saw. `truths`: of all stones, filled in
+    /// by whoever needs them first.
+    fn scanned(&self, truths: &mut Option<Vec<StoneTruth>>) -> Result<SeenByScans, SimulateError> {
+        let part = format!("epoch{}_clouds.json", self.number());
+        if let Some(seen) = self.unfinished.read(&part) {
+            truths.get_or_insert_with(|| stone_truths(self.world));
+            return Ok(seen);
+        }
         create_folder(&self.folder.join(format!("epoch{}", self.number())))?;
-        let (tls, uav) = (self.write_cloud(Sensor::Tls)?, self.write_cloud(Sensor::Uav)?);
-        let points = tls.1 + uav.1;
-        let seen = [tls.0, uav.0].map(|s| SeenByScan {
-            points: s.points().to_vec(),
-            shares: s.shares(self.truths),
-        });
-        Ok((seen, points))
+        let seen = self.write_clouds(truths)?;
+        self.unfinished.write(&part, &seen)?;
+        Ok(seen)
     }
 
-    /// Scans the section piece by piece into `cloud_SENSOR.laz`, and the same points in the same order, with the true stone
-    /// of each, into the truth; gives back what it saw, and the number of points.
-    fn write_cloud(&self, sensor: Sensor) -> Result<(SeenCells, usize), SimulateError> {
-        let mut seen = SeenCells::new(self.world, self.epoch);
+    /// Scans the section piece by piece with both scanners into `cloud_SENSOR.laz`, and the same points in the same order,
+    /// with the true stone of each, into the truth.
+    fn write_clouds(&self, truths: &mut Option<Vec<StoneTruth>>) -> Result<SeenByScans, SimulateError> {
+        let extent = self.world.wall.extent();
+        let windows = Window::cover(extent);
+        let mut seen = Sensor::ALL.map(|_| SeenCells::new(self.world, self.epoch));
+        let (mut found, mut sampled) = (Vec::new(), SampledFaces::default());
+        let mut total = 0;
+        self.progress
+            .begin(&format!("scans of epoch {}", self.number()), windows.len() as u64);
+        self.with_files(Sensor::Tls, |tls| {
+            self.with_files(Sensor::Uav, |uav| {
+                let mut files = [tls, uav];
+                for window in &windows {
+                    self.progress.check()?;
+                    let part = window.surroundings(extent);
+                    let surface = self.world.next_surface(part, &mut sampled);
+                    let scene = self.world.scene_of(&surface, self.epoch);
+                    if self.epoch == 0 && truths.is_none() {
+                        found.extend(window_truths(self.world, &scene, window));
+                    }
+                    for ((sensor, append), seen) in Sensor::ALL.into_iter().zip(&mut files).zip(&mut seen) {
+                        let scan = scan_window(&scene, &self.params.scene, sensor, self.epoch, window);
+                        if let (Some(scan), Some(append)) = (scan, append) {
+                            seen.add(&scan);
+                            total += scan.len();
+                            append(&scan)?;
+                        }
+                    }
+                    self.progress.advance(1);
+                }
+                Ok(())
+            })
+        })?;
+        found.sort_by_key(|t: &StoneTruth| t.id);
+        let truths = truths.get_or_insert(found);
+        Ok(SeenByScans {
+            total,
+            points: seen.each_ref().map(|s| s.points().to_vec()),
+            shares: seen.each_ref().map(|s| s.shares(truths)),
+        })
+    }
+
+    /// Opens the files of a scanner's cloud and lends what appends to them, or `None` where the survey has no such scanner.
+    fn with_files(
+        &self,
+        sensor: Sensor,
+        write: impl FnOnce(Option<Append<'_>>) -> Result<(), SimulateError>,
+    ) -> Result<(), SimulateError> {
         let wanted = match sensor {
             Sensor::Tls => self.params.scene.tls.is_some(),
             Sensor::Uav => self.params.scene.uav.is_some(),
         };
         if !wanted {
-            return Ok((seen, 0));
+            return write(None);
         }
-        let mut points = 0;
         let (name, number) = (sensor.name(), self.number());
         let path = self.folder.join(format!("epoch{number}/cloud_{name}.laz"));
         let truth = self
@@ -162,25 +211,11 @@ impl Survey<'_> {
             .join(format!("truth/epoch{number}_cloud_{name}_truth.laz"));
         let bounds = self.bounds();
         let columns = [("stone_id", ExtraType::U32), ("station", ExtraType::U16)];
-        self.progress
-            .begin(&format!("scan epoch {number}, {name}"), self.windows.len() as u64);
         stream_points_laz(&path, &bounds, &[], |cloud| {
             stream_points_laz(&truth, &bounds, &columns, |known| {
-                for window in self.windows {
-                    self.progress.check()?;
-                    let surface = self.world.surface(window.surroundings(self.world.wall.extent()));
-                    let scene = self.world.scene_of(&surface, self.epoch);
-                    if let Some(scan) = scan_window(&scene, &self.params.scene, sensor, self.epoch, window) {
-                        seen.add(self.truths, &scan);
-                        points += scan.len();
-                        append(cloud, known, &scan)?;
-                    }
-                    self.progress.advance(1);
-                }
-                Ok::<(), SimulateError>(())
+                write(Some(Box::new(|scan| append(cloud, known, scan))))
             })
-        })?;
-        Ok((seen, points))
+        })
     }
 
     /// A box that holds all that scanners can measure.
@@ -205,6 +240,9 @@ impl Survey<'_> {
         around.grown(margin + AROUND_M)
     }
 }
+
+/// Appends what was scanned to the files of a cloud.
+type Append<'a> = Box<dyn FnMut(&Scan) -> Result<(), SimulateError> + 'a>;
 
 fn append(cloud: &mut PointSink<'_>, known: &mut PointSink<'_>, scan: &Scan) -> Result<(), SimulateError> {
     let positions: Vec<Point3<f64>> = (0..scan.len()).map(|i| scan.cloud.world(i)).collect();

@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
 use crate::experiment::known_motion::{KnownMotion, paper_motions};
 use crate::experiment::quiet::Quiet;
+use crate::part::Part;
 use crate::pipeline::{Context, Keeps, StepStore, Until, first_stones, run_in};
 use crate::project::{Epoch, Estimator, Project, Settings};
 use crate::report::ResultSet;
@@ -30,6 +31,8 @@ pub struct PaperSurvey {
     pub name: String,
     /// The survey; only one epoch of it is used.
     pub project: Project,
+    /// Where the paper's estimator measures, which takes seconds a stone; everywhere where absent.
+    pub paper_part: Option<Part>,
 }
 
 /// How the stones are measured.
@@ -162,6 +165,9 @@ fn measure(
 ) -> Result<Option<Case>> {
     let mut project = halves.clone();
     project.settings = method.settings(&project.settings);
+    if method == Method::Paper && survey.paper_part.is_some() {
+        project.part.clone_from(&survey.paper_part);
+    }
     project.epochs[1].motion = Some(motion.field.clone());
     let quiet = Quiet(progress);
     let context = Context::with_store(&project, folder, Arc::clone(store), &quiet)?;
