@@ -39,7 +39,7 @@ pub struct StoneTruth {
     pub edge: bool,
     /// Outward normal of the face.
     pub normal: Vector3<f64>,
-    /// Cells of its face, for [`SeenCells::shares`], as places in its own frame.
+    /// Cells of its face, for [`SeenCells`], as places in its own frame.
     cells: BTreeSet<[i32; 2]>,
 }
 
@@ -145,12 +145,16 @@ impl SeenCells {
         &self.points
     }
 
+    /// Cells of each stone's face that were measured, in the wall's order; [`StoneTruth::seen_share`] says what they are worth.
+    pub fn cells(&self, truths: &[StoneTruth]) -> Vec<u32> {
+        let both = |(t, h): (&StoneTruth, &BTreeSet<_>)| h.intersection(&t.cells).count() as u32;
+        truths.iter().zip(&self.hit).map(both).collect()
+    }
+
     /// Share of each stone's face that was measured, 0..1, in the wall's order.
     pub fn shares(&self, truths: &[StoneTruth]) -> Vec<f64> {
-        let share = |(t, h): (&StoneTruth, &BTreeSet<_>)| {
-            h.intersection(&t.cells).count() as f64 / t.cells.len().max(1) as f64
-        };
-        truths.iter().zip(&self.hit).map(share).collect()
+        let share = |(t, cells): (&StoneTruth, u32)| t.seen_share(cells);
+        truths.iter().zip(self.cells(truths)).map(share).collect()
     }
 }
 
@@ -165,6 +169,11 @@ pub fn shown_stones(labels: &LabelImage, pixels: u32) -> Vec<u32> {
 }
 
 impl StoneTruth {
+    /// Share of the face that was measured where `cells` of its cells were, 0..1.
+    pub fn seen_share(&self, cells: u32) -> f64 {
+        f64::from(cells) / self.cells.len().max(1) as f64
+    }
+
     /// The form in which results are scored. `visible_share`: of its face, measured in both epochs.
     pub fn to_true_stone(&self, visible_share: f64) -> TrueStone {
         TrueStone {

@@ -21,8 +21,8 @@ pub struct SeenByScans {
     pub total: usize,
     /// Points of each stone.
     pub points: [Vec<u32>; 2],
-    /// Share of the face of each.
-    pub shares: [Vec<f64>; 2],
+    /// Cells of the face of each.
+    pub cells: [Vec<u32>; 2],
 }
 
 /// A stone counts as shown in a photo from this many pixels on.
@@ -71,7 +71,8 @@ fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError
         table.push(&format!("n_img_{number}"), epoch.photos.clone())?;
     }
     for (sensor, name) in sensors() {
-        let least = |i: usize| seen.iter().map(|e| e.scans.shares[sensor][i]).fold(1.0, f64::min);
+        let share = |i: usize, epoch: &Seen| truths[i].seen_share(epoch.scans.cells[sensor][i]);
+        let least = |i: usize| seen.iter().map(|e| share(i, e)).fold(1.0, f64::min);
         table.push(
             &format!("vis_{name}"),
             (0..truths.len()).map(least).collect::<Vec<f64>>(),

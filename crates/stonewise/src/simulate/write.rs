@@ -187,7 +187,7 @@ impl Survey<'_> {
         Ok(SeenByScans {
             total,
             points: seen.each_ref().map(|s| s.points().to_vec()),
-            shares: seen.each_ref().map(|s| s.shares(truths)),
+            cells: seen.each_ref().map(|s| s.cells(truths)),
         })
     }
 
