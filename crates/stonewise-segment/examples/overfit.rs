@@ -1,11 +1,12 @@
-//! Learns a few rendered photos by heart: `overfit [PHOTOS] [SIDE] [STEPS]`. Losses fall and AP50 nears 1 where losses,
-//! matching and the gradients of RoIAlign are right.
+//! Learns a few rendered photos by heart: `overfit [PHOTOS] [SIDE] [STEPS] [WEIGHTS]`. Losses fall and AP50 nears 1 where losses,
+//! matching and the gradients of RoIAlign are right. `WEIGHTS` is `none`, `built-in` or a file of `train`.
 #![allow(clippy::expect_used, clippy::print_stdout)]
 
 use burn::backend::{Autodiff, Flex};
 use burn::grad_clipping::GradientClippingConfig;
 use burn::module::AutodiffModule;
 use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
+use std::collections::BTreeMap;
 use std::time::Instant;
 use stonewise_core::progress::Silent;
 use stonewise_segment::Sample;
@@ -13,22 +14,26 @@ use stonewise_segment::evaluation::{MaskScore, pair_masks};
 use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig, StoneDetector};
 use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
+use stonewise_segment::{Weights, open_model};
 
 /// Photos that a step learns from.
 const BATCH: usize = 1;
 
 fn main() {
-    let mut args = std::env::args()
-        .skip(1)
-        .map(|arg| arg.parse::<u32>().expect("a number"));
-    let mut arg = |default| args.next().unwrap_or(default);
-    let (photos, side, steps) = (arg(4), arg(320), arg(200));
+    let mut args = std::env::args().skip(1);
+    let mut number = |default| {
+        args.next()
+            .map_or(default, |arg| arg.parse::<u32>().expect("a number"))
+    };
+    let (photos, side, steps) = (number(4), number(320), number(200));
     let samples: Vec<Sample> = (0..photos)
-        .map(|seed| masonry_photo(u64::from(seed), side, side))
+        .map(|seed| known(&masonry_photo(u64::from(seed), side, side)))
         .collect();
-    let config = MaskRcnnConfig::light();
-    let mut model =
-        MaskRcnn::<Autodiff<Flex>>::init(&config, 1, &Default::default()).expect("a valid preset");
+    let device = Default::default();
+    let mut model: MaskRcnn<Autodiff<Flex>> = match args.next().as_deref() {
+        None | Some("none") => MaskRcnn::init(&MaskRcnnConfig::light(), 1, &device).expect("a valid preset"),
+        Some(weights) => open_model(&Weights::named(weights.as_ref()), &device).expect("weights of train"),
+    };
     let mut optimizer = AdamWConfig::new()
         .with_epsilon(1e-8)
         .with_grad_clipping(Some(GradientClippingConfig::Norm(1.0)))
@@ -75,4 +80,18 @@ fn main() {
         })
         .collect();
     println!("{:?}", MaskScore::of(&pairs));
+}
+
+/// The sample with stones that are too small to be reported taken as unknown.
+fn known(sample: &Sample) -> Sample {
+    let least = TilingOptions::default().min_area_px;
+    let mut areas: BTreeMap<u32, u32> = BTreeMap::new();
+    for label in sample.labels().data() {
+        *areas.entry(*label).or_default() += 1;
+    }
+    let mut ignore = sample.ignore().clone();
+    for (unknown, label) in ignore.data_mut().iter_mut().zip(sample.labels().data()) {
+        *unknown |= *label > 0 && areas[label] < least;
+    }
+    Sample::new(sample.image().clone(), sample.labels().clone(), ignore).expect("the same size")
 }

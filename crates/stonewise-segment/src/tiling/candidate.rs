@@ -44,7 +44,7 @@ impl Scaling {
     }
 
     /// The part of the photo that a part of the scaled photo shows.
-    fn rect(&self, part: &Rect) -> Rect {
+    pub fn rect(&self, part: &Rect) -> Rect {
         let [left, right] = self.span(0, part.left, part.left + part.width);
         let [top, bottom] = self.span(1, part.top, part.top + part.height);
         Rect {

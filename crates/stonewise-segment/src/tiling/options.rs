@@ -14,6 +14,10 @@ pub struct TilingOptions {
     pub overlap_px: u32,
     /// Sizes at which the photo is looked at, 1 = as it is; see [`Self::scales_for`].
     pub scales: Vec<f64>,
+    /// Pixels across (square root of the area) at which stones are found well. A size above 1 is looked at only where a quarter of the stones found
+    /// at sizes up to 1 would be smaller than this even there; a size below the largest up to 1 only where the stones that would be larger than this even
+    /// there hold a quarter of the area found, or nothing was found.
+    pub stone_px: f64,
     /// Masks with a lower score are dropped.
     pub min_score: f32,
     /// Stones with fewer pixels of the photo are dropped.
@@ -27,7 +31,8 @@ impl Default for TilingOptions {
         Self {
             tile_px: 640,
             overlap_px: 160,
-            scales: vec![1.0, 0.5, 0.25],
+            scales: vec![2.0, 1.0, 0.5, 0.25],
+            stone_px: 60.0,
             min_score: 0.5,
             min_area_px: 40,
             min_new_share: 0.6,
@@ -46,19 +51,19 @@ impl TilingOptions {
     }
 
     /// The sizes at which a photo of `width` x `height` pixels is looked at. A smaller size is for stones that no tile of the larger sizes
-    /// shows whole, so it is left out where one tile of a larger size shows the whole photo.
+    /// shows whole, so it is left out where one tile of a larger size up to 1 shows the whole photo.
     pub fn scales_for(&self, width: u32, height: u32) -> Vec<f64> {
         let in_one_tile = |&scale: &f64| scaled(width.max(height), scale) <= self.tile_px;
         let is_needed = |scale: &f64| {
             !self
                 .scales
                 .iter()
-                .any(|larger| larger > scale && in_one_tile(larger))
+                .any(|larger| larger > scale && *larger <= 1.0 && in_one_tile(larger))
         };
         self.scales.iter().copied().filter(is_needed).collect()
     }
 
-    /// Number of tiles of a photo of this size, all scales together.
+    /// Number of tiles of a photo of this size, all scales together, whether or not the enlarged ones turn out to be needed.
     pub fn tile_count(&self, width: u32, height: u32) -> u64 {
         let count = |scale: f64| {
             let tiles = |size| origins(scaled(size, scale), self.tile_px, self.overlap_px).len() as u64;
@@ -82,6 +87,7 @@ impl TilingOptions {
                 "scales",
                 "must be one or more numbers from 0.01 to 4",
             ),
+            (self.stone_px >= 0.0, "stone_px", "must not be negative"),
             (
                 is_share(f64::from(self.min_score)),
                 "min_score",
@@ -110,9 +116,9 @@ mod tests {
     #[test]
     fn smaller_sizes_are_for_what_no_tile_shows_whole() {
         let options = TilingOptions::default();
-        assert_eq!(options.scales_for(300, 500), [1.0]);
-        assert_eq!(options.scales_for(640, 641), [1.0, 0.5]);
-        assert_eq!(options.scales_for(1500, 1000), [1.0, 0.5, 0.25]);
+        assert_eq!(options.scales_for(300, 500), [2.0, 1.0]);
+        assert_eq!(options.scales_for(640, 641), [2.0, 1.0, 0.5]);
+        assert_eq!(options.scales_for(1500, 1000), [2.0, 1.0, 0.5, 0.25]);
         let coarse = TilingOptions {
             scales: vec![0.25],
             ..options

@@ -1,11 +1,12 @@
 //! A photo, tile by tile.
 
 use super::candidate::{Candidate, Scaling, candidate};
-use super::grid::tiles;
+use super::grid::{Rect, tiles};
 use super::merge::merge;
 use super::options::TilingOptions;
 use super::pyramid::{at_scale, crop};
 use crate::{Detector, Segmentation};
+use std::cmp::Ordering;
 use stonewise_core::progress::{Interrupted, Progress};
 use stonewise_core::raster::RgbImage;
 
@@ -22,6 +23,8 @@ pub enum TilingError<E> {
 
 /// The stones of a photo of any size.
 ///
+/// The photo is looked at as it is first; where its stones are too small or too large for the detector, also enlarged or reduced
+/// ([`TilingOptions::stone_px`]).
 /// `progress` advances by one for every tile, [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, one
 /// tile in the detector, and the masks found. The result does not depend on the number of threads if the detector's does not.
 ///
@@ -33,24 +36,130 @@ pub fn segment_photo<D: Detector>(
     options: &TilingOptions,
     progress: &dyn Progress,
 ) -> Result<Segmentation, TilingError<D::Error>> {
-    let mut candidates: Vec<Candidate> = Vec::new();
     let scales = options.scales_for(photo.width(), photo.height());
-    for (index, &scale) in scales.iter().enumerate() {
-        let image = at_scale(photo, scale);
+    // The largest size that does not enlarge is looked at everywhere; what it shows says where others are needed.
+    let rank = |&i: &usize| (scales[i] > 1.0, -scales[i]);
+    let mut order: Vec<usize> = (0..scales.len()).collect();
+    order.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for (place, &index) in order.iter().enumerate() {
+        let size = Size::of(photo, &scales, index);
+        let limit = options.stone_px / scales[index];
+        let seen = Seen::of(&candidates);
+        for tile in size.tiles(options) {
+            let part = size.scaling.rect(&tile);
+            let is_needed = match (place, scales[index] > 1.0) {
+                (0, _) => true,
+                (_, true) => seen.has_small(&part, limit),
+                (_, false) => seen.has_large(&part, limit),
+            };
+            if is_needed {
+                size.look(detector, &tile, options, progress, &mut candidates)?;
+            } else {
+                progress.advance(1);
+            }
+        }
+    }
+    Ok(merge(candidates, photo.width(), photo.height(), options))
+}
+
+/// A photo at one size.
+struct Size {
+    image: RgbImage,
+    scaling: Scaling,
+}
+
+impl Size {
+    fn of(photo: &RgbImage, scales: &[f64], index: usize) -> Self {
+        let image = at_scale(photo, scales[index]);
         let scaling = Scaling {
             index,
             photo: [photo.width(), photo.height()],
             scaled: [image.width(), image.height()],
         };
-        for tile in tiles(image.width(), image.height(), options.tile_px, options.overlap_px) {
-            progress.check()?;
-            let found = detector
-                .detect(&crop(&image, &tile))
-                .map_err(TilingError::Detector)?;
-            let good = found.iter().filter(|d| d.score >= options.min_score);
-            candidates.extend(good.filter_map(|d| candidate(d, &tile, &scaling)));
-            progress.advance(1);
-        }
+        Self { image, scaling }
     }
-    Ok(merge(candidates, photo.width(), photo.height(), options))
+
+    fn tiles(&self, options: &TilingOptions) -> Vec<Rect> {
+        tiles(
+            self.image.width(),
+            self.image.height(),
+            options.tile_px,
+            options.overlap_px,
+        )
+    }
+
+    /// Adds what the detector finds in a tile.
+    fn look<D: Detector>(
+        &self,
+        detector: &D,
+        tile: &Rect,
+        options: &TilingOptions,
+        progress: &dyn Progress,
+        candidates: &mut Vec<Candidate>,
+    ) -> Result<(), TilingError<D::Error>> {
+        progress.check()?;
+        let found = detector
+            .detect(&crop(&self.image, tile))
+            .map_err(TilingError::Detector)?;
+        let good = found.iter().filter(|d| d.score >= options.min_score);
+        candidates.extend(good.filter_map(|d| candidate(d, tile, &self.scaling)));
+        progress.advance(1);
+        Ok(())
+    }
+}
+
+/// Where stones were seen, and how large.
+struct Seen(Vec<SeenStone>);
+
+struct SeenStone {
+    /// Middle of its box, pixels of the photo.
+    middle: [u32; 2],
+    /// Pixels of the photo.
+    area: f64,
+    is_cut: bool,
+}
+
+impl Seen {
+    fn of(candidates: &[Candidate]) -> Self {
+        let stone = |c: &Candidate| SeenStone {
+            middle: [
+                c.mask.left + c.mask.pixels.width() / 2,
+                c.mask.top + c.mask.pixels.height() / 2,
+            ],
+            area: f64::from(c.area),
+            is_cut: c.is_cut,
+        };
+        Self(candidates.iter().map(stone).collect())
+    }
+
+    fn inside(&self, part: &Rect) -> impl Iterator<Item = &SeenStone> {
+        let columns = part.left..part.left + part.width;
+        let rows = part.top..part.top + part.height;
+        let is_inside = move |s: &&SeenStone| columns.contains(&s.middle[0]) && rows.contains(&s.middle[1]);
+        self.0.iter().filter(is_inside)
+    }
+
+    /// Whether at least a quarter of the stones in a part of the photo are less than `limit` across.
+    fn has_small(&self, part: &Rect, limit: f64) -> bool {
+        let whole = self.inside(part).filter(|s| !s.is_cut);
+        let (mut all, mut small) = (0, 0);
+        for stone in whole {
+            all += 1;
+            small += usize::from(stone.area < limit * limit);
+        }
+        all > 0 && 4 * small >= all
+    }
+
+    /// Whether stones of more than `limit` across, cut ones too, hold a quarter of the area found in a part of the photo; also where there is none.
+    fn has_large(&self, part: &Rect, limit: f64) -> bool {
+        let (mut all, mut large) = (0.0, 0.0);
+        for stone in self.inside(part) {
+            all += stone.area;
+            if stone.area > limit * limit {
+                large += stone.area;
+            }
+        }
+        4.0 * large >= all
+    }
 }

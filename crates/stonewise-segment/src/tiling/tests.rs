@@ -4,6 +4,8 @@ use super::*;
 use crate::{Detection, Detector, Patch, Segmentation};
 use std::collections::BTreeMap;
 use std::convert::Infallible;
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, Raster, RgbImage, connected_components};
 
@@ -97,6 +99,7 @@ fn options(tile_px: u32, overlap_px: u32, scales: &[f64]) -> TilingOptions {
         tile_px,
         overlap_px,
         scales: scales.to_vec(),
+        stone_px: 30.0,
         min_area_px: SPECK_PX,
         ..TilingOptions::default()
     }
@@ -173,4 +176,62 @@ fn scores_below_the_threshold_and_small_stones_are_dropped() {
     let (_, parts) = connected_components(&truth);
     let expected = parts.iter().filter(|p| p.area >= 400).count();
     assert_eq!(segmented(&truth, &large).scores.len(), expected);
+}
+
+/// Sees no stone under 400 pixels of what it is given.
+struct Shortsighted;
+
+impl Detector for Shortsighted {
+    type Error = Infallible;
+
+    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Infallible> {
+        let all = Oracle.detect(image)?;
+        let is_large = |d: &Detection| d.mask.pixels.data().iter().filter(|p| **p).count() >= 400;
+        Ok(all.into_iter().filter(is_large).collect())
+    }
+}
+
+#[test]
+fn small_stones_are_found_enlarged_and_only_their_part_of_the_photo_is() {
+    let small = wall(240, 240, 24);
+    let mut labels = Raster::filled(900, 240, 0);
+    for y in 0..240 {
+        for x in 0..240 {
+            *labels.get_mut(x, y).unwrap() = *small.get(x, y).unwrap();
+        }
+    }
+    let photo = coloured(&labels);
+    let tiles = AtomicU32::new(0);
+    let found = |scales: &[f64]| {
+        let detector = Counting(&tiles);
+        let options = TilingOptions {
+            stone_px: 60.0,
+            ..options(200, 60, scales)
+        };
+        segment_photo(&detector, &photo, &options, &Silent)
+            .unwrap()
+            .scores
+            .len()
+    };
+    let (as_it_is, at_one_size) = (found(&[1.0]), tiles.swap(0, Relaxed));
+    let (closer, at_both) = (found(&[2.0, 1.0]), tiles.swap(0, Relaxed));
+    let everywhere = (found(&[2.0]), tiles.swap(0, Relaxed));
+    assert!(2 * closer >= 3 * as_it_is, "{closer} {as_it_is}");
+    assert!(10 * closer >= 9 * everywhere.0, "{closer} {everywhere:?}");
+    assert!(
+        at_both - at_one_size < everywhere.1 / 2,
+        "{at_both} {everywhere:?}"
+    );
+}
+
+/// A short-sighted detector that counts what it is shown.
+struct Counting<'a>(&'a AtomicU32);
+
+impl Detector for Counting<'_> {
+    type Error = Infallible;
+
+    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Infallible> {
+        self.0.fetch_add(1, Relaxed);
+        Shortsighted.detect(image)
+    }
 }
