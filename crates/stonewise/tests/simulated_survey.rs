@@ -175,7 +175,7 @@ fn stones_project_through_the_camera_files_onto_their_masks() {
         for (metashape, colmap) in cameras("cameras_metashape.xml").iter().zip(cameras("colmap")) {
             let name = format!("{}.jpg", metashape.name);
             let known = masks.labels_for(&name, 240, 180).unwrap().unwrap();
-            for i in 0..stones["cx"].len() {
+            for (i, id) in stones["stone_id"].iter().enumerate() {
                 let moved = |c: &str, d: &str| stones[c][i] + f64::from(epoch - 1) * stones[d][i];
                 let centroid = Point3::new(moved("cx", "dx"), moved("cy", "dy"), moved("cz", "dz"));
                 let Some(seen) = metashape.project(&centroid) else {
@@ -189,7 +189,7 @@ fn stones_project_through_the_camera_files_onto_their_masks() {
                     continue;
                 };
                 all += 1;
-                right += usize::from(mask.stone_ref == Some(stones["stone_id"][i] as u64));
+                right += usize::from(mask.stone_ref == Some(*id as u64));
             }
         }
     }
