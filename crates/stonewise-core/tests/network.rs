@@ -233,6 +233,32 @@ fn a_loose_stone_is_found_and_does_not_pull_its_neighbours() {
 }
 
 #[test]
+fn a_noisy_stone_that_went_farther_than_its_relief_reaches_is_found() {
+    let wall = Wall {
+        noise_m: 0.011,
+        points: 700,
+        relief: 3.0,
+        ..Wall::default()
+    };
+    let far = Vector3::new(0.0, 0.024, 0.0);
+    let moved = [8, 17, 26];
+    let report = run(wall.pairs(|k, _| {
+        let shift = if moved.contains(&k) { far } else { Vector3::zeros() };
+        (shift, Vector3::zeros())
+    }));
+    let found: Vec<u32> = (0..35)
+        .filter(|&k| report.results[k as usize].motion.as_ref().is_ok_and(|m| m.loose))
+        .collect();
+    assert_eq!(found, moved);
+    for k in moved {
+        let motion = report.results[k as usize].motion.as_ref().unwrap();
+        let error = motion.displacement - far;
+        let sd = motion.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+        assert!(error.norm() < 3.0 * sd && sd < 0.01, "{error} {sd}");
+    }
+}
+
+#[test]
 fn the_field_breaks_at_a_crack() {
     let wall = Wall::default();
     let side = |p: &Point3<f64>| {

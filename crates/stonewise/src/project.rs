@@ -127,9 +127,9 @@ pub struct RegistrationParams {
     /// It is reported apart and enters absolute uncertainty. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable: Vec<StableArea>,
-    /// Points nearer to the border of their stone than this many times their noise do not take part in the network
-    /// adjustment. 3: their labels, and so their heights, depend on where the photos were taken; without this the whole
-    /// wall of a UAV survey seems to move by 1 to 2 mm.
+    /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its place and not by
+    /// its label. 3: farther inside, noise does not change a label; with 0 (labels alone) the whole wall of a UAV survey
+    /// seems to move by 1 to 2 mm.
     pub border_noises: f64,
     /// Parameters of the network adjustment.
     pub network: NetworkParams,

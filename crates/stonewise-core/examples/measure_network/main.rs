@@ -5,8 +5,8 @@
 //! again), sensors `tls uav` (default: both), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
 //! checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and trajectory errors), `masks` (15 % of the second
 //! epoch's masks merged, halved or swapped), `paper` (the paper's estimator and M3C2 beside it), `each` (a line for every
-//! seed), `width=M` (length of the wall, default 4), `coarse=F` (point spacing times F), `border=F` (points nearer to the border
-//! of their stone than F times their noise are left out, as in a run; default 3), `set:KEY=F` (a parameter of the adjustment), `scale=N` (time for about N stones).
+//! seed), `width=M` (length of the wall, default 4), `coarse=F` (point spacing times F), `border=F` (width of the
+//! border, in noise levels, where a point's place decides and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the adjustment), `scale=N` (time for about N stones).
 //! A row holds medians over the seeds. Millimetres.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
@@ -141,7 +141,7 @@ fn main() {
     }
 }
 
-const HEAD: &str = "case        sensor  | share in2D   out | no datum   out | >1cm | loose P    R | cover a    u    o | chi2 mean med | alarms FDR  | bound in   out window    out | crack  good bad span | spoilt flagged wrong | s";
+const HEAD: &str = "case        sensor  | share in2D   out | no datum   out | >1cm | loose P    R  max | cover a    u    o | chi2 mean med | alarms FDR  | bound in   out window    out | crack  good bad span | spoilt flagged wrong | s";
 
 fn measure(case: Case, sensor: &str, seeds: &[u64], options: &Options) {
     let (mut network, mut paper, mut m3c2) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
@@ -216,7 +216,7 @@ fn line(name: &str, sensor: &str, runs: &[Figures]) -> String {
     let c = |k: usize| m(&|f| f.coverage[k]);
     let b = |k: usize| m(&|f| f.bounds[k]);
     format!(
-        "{name:12}{sensor:6}  | {:5.3} {:5.3} {:5.3} | {:8.3} {:5.3} | {:4.1} | {:7.2} {:4.2} | {:7.3} {:4.2} {:4.2} | {:9.2} {:3.2} | {:6.3} {:.3} | {:8.3} {:5.3} {:6.3} {:6.3} | {:5.2} {:5} {:3} {:4.2} | {:14.2} {:5.2} | {:.1}",
+        "{name:12}{sensor:6}  | {:5.3} {:5.3} {:5.3} | {:8.3} {:5.3} | {:4.1} | {:7.2} {:4.2} {:4.2} | {:7.3} {:4.2} {:4.2} | {:9.2} {:3.2} | {:6.3} {:.3} | {:8.3} {:5.3} {:6.3} {:6.3} | {:5.2} {:5} {:3} {:4.2} | {:14.2} {:5.2} | {:.1}",
         m(&|f| f.measured),
         m(&|f| f.in_plane),
         m(&|f| f.out),
@@ -225,6 +225,7 @@ fn line(name: &str, sensor: &str, runs: &[Figures]) -> String {
         m(&|f| f.beyond) * 100.0,
         m(&|f| f.precision),
         m(&|f| f.recall),
+        m(&|f| f.possible),
         c(0),
         c(1),
         c(2),

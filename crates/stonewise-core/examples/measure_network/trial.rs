@@ -4,9 +4,9 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::Cloud;
-use stonewise_core::geometry::Plane;
+use stonewise_core::geometry::{Bounds, Plane};
 use stonewise_core::id::StoneId;
-use stonewise_core::registration::{PairPoints, inner_points};
+use stonewise_core::registration::{NearPoint, PairPoints, local_shifts, stone_points};
 
 /// Points by stone, world frame; 0 holds what is no stone.
 pub type Stones = BTreeMap<u32, Vec<Point3<f64>>>;
@@ -52,34 +52,64 @@ impl Crack {
 }
 
 impl Trial {
-    /// Pairs of the same stone in both epochs, for the estimators; the borders of the masks are left out as in a run.
+    /// Pairs of the same stone in both epochs, for the estimators; near the border of a stone points are chosen as in a run.
     pub fn pairs(&self, border_noises: f64) -> Vec<PairPoints> {
         let [first, second] = &self.stones;
-        first
-            .par_iter()
-            .filter_map(|(&id, points)| {
-                let other = second.get(&id)?;
-                if id == 0 || points.len() < 10 || other.len() < 10 {
+        let ids: Vec<u32> = first
+            .keys()
+            .copied()
+            .filter(|id| *id > 0 && second.contains_key(id))
+            .collect();
+        let centroids: Vec<Point3<f64>> = ids.iter().map(|id| mean(&first[id])).collect();
+        let moved: Vec<Vector3<f64>> = ids
+            .iter()
+            .zip(&centroids)
+            .map(|(id, c)| mean(&second[id]) - c)
+            .collect();
+        let shifts = local_shifts(&centroids, &moved);
+        let bounds = [first, second].map(|stones| -> BTreeMap<u32, Bounds> {
+            let of =
+                |(id, points): (&u32, &Vec<Point3<f64>>)| Some((*id, Bounds::of(points.iter().copied())?));
+            stones.iter().filter_map(of).collect()
+        });
+        ids.par_iter()
+            .zip(&centroids)
+            .zip(&shifts)
+            .filter_map(|((&id, &centroid), shift)| {
+                let (points, other) = (&first[&id], &second[&id]);
+                if points.len() < 10 || other.len() < 10 {
                     return None;
                 }
-                let centroid = mean(points);
                 let plane = Plane::fit(points)?.normal;
                 let normal = plane * plane.dot(&self.truth.get(&id)?.normal).signum();
-                let cloud = |points: &[Point3<f64>]| {
-                    let offsets = points
+                let near = |epoch: usize, shift: Vector3<f64>| -> Vec<NearPoint> {
+                    let here = bounds[0][&id].grown(0.02);
+                    let place = Bounds {
+                        min: here.min + shift,
+                        max: here.max + shift,
+                    };
+                    let around = self.stones[epoch]
                         .iter()
-                        .map(|p| (p - centroid).cast::<f32>().into())
-                        .collect();
-                    Cloud::new(centroid, inner_points(offsets, &normal, border_noises))
+                        .filter(|(k, _)| bounds[epoch][*k].intersects(&place));
+                    around
+                        .flat_map(|(k, points)| points.iter().map(move |p| (*k == id, p)))
+                        .filter(|(own, p)| *own || place.contains(p))
+                        .map(|(labelled, p)| NearPoint {
+                            offset: (p - centroid).cast::<f32>().into(),
+                            labelled,
+                        })
+                        .collect()
                 };
+                let [one, two] = [near(0, Vector3::zeros()), near(1, *shift)];
+                let [inner, inner_second] = stone_points([&one, &two], &normal, shift, border_noises);
                 Some(PairPoints {
                     first: StoneId(id),
                     second: StoneId(id),
                     centroid,
                     centroid_second: mean(other),
                     normal,
-                    points_first: cloud(points),
-                    points_second: cloud(other),
+                    points_first: Cloud::new(centroid, inner),
+                    points_second: Cloud::new(centroid, inner_second),
                 })
             })
             .collect()

@@ -1,39 +1,125 @@
-//! Points of a stone away from the border of its mask.
+//! Which points near the border of a mask belong to the stone.
+//!
+//! Whether a noisy point there gets the stone's label depends on its noise, and on where the photos that voted stood: the heights of
+//! labelled points are biased along the border, differently in every epoch and alike for all stones. So near the border a point's
+//! place in the face decides, not its label: points that noise moved in and points that it moved out then balance. The border of
+//! the first epoch serves both, moved as the stones around moved.
 
+use super::survey::middle;
 use crate::cloud::GridIndex;
 use crate::geometry::{FaceFrame, OutlineParams, outline, signed_area};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
-/// The border is at most this share of the square root of a stone's area, so that small stones keep a core.
-const LARGEST_SHARE: f64 = 0.12;
 /// Points of a stone on which its noise is measured.
 const NOISE_SAMPLES: usize = 300;
+/// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches.
+const DEPTH_TAIL: f64 = 0.02;
+/// Noise levels by which the depth of a stone is widened.
+const DEPTH_NOISES: f64 = 4.0;
+/// Neighbours whose shifts, in the median, say where the border lies in the second epoch.
+const SHIFT_NEIGHBOURS: usize = 12;
 
-/// The points that lie farther inside the outline of all of them, seen along `normal`, than `border_noises` times their
-/// noise along the normal; in their order.
+/// A point near a stone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearPoint {
+    /// Relative to the stone's centroid in the first epoch, metres.
+    pub offset: [f32; 3],
+    /// Whether the point has the label of the stone.
+    pub labelled: bool,
+}
+
+/// The points of a stone in both epochs, from all points near it, in their order.
 ///
-/// Whether a noisy point near the border of a stone gets its label depends on its noise, and on where the photos that
-/// voted stood: the heights at the border are biased, differently in every epoch. All points stay where no outline can
-/// be found.
-pub fn inner_points(points: Vec<[f32; 3]>, normal: &Vector3<f64>, border_noises: f64) -> Vec<[f32; 3]> {
-    let frame = FaceFrame::from_normal(normal);
-    let local: Vec<Point3<f64>> = points
-        .iter()
-        .map(|p| Point3::from(frame.face_from_world() * Vector3::from(p.map(f64::from))))
-        .collect();
-    let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
-    let Some(ring) = outline(&flat, &OutlineParams::default()) else {
-        return points;
+/// Farther inside the outline of the first epoch's labelled points than `border_noises` times their noise, labelled points belong to
+/// the stone. Nearer to the outline all points inside do, whatever their label, if they lie no deeper and no farther out than the
+/// labelled ones. `shift`: how the outline moved, second epoch minus first. Labelled points alone where no outline can be found, or
+/// where `border_noises` is 0.
+pub fn stone_points(
+    near: [&[NearPoint]; 2],
+    normal: &Vector3<f64>,
+    shift: &Vector3<f64>,
+    border_noises: f64,
+) -> [Vec<[f32; 3]>; 2] {
+    let labelled: Vec<[f32; 3]> = labelled(near[0]);
+    match Region::new(&labelled, normal, border_noises) {
+        Some(region) => [
+            region.members(near[0], &Vector3::zeros()),
+            region.members(near[1], shift),
+        ],
+        None => [labelled, self::labelled(near[1])],
+    }
+}
+
+/// How the surroundings of each stone moved: the median, component by component, of the shifts of its nearest neighbours and itself.
+pub fn local_shifts(centroids: &[Point3<f64>], shifts: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let Some(bounds) = crate::geometry::Bounds::of(centroids.iter().copied()) else {
+        return Vec::new();
     };
-    let size_m = signed_area(&ring).abs().sqrt();
-    let border_m = (border_noises * noise_m(&local, size_m)).min(LARGEST_SHARE * size_m);
-    let inside = |p: &Point2<f64>| is_inside(&ring, p) && distance_to_ring(&ring, p) > border_m;
-    points
-        .into_iter()
-        .zip(&flat)
-        .filter(|(_, p)| inside(p))
-        .map(|(point, _)| point)
+    let extent_m = (bounds.max - bounds.min).norm().max(1e-3);
+    let index = GridIndex::new(centroids, 2.0 * extent_m / (centroids.len() as f64).sqrt());
+    centroids
+        .iter()
+        .map(|c| {
+            let near = index.nearest_k(c, SHIFT_NEIGHBOURS, extent_m);
+            middle(&near.iter().map(|(j, _)| shifts[*j]).collect::<Vec<_>>())
+        })
         .collect()
+}
+
+fn labelled(near: &[NearPoint]) -> Vec<[f32; 3]> {
+    near.iter().filter(|p| p.labelled).map(|p| p.offset).collect()
+}
+
+/// The part of space that a stone's face takes.
+struct Region {
+    face_from_world: Matrix3<f64>,
+    ring: Vec<Point2<f64>>,
+    /// Width of the border along the inside of the ring.
+    border_m: f64,
+    /// Lowest and highest place across the face.
+    depth: [f64; 2],
+}
+
+impl Region {
+    fn new(labelled: &[[f32; 3]], normal: &Vector3<f64>, border_noises: f64) -> Option<Self> {
+        let face_from_world = FaceFrame::from_normal(normal).face_from_world();
+        let local: Vec<Point3<f64>> = labelled.iter().map(|p| place(&face_from_world, p)).collect();
+        let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
+        let ring = outline(&flat, &OutlineParams::default()).filter(|_| border_noises > 0.0)?;
+        let noise = noise_m(&local, signed_area(&ring).abs().sqrt());
+        let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+        heights.sort_by(f64::total_cmp);
+        let tail = (DEPTH_TAIL * heights.len() as f64) as usize;
+        Some(Self {
+            face_from_world,
+            ring,
+            border_m: border_noises * noise,
+            depth: [
+                heights[tail] - DEPTH_NOISES * noise,
+                heights[heights.len() - 1 - tail] + DEPTH_NOISES * noise,
+            ],
+        })
+    }
+
+    fn members(&self, near: &[NearPoint], shift: &Vector3<f64>) -> Vec<[f32; 3]> {
+        let shift = self.face_from_world * shift;
+        near.iter()
+            .filter(|p| {
+                let at = place(&self.face_from_world, &p.offset) - shift;
+                let (flat, [low, high]) = (at.xy(), self.depth);
+                is_inside(&self.ring, &flat)
+                    && match distance_to_ring(&self.ring, &flat) < self.border_m {
+                        true => at.z > low && at.z < high,
+                        false => p.labelled,
+                    }
+            })
+            .map(|p| p.offset)
+            .collect()
+    }
+}
+
+fn place(face_from_world: &Matrix3<f64>, offset: &[f32; 3]) -> Point3<f64> {
+    Point3::from(face_from_world * Vector3::from(offset.map(f64::from)))
 }
 
 /// Noise along z of points of a face of `size_m`: the median difference of neighbours that are nearest in x and y.
@@ -80,43 +166,87 @@ fn distance_to_ring(ring: &[Point2<f64>], p: &Point2<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
 
-    /// A square of 0.4 m with points every 4 mm and heights from a fixed sequence of Gaussian numbers.
-    fn square(noise_m: f32) -> Vec<[f32; 3]> {
-        let mut state = 1u64;
-        let mut uniform = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u64 << 24) as f32
-        };
-        let mut gauss = || (0..12).map(|_| uniform()).sum::<f32>() - 6.0;
-        (0..10_000)
+    const NOISE_M: f64 = 0.01;
+
+    /// A plane of 0.6 m, points every 4 mm, normal noise; a mask of 0.4 m in the middle, drawn by a photo from the side: what stands out
+    /// seems farther along y by `slant` times its height.
+    fn seen_from(slant: f64, shift: &Vector3<f64>, seed: u64) -> Vec<NearPoint> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..150 * 150)
             .map(|i| {
-                [
-                    noise_m * gauss(),
-                    (i % 100) as f32 * 0.004,
-                    (i / 100) as f32 * 0.004,
-                ]
+                let noise = NOISE_M * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                let (y, z) = (f64::from(i % 150) * 0.004 - 0.3, f64::from(i / 150) * 0.004 - 0.3);
+                let p = Vector3::new(noise, y, z) + shift;
+                NearPoint {
+                    offset: p.cast::<f32>().into(),
+                    labelled: (y + slant * noise).abs() < 0.2 && z.abs() < 0.2,
+                }
             })
             .collect()
     }
 
-    #[test]
-    fn a_square_loses_a_border_of_its_noise_and_nothing_else() {
-        let kept = inner_points(square(0.01), &Vector3::x(), 2.0);
-        // 0.4 m less 2 cm on either side; the noise is known to a tenth.
-        let side = (kept.len() as f64).sqrt() * 0.004;
-        assert!((side - 0.36).abs() < 0.01, "{side}");
-        assert!(kept.iter().all(|p| p[1] > 0.013 && p[1] < 0.383));
+    /// Mean height of the points near either end along y.
+    fn ends(points: &[[f32; 3]], shift: &Vector3<f64>) -> [f64; 2] {
+        [-1.0, 1.0].map(|side| {
+            let at: Vec<f64> = points
+                .iter()
+                .map(|p| Vector3::from(p.map(f64::from)) - shift)
+                .filter(|p| side * p.y > 0.19)
+                .map(|p| p.x)
+                .collect();
+            at.iter().sum::<f64>() / at.len() as f64
+        })
     }
 
     #[test]
-    fn small_stones_keep_a_core_and_zero_keeps_all_inside_the_outline() {
-        let points = square(0.01);
-        assert!(inner_points(points.clone(), &Vector3::x(), 1000.0).len() > 5_000);
-        assert!(inner_points(points, &Vector3::x(), 0.0).len() > 9_700);
-        let few = vec![[0.0, 0.0, 0.0], [0.0, 0.1, 0.0]];
-        assert_eq!(inner_points(few.clone(), &Vector3::x(), 2.0), few);
+    fn heights_at_the_border_are_not_biased_by_where_the_photos_stood() {
+        let shift = Vector3::new(0.03, 0.01, -0.02);
+        let first = seen_from(1.0, &Vector3::zeros(), 1);
+        let second = seen_from(-1.0, &shift, 2);
+        let near = [first.as_slice(), second.as_slice()];
+        let by_label = stone_points(near, &Vector3::x(), &shift, 0.0);
+        let [left, right] = ends(&by_label[0], &Vector3::zeros());
+        assert!(left > 0.003 && right < -0.003, "{left} {right}");
+        let [left, right] = ends(&by_label[1], &shift);
+        assert!(left < -0.003 && right > 0.003, "{left} {right}");
+        let by_place = stone_points(near, &Vector3::x(), &shift, 3.0);
+        for (points, shift) in by_place.iter().zip([Vector3::zeros(), shift]) {
+            let [left, right] = ends(points, &shift);
+            assert!(left.abs() < 1e-3 && right.abs() < 1e-3, "{left} {right}");
+            let side = (points.len() as f64).sqrt() * 0.004;
+            assert!((side - 0.41).abs() < 0.02, "{side}");
+        }
+    }
+
+    #[test]
+    fn inside_the_border_and_without_an_outline_labels_decide() {
+        let mut near = seen_from(0.0, &Vector3::zeros(), 1);
+        let hole = |p: &NearPoint| p.offset[1].abs() < 0.05 && p.offset[2].abs() < 0.05;
+        for p in near.iter_mut().filter(|p| hole(p)) {
+            p.labelled = false;
+        }
+        let [first, _] = stone_points([&near, &near], &Vector3::x(), &Vector3::zeros(), 3.0);
+        assert!(!first.iter().any(|p| p[1].abs() < 0.04 && p[2].abs() < 0.04));
+        let few = &near[..3];
+        assert_eq!(
+            stone_points([few, few], &Vector3::x(), &Vector3::zeros(), 3.0),
+            [labelled(few), labelled(few)]
+        );
+    }
+
+    #[test]
+    fn one_wrong_shift_does_not_move_a_stone_away_from_its_neighbours() {
+        let places: Vec<Point3<f64>> = (0..40)
+            .map(|k| Point3::new(0.0, 0.3 * f64::from(k % 8), 0.2 * f64::from(k / 8)))
+            .collect();
+        let mut shifts = vec![Vector3::new(0.0, 0.02, 0.05); 40];
+        shifts[17] = Vector3::new(0.0, 0.3, 0.0);
+        assert_eq!(
+            local_shifts(&places, &shifts),
+            vec![Vector3::new(0.0, 0.02, 0.05); 40]
+        );
     }
 }

@@ -241,8 +241,9 @@ fn add_patch(
             let [u, v, z] = o.position;
             let [h, hu, hv] = fit.surface(u, v);
             let r = z - h;
-            compare.add(epoch, &o.position, r);
-            coarse.add(epoch, &o.position, r);
+            let weight = steepness([hu, hv]);
+            compare.add(epoch, &o.position, r, weight);
+            coarse.add(epoch, &o.position, r, weight);
             sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
             sum.scatter[epoch].1 += 1.0;
             sum.deviance += o.weight * r * r / (sigma * sigma);
@@ -272,7 +273,14 @@ fn add_patch(
     }
 }
 
-/// Fits the surface; points far off it lose weight and it is fitted again.
+/// Factor on a point's weight where the surface has these slopes: noise goes in all directions, so what counts is the distance from
+/// the surface and not that along the height (orthogonal distance regression, Boggs, Byrd & Schnabel 1987). At the steep rims of
+/// stones, where a surface of cells also fits worst, points say little.
+fn steepness([u, v]: [f64; 2]) -> f64 {
+    1.0 / (1.0 + u * u + v * v)
+}
+
+/// Fits the surface; points on its steep parts and points far off it lose weight and it is fitted again.
 pub(super) fn robust_fit(
     grid: PatchGrid,
     epochs: &mut [Vec<Observation>; 2],
@@ -283,10 +291,12 @@ pub(super) fn robust_fit(
     for _ in 0..2 {
         let mut changed = false;
         for (observations, sigma) in epochs.iter_mut().zip(noise.sigma_m) {
-            let limit = layout.outlier_sigmas * sigma;
             for o in observations {
-                let r = (o.position[2] - fit.surface(o.position[0], o.position[1])[0]).abs();
-                let weight = if r > limit { (limit / r).powi(2) } else { 1.0 };
+                let [h, hu, hv] = fit.surface(o.position[0], o.position[1]);
+                let steepness = steepness([hu, hv]);
+                let limit = layout.outlier_sigmas * sigma;
+                let r = (o.position[2] - h).abs() * steepness.sqrt();
+                let weight = steepness * if r > limit { (limit / r).powi(2) } else { 1.0 };
                 changed |= (weight - o.weight).abs() > 0.05;
                 o.weight = weight;
             }
@@ -299,7 +309,7 @@ pub(super) fn robust_fit(
     Some(fit)
 }
 
-/// Mean residuals of both epochs in small cells.
+/// Weighted residuals of both epochs in small cells, and the sums of their weights.
 struct Compare {
     low: [f64; 2],
     cell_m: f64,
@@ -318,17 +328,17 @@ impl Compare {
         }
     }
 
-    fn add(&mut self, epoch: usize, p: &[f64; 3], residual: f64) {
+    fn add(&mut self, epoch: usize, p: &[f64; 3], residual: f64, weight: f64) {
         let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.cell_m).floor());
         if (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64) {
             let cell = &mut self.sums[at[1] as usize * self.counts[0] + at[0] as usize][epoch];
-            cell.0 += residual;
-            cell.1 += 1.0;
+            cell.0 += weight * residual;
+            cell.1 += weight;
         }
     }
 
     fn count(&mut self, epoch: usize, p: &[f64; 3]) {
-        self.add(epoch, p, 0.0);
+        self.add(epoch, p, 0.0, 1.0);
     }
 
     fn overlap(&self) -> f64 {

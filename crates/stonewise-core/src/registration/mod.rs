@@ -24,7 +24,7 @@ mod sparse;
 mod survey;
 mod track;
 
-pub use border::inner_points;
+pub use border::{NearPoint, local_shifts, stone_points};
 pub use datum::DatumError;
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use hyper::VarianceComponents;

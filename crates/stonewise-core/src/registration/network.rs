@@ -42,6 +42,10 @@ pub enum AdjustError<E: std::error::Error + 'static> {
 
 /// Iterations at which the noise of the points is estimated: rough, aligned, final.
 const NOISE_AT: [usize; 3] = [0, 2, 4];
+/// Iteration at which stones are probed for motions of their own, once noise and field are about right.
+const PROBED_AT: usize = 4;
+/// Directions in the face in which a stone is probed.
+const PROBES: usize = 8;
 /// Iterations at which the variance components are estimated.
 const COMPONENTS_AT: [usize; 6] = [0, 1, 2, 3, 5, 7];
 /// From here on weights and components stay, so that the iteration settles.
@@ -56,11 +60,17 @@ const RESTLESS: usize = 50;
 const HALF_STONE_M: f64 = 0.1;
 /// Rounds of learning beliefs from the field in an iteration; one in a large network, where each is dear.
 const LEARN_STEPS: usize = 4;
-/// Probability of being loose from which on a stone's own optimum is followed.
-const SUSPECT: f64 = 0.1;
+/// A stone is probed if its points leave its motion in the face less certain than this share of what loose stones move.
+const OPEN_SHARE: f64 = 0.1;
+/// A stone's own optimum is followed once its points make it so many times more probably loose than it was without them.
+const SUSPECT: f64 = 1.5;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
 
+/// An optimum within so many cells of the field's motion lies where the stone's equations there still hold.
+const NEAR_CELLS: f64 = 0.5;
+/// A test that finds no less than this found nothing.
+const UNREMARKABLE: f64 = 0.05;
 /// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what is known of loose
 /// stones beforehand) has learnt too little from its points to be told from its neighbours.
 const BLIND_SHARE: f64 = 0.85;
@@ -114,6 +124,9 @@ pub fn adjust<S: PairSource>(
             network.estimate_noise();
         }
         network.evaluate(source, progress)?;
+        if iterations == PROBED_AT {
+            network.probe(source, params, progress)?;
+        }
         let terms = network.terms();
         if COMPONENTS_AT.contains(&stage) {
             network.estimate_components(&terms);
@@ -270,6 +283,76 @@ impl Network {
         })
     }
 
+    /// Looks for optima far from the field's motion: a noisy stone that moved by more than the reach of its relief does not show at
+    /// the field's motion where it went. Each stone is tried at the loose stones' typical distance; the best place is followed.
+    ///
+    /// Only stones whose points leave their motion in the face that open. Cost: [`PROBES`] evaluations of these.
+    fn probe<S: PairSource>(
+        &mut self,
+        source: &S,
+        params: &NetworkParams,
+        progress: &dyn Progress,
+    ) -> Result<(), AdjustError<S::Error>> {
+        let mut start = 0;
+        for batch in 0..source.batch_count() {
+            progress.check()?;
+            let range = start..start + self.survey.batch_sizes[batch];
+            start = range.end;
+            if range.clone().any(|i| self.is_open(i, params)) {
+                let pairs = source.load(batch).map_err(AdjustError::Source)?;
+                let found: Vec<(usize, Option<Motion9>)> = pairs
+                    .par_iter()
+                    .zip(range)
+                    .filter(|(_, i)| self.is_open(*i, params))
+                    .map(|(pair, i)| (i, self.probe_one(i, pair, params)))
+                    .collect();
+                for (i, place) in found {
+                    self.free[i] = place.map(Track::new);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a stone's points alone leave its motion in the face uncertain by a share of what loose stones move.
+    fn is_open(&self, i: usize, params: &NetworkParams) -> bool {
+        let Some(e) = self.tight[i].equations().filter(|_| self.free[i].is_none()) else {
+            return false;
+        };
+        let least = params.loose_move_m.powi(-2);
+        let known = e
+            .information
+            .fixed_view::<2, 2>(0, 0)
+            .symmetric_eigenvalues()
+            .min()
+            / self.inflation(i);
+        self.survey.stones[i].usable && known > least && known < least * OPEN_SHARE.powi(-2)
+    }
+
+    /// The place, of those tried, where the stone's points are best explained after one more step; `None` if that is where it is.
+    fn probe_one(&self, i: usize, pair: &PairPoints, params: &NetworkParams) -> Option<Motion9> {
+        let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
+        let here = self.tight[i].motion;
+        let expected = |e: &Equations| {
+            let held = e.information + Matrix9::identity() * self.inflation(i) / params.loose_move_m.powi(2);
+            held.cholesky().map_or(f64::INFINITY, |c| {
+                e.deviance - e.gradient.dot(&c.solve(&e.gradient))
+            })
+        };
+        let mut best = (expected(self.tight[i].equations()?), None);
+        for k in 0..PROBES {
+            let (s, c) = (std::f64::consts::TAU * k as f64 / PROBES as f64).sin_cos();
+            let mut place = here;
+            place[0] += params.loose_move_m * c;
+            place[1] += params.loose_move_m * s;
+            let value = expected(&equations(&local, &place, &self.noise, &self.layout));
+            if value < best.0 {
+                best = (value, Some(place));
+            }
+        }
+        best.1
+    }
+
     /// Equations about the common translation, with correlation between points accounted for.
     fn terms(&self) -> Terms {
         let term = |i: usize, track: &Track| match self.survey.stones[i].usable {
@@ -381,7 +464,7 @@ impl Network {
                     &self.loose,
                     &self.shared_variances(1.0, params),
                 );
-                self.disbelieve_the_blind(terms, &field, params);
+                self.disbelieve(terms, &field, params);
                 field::learn_ties(
                     &self.graph,
                     &field,
@@ -418,16 +501,23 @@ impl Network {
         true
     }
 
-    /// Lets stones whose own points hardly know their motion move with the field: few noisy points have optima far away
-    /// that mean nothing.
-    fn disbelieve_the_blind(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) {
+    /// Lets stones move with the field whose own optimum means nothing: those whose own points hardly know their motion (few noisy
+    /// points have optima far away), and those whose optimum lies so near that their test at the field's motion answers for it,
+    /// and finds nothing.
+    fn disbelieve(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) {
         let wide = field::loose_variances(&self.components, &self.loose);
-        for (i, tight) in self.beliefs.tight.iter_mut().enumerate() {
+        let p_values = outcome::own_motion_tests(self, terms, field, params);
+        for (i, p) in p_values.into_iter().enumerate() {
             let term = terms.free[i].as_ref().unwrap_or(&terms.tight[i]);
             let own = field::posterior(term, &field.from_others[i], &wide).covariance;
             let variances = own.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
-            if variances.max().sqrt() > BLIND_SHARE * params.loose_move_m {
-                *tight = 1.0;
+            let is_blind = variances.max().sqrt() > BLIND_SHARE * params.loose_move_m;
+            let apart_m = self.free[i].as_ref().map_or(0.0, |free| {
+                (free.motion - self.tight[i].motion).fixed_rows::<3>(0).norm()
+            });
+            let is_near = apart_m < NEAR_CELLS * self.layout.cell_m;
+            if is_blind || (is_near && p.is_none_or(|p| p > UNREMARKABLE)) {
+                self.beliefs.tight[i] = 1.0;
             }
         }
     }
@@ -450,7 +540,7 @@ impl Network {
             follow(&mut self.tight[i], &tight);
             if let (Some(track), Some(term)) = (&mut self.free[i], &terms.free[i]) {
                 follow(track, &field::posterior(term, prediction, &wide));
-            } else if 1.0 - self.beliefs.tight[i] > SUSPECT {
+            } else if 1.0 - self.beliefs.tight[i] > SUSPECT * self.loose.share {
                 let start = field::posterior(&terms.tight[i], prediction, &wide).mean + origin;
                 let mut track = Track::new(self.tight[i].motion);
                 track.move_to(&start, params.max_step_m);

@@ -15,8 +15,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 const BAD_CELL: f64 = 9.0;
 /// A face of which this share shows two surfaces is not the same stone twice.
 const BAD_SHARE: f64 = 0.25;
-/// The same where the stone is thought loose: what still disagrees at its own optimum was not moved, but spoilt.
-const BAD_SHARE_LOOSE: f64 = 0.1;
+/// At least so many cells: one alone may be that of a neighbour which did not move along.
+const BAD_CELLS: usize = 2;
+/// The same share where the stone is thought loose: what still disagrees at its own optimum was not moved, but spoilt.
+const BAD_SHARE_LOOSE: f64 = 0.2;
 /// A stone less likely than this to move with the field is loose, whatever its test at the field's motion says.
 const SURELY_LOOSE: f64 = 0.05;
 /// Factor by which the bending's variance is raised in the test for loose stones.
@@ -95,7 +97,7 @@ pub(super) fn report(
 
 /// Tests each stone against its neighbours: probability of so large a departure where it moves with them. `None` where its
 /// points say nothing.
-fn own_motion_tests(
+pub(super) fn own_motion_tests(
     network: &Network,
     terms: &Terms,
     field: &Field,
@@ -193,13 +195,14 @@ fn judge(network: &Network, i: usize, params: &NetworkParams) -> Option<MotionFa
     };
     let cells = e.differences.len() as f64;
     let limit = BAD_CELL * network.correlation.factor();
-    let bad = e.differences.iter().filter(|d| **d > limit).count() as f64 / cells.max(1.0);
+    let bad = e.differences.iter().filter(|d| **d > limit).count();
+    let bad_share = bad as f64 / cells.max(1.0);
     let share = if network.beliefs.tight[i] < 0.5 {
         BAD_SHARE_LOOSE
     } else {
         BAD_SHARE
     };
-    if e.overlap < params.min_overlap || (cells >= 4.0 && bad > share) {
+    if e.overlap < params.min_overlap || (bad >= BAD_CELLS && bad_share > share) {
         return Some(MotionFailure::Disagreement);
     }
     None

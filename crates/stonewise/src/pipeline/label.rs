@@ -7,8 +7,11 @@ use crate::pipeline::photos::Segmented;
 use crate::pipeline::step::{Key, StepDir};
 use crate::pipeline::tiled::Tiled;
 use crate::pipeline::tiles::DiskTiles;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::geometry::Bounds;
+use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
 use stonewise_io::table::{Table, read_columns, write_parquet};
@@ -30,6 +33,28 @@ impl Labelled {
     /// Labels of a tile's points.
     pub fn labels(&self, tile: usize) -> Result<TileLabels> {
         self.store.read(tile)
+    }
+
+    /// Box around the points of every stone. Cost: one pass over all tiles.
+    pub fn extents(&self, progress: &dyn Progress) -> Result<BTreeMap<u32, Bounds>> {
+        let tiles = &self.tiled.tiles;
+        let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
+        progress.begin("find stones", tiles.tile_count() as u64);
+        for tile in 0..tiles.tile_count() {
+            progress.check()?;
+            let (cloud, labels) = (tiles.load(tile)?, self.labels(tile)?);
+            for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
+                let place = cloud.world(i);
+                let point = Bounds {
+                    min: place,
+                    max: place,
+                };
+                let extent = extents.entry(labels.stone[i]).or_insert(point);
+                *extent = extent.union(&point);
+            }
+            progress.advance(1);
+        }
+        Ok(extents)
     }
 }
 

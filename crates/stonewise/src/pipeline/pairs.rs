@@ -4,14 +4,16 @@ use crate::error::{Error, Result};
 use crate::pipeline::label::Labelled;
 use crate::pipeline::spill::{Spill, SpillBins};
 use crate::pipeline::step::StepDir;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{PairPoints, PairSource, inner_points};
+use stonewise_core::registration::{NearPoint, PairPoints, PairSource, local_shifts, stone_points};
 use stonewise_core::stone::Stone;
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
@@ -19,17 +21,30 @@ use stonewise_io::table::{Table, read_columns, write_parquet};
 const BATCH: usize = 64;
 /// Edge of the cells by which stones are sorted into neighbourhoods, metres.
 const NEIGHBOURHOOD_M: f64 = 4.0;
+/// Edge of the cells by which a point finds the stones that it may belong to, metres.
+const BOX_CELL_M: f64 = 0.5;
+/// The outline of a stone reaches half a point spacing beyond its points, metres.
+const BOX_MARGIN_M: f64 = 0.02;
 
 /// Matched pairs whose points lie in one file a batch.
 pub struct DiskPairs {
     dir: PathBuf,
-    batches: Vec<Vec<(Stone, Stone)>>,
+    batches: Vec<Vec<Pair>>,
+}
+
+/// A matched stone in both epochs.
+struct Pair {
+    first: Stone,
+    second: Stone,
+    /// How the stones around it moved, metres.
+    shift: Vector3<f64>,
 }
 
 impl DiskPairs {
     /// Gathers the points of the matched stones of two epochs into the step's folder.
     ///
-    /// Points nearer to the border of their stone than `border_noises` times the noise are left out, see [`inner_points`].
+    /// Nearer to the border of a stone than `border_noises` times the noise, points are chosen by their place instead of by their
+    /// label, see [`stone_points`].
     pub fn gather(
         first: &Labelled,
         second: &Labelled,
@@ -43,8 +58,12 @@ impl DiskPairs {
             batches: batches(first, second, matches),
         };
         let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
-        pairs.spill(first, 0, &mut spill, progress)?;
-        pairs.spill(second, 1, &mut spill, progress)?;
+        let extents = match border_noises > 0.0 {
+            true => first.extents(progress)?,
+            false => BTreeMap::new(),
+        };
+        pairs.spill(first, 0, &extents, &mut spill, progress)?;
+        pairs.spill(second, 1, &extents, &mut spill, progress)?;
         let bins = spill.finish()?;
         (0..pairs.batches.len())
             .into_par_iter()
@@ -68,22 +87,18 @@ impl DiskPairs {
         } else {
             Vec::new()
         };
-        let mut points = vec![[Vec::new(), Vec::new()]; self.batches[batch].len()];
+        let mut near = vec![[Vec::new(), Vec::new()]; self.batches[batch].len()];
         for record in bytes.chunks_exact(RECORD) {
-            let (slot, epoch, offset) = decode(record);
-            points[slot][epoch].push(offset);
+            let (slot, epoch, point) = decode(record);
+            near[slot][epoch].push(point);
         }
         let (mut slots, mut epochs, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
-        for (slot, (of_stone, (stone, _))) in points.into_iter().zip(&self.batches[batch]).enumerate() {
-            for (epoch, of_epoch) in of_stone.into_iter().enumerate() {
-                let inner = if border_noises > 0.0 {
-                    inner_points(of_epoch, &stone.normal, border_noises)
-                } else {
-                    of_epoch
-                };
-                slots.extend(std::iter::repeat_n(slot as u32, inner.len()));
-                epochs.extend(std::iter::repeat_n(epoch as u32, inner.len()));
-                offsets.extend(inner);
+        for (slot, ([one, two], pair)) in near.iter().zip(&self.batches[batch]).enumerate() {
+            let chosen = stone_points([one, two], &pair.first.normal, &pair.shift, border_noises);
+            for (epoch, points) in chosen.into_iter().enumerate() {
+                slots.extend(std::iter::repeat_n(slot as u32, points.len()));
+                epochs.extend(std::iter::repeat_n(epoch as u32, points.len()));
+                offsets.extend(points);
             }
         }
         let mut table = Table::new();
@@ -102,31 +117,40 @@ impl DiskPairs {
         self.dir.join(format!("pairs-{batch:05}.parquet"))
     }
 
-    /// Sends every point of a matched stone to its batch, relative to the stone's centroid in the first epoch.
+    /// Sends every point of a matched stone, and every other point in its box, to its batch, relative to the stone's centroid in the
+    /// first epoch. `extents`: boxes of the first epoch's stones.
     fn spill(
         &self,
         epoch: &Labelled,
         which: u16,
+        extents: &BTreeMap<u32, Bounds>,
         spill: &mut Spill<u32>,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let mut places = BTreeMap::new();
-        for (batch, pairs) in self.batches.iter().enumerate() {
-            for (slot, pair) in pairs.iter().enumerate() {
-                let stone = if which == 0 { pair.0.id } else { pair.1.id };
-                places.insert(stone.0, (batch as u32, slot as u16, pair.0.centroid));
-            }
-        }
+        let (places, of_stone) = self.places(which, extents);
+        let cells = by_cell(&places);
         progress.begin("gather stones", epoch.tiled.tiles.tile_count() as u64);
         for tile in 0..epoch.tiled.tiles.tile_count() {
             progress.check()?;
+            let bounds = epoch.tiled.tiles.bounds(tile);
             let labels = epoch.labels(tile)?;
-            if labels.stone.iter().any(|s| places.contains_key(s)) {
+            let concerns = |p: &Place| p.extent.is_some_and(|e| e.intersects(&bounds));
+            if places.iter().any(concerns) || labels.stone.iter().any(|s| of_stone.contains_key(s)) {
                 let cloud = epoch.tiled.tiles.load(tile)?;
                 for (i, stone) in labels.stone.iter().enumerate() {
-                    if let Some((batch, slot, centre)) = places.get(stone) {
-                        let offset = (cloud.world(i) - centre).cast::<f32>();
-                        spill.push(*batch, &encode(*slot, which, [offset.x, offset.y, offset.z]))?;
+                    let point = cloud.world(i);
+                    let own = of_stone.get(stone).copied();
+                    let others = cells.get(&cell(&point, BOX_CELL_M)).into_iter().flatten();
+                    let others = others
+                        .copied()
+                        .filter(|&k| Some(k) != own && places[k].extent.is_some_and(|e| e.contains(&point)));
+                    for k in own.into_iter().chain(others) {
+                        let place = &places[k];
+                        let near = NearPoint {
+                            offset: (point - place.centre).cast::<f32>().into(),
+                            labelled: Some(k) == own,
+                        };
+                        spill.push(place.batch, &encode(place.slot, which, near))?;
                     }
                 }
             }
@@ -134,6 +158,62 @@ impl DiskPairs {
         }
         Ok(())
     }
+
+    /// Where the matched stones lie in an epoch, and which place is that of which of its stones.
+    fn places(&self, which: u16, extents: &BTreeMap<u32, Bounds>) -> (Vec<Place>, BTreeMap<u32, usize>) {
+        let (mut places, mut of_stone) = (Vec::new(), BTreeMap::new());
+        for (batch, pairs) in self.batches.iter().enumerate() {
+            for (slot, pair) in pairs.iter().enumerate() {
+                let (stone, shift) = match which {
+                    0 => (pair.first.id, Vector3::zeros()),
+                    _ => (pair.second.id, pair.shift),
+                };
+                of_stone.insert(stone.0, places.len());
+                let extent = extents.get(&pair.first.id.0).map(|e| e.grown(BOX_MARGIN_M));
+                places.push(Place {
+                    batch: batch as u32,
+                    slot: slot as u16,
+                    centre: pair.first.centroid,
+                    extent: extent.map(|e| Bounds {
+                        min: e.min + shift,
+                        max: e.max + shift,
+                    }),
+                });
+            }
+        }
+        (places, of_stone)
+    }
+}
+
+/// Where a matched stone lies in an epoch, and where its points go.
+struct Place {
+    batch: u32,
+    slot: u16,
+    /// What its points are relative to: its centroid in the first epoch.
+    centre: Point3<f64>,
+    /// Box in which all points are of interest; `None`: labelled ones only.
+    extent: Option<Bounds>,
+}
+
+/// Places by the cells that their boxes touch.
+fn by_cell(places: &[Place]) -> BTreeMap<[i64; 3], Vec<usize>> {
+    let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+    for (k, place) in places.iter().enumerate() {
+        let Some(extent) = &place.extent else { continue };
+        let (low, high) = (cell(&extent.min, BOX_CELL_M), cell(&extent.max, BOX_CELL_M));
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    cells.entry([x, y, z]).or_default().push(k);
+                }
+            }
+        }
+    }
+    cells
+}
+
+fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
+    [0, 1, 2].map(|a| (point[a] / size_m).floor() as i64)
 }
 
 impl PairSource for DiskPairs {
@@ -159,21 +239,21 @@ impl PairSource for DiskPairs {
         let loaded = pairs
             .iter()
             .zip(offsets)
-            .map(|((a, b), [first, second])| PairPoints {
-                first: a.id,
-                second: b.id,
-                centroid: a.centroid,
-                centroid_second: b.centroid,
-                normal: a.normal,
-                points_first: Cloud::new(a.centroid, first),
-                points_second: Cloud::new(a.centroid, second),
+            .map(|(pair, [first, second])| PairPoints {
+                first: pair.first.id,
+                second: pair.second.id,
+                centroid: pair.first.centroid,
+                centroid_second: pair.second.centroid,
+                normal: pair.first.normal,
+                points_first: Cloud::new(pair.first.centroid, first),
+                points_second: Cloud::new(pair.first.centroid, second),
             });
         Ok(loaded.collect())
     }
 }
 
 /// Pairs in batches of neighbours: sorted by the cell of the first centroid, then by stone.
-fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<Vec<(Stone, Stone)>> {
+fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<Vec<Pair>> {
     let by_id = |epoch: &Labelled| {
         epoch
             .stones
@@ -182,29 +262,49 @@ fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) 
             .collect::<BTreeMap<_, _>>()
     };
     let (ones, twos) = (by_id(first), by_id(second));
-    let mut pairs: Vec<(Stone, Stone)> = matches
+    let found: Vec<(Stone, Stone)> = matches
         .iter()
         .filter_map(|(a, b)| Some((ones.get(a)?.clone(), twos.get(b)?.clone())))
         .collect();
-    let cell = |stone: &Stone| [0, 1, 2].map(|a| (stone.centroid[a] / NEIGHBOURHOOD_M).floor() as i64);
-    pairs.sort_by_key(|(a, _)| (cell(a), a.id));
-    pairs.chunks(BATCH).map(<[_]>::to_vec).collect()
+    let centroids: Vec<Point3<f64>> = found.iter().map(|(a, _)| a.centroid).collect();
+    let moved: Vec<Vector3<f64>> = found.iter().map(|(a, b)| b.centroid - a.centroid).collect();
+    let mut pairs: Vec<Pair> = found
+        .into_iter()
+        .zip(local_shifts(&centroids, &moved))
+        .map(|((first, second), shift)| Pair { first, second, shift })
+        .collect();
+    pairs.sort_by_key(|p| (cell(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
+    let mut batches = Vec::new();
+    while !pairs.is_empty() {
+        let rest = pairs.split_off(pairs.len().min(BATCH));
+        batches.push(std::mem::replace(&mut pairs, rest));
+    }
+    batches
 }
 
 const RECORD: usize = 16;
 
-fn encode(slot: u16, epoch: u16, offset: [f32; 3]) -> [u8; RECORD] {
+/// Bit beside the epoch's number: the point has the label of the stone.
+const LABELLED: u16 = 2;
+
+fn encode(slot: u16, epoch: u16, point: NearPoint) -> [u8; RECORD] {
     let mut record = [0; RECORD];
+    let flags = epoch | if point.labelled { LABELLED } else { 0 };
     record[..2].copy_from_slice(&slot.to_le_bytes());
-    record[2..4].copy_from_slice(&epoch.to_le_bytes());
+    record[2..4].copy_from_slice(&flags.to_le_bytes());
     for axis in 0..3 {
-        record[4 + 4 * axis..8 + 4 * axis].copy_from_slice(&offset[axis].to_le_bytes());
+        record[4 + 4 * axis..8 + 4 * axis].copy_from_slice(&point.offset[axis].to_le_bytes());
     }
     record
 }
 
-fn decode(record: &[u8]) -> (usize, usize, [f32; 3]) {
-    let short = |at: usize| usize::from(u16::from_le_bytes([record[at], record[at + 1]]));
+fn decode(record: &[u8]) -> (usize, usize, NearPoint) {
+    let short = |at: usize| u16::from_le_bytes([record[at], record[at + 1]]);
     let real = |at: usize| f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]]);
-    (short(0), short(2), [real(4), real(8), real(12)])
+    let flags = short(2);
+    let point = NearPoint {
+        offset: [real(4), real(8), real(12)],
+        labelled: flags & LABELLED != 0,
+    };
+    (usize::from(short(0)), usize::from(flags & !LABELLED), point)
 }

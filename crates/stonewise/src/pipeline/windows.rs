@@ -31,7 +31,7 @@ pub fn align_windows(
         let cell = [0, 1, 2].map(|a| (pair.0.centroid[a] / size_m).floor() as i64);
         groups.entry(cell).or_default().push(pair);
     }
-    let extents = extents(first, progress)?;
+    let extents = first.extents(progress)?;
     progress.begin("align stones", pairs.len() as u64);
     let mut measured: BTreeMap<StoneId, PairResult> = BTreeMap::new();
     for group in groups.values() {
@@ -57,28 +57,6 @@ fn pairs(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) ->
     };
     let both = |(a, b): &(StoneId, StoneId)| Some((find(&first.stones, *a)?, find(&second.stones, *b)?));
     matches.iter().filter_map(both).collect()
-}
-
-/// Box around the points of every stone.
-fn extents(epoch: &Labelled, progress: &dyn Progress) -> Result<BTreeMap<u32, Bounds>> {
-    let tiles = &epoch.tiled.tiles;
-    let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
-    progress.begin("find stones", tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let (cloud, labels) = (tiles.load(tile)?, epoch.labels(tile)?);
-        for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
-            let place = cloud.world(i);
-            let point = Bounds {
-                min: place,
-                max: place,
-            };
-            let extent = extents.entry(labels.stone[i]).or_insert(point);
-            *extent = extent.union(&point);
-        }
-        progress.advance(1);
-    }
-    Ok(extents)
 }
 
 fn align_group(
