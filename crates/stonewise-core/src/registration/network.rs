@@ -69,6 +69,8 @@ const SETTLED: f64 = 0.01;
 
 /// An optimum within so many cells of the field's motion lies where the stone's equations there still hold.
 const NEAR_CELLS: f64 = 0.5;
+/// Square of a distance, in units of its covariance, which chance alone makes less than once in a million: optima farther away are many.
+const FAR_EXCESS: f64 = 30.7;
 /// A test that finds no less than this found nothing.
 const UNREMARKABLE: f64 = 0.05;
 /// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what is known of loose
@@ -502,21 +504,24 @@ impl Network {
     }
 
     /// Lets stones move with the field whose own optimum means nothing: those whose own points hardly know their motion (few noisy
-    /// points have optima far away), and those whose optimum lies so near that their test at the field's motion answers for it,
-    /// and finds nothing.
+    /// points have optima far away), and those whose test at the field's motion finds nothing, while their optimum lies so near that
+    /// this test answers for it, or is so vague that one of many places far away would look like it.
     fn disbelieve(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) {
         let wide = field::loose_variances(&self.components, &self.loose);
         let p_values = outcome::own_motion_tests(self, terms, field, params);
         for (i, p) in p_values.into_iter().enumerate() {
             let term = terms.free[i].as_ref().unwrap_or(&terms.tight[i]);
-            let own = field::posterior(term, &field.from_others[i], &wide).covariance;
-            let variances = own.fixed_view::<3, 3>(0, 0).into_owned().symmetric_eigenvalues();
-            let is_blind = variances.max().sqrt() > BLIND_SHARE * params.loose_move_m;
-            let apart_m = self.free[i].as_ref().map_or(0.0, |free| {
-                (free.motion - self.tight[i].motion).fixed_rows::<3>(0).norm()
-            });
-            let is_near = apart_m < NEAR_CELLS * self.layout.cell_m;
-            if is_blind || (is_near && p.is_none_or(|p| p > UNREMARKABLE)) {
+            let prediction = &field.from_others[i];
+            let own = field::posterior(term, prediction, &wide);
+            let known = own.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+            let is_blind = known.symmetric_eigenvalues().max().sqrt() > BLIND_SHARE * params.loose_move_m;
+            let apart = own.mean.fixed_rows::<3>(0) - prediction.mean.fixed_rows::<3>(0);
+            let spread = known + prediction.covariance.fixed_view::<3, 3>(0, 0);
+            let is_near = apart.norm() < NEAR_CELLS * self.layout.cell_m;
+            let is_vague = spread
+                .cholesky()
+                .is_none_or(|c| apart.dot(&c.solve(&apart)) < FAR_EXCESS);
+            if is_blind || ((is_near || is_vague) && p.is_none_or(|p| p > UNREMARKABLE)) {
                 self.beliefs.tight[i] = 1.0;
             }
         }
