@@ -168,7 +168,7 @@ pub struct SegmentArgs {
     pub scales: Option<Vec<f64>>,
     /// Stones of which the network is less sure are left out, 0 to 1.
     #[arg(long, value_name = "P")]
-    pub min_score: Option<f32>,
+    pub min_score: Option<f64>,
     /// Masks to measure the result on: COCO json or a folder of label PNGs.
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,

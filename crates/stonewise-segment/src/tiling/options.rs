@@ -19,7 +19,7 @@ pub struct TilingOptions {
     /// there hold a quarter of the area found, or nothing was found.
     pub stone_px: f64,
     /// Masks with a lower score are dropped.
-    pub min_score: f32,
+    pub min_score: f64,
     /// Stones with fewer pixels of the photo are dropped.
     pub min_area_px: u32,
     /// Share of a mask that must not lie on better ones.
@@ -88,11 +88,7 @@ impl TilingOptions {
                 "must be one or more numbers from 0.01 to 4",
             ),
             (self.stone_px >= 0.0, "stone_px", "must not be negative"),
-            (
-                is_share(f64::from(self.min_score)),
-                "min_score",
-                "is a share, 0 to 1",
-            ),
+            (is_share(self.min_score), "min_score", "is a share, 0 to 1"),
             (
                 is_share(self.min_new_share),
                 "min_new_share",

@@ -102,7 +102,7 @@ impl Size {
         let found = detector
             .detect(&crop(&self.image, tile))
             .map_err(TilingError::Detector)?;
-        let good = found.iter().filter(|d| d.score >= options.min_score);
+        let good = found.iter().filter(|d| f64::from(d.score) >= options.min_score);
         candidates.extend(good.filter_map(|d| candidate(d, tile, &self.scaling)));
         progress.advance(1);
         Ok(())

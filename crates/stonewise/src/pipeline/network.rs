@@ -58,8 +58,8 @@ fn write_stones(
     warnings: &Warnings,
 ) -> Result<Vec<VotingPhoto>> {
     let tiling = &context.project.settings.segment.tiling;
-    let detector =
-        StoneDetector::new(open_model::<Compute>(weights, &device())?).with_min_score(tiling.min_score);
+    let detector = StoneDetector::new(open_model::<Compute>(weights, &device())?)
+        .with_min_score(tiling.min_score as f32);
     let candidates = posed_photos(epoch, warnings)?;
     let tiles = |view: &View| tiling.tile_count(view.camera.width, view.camera.height);
     let total = candidates.iter().map(|(view, _)| tiles(view)).sum();

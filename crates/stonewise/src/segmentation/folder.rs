@@ -96,7 +96,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let key = Key::new(STEP, job.tiling, &[&network]);
     let step = StepDir::open(job.out.join("work").join(STEP), key)?;
     let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?)
-        .with_min_score(job.tiling.min_score);
+        .with_min_score(job.tiling.min_score as f32);
     let warnings = Warnings::default();
     let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
     progress.begin("stones", photos.iter().map(tiles).sum());
