@@ -83,11 +83,7 @@ impl Trial {
                 let plane = Plane::fit(points)?.normal;
                 let normal = plane * plane.dot(&self.truth.get(&id)?.normal).signum();
                 let near = |epoch: usize, shift: Vector3<f64>| -> Vec<NearPoint> {
-                    let here = bounds[0][&id].grown(0.02);
-                    let place = Bounds {
-                        min: here.min + shift,
-                        max: here.max + shift,
-                    };
+                    let place = bounds[0][&id].grown(0.02).moved(&shift);
                     let around = self.stones[epoch]
                         .iter()
                         .filter(|(k, _)| bounds[epoch][*k].intersects(&place));

@@ -34,6 +34,14 @@ impl Bounds {
         }
     }
 
+    /// The box somewhere else.
+    pub fn moved(&self, by: &Vector3<f64>) -> Self {
+        Self {
+            min: self.min + by,
+            max: self.max + by,
+        }
+    }
+
     /// The box, larger by `margin_m` on every side.
     pub fn grown(&self, margin_m: f64) -> Self {
         let margin = Vector3::repeat(margin_m);

@@ -3,6 +3,7 @@
 mod bounds;
 mod brown;
 mod camera;
+mod cell;
 mod contour;
 mod distortion;
 mod face_frame;
@@ -15,6 +16,7 @@ mod view;
 pub use bounds::Bounds;
 pub use brown::Brown;
 pub use camera::Camera;
+pub use cell::cell_of;
 pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};

@@ -82,10 +82,13 @@ struct Region {
 
 impl Region {
     fn new(labelled: &[[f32; 3]], normal: &Vector3<f64>, border_noises: f64) -> Option<Self> {
+        if border_noises <= 0.0 {
+            return None;
+        }
         let face_from_world = FaceFrame::from_normal(normal).face_from_world();
         let local: Vec<Point3<f64>> = labelled.iter().map(|p| place(&face_from_world, p)).collect();
         let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
-        let ring = outline(&flat, &OutlineParams::default()).filter(|_| border_noises > 0.0)?;
+        let ring = outline(&flat, &OutlineParams::default())?;
         let noise = noise_m(&local, signed_area(&ring).abs().sqrt());
         let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
         heights.sort_by(f64::total_cmp);

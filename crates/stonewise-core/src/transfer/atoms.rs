@@ -3,6 +3,7 @@
 use super::TransferError;
 use super::visibility::{Observer, Sighting};
 use crate::cloud::{Cloud, TileSource};
+use crate::geometry::cell_of;
 use crate::progress::Progress;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
@@ -72,7 +73,7 @@ fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
     (0..cloud.len() as u32)
         .filter(|&i| {
             let p = cloud.world(i as usize);
-            taken.insert([0, 1, 2].map(|a| (p[a] / voxel_m).floor() as i64))
+            taken.insert(cell_of(&p, voxel_m))
         })
         .collect()
 }

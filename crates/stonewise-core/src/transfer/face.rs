@@ -1,7 +1,7 @@
 //! The wall's face around a stone, without the stones' own bumps.
 
 use super::islands::Voxel;
-use crate::geometry::Plane;
+use crate::geometry::{Plane, cell_of};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::HashMap;
 
@@ -29,7 +29,7 @@ impl FaceCells {
 
     /// Adds a point of a stone.
     pub(super) fn add(&mut self, world: &Point3<f64>) {
-        let voxel = key(world);
+        let voxel = cell_of(world, CELL_M);
         let (count, sum) = self.cells.entry(voxel).or_insert((0, Vector3::zeros()));
         *count += 1;
         *sum += world - corner(voxel);
@@ -64,8 +64,8 @@ impl FaceCells {
 
     /// Mean points of the cells within a radius, in the order of the grid.
     fn within(&self, centre: &Point3<f64>, radius_m: f64) -> Vec<Point3<f64>> {
-        let low = key(&centre.map(|c| c - radius_m));
-        let high = key(&centre.map(|c| c + radius_m));
+        let low = cell_of(&centre.map(|c| c - radius_m), CELL_M);
+        let high = cell_of(&centre.map(|c| c + radius_m), CELL_M);
         let mut found = Vec::new();
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
@@ -82,10 +82,6 @@ impl FaceCells {
         }
         found
     }
-}
-
-fn key(p: &Point3<f64>) -> Voxel {
-    [0, 1, 2].map(|a| (p[a] / CELL_M).floor() as i64)
 }
 
 fn corner(voxel: Voxel) -> Point3<f64> {

@@ -1,6 +1,7 @@
 //! Parts of a stone that are cut off from its main body.
 
 use super::TransferParams;
+use crate::geometry::cell_of;
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -37,7 +38,7 @@ impl Occupancy {
     pub(super) fn add(&mut self, stone: u32, world: &Point3<f64>) {
         *self
             .counts
-            .entry((stone, voxel_of(world, self.voxel_m)))
+            .entry((stone, cell_of(world, self.voxel_m)))
             .or_insert(0) += 1;
     }
 
@@ -90,17 +91,13 @@ impl Removal {
 
     /// Whether a point of a stone loses its label.
     pub(super) fn takes(&self, stone: u32, world: &Point3<f64>) -> bool {
-        self.voxels.contains(&(stone, voxel_of(world, self.voxel_m)))
+        self.voxels.contains(&(stone, cell_of(world, self.voxel_m)))
     }
 
     /// Side of the voxels, metres.
     pub(super) fn voxel_m(&self) -> f64 {
         self.voxel_m
     }
-}
-
-fn voxel_of(p: &Point3<f64>, voxel_m: f64) -> Voxel {
-    [0, 1, 2].map(|a| (p[a] / voxel_m).floor() as i64)
 }
 
 fn parts(mut voxels: BTreeMap<Voxel, u32>) -> Vec<Part> {

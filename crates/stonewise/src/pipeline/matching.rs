@@ -8,6 +8,7 @@ use crate::pipeline::step::Key;
 use nalgebra::Point3;
 use std::collections::HashSet;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::geometry::cell_of;
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::stone::MatchOutcome;
@@ -45,7 +46,8 @@ pub fn find_partners(
         let (_, footprints) = survey(context, first)?;
         let (covered, footprints_2) = survey(context, second)?;
         let overlap = footprint_overlap(&footprints, &footprints_2);
-        let sees = |p: &Point3<f64>| neighbourhood(cell_of(p)).any(|cell| covered.contains(&cell));
+        let sees =
+            |p: &Point3<f64>| neighbourhood(cell_of(p, COVERAGE_CELL_M)).any(|cell| covered.contains(&cell));
         let surroundings = Surroundings {
             covered: &sees,
             overlap: Some(&overlap),
@@ -69,17 +71,13 @@ fn survey(context: &Context, epoch: &Labelled) -> Result<(HashSet<Cell>, Footpri
         let (cloud, labels) = (epoch.tiled.tiles.load(tile)?, epoch.labels(tile)?);
         for i in (0..cloud.len()).filter(|&i| labels.seen[i]) {
             let place = cloud.world(i);
-            covered.insert(cell_of(&place));
+            covered.insert(cell_of(&place, COVERAGE_CELL_M));
             if labels.stone[i] != 0 {
                 footprints.add(StoneId(labels.stone[i]), &place);
             }
         }
     }
     Ok((covered, footprints))
-}
-
-fn cell_of(p: &Point3<f64>) -> Cell {
-    [0, 1, 2].map(|axis| (p[axis] / COVERAGE_CELL_M).floor() as i64)
 }
 
 fn neighbourhood(cell: Cell) -> impl Iterator<Item = Cell> {

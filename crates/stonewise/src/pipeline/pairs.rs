@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::Bounds;
+use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::{NearPoint, PairPoints, PairSource, local_shifts, stone_points};
@@ -33,6 +33,7 @@ pub struct DiskPairs {
 }
 
 /// A matched stone in both epochs.
+#[derive(Clone)]
 struct Pair {
     first: Stone,
     second: Stone,
@@ -140,7 +141,7 @@ impl DiskPairs {
                 for (i, stone) in labels.stone.iter().enumerate() {
                     let point = cloud.world(i);
                     let own = of_stone.get(stone).copied();
-                    let others = cells.get(&cell(&point, BOX_CELL_M)).into_iter().flatten();
+                    let others = cells.get(&cell_of(&point, BOX_CELL_M)).into_iter().flatten();
                     let others = others
                         .copied()
                         .filter(|&k| Some(k) != own && places[k].extent.is_some_and(|e| e.contains(&point)));
@@ -169,15 +170,13 @@ impl DiskPairs {
                     _ => (pair.second.id, pair.shift),
                 };
                 of_stone.insert(stone.0, places.len());
-                let extent = extents.get(&pair.first.id.0).map(|e| e.grown(BOX_MARGIN_M));
                 places.push(Place {
                     batch: batch as u32,
                     slot: slot as u16,
                     centre: pair.first.centroid,
-                    extent: extent.map(|e| Bounds {
-                        min: e.min + shift,
-                        max: e.max + shift,
-                    }),
+                    extent: extents
+                        .get(&pair.first.id.0)
+                        .map(|e| e.grown(BOX_MARGIN_M).moved(&shift)),
                 });
             }
         }
@@ -200,7 +199,7 @@ fn by_cell(places: &[Place]) -> BTreeMap<[i64; 3], Vec<usize>> {
     let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     for (k, place) in places.iter().enumerate() {
         let Some(extent) = &place.extent else { continue };
-        let (low, high) = (cell(&extent.min, BOX_CELL_M), cell(&extent.max, BOX_CELL_M));
+        let (low, high) = (cell_of(&extent.min, BOX_CELL_M), cell_of(&extent.max, BOX_CELL_M));
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
                 for z in low[2]..=high[2] {
@@ -210,10 +209,6 @@ fn by_cell(places: &[Place]) -> BTreeMap<[i64; 3], Vec<usize>> {
         }
     }
     cells
-}
-
-fn cell(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
-    [0, 1, 2].map(|a| (point[a] / size_m).floor() as i64)
 }
 
 impl PairSource for DiskPairs {
@@ -273,13 +268,8 @@ fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) 
         .zip(local_shifts(&centroids, &moved))
         .map(|((first, second), shift)| Pair { first, second, shift })
         .collect();
-    pairs.sort_by_key(|p| (cell(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
-    let mut batches = Vec::new();
-    while !pairs.is_empty() {
-        let rest = pairs.split_off(pairs.len().min(BATCH));
-        batches.push(std::mem::replace(&mut pairs, rest));
-    }
-    batches
+    pairs.sort_by_key(|p| (cell_of(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
+    pairs.chunks(BATCH).map(<[_]>::to_vec).collect()
 }
 
 const RECORD: usize = 16;

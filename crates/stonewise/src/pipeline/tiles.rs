@@ -14,7 +14,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::Bounds;
+use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::progress::Progress;
 use stonewise_io::cloud::{cloud_info, read_cloud};
 use stonewise_io::table::{Table, read_columns, write_parquet};
@@ -149,7 +149,7 @@ pub fn ingest(
                 .zip(&chunk.indices)
                 .filter(|(p, _)| takes_part(p));
             for (p, &index) in taken {
-                let key = [0, 1, 2].map(|a| (p[a] / size_m).floor() as i64);
+                let key = cell_of(p, size_m);
                 spill.push(key, &encode(p, &tile_origin(&key, size_m), file as u32, index))?;
             }
             progress.advance(chunk.len() as u64);

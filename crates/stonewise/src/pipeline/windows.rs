@@ -5,7 +5,7 @@ use crate::pipeline::label::Labelled;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::Bounds;
+use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::{GicpBlock, GicpParams, GicpStone, align, relate_to_neighbours};
@@ -28,7 +28,7 @@ pub fn align_windows(
     let pairs = pairs(first, second, matches);
     let mut groups: BTreeMap<[i64; 3], Vec<&(Stone, Stone)>> = BTreeMap::new();
     for pair in &pairs {
-        let cell = [0, 1, 2].map(|a| (pair.0.centroid[a] / size_m).floor() as i64);
+        let cell = cell_of(&pair.0.centroid, size_m);
         groups.entry(cell).or_default().push(pair);
     }
     let extents = first.extents(progress)?;

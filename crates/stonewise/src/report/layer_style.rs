@@ -8,6 +8,38 @@ use stonewise_io::layers::LayerStyle;
 /// Classes of a scale in the legend, odd so that one holds zero.
 const CLASSES: i32 = 9;
 
+/// A class of a scale in the legend.
+struct Class {
+    number: i32,
+    /// Filter of the rows in it; the first and the last class are open.
+    range: String,
+    /// Least and largest value, metres.
+    edges: [f64; 2],
+    /// Red, green, blue and alpha.
+    colour: String,
+}
+
+/// The classes of the values of a column.
+fn classes(column: &str, scale: Scale) -> impl Iterator<Item = Class> {
+    let (low, high) = scale.range_m();
+    let edge = move |i: i32| low + (high - low) * f64::from(i) / f64::from(CLASSES);
+    (0..CLASSES).map(move |number| {
+        let (from, to) = (edge(number), edge(number + 1));
+        let range = match number {
+            0 => format!("\"{column}\" < {to}"),
+            c if c == CLASSES - 1 => format!("\"{column}\" >= {from}"),
+            _ => format!("\"{column}\" >= {from} AND \"{column}\" < {to}"),
+        };
+        let [r, g, b] = scale.colour(scale.step((from + to) / 2.0)).0;
+        Class {
+            number,
+            range,
+            edges: [from, to],
+            colour: format!("{r},{g},{b},255"),
+        }
+    })
+}
+
 /// Polygons coloured by a column in metres, legend in millimetres; grey hatch where the column is empty.
 ///
 /// `fade`: stones whose motion is not significant are pale.
@@ -25,17 +57,14 @@ pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) ->
             r#"<symbol type="fill" name="{key}" alpha="{alpha}" clip_to_extent="1" force_rhr="0">{fill}</symbol>"#
         );
     };
-    let (low, high) = scale.range_m();
-    let edge = |i: i32| low + (high - low) * f64::from(i) / f64::from(CLASSES);
-    for class in 0..CLASSES {
-        let (from, to) = (edge(class), edge(class + 1));
-        let range = match class {
-            0 => format!("\"{column}\" < {to}"),
-            c if c == CLASSES - 1 => format!("\"{column}\" >= {from}"),
-            _ => format!("\"{column}\" >= {from} AND \"{column}\" < {to}"),
-        };
-        let [r, g, b] = scale.colour(scale.step((from + to) / 2.0)).0;
-        let fill = simple_fill(&format!("{r},{g},{b},255"), "solid");
+    for Class {
+        range,
+        edges: [from, to],
+        colour,
+        ..
+    } in classes(column, scale)
+    {
+        let fill = simple_fill(&colour, "solid");
         let label = format!("{:.1} to {:.1} mm", from * 1e3, to * 1e3);
         if fade {
             add(&format!("{range} AND \"significant\" = 1"), &label, &fill, 1.0);
@@ -97,8 +126,6 @@ pub(super) fn arrow_style() -> LayerStyle {
 
 /// Lines coloured by a column in metres, legend in millimetres; thin and grey where the column is empty.
 pub(super) fn line_style(name: &str, column: &str, scale: Scale) -> LayerStyle {
-    let (low, high) = scale.range_m();
-    let edge = |i: i32| low + (high - low) * f64::from(i) / f64::from(CLASSES);
     let (mut rules, mut symbols) = (String::new(), String::new());
     let mut add = |key: i32, filter: &str, label: &str, colour: &str, width: &str| {
         let (filter, label) = (escape(filter), escape(label));
@@ -117,16 +144,15 @@ pub(super) fn line_style(name: &str, column: &str, scale: Scale) -> LayerStyle {
             r#"<symbol type="line" name="{key}" alpha="1" clip_to_extent="1" force_rhr="0"><layer class="SimpleLine" enabled="1" locked="0" pass="0">{line}</layer></symbol>"#
         );
     };
-    for class in 0..CLASSES {
-        let (from, to) = (edge(class), edge(class + 1));
-        let range = match class {
-            0 => format!("\"{column}\" < {to}"),
-            c if c == CLASSES - 1 => format!("\"{column}\" >= {from}"),
-            _ => format!("\"{column}\" >= {from} AND \"{column}\" < {to}"),
-        };
-        let [r, g, b] = scale.colour(scale.step((from + to) / 2.0)).0;
+    for Class {
+        number,
+        range,
+        edges: [from, to],
+        colour,
+    } in classes(column, scale)
+    {
         let label = format!("{:.2} to {:.2} mm", from * 1e3, to * 1e3);
-        add(class, &range, &label, &format!("{r},{g},{b},255"), "0.9");
+        add(number, &range, &label, &colour, "0.9");
     }
     add(
         CLASSES,

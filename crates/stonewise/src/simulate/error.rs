@@ -36,6 +36,9 @@ pub enum SimulateError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// What is finished cannot be noted.
+    #[error(transparent)]
+    Unfinished(#[from] Box<crate::Error>),
     /// Parameters cannot be written as TOML.
     #[error("cannot write parameters: {0}")]
     Toml(#[from] toml::ser::Error),
