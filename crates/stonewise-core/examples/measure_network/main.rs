@@ -5,7 +5,7 @@
 //! again), sensors `tls uav` (default: both), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
 //! checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and trajectory errors), `masks` (15 % of the second
 //! epoch's masks merged, halved or swapped), `paper` (the paper's estimator and M3C2 beside it), `each` (a line for every
-//! seed), `width=M` (length of the wall, default 4), `coarse=F` (point spacing times F), `border=F` (width of the
+//! seed), `width=M height=M` (of the wall, default 4 by 3), `coarse=F` (point spacing times F), `border=F` (width of the
 //! border, in noise levels, where a point's place decides and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the adjustment), `scale=N` (time for about N stones).
 //! A row holds medians over the seeds. Millimetres.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
@@ -56,10 +56,12 @@ impl Case {
 }
 
 /// The words of the command line.
+#[derive(Clone)]
 pub struct Options {
     words: Vec<String>,
     pub exact: bool,
     pub width_m: f64,
+    pub height_m: f64,
     coarse: f64,
     pub border_noises: f64,
 }
@@ -74,6 +76,7 @@ impl Options {
         Self {
             exact: words.iter().any(|w| w == "exact"),
             width_m: number("width=").unwrap_or(4.0),
+            height_m: number("height=").unwrap_or(3.0),
             coarse: number("coarse=").unwrap_or(1.0),
             border_noises: number("border=").unwrap_or(3.0),
             words,

@@ -1,63 +1,37 @@
-//! Time and memory for large walls: a simulated survey set side by side many times.
+//! Time and memory for large walls.
 
-use crate::trial::Trial;
 use crate::{Case, Options, simulated};
-use nalgebra::Vector3;
-use stonewise_core::cloud::Cloud;
-use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::{PairPoints, PairSource, adjust};
+use stonewise_core::registration::{MemoryPairs, adjust};
 
-/// Copies of a section, one beside and above the other, read copy by copy.
-struct LongWall {
-    pairs: Vec<PairPoints>,
-    copies: usize,
-}
-
-impl PairSource for LongWall {
-    type Error = std::convert::Infallible;
-
-    fn batch_count(&self) -> usize {
-        self.copies
-    }
-
-    fn load(&self, batch: usize) -> Result<Vec<PairPoints>, Self::Error> {
-        let per_row = (self.copies as f64 * 4.0).sqrt().ceil() as usize;
-        let shift = Vector3::new(
-            0.0,
-            4.0 * (batch % per_row) as f64,
-            3.0 * (batch / per_row) as f64,
-        );
-        let moved = |c: &Cloud| Cloud::new(c.origin() + shift, c.offsets().to_vec());
-        let copy = |p: &PairPoints| PairPoints {
-            first: StoneId(p.first.0 + 1000 * batch as u32),
-            second: StoneId(p.second.0 + 1000 * batch as u32),
-            centroid: p.centroid + shift,
-            centroid_second: p.centroid_second + shift,
-            normal: p.normal,
-            points_first: moved(&p.points_first),
-            points_second: moved(&p.points_second),
-        };
-        Ok(self.pairs.iter().map(copy).collect())
-    }
-}
+/// Stones of the simulated wall on a square metre.
+const STONES_PER_M2: f64 = 17.5;
+/// Width of the wall over its height, as of a dam.
+const SHAPE: f64 = 7.0;
 
 /// Time of the whole adjustment for about this many stones, and the most memory that the process had.
 pub fn measure(sensor: &str, stones: usize, options: &Options) {
-    let trial: Trial = simulated::build(Case::Bulge, sensor, 1, options);
-    let pairs = trial.pairs(options.border_noises);
+    let area_m2 = stones as f64 / STONES_PER_M2;
+    let height_m = (area_m2 / SHAPE).sqrt();
+    let large = Options {
+        height_m,
+        width_m: area_m2 / height_m,
+        ..options.clone()
+    };
+    let pairs = simulated::build(Case::Bulge, sensor, 1, &large).pairs(options.border_noises);
+    let count = pairs.len();
     let points: usize = pairs.iter().map(|p| p.points_first.len()).sum();
-    let copies = stones.div_ceil(pairs.len());
-    let count = copies * pairs.len();
-    let mean_points = points / pairs.len();
-    drop(trial);
+    let source = MemoryPairs::new(pairs);
+    let before = peak_memory().unwrap_or_default();
     let start = std::time::Instant::now();
-    let report = adjust(&LongWall { pairs, copies }, &options.network(), &Silent).unwrap();
+    let report = adjust(&source, &options.network(), &Silent).unwrap();
     println!(
-        "{count} stones of {mean_points} points an epoch, {sensor}: {:.0} s, {} iterations, converged {}, loose {}, peak memory {}",
+        "{count} stones of {} points an epoch, {sensor}: {:.0} s, {} iterations, converged {}, {} breaks, {} loose, peak memory {} (points {before})",
+        points / count.max(1),
         start.elapsed().as_secs_f64(),
         report.iterations,
         report.converged,
+        report.breaks.len(),
         report.loose,
         peak_memory().unwrap_or_default()
     );

@@ -121,6 +121,7 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
     SceneParams {
         wall: WallParams {
             width_m,
+            height_m: options.height_m,
             ..WallParams::default()
         },
         motions: match case {

@@ -1,127 +1,180 @@
 //! Symmetric positive definite band matrices: Cholesky factor, solves, log determinant.
 
-/// Rows of the lower triangle; row `i` holds columns `i - half ..= i`, missing ones are zero.
+use pulp::{Arch, Simd, WithSimd};
+
+/// Columns that are eliminated together: each later column is then read and written once for all of them.
+const PANEL: usize = 4;
+/// A multiple of the numbers in a vector of any processor.
+const LANES: usize = 8;
+
+/// Columns of the lower triangle; column `j` holds rows `j ..= j + half`, missing ones are zero, then zeros up to the stride, so that
+/// whole vectors of a panel's columns can be read.
 pub(super) struct Band {
     size: usize,
     half: usize,
-    rows: Vec<f64>,
+    stride: usize,
+    columns: Vec<f64>,
 }
 
-/// The lower Cholesky factor of a [`Band`].
+/// The lower Cholesky factor of a [`Band`]; its diagonal is kept inverted, which is what every solve needs.
 pub(super) struct BandFactor(Band);
 
 impl Band {
     /// A zero matrix with `half` diagonals below the main one.
     pub fn zeros(size: usize, half: usize) -> Self {
+        let stride = half + PANEL + LANES - 1;
         Self {
             size,
             half,
-            rows: vec![0.0; size * (half + 1)],
+            stride,
+            columns: vec![0.0; size * stride],
         }
     }
 
-    /// Columns `first ..= first + count - 1` of row `row`; all must lie in the band and not right of the diagonal.
-    pub fn row_part(&mut self, row: usize, first: usize, count: usize) -> &mut [f64] {
-        let start = row * (self.half + 1) + first + self.half - row;
-        &mut self.rows[start..start + count]
+    /// Rows `first ..= first + count - 1` of column `column`; all must lie in the band and not above the diagonal.
+    #[inline(always)]
+    pub fn column_part(&mut self, column: usize, first: usize, count: usize) -> &mut [f64] {
+        let start = column * self.stride + first - column;
+        &mut self.columns[start..start + count]
     }
 
     /// Adds to one entry of the lower triangle.
+    #[inline(always)]
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        self.row_part(row, column, 1)[0] += value;
+        self.column_part(column, row, 1)[0] += value;
     }
 
-    /// L L' = A; `None` where A is not positive definite. Cost: size * half^2 multiplications.
+    /// L L' = A; `None` where A is not positive definite. Cost: size * half^2 / 2 multiplications.
     pub fn factor(mut self) -> Option<BandFactor> {
-        let width = self.half + 1;
-        for i in 0..self.size {
-            let (above, current) = self.rows.split_at_mut(i * width);
-            let row = &mut current[..width];
-            let first = i.saturating_sub(self.half);
-            for j in first..i {
-                let start = first.max(j.saturating_sub(self.half));
-                let other = &above[j * width..(j + 1) * width];
-                let sum = dot(
-                    &row[start + self.half - i..j + self.half - i],
-                    &other[start + self.half - j..self.half],
-                );
-                let at = j + self.half - i;
-                row[at] = (row[at] - sum) * other[self.half];
+        Arch::new()
+            .dispatch(Elimination(&mut self))
+            .then_some(BandFactor(self))
+    }
+
+    fn column(&self, j: usize) -> &[f64] {
+        let reach = self.half.min(self.size - 1 - j);
+        &self.columns[j * self.stride..][..=reach]
+    }
+}
+
+/// Factors a matrix in place, a panel at a time, right-looking; whether all pivots were positive.
+struct Elimination<'a>(&'a mut Band);
+
+impl WithSimd for Elimination<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> bool {
+        let Band {
+            size, half, stride, ..
+        } = *self.0;
+        for start in (0..size).step_by(PANEL) {
+            let end = (start + PANEL).min(size);
+            let (done, later) = self.0.columns.split_at_mut(end * stride);
+            let panel = &mut done[start * stride..];
+            if !eliminate_within(panel, half, stride) {
+                return false;
             }
-            let head = &row[first + self.half - i..self.half];
-            let pivot = row[self.half] - dot(head, head);
-            if !(pivot > 0.0 && pivot.is_finite()) {
-                return None;
+            for i in end..(end + half).min(size) {
+                let length = (half + end - i).next_multiple_of(LANES);
+                let target = &mut later[(i - end) * stride..][..length];
+                let mut parts = [&panel[..0]; PANEL];
+                for (k, part) in parts.iter_mut().enumerate() {
+                    *part = &panel[k * stride + i - start - k..][..length];
+                }
+                subtract(simd, target, parts);
             }
-            // The inverse of the diagonal is what every later step needs.
-            row[self.half] = pivot.sqrt().recip();
         }
-        Some(BandFactor(self))
+        true
+    }
+}
+
+/// Factors the columns of a panel, each by those before it; whether all pivots were positive.
+#[inline(always)]
+fn eliminate_within(panel: &mut [f64], half: usize, stride: usize) -> bool {
+    for j in 0..panel.len() / stride {
+        let (before, rest) = panel.split_at_mut(j * stride);
+        let column = &mut rest[..=half];
+        for k in 0..j {
+            let other = &before[k * stride..][(j - k).min(half + 1)..=half];
+            let factor = other.first().copied().unwrap_or(0.0);
+            for (x, l) in column.iter_mut().zip(other) {
+                *x -= factor * l;
+            }
+        }
+        let pivot = column[0];
+        if !(pivot > 0.0 && pivot.is_finite()) {
+            return false;
+        }
+        let inverse = pivot.sqrt().recip();
+        column[0] = inverse;
+        for x in &mut column[1..] {
+            *x *= inverse;
+        }
+    }
+    true
+}
+
+/// Takes each part, times its first entry, off the target. All have the same length, a multiple of [`LANES`]. Without fused
+/// multiplication, so that every processor finds the same.
+#[inline(always)]
+fn subtract<S: Simd>(simd: S, target: &mut [f64], [a, b, c, d]: [&[f64]; PANEL]) {
+    let (fa, fb) = (simd.splat_f64s(a[0]), simd.splat_f64s(b[0]));
+    let (fc, fd) = (simd.splat_f64s(c[0]), simd.splat_f64s(d[0]));
+    let (a, b) = (S::as_simd_f64s(a).0, S::as_simd_f64s(b).0);
+    let (c, d) = (S::as_simd_f64s(c).0, S::as_simd_f64s(d).0);
+    let target = S::as_mut_simd_f64s(target).0;
+    for ((((t, a), b), c), d) in target.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+        let first = simd.add_f64s(simd.mul_f64s(fa, *a), simd.mul_f64s(fb, *b));
+        let second = simd.add_f64s(simd.mul_f64s(fc, *c), simd.mul_f64s(fd, *d));
+        *t = simd.sub_f64s(*t, simd.add_f64s(first, second));
     }
 }
 
 impl BandFactor {
     /// log |A|.
     pub fn log_det(&self) -> f64 {
-        let Band { size, half, rows } = &self.0;
-        -2.0 * (0..*size).map(|i| rows[i * (half + 1) + half].ln()).sum::<f64>()
+        -2.0 * (0..self.0.size).map(|j| self.0.column(j)[0].ln()).sum::<f64>()
     }
 
     /// Replaces the right-hand sides by L^-1 times them.
     pub fn forward<const N: usize>(&self, rhs: &mut [[f64; N]]) {
-        let Band { size, half, rows } = &self.0;
-        for i in 0..*size {
-            let row = &rows[i * (half + 1)..(i + 1) * (half + 1)];
-            let first = i.saturating_sub(*half);
-            let (known, rest) = rhs.split_at_mut(i);
-            let mut sum = rest[0];
-            for (l, y) in row[first + half - i..*half].iter().zip(&known[first..]) {
+        for j in 0..self.0.size {
+            let column = self.0.column(j);
+            let known = rhs[j].map(|y| y * column[0]);
+            rhs[j] = known;
+            for (l, y) in column[1..].iter().zip(&mut rhs[j + 1..]) {
                 for c in 0..N {
-                    sum[c] -= l * y[c];
+                    y[c] -= l * known[c];
                 }
             }
-            rest[0] = sum.map(|s| s * row[*half]);
         }
     }
 
     /// Replaces the right-hand side by A^-1 times it.
     pub fn solve(&self, rhs: &mut [[f64; 1]]) {
         self.forward(rhs);
-        let Band { size, half, rows } = &self.0;
-        for i in (0..*size).rev() {
-            let row = &rows[i * (half + 1)..(i + 1) * (half + 1)];
-            let first = i.saturating_sub(*half);
-            let value = rhs[i][0] * row[*half];
-            rhs[i][0] = value;
-            for (l, y) in row[first + half - i..*half].iter().zip(&mut rhs[first..i]) {
-                y[0] -= l * value;
-            }
+        for j in (0..self.0.size).rev() {
+            let column = self.0.column(j);
+            let known = rhs[j + 1..].as_flattened();
+            rhs[j][0] = (rhs[j][0] - dot(&column[1..], known)) * column[0];
         }
     }
 }
 
-/// Sum of products in eight lanes, which the compiler turns into vector instructions.
+/// Sum of products in lanes, so that no product waits for the sum before it. The longer of the two is cut.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = a8
-        .remainder()
-        .iter()
-        .zip(b8.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
-    for (x, y) in a8.zip(b8) {
-        for k in 0..8 {
-            lanes[k] += x[k] * y[k];
+    let length = a.len().min(b.len());
+    let (a, a_rest) = a[..length].as_chunks::<LANES>();
+    let (b, b_rest) = b[..length].as_chunks::<LANES>();
+    let mut lanes = [0.0; LANES];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..LANES {
+            lanes[k] += a[k] * b[k];
         }
     }
-    let pairs = [
-        lanes[0] + lanes[4],
-        lanes[1] + lanes[5],
-        lanes[2] + lanes[6],
-        lanes[3] + lanes[7],
-    ];
-    (pairs[0] + pairs[2]) + (pairs[1] + pairs[3]) + tail
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    lanes.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

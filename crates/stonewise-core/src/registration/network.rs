@@ -64,6 +64,8 @@ const LEARN_STEPS: usize = 4;
 const OPEN_SHARE: f64 = 0.1;
 /// A stone's own optimum is followed once its points make it so many times more probably loose than it was without them.
 const SUSPECT: f64 = 1.5;
+/// A stone is evaluated again once its equations, which are those of another motion, may be wrong by this, metres.
+const LINEAR_M: f64 = 1e-8;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
 
@@ -247,7 +249,7 @@ impl Network {
             let count = self.survey.batch_sizes[batch];
             let range = start..start + count;
             let tracks = || range.clone().map(|i| (&self.tight[i], self.free[i].as_ref()));
-            if tracks().any(|(tight, free)| tight.is_due() || free.is_some_and(Track::is_due)) {
+            if tracks().any(|(tight, free)| self.is_due(tight) || free.is_some_and(|f| self.is_due(f))) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
                 let new: Vec<[Option<Equations>; 2]> = pairs
                     .par_iter()
@@ -275,14 +277,20 @@ impl Network {
 
     fn evaluate_one(&self, i: usize, pair: &PairPoints) -> [Option<Equations>; 2] {
         let tracks = [Some(&self.tight[i]), self.free[i].as_ref()];
-        if !tracks.iter().flatten().any(|t| t.is_due()) {
+        if !tracks.iter().flatten().any(|t| self.is_due(t)) {
             return [None, None];
         }
         let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
         tracks.map(|t| {
-            t.filter(|t| t.is_due())
+            t.filter(|t| self.is_due(t))
                 .map(|t| equations(&local, &t.motion, &self.noise, &self.layout))
         })
+    }
+
+    /// Whether a track's equations no longer hold where it is: they are quadratic, and their error grows with the square of the
+    /// distance, in units of the surface's cells.
+    fn is_due(&self, track: &Track) -> bool {
+        track.is_due((LINEAR_M * self.layout.cell_m).sqrt())
     }
 
     /// Looks for optima far from the field's motion: a noisy stone that moved by more than the reach of its relief does not show at

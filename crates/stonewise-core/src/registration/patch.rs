@@ -117,24 +117,7 @@ impl PatchGrid {
         let mut rhs = vec![[0.0]; self.coefficient_count()];
         for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
             for o in observations {
-                let basis = self.basis(o.position[0], o.position[1]);
-                let (bs, bl) = (basis.value[self.short], basis.value[1 - self.short]);
-                let weight = o.weight / (sigma * sigma);
-                for a in 0..4 {
-                    for b in 0..4 {
-                        let row = self.index(&basis, a, b);
-                        let w = weight * bl[a] * bs[b];
-                        rhs[row][0] += w * o.position[2];
-                        for (c, along) in bl.iter().enumerate().take(a + 1) {
-                            let count = if c == a { b + 1 } else { 4 };
-                            let part = matrix.row_part(row, self.index(&basis, c, 0), count);
-                            let wc = w * along;
-                            for (entry, s) in part.iter_mut().zip(bs) {
-                                *entry += wc * s;
-                            }
-                        }
-                    }
-                }
+                self.add_observation(o, o.weight / (sigma * sigma), &mut matrix, &mut rhs);
             }
         }
         self.each_difference(|taps| {
@@ -152,6 +135,31 @@ impl PatchGrid {
             matrix.add(i, i, 1e-8 / (noise.tau_m * noise.tau_m));
         }
         (matrix, rhs)
+    }
+
+    /// Adds what a point says to the normal equations of the coefficients: products of its basis along the short axis, times those
+    /// along the long one.
+    fn add_observation(&self, o: &Observation, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
+        let basis = self.basis(o.position[0], o.position[1]);
+        let (bs, bl) = (basis.value[self.short], basis.value[1 - self.short]);
+        let products = bs.map(|x| bs.map(|y| weight * x * y));
+        for a in 0..4 {
+            for b in 0..4 {
+                let column = self.index(&basis, a, b);
+                rhs[column][0] += weight * bl[a] * bs[b] * o.position[2];
+                let own = matrix.column_part(column, column, 4 - b);
+                for (entry, p) in own.iter_mut().zip(&products[b][b..]) {
+                    *entry += bl[a] * bl[a] * p;
+                }
+                for c in a + 1..4 {
+                    let along = bl[a] * bl[c];
+                    let part = matrix.column_part(column, self.index(&basis, c, 0), 4);
+                    for (entry, p) in part.iter_mut().zip(products[b]) {
+                        *entry += along * p;
+                    }
+                }
+            }
+        }
     }
 
     /// The prior's second differences: along each axis, and mixed (twice, as in a thin plate).
@@ -207,12 +215,13 @@ impl PatchFit {
         let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 3];
         for a in 0..4 {
-            for b in 0..4 {
-                let c = self.coefficients[self.grid.index(&basis, a, b)][0];
-                out[0] += c * basis.value[l][a] * basis.value[s][b];
-                out[1 + s] += c * basis.value[l][a] * basis.slope[s][b];
-                out[1 + l] += c * basis.slope[l][a] * basis.value[s][b];
-            }
+            let first = self.grid.index(&basis, a, 0);
+            let row = self.coefficients[first..first + 4].as_flattened();
+            let along = |b: &[f64; 4]| row.iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
+            let (value, slope) = (along(&basis.value[s]), along(&basis.slope[s]));
+            out[0] += value * basis.value[l][a];
+            out[1 + s] += slope * basis.value[l][a];
+            out[1 + l] += value * basis.slope[l][a];
         }
         out
     }

@@ -3,8 +3,6 @@
 use super::equations::{Equations, Motion9};
 use super::field::StoneTerm;
 
-/// A stone is evaluated again once it moved by more than this, metres (of its centroid or its rim).
-const REFRESH_M: f64 = 2e-7;
 /// Distance of a stone's rim from its centroid, metres, for judging rotation and bending.
 const RIM_M: f64 = 0.2;
 
@@ -33,12 +31,12 @@ impl Track {
         self.evaluated.as_ref().map(|e| &e.1)
     }
 
-    /// Whether the equations are missing or belong to another motion.
-    pub fn is_due(&self) -> bool {
+    /// Whether the equations are missing or belong to a motion farther away than this, metres (of the centroid or the rim).
+    pub fn is_due(&self, reach_m: f64) -> bool {
         self.evaluated.as_ref().is_none_or(|(at, _)| {
             let d = at - self.motion;
             let turn = RIM_M * d.fixed_rows::<3>(3).norm() + RIM_M * RIM_M * d.fixed_rows::<3>(6).norm();
-            d.fixed_rows::<3>(0).norm() + turn > REFRESH_M
+            d.fixed_rows::<3>(0).norm() + turn > reach_m
         })
     }
 
