@@ -112,6 +112,7 @@ impl Backdrop {
         let cracked = chance(rng, 0.4);
         let clouds = chance(rng, 0.5);
         let pebbles = sometimes(rng, 0.35, 0.1, 0.5);
+        let blotches = log_between(rng, 0.05, 0.6);
         let gravel = Field::sized(rng, Grain::Cells, 5.0, 40.0);
         let (sin, cos) = stripe_angle.sin_cos();
         for y in 0..canvas.height {
@@ -141,14 +142,14 @@ impl Backdrop {
                         )
                     }
                     BackdropKind::Ground => {
-                        let mut tone = 1.0 + 0.15 * rough + 0.12 * grain;
+                        let mut tone = (blotches * rough + 0.12 * grain).exp();
                         let mut height = 0.25 * grain;
                         if pebbles > 0.0 {
                             let pebble = smoothstep(pebbles, 0.6 * pebbles, gravel.at(px, py) + 0.05 * grain);
                             tone += 0.2 * pebble;
                             height += 3.0 * pebbles * pebble;
                         }
-                        (scaled(self.colour, tone.max(0.2)), height)
+                        (scaled(self.colour, tone.clamp(0.2, 3.0)), height)
                     }
                     BackdropKind::Plaster => {
                         let line = cracked && crack.at(px, py).abs() < 0.012;

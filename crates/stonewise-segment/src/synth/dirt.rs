@@ -19,6 +19,8 @@ pub struct Dirt {
     pub stains_px: f32,
     /// Strength of runs down the wall, 0 to 0.6.
     pub runs: f32,
+    /// Width over which a run sets in, 0.1 (a sharp line) to 1.4, in deviations of the noise.
+    pub runs_softness: f32,
     /// Share of the wall under moss, 0 to about 0.6.
     pub moss: f32,
     /// Share of the wall under lichen, 0 to about 0.4.
@@ -43,6 +45,7 @@ impl Dirt {
             stains: sometimes(rng, 2.0 * often, 0.05, 0.5),
             stains_px: log_between(rng, 40.0, 400.0),
             runs: sometimes(rng, often, 0.1, 0.6),
+            runs_softness: log_between(rng, 0.1, 1.4),
             moss: sometimes(rng, 0.6 * often, 0.05, 0.6),
             lichen: sometimes(rng, 0.6 * often, 0.05, 0.4),
             lichen_px: log_between(rng, 5.0, 30.0),
@@ -89,7 +92,7 @@ impl Dirt {
                     colour = mix(scaled(colour, tone), product(colour, stain), 0.5 * amount);
                 }
                 if self.runs > 0.0 {
-                    let amount = self.runs * smoothstep(0.2, 1.6, streaks.at(px, py));
+                    let amount = self.runs * smoothstep(0.2, 0.2 + self.runs_softness, streaks.at(px, py));
                     colour = scaled(colour, 1.0 - 0.8 * amount);
                 }
                 if self.soot > 0.0 {

@@ -77,7 +77,7 @@ impl Bond {
     /// A bond drawn at random: courses and rubble over a third each, squared blocks, bricks.
     pub(super) fn random(rng: &mut Rng) -> Self {
         let kind = between(rng, 0.0, 1.0);
-        if kind < 0.38 {
+        if kind < 0.32 {
             let regular = chance(rng, 0.4);
             Self::Courses(Courses {
                 aspect: log_between(rng, 0.9, 3.0),
@@ -86,7 +86,7 @@ impl Bond {
                 lean: if regular { 0.0 } else { between(rng, 0.0, 0.3) },
                 split: if regular { 0.0 } else { between(rng, 0.0, 0.35) },
             })
-        } else if kind < 0.72 {
+        } else if kind < 0.74 {
             Self::Rubble {
                 aspect: log_between(rng, 0.8, 2.2),
                 mixture: between(rng, 0.0, 0.8),

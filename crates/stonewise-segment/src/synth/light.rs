@@ -80,7 +80,7 @@ impl Light {
             cast: if overcast && chance(rng, 0.8) {
                 Vec::new()
             } else {
-                let count = (0..3).filter(|_| chance(rng, 0.25)).count();
+                let count = (0..3).filter(|_| chance(rng, 0.35)).count();
                 (0..count).map(|_| CastShadow::random(rng)).collect()
             },
         }

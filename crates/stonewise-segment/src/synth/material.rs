@@ -24,11 +24,11 @@ const COMMON_COLOURS: [[f32; 3]; 14] = [
 /// The stones' substance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// Mean colours, linear; every stone takes one of the one to three.
+    /// Mean colours, linear; every stone takes one of the one to six.
     pub colours: Vec<[f32; 3]>,
     /// Standard deviation of the logarithm of a stone's brightness, 0 to 0.35.
     pub tone_spread: f32,
-    /// The same per colour channel, 0 to 0.05.
+    /// The same per colour channel, 0 to 0.1.
     pub hue_spread: f32,
     /// Brightness of blotches within a stone, 0 to 0.25.
     pub mottle: f32,
@@ -82,7 +82,7 @@ pub struct FaceRelief {
 pub struct Mortar {
     /// Mean colour, linear.
     pub colour: [f32; 3],
-    /// Width of the joints in parts of the stones' size, 0.006 to 0.11; hairlines are 0 to 1 pixel.
+    /// Width of the joints in parts of the stones' size, 0.006 to 0.14; hairlines are 0 to 1 pixel.
     pub width: f32,
     /// Variation of the width from stone to stone, in parts of it, 0 to 0.7.
     pub width_spread: f32,
@@ -102,15 +102,27 @@ impl Material {
         } else {
             1.0
         };
+        // Fieldstones of every origin, or the stones of one or two quarries.
+        let is_mixed = chance(rng, 0.3);
         let mut colours = vec![stone_colour(rng)];
-        for _ in 0..usize::from(chance(rng, 0.25)) + usize::from(chance(rng, 0.15)) {
+        let others = if is_mixed {
+            2 + (between(rng, 0.0, 4.0) as usize)
+        } else {
+            usize::from(chance(rng, 0.25)) + usize::from(chance(rng, 0.15))
+        };
+        for _ in 0..others {
             let other = mix(colours[0], stone_colour(rng), between(rng, 0.2, 1.0));
             colours.push(other);
         }
+        let spread = if is_mixed {
+            between(rng, 0.4, 1.0)
+        } else {
+            between(rng, 0.0, 1.0)
+        };
         Self {
             colours,
-            tone_spread: between(rng, 0.0, 0.35) * between(rng, 0.0, 1.0),
-            hue_spread: between(rng, 0.0, 0.05) * between(rng, 0.0, 1.0),
+            tone_spread: between(rng, 0.0, 0.35) * spread,
+            hue_spread: between(rng, 0.0, if is_mixed { 0.1 } else { 0.05 }) * spread,
             mottle: busy * between(rng, 0.0, 0.25) * between(rng, 0.2, 1.0),
             accent: busy * sometimes(rng, 0.5, 0.1, 0.8),
             accent_softness: log_between(rng, 0.05, 1.2),
@@ -168,7 +180,7 @@ impl Mortar {
         let width = if hairline {
             between(rng, 0.0, 1.0) / stone_px
         } else {
-            log_between(rng, 0.006, 0.11).max(0.8 / stone_px)
+            log_between(rng, 0.006, 0.14).max(0.8 / stone_px)
         };
         let recess = match between(rng, 0.0, 1.0) {
             p if p < 0.3 => between(rng, -0.01, 0.005),

@@ -8,6 +8,7 @@
 //! Lengths are pixels of the photo unless a field says otherwise; pixel (0, 0) covers `[0, 1) x [0, 1)`.
 
 mod backdrop;
+mod building;
 mod camera;
 mod canvas;
 mod dirt;
@@ -71,7 +72,7 @@ impl MasonryStyle {
         let layers = scene::random_layers(viewpoint, width, height, &mut rng);
         let shorter = width.min(height) as f32;
         let smallest_px = layers.iter().map(Layer::stone_px).fold(shorter, f32::min);
-        let often = if chance(&mut rng, 0.4) { 0.4 } else { 0.05 };
+        let often = if chance(&mut rng, 0.45) { 0.45 } else { 0.08 };
         let count = (0..MAX_OBJECTS).filter(|_| chance(&mut rng, often)).count();
         let colour = layers.first().map_or([0.3; 3], Layer::colour);
         let mut objects = if chance(&mut rng, 0.06) {

@@ -1,7 +1,8 @@
 //! Things in front of the wall that are no stones: railings, pipes, cables, windows, doors, signs, targets, plants, people,
-//! ornaments.
+//! ornaments, small buildings.
 
 use super::backdrop::building_angle;
+use super::building::Facade;
 use super::canvas::Canvas;
 use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep};
 use super::material::{linear, stone_colour};
@@ -47,10 +48,16 @@ pub enum ObjectKind {
     Patch,
     /// A moulded band.
     Cornice,
+    /// A small house with smooth walls and a roof.
+    Building,
 }
 
-const KINDS: [ObjectKind; 10] = [
+/// From these one is drawn: railings and buildings, which stand before every dam, twice as often as the others.
+const KINDS: [ObjectKind; 13] = [
     ObjectKind::Railing,
+    ObjectKind::Railing,
+    ObjectKind::Building,
+    ObjectKind::Building,
     ObjectKind::Pipe,
     ObjectKind::Window,
     ObjectKind::Sign,
@@ -99,10 +106,11 @@ impl Object {
         let part = |low: f32, high: f32, rng: &mut Rng| shorter * log_between(rng, low, high);
         let long = 1.5 * shorter;
         let half_px = match kind {
-            ObjectKind::Railing => [part(0.2, 1.0, rng), part(0.1, 0.5, rng)],
+            ObjectKind::Railing => [part(0.2, 1.5, rng), part(0.1, 0.8, rng)],
             ObjectKind::Pipe => [log_between(rng, 0.7, (0.05 * shorter).max(1.0)), long],
             ObjectKind::Cornice => [part(0.015, 0.12, rng), long],
             ObjectKind::Window => [part(0.08, 0.35, rng), part(0.08, 0.4, rng)],
+            ObjectKind::Building => [part(0.1, 0.6, rng), part(0.15, 0.7, rng)],
             ObjectKind::Sign => [part(0.02, 0.15, rng), part(0.02, 0.15, rng)],
             ObjectKind::Target => [part(0.015, 0.07, rng); 2],
             ObjectKind::Plant | ObjectKind::Patch => [part(0.05, 0.35, rng), part(0.05, 0.35, rng)],
@@ -148,7 +156,9 @@ impl Object {
             },
             colours,
             stands_px: match kind {
-                ObjectKind::Railing | ObjectKind::Plant | ObjectKind::Person => between(rng, 2.0, 12.0),
+                ObjectKind::Railing | ObjectKind::Plant | ObjectKind::Person | ObjectKind::Building => {
+                    between(rng, 2.0, 12.0)
+                }
                 ObjectKind::Window => -between(rng, 0.0, 6.0),
                 _ => between(rng, 0.3, 4.0),
             },
@@ -197,6 +207,7 @@ struct Brush<'a> {
     rings: f32,
     round: bool,
     motif: Motif,
+    facade: Facade,
 }
 
 /// What an ornament shows.
@@ -210,12 +221,12 @@ enum Motif {
 impl<'a> Brush<'a> {
     fn new(object: &'a Object, rng: &mut Rng) -> Self {
         let widest = object.half_px[0].max(object.half_px[1]);
-        let bar = log_between(rng, 0.8, 7.0);
+        let bar = log_between(rng, 0.8, 10.0);
         Self {
             object,
             rough: Field::isotropic(rng, Grain::Fractal, (0.8 * widest).clamp(12.0, 150.0)),
             leaves: Field::sized(rng, Grain::Cells, 3.0, 14.0),
-            spacing: bar * between(rng, 3.0, 14.0),
+            spacing: bar * log_between(rng, 3.0, 45.0),
             bar,
             sectors: between(rng, 2.0, 9.0).floor(),
             rings: between(rng, 1.0, 6.0),
@@ -226,6 +237,7 @@ impl<'a> Brush<'a> {
                 2 => Motif::Lattice,
                 _ => Motif::Flutes,
             },
+            facade: Facade::random(rng),
         }
     }
 
@@ -330,6 +342,10 @@ impl<'a> Brush<'a> {
                     let colour = mix(main, second, smoothstep(0.2, -0.8, wave));
                     (scaled(colour, tone), deep * wave)
                 })
+            }
+            ObjectKind::Building => {
+                let plain = self.facade.at(x / half_x, y / half_y, main, second)?;
+                Some((scaled(plain, 1.0 + 0.05 * self.rough.at(x, y)), 0.0))
             }
             ObjectKind::Patch => {
                 let rough = self.rough.at(x, y);

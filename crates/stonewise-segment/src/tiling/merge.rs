@@ -14,7 +14,7 @@ const SAME_STONE_SHARE: f64 = 0.5;
 /// Chooses among candidates and lays them on a photo from best to worst.
 ///
 /// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone, and come after all whole
-/// ones: only stones larger than the overlap at every scale are made of them. Of the rest the higher score wins, then the finer scale.
+/// ones: only stones larger than the overlap at every scale are made of them. A cut mask of which the neighbouring tile knows nothing is dropped. Of the rest the higher score wins, then the finer scale.
 pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &TilingOptions) -> Segmentation {
     let (cut, whole): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
     let mut all = choose(best_first(whole));
@@ -77,7 +77,7 @@ fn without_fragments(painted: &LabelImage, scores: &[f32], min_area_px: u32) -> 
     }
 }
 
-/// Cut masks, joined where neighbouring tiles show parts of one stone. Cost: O(n^2) tests of rectangles.
+/// Cut masks of which neighbouring tiles show parts of one stone, joined; the others are left out. Cost: O(n^2) tests of rectangles.
 fn joined(cut: Vec<Candidate>) -> Vec<Candidate> {
     let mut group: Vec<usize> = (0..cut.len()).collect();
     for second in 0..cut.len() {
@@ -95,7 +95,8 @@ fn joined(cut: Vec<Candidate>) -> Vec<Candidate> {
             .or_default()
             .push(candidate);
     }
-    members.into_values().map(|members| union(&members)).collect()
+    let several = members.into_values().filter(|members| members.len() > 1);
+    several.map(|members| union(&members)).collect()
 }
 
 fn root(group: &mut [usize], mut index: usize) -> usize {
@@ -151,5 +152,43 @@ fn for_each_pixel(mask: &Patch, mut act: impl FnMut(u32, u32)) {
         for (x, _) in row.iter().enumerate().filter(|(_, set)| **set) {
             act(mask.left + x as u32, mask.top + y as u32);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Rect;
+    use super::*;
+
+    /// A mask over `columns` of the photo's rows 10 to 30, cut by the border of a tile that begins at a column; tiles are 60 x 60 pixels.
+    fn cut(columns: std::ops::Range<u32>, tile_left: u32) -> Candidate {
+        let (width, height) = (columns.end - columns.start, 20);
+        Candidate {
+            mask: Patch {
+                left: columns.start,
+                top: 10,
+                pixels: Raster::filled(width, height, true),
+            },
+            area: width * height,
+            score: 0.9,
+            scale: 0,
+            tile: Rect {
+                left: tile_left,
+                top: 0,
+                width: 60,
+                height: 60,
+            },
+            is_cut: true,
+        }
+    }
+
+    #[test]
+    fn a_cut_mask_counts_where_the_neighbouring_tile_shows_the_stone_too() {
+        let stones = |all: Vec<Candidate>| merge(all, 100, 60, &TilingOptions::default());
+        let (left, right) = (cut(20..60, 0), cut(40..80, 40));
+        assert!(stones(vec![left.clone()]).scores.is_empty());
+        let both = stones(vec![left, right]);
+        let pixels = both.labels.data().iter().filter(|&&label| label == 1).count();
+        assert_eq!((both.scores.len(), pixels), (1, 60 * 20));
     }
 }
