@@ -82,14 +82,31 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         }
         _ => None,
     };
+    let at = |p: &Point3<f64>| match &field {
+        Some(field) => field.displacement_at(p),
+        None if case == Case::Crack && crack.distance(p) > 0.0 => Vector3::new(0.003, 0.008, 0.005),
+        None => Vector3::zeros(),
+    };
+    let rows = read_truth(&folder.join("stones.csv"), sensor);
+    if !combo {
+        // A crack runs along joints: a stone moves as one, what is no stone where it lies.
+        for (id, points) in &mut second {
+            let of_stone = (case == Case::Crack && rows.contains_key(id))
+                .then(|| first.get(id))
+                .flatten()
+                .map(|points| at(&mean(points)));
+            points
+                .iter_mut()
+                .for_each(|p| *p += of_stone.unwrap_or_else(|| at(p)));
+        }
+    }
     let mut truth = BTreeMap::new();
-    for (id, mut row) in read_truth(&folder.join("stones.csv"), sensor) {
+    for (id, mut row) in rows {
         let Some(points) = first.get(&id) else { continue };
         let c = mean(points);
         let turn = Rotation3::new(row.rotation);
-        let moved = second.get_mut(&id);
         if case == Case::Datum {
-            for p in moved.into_iter().flatten() {
+            for p in second.get_mut(&id).into_iter().flatten() {
                 *p = row.centroid + turn.inverse() * (*p - row.centroid - row.truth.displacement);
             }
             row.truth.displacement = Vector3::zeros();
@@ -97,13 +114,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         } else if combo {
             row.truth.displacement += turn * (c - row.centroid) - (c - row.centroid);
         } else {
-            let at = |p: &Point3<f64>| match &field {
-                Some(field) => field.displacement_at(p),
-                None if case == Case::Crack && crack.distance(&c) > 0.0 => Vector3::new(0.003, 0.008, 0.005),
-                None => Vector3::zeros(),
-            };
             row.truth.displacement = at(&c);
-            moved.into_iter().flatten().for_each(|p| *p += at(p));
         }
         truth.insert(id, row.truth);
     }

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use stonewise_core::cloud::Cloud;
 use stonewise_core::geometry::{Bounds, Plane};
 use stonewise_core::id::StoneId;
@@ -97,15 +98,17 @@ impl Trial {
                         .collect()
                 };
                 let [one, two] = [near(0, Vector3::zeros()), near(1, *shift)];
-                let [inner, inner_second] = stone_points([&one, &two], &normal, shift, border_noises);
+                let chosen = stone_points([&one, &two], &normal, shift, border_noises);
                 Some(PairPoints {
                     first: StoneId(id),
                     second: StoneId(id),
                     centroid,
                     centroid_second: mean(other),
                     normal,
-                    points_first: Cloud::new(centroid, inner),
-                    points_second: Cloud::new(centroid, inner_second),
+                    points_first: Cloud::new(centroid, chosen.first),
+                    points_second: Cloud::new(centroid, chosen.second),
+                    nearby_second: Cloud::new(centroid, chosen.nearby_second),
+                    window: chosen.window.map(Arc::new),
                 })
             })
             .collect()

@@ -162,6 +162,51 @@ impl BandFactor {
     }
 }
 
+/// The entries of an inverse that lie in the band of the matrix.
+pub(super) struct BandInverse(Band);
+
+impl BandInverse {
+    /// Rows `first ..= first + count - 1` of column `column`, all in the band and not above the diagonal.
+    pub fn column_part(&self, column: usize, first: usize, count: usize) -> &[f64] {
+        let start = column * self.0.stride + first - column;
+        &self.0.columns[start..start + count]
+    }
+}
+
+impl BandFactor {
+    /// The inverse within the band, column by column from the last (Takahashi, Fagan & Chen 1973). Cost: size * half^2
+    /// multiplications.
+    pub fn inverse(&self) -> BandInverse {
+        let Band {
+            size, half, stride, ..
+        } = self.0;
+        let mut inverse = Band::zeros(size, half);
+        let mut sums = vec![0.0; half];
+        for j in (0..size).rev() {
+            let [pivot, below @ ..] = self.0.column(j) else {
+                continue;
+            };
+            let sums = &mut sums[..below.len()];
+            sums.fill(0.0);
+            let (before, known) = inverse.columns.split_at_mut((j + 1) * stride);
+            for (k, l) in below.iter().enumerate() {
+                let column = &known[k * stride..][..below.len() - k];
+                let (here, after) = sums[k..].split_at_mut(1);
+                here[0] += l * column[0] + dot(&column[1..], &below[k + 1..]);
+                for (sum, z) in after.iter_mut().zip(&column[1..]) {
+                    *sum += l * z;
+                }
+            }
+            let target = &mut before[j * stride..];
+            for (entry, sum) in target[1..].iter_mut().zip(&*sums) {
+                *entry = -pivot * sum;
+            }
+            target[0] = pivot * (pivot - dot(below, &target[1..]));
+        }
+        BandInverse(inverse)
+    }
+}
+
 /// Sum of products in lanes, so that no product waits for the sum before it. The longer of the two is cut.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
@@ -212,6 +257,17 @@ mod tests {
         let quadratic: f64 = half_solved.iter().map(|r| r[0] * r[1] / 2.0).sum();
         let direct: f64 = rhs.iter().zip(&expected).map(|(r, e)| r[0] * e).sum();
         assert!((quadratic - direct).abs() < 1e-12);
+        let inverse = factor.inverse();
+        let expected_inverse = dense.try_inverse().unwrap();
+        for j in 0..size {
+            for (k, entry) in inverse
+                .column_part(j, j, (half + 1).min(size - j))
+                .iter()
+                .enumerate()
+            {
+                assert!((entry - expected_inverse[(j + k, j)]).abs() < 1e-12);
+            }
+        }
         factor.solve(&mut rhs);
         assert!(rhs.iter().zip(&expected).all(|(r, e)| (r[0] - e).abs() < 1e-12));
     }

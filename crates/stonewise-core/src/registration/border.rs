@@ -2,8 +2,9 @@
 //!
 //! Whether a noisy point there gets the stone's label depends on its noise, and on where the photos that voted stood: the heights of
 //! labelled points are biased along the border, differently in every epoch and alike for all stones. So near the border a point's
-//! place in the face decides, not its label: points that noise moved in and points that it moved out then balance. The border of
-//! the first epoch serves both, moved as the stones around moved.
+//! place in the face decides, not its label: points that noise moved in and points that it moved out then balance. Both epochs have
+//! the same borders, moved as the stones around moved: those of each, because an outline encloses the stray points of the epoch it
+//! was drawn around and cuts off those of the other, which biases the motion of the whole wall.
 
 use super::survey::middle;
 use crate::cloud::GridIndex;
@@ -16,6 +17,8 @@ const NOISE_SAMPLES: usize = 300;
 const DEPTH_TAIL: f64 = 0.02;
 /// Noise levels by which the depth of a stone is widened.
 const DEPTH_NOISES: f64 = 4.0;
+/// How much farther than its neighbours' shift a stone may be followed into points without its label, metres.
+const REACH_M: f64 = 0.03;
 /// Neighbours whose shifts, in the median, say where the border lies in the second epoch.
 const SHIFT_NEIGHBOURS: usize = 12;
 
@@ -28,25 +31,55 @@ pub struct NearPoint {
     pub labelled: bool,
 }
 
+/// The points of a stone, chosen from all points near it, and the window in which they count.
+#[derive(Clone, Debug)]
+pub struct StonePoints {
+    /// Of the first epoch: those in the window.
+    pub first: Vec<[f32; 3]>,
+    /// Of the second epoch: those with the label, in or out of the window, which moves with the stone.
+    pub second: Vec<[f32; 3]>,
+    /// Of the second epoch: those without the label that may lie in the window.
+    pub nearby_second: Vec<[f32; 3]>,
+    /// `None`: all points count.
+    pub window: Option<Window>,
+}
+
 /// The points of a stone in both epochs, from all points near it, in their order.
 ///
-/// Farther inside the outline of the first epoch's labelled points than `border_noises` times their noise, labelled points belong to
-/// the stone. Nearer to the outline all points inside do, whatever their label, if they lie no deeper and no farther out than the
-/// labelled ones. `shift`: how the outline moved, second epoch minus first. Labelled points alone where no outline can be found, or
-/// where `border_noises` is 0.
+/// Farther inside the outlines of both epochs' labelled points than `border_noises` times their noise, labelled points belong to the
+/// stone. Nearer to an outline all points inside both do, whatever their label, if they lie no deeper and no farther out than the
+/// labelled ones. `shift`: how the stone's place moved, second epoch minus first, about. Labelled points alone where no outline can be
+/// found, or where `border_noises` is 0.
 pub fn stone_points(
     near: [&[NearPoint]; 2],
     normal: &Vector3<f64>,
     shift: &Vector3<f64>,
     border_noises: f64,
-) -> [Vec<[f32; 3]>; 2] {
-    let labelled: Vec<[f32; 3]> = labelled(near[0]);
-    match Region::new(&labelled, normal, border_noises) {
-        Some(region) => [
-            region.members(near[0], &Vector3::zeros()),
-            region.members(near[1], shift),
-        ],
-        None => [labelled, self::labelled(near[1])],
+) -> StonePoints {
+    let [first, second] = near.map(labelled);
+    match Window::new([&first, &second], normal, shift, border_noises) {
+        Some(window) => StonePoints {
+            first: near[0]
+                .iter()
+                .filter(|p| window.holds(&window.place(&p.offset), p.labelled))
+                .map(|p| p.offset)
+                .collect(),
+            second,
+            nearby_second: near[1]
+                .iter()
+                .filter(|p| {
+                    !p.labelled && window.is_near(&(window.place(&p.offset) - window.face_from_world * shift))
+                })
+                .map(|p| p.offset)
+                .collect(),
+            window: Some(window),
+        },
+        None => StonePoints {
+            first,
+            second,
+            nearby_second: Vec::new(),
+            window: None,
+        },
     }
 }
 
@@ -70,54 +103,101 @@ fn labelled(near: &[NearPoint]) -> Vec<[f32; 3]> {
     near.iter().filter(|p| p.labelled).map(|p| p.offset).collect()
 }
 
-/// The part of space that a stone's face takes.
-struct Region {
+/// The part of a stone's face that both epochs show, about its centroid in the first. In the second it moves with the stone: were it
+/// put where the stone is thought to be, the points' edge would pull the stone's motion away from there, by as much as the thought
+/// was wrong in noisy clouds.
+#[derive(Clone, Debug)]
+pub struct Window {
     face_from_world: Matrix3<f64>,
-    ring: Vec<Point2<f64>>,
-    /// Width of the border along the inside of the ring.
+    /// Outline of each epoch, in the place of the first.
+    rings: [Vec<Point2<f64>>; 2],
+    /// Width of the border along the inside of the rings.
     border_m: f64,
     /// Lowest and highest place across the face.
     depth: [f64; 2],
 }
 
-impl Region {
-    fn new(labelled: &[[f32; 3]], normal: &Vector3<f64>, border_noises: f64) -> Option<Self> {
+impl Window {
+    fn new(
+        labelled: [&[[f32; 3]]; 2],
+        normal: &Vector3<f64>,
+        shift: &Vector3<f64>,
+        border_noises: f64,
+    ) -> Option<Self> {
         if border_noises <= 0.0 {
             return None;
         }
         let face_from_world = FaceFrame::from_normal(normal).face_from_world();
-        let local: Vec<Point3<f64>> = labelled.iter().map(|p| place(&face_from_world, p)).collect();
+        let first = Face::new(labelled[0], &face_from_world, &Vector3::zeros())?;
+        let second = Face::new(labelled[1], &face_from_world, shift)?;
+        Some(Self {
+            face_from_world,
+            border_m: border_noises * first.noise_m.max(second.noise_m),
+            depth: [
+                first.depth[0].max(second.depth[0]),
+                first.depth[1].min(second.depth[1]),
+            ],
+            rings: [first.ring, second.ring],
+        })
+    }
+
+    /// From world axes to the window's: along, up and out of the face.
+    pub(super) fn face_from_world(&self) -> &Matrix3<f64> {
+        &self.face_from_world
+    }
+
+    /// Whether a point counts that lies here, in the window's axes about the stone's centroid.
+    pub(super) fn holds(&self, at: &Point3<f64>, labelled: bool) -> bool {
+        let (flat, [low, high]) = (at.xy(), self.depth);
+        let is_close = |ring: &Vec<Point2<f64>>| distance_to_ring(ring, &flat) < self.border_m;
+        self.rings.iter().all(|ring| is_inside(ring, &flat))
+            && match self.rings.iter().any(is_close) {
+                true => at.z > low && at.z < high,
+                false => labelled,
+            }
+    }
+
+    /// Whether a point that lies here may come to lie in the window once the stone's motion is known better.
+    fn is_near(&self, at: &Point3<f64>) -> bool {
+        let flat = at.xy();
+        let is_near =
+            |ring: &Vec<Point2<f64>>| is_inside(ring, &flat) || distance_to_ring(ring, &flat) < REACH_M;
+        self.rings.iter().all(is_near)
+    }
+
+    fn place(&self, offset: &[f32; 3]) -> Point3<f64> {
+        place(&self.face_from_world, offset)
+    }
+}
+
+/// Outline, noise and depth of a stone's labelled points in one epoch.
+struct Face {
+    ring: Vec<Point2<f64>>,
+    noise_m: f64,
+    depth: [f64; 2],
+}
+
+impl Face {
+    fn new(labelled: &[[f32; 3]], face_from_world: &Matrix3<f64>, shift: &Vector3<f64>) -> Option<Self> {
+        let shift = face_from_world * shift;
+        let local: Vec<Point3<f64>> = labelled
+            .iter()
+            .map(|p| place(face_from_world, p) - shift)
+            .collect();
         let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
         let ring = outline(&flat, &OutlineParams::default())?;
-        let noise = noise_m(&local, signed_area(&ring).abs().sqrt());
+        let noise_m = noise_m(&local, signed_area(&ring).abs().sqrt());
         let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
         heights.sort_by(f64::total_cmp);
         let tail = (DEPTH_TAIL * heights.len() as f64) as usize;
         Some(Self {
-            face_from_world,
             ring,
-            border_m: border_noises * noise,
+            noise_m,
             depth: [
-                heights[tail] - DEPTH_NOISES * noise,
-                heights[heights.len() - 1 - tail] + DEPTH_NOISES * noise,
+                heights[tail] - DEPTH_NOISES * noise_m,
+                heights[heights.len() - 1 - tail] + DEPTH_NOISES * noise_m,
             ],
         })
-    }
-
-    fn members(&self, near: &[NearPoint], shift: &Vector3<f64>) -> Vec<[f32; 3]> {
-        let shift = self.face_from_world * shift;
-        near.iter()
-            .filter(|p| {
-                let at = place(&self.face_from_world, &p.offset) - shift;
-                let (flat, [low, high]) = (at.xy(), self.depth);
-                is_inside(&self.ring, &flat)
-                    && match distance_to_ring(&self.ring, &flat) < self.border_m {
-                        true => at.z > low && at.z < high,
-                        false => p.labelled,
-                    }
-            })
-            .map(|p| p.offset)
-            .collect()
     }
 }
 
@@ -211,17 +291,43 @@ mod tests {
         let second = seen_from(-1.0, &shift, 2);
         let near = [first.as_slice(), second.as_slice()];
         let by_label = stone_points(near, &Vector3::x(), &shift, 0.0);
-        let [left, right] = ends(&by_label[0], &Vector3::zeros());
+        let [left, right] = ends(&by_label.first, &Vector3::zeros());
         assert!(left > 0.003 && right < -0.003, "{left} {right}");
-        let [left, right] = ends(&by_label[1], &shift);
+        let [left, right] = ends(&by_label.second, &shift);
         assert!(left < -0.003 && right > 0.003, "{left} {right}");
         let by_place = stone_points(near, &Vector3::x(), &shift, 3.0);
-        for (points, shift) in by_place.iter().zip([Vector3::zeros(), shift]) {
+        for (points, shift) in counting(&by_place, &shift).iter().zip([Vector3::zeros(), shift]) {
             let [left, right] = ends(points, &shift);
             assert!(left.abs() < 1e-3 && right.abs() < 1e-3, "{left} {right}");
             let side = (points.len() as f64).sqrt() * 0.004;
             assert!((side - 0.41).abs() < 0.02, "{side}");
         }
+    }
+
+    /// Points of both epochs that count when the second moved by `shift`.
+    fn counting(found: &StonePoints, shift: &Vector3<f64>) -> [Vec<[f32; 3]>; 2] {
+        let Some(window) = &found.window else {
+            return [found.first.clone(), found.second.clone()];
+        };
+        let there = |p: &&[f32; 3], labelled: bool| {
+            let at = window.face_from_world() * (Vector3::from(p.map(f64::from)) - shift);
+            window.holds(&Point3::from(at), labelled)
+        };
+        let stone = found.second.iter().filter(|p| there(p, true));
+        let nearby = found.nearby_second.iter().filter(|p| there(p, false));
+        [found.first.clone(), stone.chain(nearby).copied().collect()]
+    }
+
+    #[test]
+    fn no_epoch_is_treated_unlike_the_other() {
+        let shift = Vector3::new(0.03, 0.01, -0.02);
+        let (first, second) = (seen_from(1.0, &Vector3::zeros(), 1), seen_from(-1.0, &shift, 2));
+        let one_way = stone_points([&first, &second], &Vector3::x(), &shift, 3.0);
+        let other_way = stone_points([&second, &first], &Vector3::x(), &-shift, 3.0);
+        let [a, b] = counting(&one_way, &shift).map(|points| points.len());
+        let [d, c] = counting(&other_way, &-shift).map(|points| points.len());
+        assert!(a.abs_diff(c) < 10 && b.abs_diff(d) < 10, "{a} {b} {c} {d}");
+        assert!(a.abs_diff(b) < 100, "{a} {b}");
     }
 
     #[test]
@@ -231,13 +337,12 @@ mod tests {
         for p in near.iter_mut().filter(|p| hole(p)) {
             p.labelled = false;
         }
-        let [first, _] = stone_points([&near, &near], &Vector3::x(), &Vector3::zeros(), 3.0);
+        let first = stone_points([&near, &near], &Vector3::x(), &Vector3::zeros(), 3.0).first;
         assert!(!first.iter().any(|p| p[1].abs() < 0.04 && p[2].abs() < 0.04));
         let few = &near[..3];
-        assert_eq!(
-            stone_points([few, few], &Vector3::x(), &Vector3::zeros(), 3.0),
-            [labelled(few), labelled(few)]
-        );
+        let found = stone_points([few, few], &Vector3::x(), &Vector3::zeros(), 3.0);
+        assert!(found.window.is_none() && found.nearby_second.is_empty());
+        assert_eq!([found.first, found.second], [labelled(few), labelled(few)]);
     }
 
     #[test]

@@ -8,6 +8,10 @@ use super::survey::median;
 
 /// Cells that a stone needs to be judged.
 const CELLS: usize = 10;
+/// The same for slopes, where cells have different weights.
+const SLOPE_CELLS: f64 = 4.0;
+/// Stones that a survey needs to be judged.
+const STONES: usize = 10;
 /// Cells' worth of belief that a stone's noise is that of the survey.
 const PRIOR_CELLS: f64 = 30.0;
 /// A cell counts no more than this: a single disturbed cell does not condemn a stone.
@@ -20,6 +24,8 @@ pub(super) struct Correlation {
     pub small: f64,
     /// In larger cells: also what is shared over decimetres.
     pub large: f64,
+    /// The same of what the small cells' slopes say of motions in the face: points err more at steep rims.
+    pub slopes: f64,
 }
 
 impl Correlation {
@@ -27,6 +33,7 @@ impl Correlation {
     pub const NONE: Self = Self {
         small: 1.0,
         large: 1.0,
+        slopes: 1.0,
     };
 
     /// `fitted`: how many unknowns each stone's own points determined, which their cells lack.
@@ -36,12 +43,15 @@ impl Correlation {
                 .iter()
                 .filter_map(|(e, fitted)| excess(cells(e), *fitted))
                 .collect();
-            let middle = median(&mut ratios).filter(|_| ratios.len() >= 10);
+            let middle = median(&mut ratios).filter(|_| ratios.len() >= STONES);
             middle.unwrap_or(1.0).max(1.0)
         };
+        let mut slopes: Vec<f64> = stones.iter().filter_map(|(e, _)| slope_excess(e)).collect();
+        let middle = median(&mut slopes).filter(|_| slopes.len() >= STONES);
         Self {
             small: at(|e| &e.differences),
             large: at(|e| &e.coarse_differences),
+            slopes: middle.unwrap_or(1.0).max(1.0),
         }
     }
 
@@ -58,6 +68,13 @@ pub(super) fn stone_factor(stone: &Equations, fitted: f64, survey: f64) -> f64 {
     ((PRIOR_CELLS + sum) / (PRIOR_CELLS + (cells - fitted).max(0.0))).max(1.0)
 }
 
+/// Factor on the variances of one stone's motion in the face, for the survey's factor on them; at least 1.
+pub(super) fn stone_slope_factor(stone: &Equations, survey: f64) -> f64 {
+    let freedom = slope_freedom(stone);
+    let ratio = slope_ratio(stone).min(CAP * survey);
+    ((PRIOR_CELLS * survey + freedom * ratio) / (PRIOR_CELLS + freedom)).max(1.0)
+}
+
 /// Variance, m^2, of an error that all points of a stone share, in any direction, per octave of length.
 ///
 /// Correlation of neighbouring points alone raises small and larger cells by the same factor; what larger cells have beyond that does
@@ -71,9 +88,34 @@ pub(super) fn shared_variance(stones: &[&Equations], correlation: &Correlation) 
     median(&mut variances).unwrap_or(0.0) * (correlation.large - correlation.small).max(0.0)
 }
 
+/// How much more a stone's cells scatter in what their slopes say than noise alone explains: the ratio of an empirical to a model
+/// variance of the motion (White 1980).
+fn slope_ratio(stone: &Equations) -> f64 {
+    let [found, expected] = stone
+        .slopes
+        .map(|s| s.sums())
+        .iter()
+        .fold([0.0; 2], |a, s| [a[0] + s[0], a[1] + s[1]]);
+    if expected > 0.0 { found / expected } else { 1.0 }
+}
+
+fn slope_freedom(stone: &Equations) -> f64 {
+    stone.slopes.iter().map(|s| s.freedom()).sum()
+}
+
+/// [`slope_ratio`], made comparable in the median.
+fn slope_excess(stone: &Equations) -> Option<f64> {
+    let freedom = slope_freedom(stone);
+    (freedom >= SLOPE_CELLS).then(|| slope_ratio(stone) / median_of_law(freedom))
+}
+
+/// Median of a chi-square variable over its mean (Wilson & Hilferty 1931).
+fn median_of_law(freedom: f64) -> f64 {
+    (1.0 - 2.0 / (9.0 * freedom)).powi(3)
+}
+
 /// Mean of a stone's cells over that of independent points, made comparable in the median.
 fn excess(cells: &[f64], fitted: f64) -> Option<f64> {
     let freedom = (cells.len() as f64 - fitted).max(1.0);
-    let median_of_law = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
-    (cells.len() >= CELLS).then(|| cells.iter().sum::<f64>() / freedom / median_of_law)
+    (cells.len() >= CELLS).then(|| cells.iter().sum::<f64>() / freedom / median_of_law(freedom))
 }

@@ -4,9 +4,11 @@
 //! translation of the centroid (m), rotation vector (rad) and bending (1/m: second derivatives uu, uv, vv of an
 //! out-of-plane distortion; masonry does not bend, but a motion field prescribed for a survey may).
 
+use super::border::Window;
 use super::pairs::PairPoints;
 use super::patch::{Observation, PatchFit, PatchGrid, SurfaceNoise};
-use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, SMatrix, SVector, Vector3};
+use std::sync::Arc;
 
 /// Number of unknowns of a stone.
 pub(super) const UNKNOWNS: usize = 9;
@@ -29,7 +31,12 @@ pub(super) struct Layout {
 /// Points of both epochs in the stone's frame, the second unmoved.
 pub(super) struct LocalPair {
     pub first: Vec<[f64; 3]>,
-    pub second: Vec<[f64; 3]>,
+    /// Those with the stone's label, then those nearby without it.
+    second: Vec<[f64; 3]>,
+    /// How many of the second have the label.
+    labelled: usize,
+    /// Where points count, and from the stone's frame to the window's.
+    window: Option<(Arc<Window>, Matrix3<f64>)>,
 }
 
 impl LocalPair {
@@ -38,12 +45,35 @@ impl LocalPair {
             let shift = cloud.origin() - pair.centroid;
             (0..cloud.len())
                 .map(|i| (face_from_world * (cloud.local(i).coords + shift)).into())
-                .collect()
+                .collect::<Vec<[f64; 3]>>()
         };
+        let mut second = local(&pair.points_second);
+        let labelled = second.len();
+        second.extend(local(&pair.nearby_second));
         Self {
             first: local(&pair.points_first),
-            second: local(&pair.points_second),
+            second,
+            labelled,
+            window: pair
+                .window
+                .as_ref()
+                .map(|w| (w.clone(), w.face_from_world() * face_from_world.transpose())),
         }
+    }
+
+    /// The second epoch's points in the window, where that moved by `window`, moved back by `motion`.
+    fn second_moved_back<'a>(
+        &'a self,
+        motion: &'a Moved,
+        window: &'a Moved,
+    ) -> impl Iterator<Item = [f64; 3]> + 'a {
+        self.second.iter().enumerate().filter_map(move |(i, q)| {
+            let counts = self.window.as_ref().is_none_or(|(part, turn)| {
+                let at = turn * Vector3::from(window.undo(q));
+                part.holds(&Point3::from(at), i < self.labelled)
+            });
+            counts.then(|| motion.undo(q))
+        })
     }
 }
 
@@ -64,21 +94,69 @@ pub(super) struct Equations {
     pub coarse_differences: Vec<f64>,
     /// Expected variances behind `coarse_differences`, m^2.
     pub coarse_variances: Vec<f64>,
+    /// Scatter of what the cells' slopes say of a motion along u and v.
+    pub slopes: [SlopeScatter; 2],
     /// Root mean square of the second epoch's residuals, metres.
     pub rms_m: f64,
     /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
     pub scatter: [(f64, f64); 2],
 }
 
+/// Sums over a stone's small cells, each of which tells a motion in the face from its own slopes, with the weight of its points.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SlopeScatter {
+    weights: f64,
+    squares: f64,
+    /// Motion times weight, times the square of the weight, and its square times that.
+    products: [f64; 3],
+}
+
+impl SlopeScatter {
+    fn add(&mut self, motion: f64, weight: f64) {
+        self.weights += weight;
+        self.squares += weight * weight;
+        self.products[0] += weight * motion;
+        self.products[1] += weight * weight * motion;
+        self.products[2] += (weight * motion).powi(2);
+    }
+
+    /// Sum of the squared weighted distances from the mean, and what noise alone would make it.
+    pub fn sums(&self) -> [f64; 2] {
+        if self.weights <= 0.0 {
+            return [0.0; 2];
+        }
+        let [first, second, third] = self.products;
+        let mean = first / self.weights;
+        let found = third - 2.0 * mean * second + mean * mean * self.squares;
+        [found, self.weights - self.squares / self.weights]
+    }
+
+    /// How many cells of equal weight would scatter as reliably, less one for the mean.
+    pub fn freedom(&self) -> f64 {
+        (self.weights * self.weights / self.squares.max(f64::MIN_POSITIVE) - 1.0).max(0.0)
+    }
+}
+
 /// Points in each epoch that a patch needs to say anything.
 const PATCH_POINTS: usize = 12;
+/// Weight of the points of an epoch that a cell needs.
+const CELL_POINTS: f64 = 3.0;
+/// The same, times the square of the slope: less says nothing of motions in the face.
+const LEAST_SLOPE: f64 = 1e-3;
 /// Side of the small cells in which the epochs are compared, in cells of the surface.
 const COMPARE_CELLS: f64 = 4.0;
 
-/// Normal equations at motion `x`. Cost: points, plus coefficients times patch width squared.
-pub(super) fn equations(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, layout: &Layout) -> Equations {
+/// Normal equations at motion `x`, of the points in the stone's window where that moved by `window`. Cost: points, plus coefficients
+/// times patch width squared.
+pub(super) fn equations(
+    pair: &LocalPair,
+    x: &Motion9,
+    window: &Motion9,
+    noise: &SurfaceNoise,
+    layout: &Layout,
+) -> Equations {
     let motion = Moved::new(x);
-    let patches = cut(pair, &motion, layout);
+    let patches = cut(pair, &motion, &Moved::new(window), layout);
     let mut sum = Equations {
         information: Matrix9::zeros(),
         gradient: Motion9::zeros(),
@@ -87,6 +165,7 @@ pub(super) fn equations(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, lay
         differences: Vec::new(),
         coarse_differences: Vec::new(),
         coarse_variances: Vec::new(),
+        slopes: [SlopeScatter::default(); 2],
         rms_m: 0.0,
         scatter: [(0.0, 0.0); 2],
     };
@@ -166,7 +245,7 @@ pub(super) struct Patches {
 }
 
 /// Cuts the face of the first epoch into patches and gives each its points.
-pub(super) fn cut(pair: &LocalPair, motion: &Moved, layout: &Layout) -> Patches {
+pub(super) fn cut(pair: &LocalPair, motion: &Moved, window: &Moved, layout: &Layout) -> Patches {
     let margin = 2.0 * layout.cell_m;
     let mut low = [f64::INFINITY; 2];
     let mut high = [f64::NEG_INFINITY; 2];
@@ -187,7 +266,7 @@ pub(super) fn cut(pair: &LocalPair, motion: &Moved, layout: &Layout) -> Patches 
     let step = [0, 1].map(|a| (high[a] - low[a]) / count[a] as f64);
     let mut epochs = vec![[Vec::new(), Vec::new()]; count[0] * count[1]];
     let mut compare = Compare::new(low, high, COMPARE_CELLS * layout.cell_m);
-    let moved = pair.second.iter().map(|q| (1, motion.undo(q)));
+    let moved = pair.second_moved_back(motion, window).map(|p| (1, p));
     for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
         let at = [0, 1].map(|a| ((p[a] - low[a]) / step[a]).floor());
         compare.count(epoch, &p);
@@ -229,7 +308,10 @@ fn add_patch(
         return;
     };
     let mut coupling = vec![[0.0; UNKNOWNS]; patch.grid.coefficient_count()];
-    let mut compare = Compare::new(patch.grid.low(), patch.grid.high(), COMPARE_CELLS * layout.cell_m);
+    let inverse = fit.factor.inverse();
+    let small = || Compare::new(patch.grid.low(), patch.grid.high(), COMPARE_CELLS * layout.cell_m);
+    let mut compare = small();
+    let mut slopes = [small(), small()];
     let half = 0.5
         * (0..2)
             .map(|a| patch.grid.high()[a] - patch.grid.low()[a])
@@ -242,17 +324,28 @@ fn add_patch(
             let [h, hu, hv] = fit.surface(u, v);
             let r = z - h;
             let weight = steepness([hu, hv]);
-            compare.add(epoch, &o.position, r, weight);
-            coarse.add(epoch, &o.position, r, weight);
+            compare.add(epoch, &o.position, weight * r, weight);
+            coarse.add(epoch, &o.position, weight * r, weight);
+            for (compare, slope) in slopes.iter_mut().zip([hu, hv]) {
+                let w = o.weight * slope;
+                compare.add(epoch, &o.position, w * r, w * slope);
+            }
             sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
             sum.scatter[epoch].1 += 1.0;
             sum.deviance += o.weight * r * r / (sigma * sigma);
+            let w = o.weight / (sigma * sigma);
+            let row = motion.jacobian(&o.position, [hu, hv]);
+            let j = Motion9::from(row);
+            // The surface follows each point a little, most at the edge of the points, and takes the slope with it: residuals and
+            // slopes are correlated by minus this covariance, which the gradient of the determinant makes good.
+            let bias = motion.jacobian(&o.position, fit.slope_covariance(u, v, &inverse));
+            let level = motion.jacobian(&o.position, [0.0; 2]);
+            let bias = Motion9::from(bias) - Motion9::from(level);
+            // What matters is the motion of one epoch against the other: half a step of each. Where the surface cannot follow the
+            // stone, at joints, both epochs' residuals are alike, and that drops out.
+            sum.gradient += (j * r - bias) * (w * [-0.5, 0.5][epoch]);
             if epoch == 1 {
-                let w = o.weight / (sigma * sigma);
-                let row = motion.jacobian(&o.position, [hu, hv]);
                 fit.scatter(u, v, w, &row, &mut coupling);
-                let j = Motion9::from(row);
-                sum.gradient += j * (w * r);
                 sum.information.syger(w, &j, &j, 1.0);
             }
         }
@@ -265,11 +358,17 @@ fn add_patch(
         sum.information.syger(-1.0, &c, &c, 1.0);
     }
     sum.information.fill_upper_triangle_with_lower_triangle();
-    sum.differences
-        .extend(compare.differences(&noise.sigma_m).map(|d| d.0));
-    for (difference, variance) in coarse.differences(&noise.sigma_m) {
-        sum.coarse_differences.push(difference);
+    for (difference, variance) in compare.differences(&noise.sigma_m, CELL_POINTS) {
+        sum.differences.push(difference * difference / variance);
+    }
+    for (difference, variance) in coarse.differences(&noise.sigma_m, CELL_POINTS) {
+        sum.coarse_differences.push(difference * difference / variance);
         sum.coarse_variances.push(variance);
+    }
+    for (scatter, slopes) in sum.slopes.iter_mut().zip(&slopes) {
+        for (motion, variance) in slopes.differences(&noise.sigma_m, LEAST_SLOPE) {
+            scatter.add(motion, 1.0 / variance);
+        }
     }
 }
 
@@ -328,11 +427,11 @@ impl Compare {
         }
     }
 
-    fn add(&mut self, epoch: usize, p: &[f64; 3], residual: f64, weight: f64) {
+    fn add(&mut self, epoch: usize, p: &[f64; 3], product: f64, weight: f64) {
         let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.cell_m).floor());
         if (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64) {
             let cell = &mut self.sums[at[1] as usize * self.counts[0] + at[0] as usize][epoch];
-            cell.0 += weight * residual;
+            cell.0 += product;
             cell.1 += weight;
         }
     }
@@ -347,15 +446,76 @@ impl Compare {
         both / held(|c| c[0].1 > 0.0).max(1.0)
     }
 
-    /// Per cell seen by both: squared difference of the means over its expected variance, and that variance.
-    fn differences<'a>(&'a self, sigma_m: &'a [f64; 2]) -> impl Iterator<Item = (f64, f64)> + 'a {
+    /// Per cell to which both give at least this weight: difference of the means, and its expected variance.
+    fn differences<'a>(&'a self, sigma_m: &'a [f64; 2], least: f64) -> impl Iterator<Item = (f64, f64)> + 'a {
         self.sums
             .iter()
-            .filter(|c| c.iter().all(|e| e.1 >= 3.0))
+            .filter(move |c| c.iter().all(|e| e.1 >= least))
             .map(|c| {
                 let d = c[1].0 / c[1].1 - c[0].0 / c[0].1;
                 let variance = sigma_m[0].powi(2) / c[0].1 + sigma_m[1].powi(2) / c[1].1;
-                (d * d / variance, variance)
+                (d, variance)
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const NOISE: SurfaceNoise = SurfaceNoise {
+        sigma_m: [0.004, 0.005],
+        tau_m: 0.01,
+    };
+    const LAYOUT: Layout = Layout {
+        cell_m: 0.02,
+        patch_cells: 24,
+        outlier_sigmas: 1e9,
+    };
+
+    /// Two scans of a bumpy face; the second shows another part of it, `beside` metres farther along.
+    fn scans(beside: f64) -> LocalPair {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut scan = |sigma: f64, from: f64| {
+            (0..400)
+                .map(|_| {
+                    let (u, v) = (from + rng.random_range(-0.1..0.1), rng.random_range(-0.08..0.08));
+                    let noise = sigma * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                    [u, v, 0.002 * (40.0 * u).sin() + 0.001 * (55.0 * v).cos() + noise]
+                })
+                .collect::<Vec<_>>()
+        };
+        let (first, second) = (scan(NOISE.sigma_m[0], 0.0), scan(NOISE.sigma_m[1], beside));
+        LocalPair {
+            first,
+            labelled: second.len(),
+            second,
+            window: None,
+        }
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_the_marginal_likelihood() {
+        for beside in [0.0, 0.02] {
+            let pair = scans(beside);
+            let at = |x: &Motion9| equations(&pair, x, x, &NOISE, &LAYOUT);
+            let here = at(&Motion9::zeros());
+            for k in 0..6 {
+                let step = 1e-3 * here.information[(k, k)].sqrt().recip();
+                let moved = |by: f64| {
+                    let mut x = Motion9::zeros();
+                    x[k] = by * step;
+                    at(&x).deviance
+                };
+                let slope = (moved(1.0) - moved(-1.0)) / (4.0 * step);
+                let scale = here.information[(k, k)].sqrt();
+                // The rotation in the face is seen by steep points most, whose weights are held.
+                let allowed = if k == 5 { 0.35 } else { 0.12 };
+                let difference = (slope - here.gradient[k]).abs() / scale;
+                assert!(difference < allowed, "{beside} {k}: {difference}");
+            }
+        }
     }
 }

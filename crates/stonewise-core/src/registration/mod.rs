@@ -8,6 +8,7 @@ mod border;
 mod breaks;
 mod correlation;
 mod datum;
+mod discount;
 mod equations;
 mod excerpt;
 mod field;
@@ -24,7 +25,7 @@ mod sparse;
 mod survey;
 mod track;
 
-pub use border::{NearPoint, local_shifts, stone_points};
+pub use border::{NearPoint, StonePoints, Window, local_shifts, stone_points};
 pub use datum::DatumError;
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use hyper::VarianceComponents;

@@ -1,7 +1,8 @@
 //! The stone network adjustment: the motion of every matched stone, all stones together.
 
 use super::breaks::{BreakLine, find_line};
-use super::correlation::{Correlation, shared_variance, stone_factor};
+use super::correlation::{Correlation, shared_variance, stone_factor, stone_slope_factor};
+use super::discount::discounted;
 use super::equations::{Equations, Layout, LocalPair, Matrix9, Motion9, equations};
 use super::excerpt::Excerpt;
 use super::field::{self, Beliefs, Field, LoosePrior, Posterior, StoneTerm};
@@ -283,7 +284,7 @@ impl Network {
         let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
         tracks.map(|t| {
             t.filter(|t| self.is_due(t))
-                .map(|t| equations(&local, &t.motion, &self.noise, &self.layout))
+                .map(|t| equations(&local, &t.motion, &t.window(), &self.noise, &self.layout))
         })
     }
 
@@ -355,7 +356,7 @@ impl Network {
             let mut place = here;
             place[0] += params.loose_move_m * c;
             place[1] += params.loose_move_m * s;
-            let value = expected(&equations(&local, &place, &self.noise, &self.layout));
+            let value = expected(&equations(&local, &place, &place, &self.noise, &self.layout));
             if value < best.0 {
                 best = (value, Some(place));
             }
@@ -366,7 +367,11 @@ impl Network {
     /// Equations about the common translation, with correlation between points accounted for.
     fn terms(&self) -> Terms {
         let term = |i: usize, track: &Track| match self.survey.stones[i].usable {
-            true => track.term(&self.common_in(i), self.inflation(i)),
+            true => {
+                let inflation = self.inflation(i);
+                let inside = self.inflation_inside(i) / inflation;
+                discounted(&track.term(&self.common_in(i), inflation), inside.max(1.0))
+            }
             false => StoneTerm::nothing(),
         };
         Terms {
@@ -401,16 +406,26 @@ impl Network {
         (extent_m / step_m.max(1e-3)).log2().max(0.0) + 1.0
     }
 
-    /// Factor on a stone's variances, judged at the better of its motions.
+    /// Factor on a stone's variances.
     fn inflation(&self, i: usize) -> f64 {
         let survey = self.correlation.factor();
-        let own = [Some(&self.tight[i]), self.free[i].as_ref()]
+        survey * self.at_better(i, |e| stone_factor(e, self.determined[i], survey))
+    }
+
+    /// Factor on the variances of a stone's motion in the face, where that is larger.
+    fn inflation_inside(&self, i: usize) -> f64 {
+        self.at_better(i, |e| stone_slope_factor(e, self.correlation.slopes))
+    }
+
+    /// The least of a figure at a stone's motions: the worse one need not be right.
+    fn at_better(&self, i: usize, figure: impl Fn(&Equations) -> f64) -> f64 {
+        let least = [Some(&self.tight[i]), self.free[i].as_ref()]
             .into_iter()
             .flatten()
             .filter_map(Track::equations)
-            .map(|e| stone_factor(e, self.determined[i], survey))
+            .map(figure)
             .fold(f64::INFINITY, f64::min);
-        survey * if own.is_finite() { own } else { 1.0 }
+        if least.is_finite() { least } else { 1.0 }
     }
 
     /// The common translation in a stone's frame.
@@ -542,17 +557,19 @@ impl Network {
         let wide = field::loose_variances(&self.components, &self.loose);
         for i in 0..self.tight.len() {
             let origin = self.common_in(i);
-            let mut follow = |track: &mut Track, posterior: &Posterior| {
+            let p = self.beliefs.tight[i];
+            // A motion that is hardly believed moves the stone's estimate by its share only.
+            let mut follow = |track: &mut Track, posterior: &Posterior, belief: f64| {
                 let step = track.move_to(&(posterior.mean + origin), params.max_step_m);
                 let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
-                restless += usize::from(step > params.tolerance_m.max(SETTLED * sd));
+                restless += usize::from(belief * step > params.tolerance_m.max(SETTLED * sd));
             };
             let prediction = &field.from_others[i];
             let tight = field::posterior(&terms.tight[i], prediction, &own);
             self.determined[i] = tight.determined;
-            follow(&mut self.tight[i], &tight);
+            follow(&mut self.tight[i], &tight, p);
             if let (Some(track), Some(term)) = (&mut self.free[i], &terms.free[i]) {
-                follow(track, &field::posterior(term, prediction, &wide));
+                follow(track, &field::posterior(term, prediction, &wide), 1.0 - p);
             } else if 1.0 - self.beliefs.tight[i] > SUSPECT * self.loose.share {
                 let start = field::posterior(&terms.tight[i], prediction, &wide).mean + origin;
                 let mut track = Track::new(self.tight[i].motion);

@@ -74,7 +74,10 @@ fn from_log(log: [f64; 3]) -> SurfaceNoise {
 fn sampled(sample: &[(&LocalPair, Motion9)], layout: &Layout) -> Vec<PatchPoints> {
     let all: Vec<PatchPoints> = sample
         .par_iter()
-        .map(|(pair, x)| cut(pair, &Moved::new(x), layout).list)
+        .map(|(pair, x)| {
+            let motion = Moved::new(x);
+            cut(pair, &motion, &motion, layout).list
+        })
         .collect::<Vec<_>>()
         .into_iter()
         .flatten()

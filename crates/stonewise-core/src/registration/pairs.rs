@@ -1,8 +1,10 @@
 //! Matched pairs of stones with their points, batch by batch.
 
+use super::border::Window;
 use crate::cloud::Cloud;
 use crate::id::StoneId;
 use nalgebra::{Point3, Vector3};
+use std::sync::Arc;
 
 /// The points of a stone in both epochs.
 #[derive(Clone, Debug)]
@@ -21,6 +23,10 @@ pub struct PairPoints {
     pub points_first: Cloud,
     /// Points of the second epoch, unmoved.
     pub points_second: Cloud,
+    /// Points of the second epoch near the stone without its label, unmoved: they count where the window says so.
+    pub nearby_second: Cloud,
+    /// Where points count; `None`: all of the stone's, none nearby.
+    pub window: Option<Arc<Window>>,
 }
 
 /// Matched pairs in batches, so that a survey's points need not be in memory at once.

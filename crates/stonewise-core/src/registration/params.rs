@@ -66,7 +66,7 @@ impl Default for NetworkParams {
             max_sd_m: 0.02,
             max_step_m: 0.015,
             tolerance_m: 1e-6,
-            max_iterations: 24,
+            max_iterations: 32,
         }
     }
 }

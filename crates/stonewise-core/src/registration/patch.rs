@@ -4,7 +4,7 @@
 //! `tau^2` (Lang & Brezger 2004, Bayesian P-splines). Points of both epochs observe the surface with noise
 //! `sigma`; the coefficients are eliminated, which leaves the normal equations of the motion alone.
 
-use super::band::{Band, BandFactor};
+use super::band::{Band, BandFactor, BandInverse};
 
 /// Noise of the points and roughness of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,6 +222,43 @@ impl PatchFit {
             out[0] += value * basis.value[l][a];
             out[1 + s] += slope * basis.value[l][a];
             out[1 + l] += value * basis.slope[l][a];
+        }
+        out
+    }
+
+    /// Covariance of the height with its slopes along u and v, given the points: `inverse` is that of [`Self::factor`].
+    pub fn slope_covariance(&self, u: f64, v: f64, inverse: &BandInverse) -> [f64; 2] {
+        let basis = self.grid.basis(u, v);
+        let (s, l) = (self.grid.short, 1 - self.grid.short);
+        let (bs, bl) = (basis.value[s], basis.value[l]);
+        // Covariance of each coefficient with the height.
+        let mut with_height = [[0.0; 4]; 4];
+        for a in 0..4 {
+            for b in 0..4 {
+                let column = self.grid.index(&basis, a, b);
+                let own = inverse.column_part(column, column, 4 - b);
+                for (d, z) in (b..4).zip(own) {
+                    with_height[a][b] += z * bl[a] * bs[d];
+                    if d > b {
+                        with_height[a][d] += z * bl[a] * bs[b];
+                    }
+                }
+                for c in a + 1..4 {
+                    let part = inverse.column_part(column, self.grid.index(&basis, c, 0), 4);
+                    let sum: f64 = part.iter().zip(bs).map(|(z, s)| z * s).sum();
+                    with_height[a][b] += sum * bl[c];
+                    let back = bl[a] * bs[b];
+                    for (target, z) in with_height[c].iter_mut().zip(part) {
+                        *target += z * back;
+                    }
+                }
+            }
+        }
+        let mut out = [0.0; 2];
+        for a in 0..4 {
+            let along = |b: &[f64; 4]| with_height[a].iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
+            out[s] += along(&basis.slope[s]) * bl[a];
+            out[l] += along(&bs) * basis.slope[l][a];
         }
         out
     }

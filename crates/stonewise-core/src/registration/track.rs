@@ -3,6 +3,8 @@
 use super::equations::{Equations, Motion9};
 use super::field::StoneTerm;
 
+/// Evaluations in which a stone's points are chosen anew.
+const CHOICES: usize = 11;
 /// Distance of a stone's rim from its centroid, metres, for judging rotation and bending.
 const RIM_M: f64 = 0.2;
 
@@ -11,6 +13,9 @@ const RIM_M: f64 = 0.2;
 pub(super) struct Track {
     /// In the stone's frame.
     pub motion: Motion9,
+    /// The motion with which the stone's window moved when points were last chosen.
+    window: Motion9,
+    choices: usize,
     evaluated: Option<(Motion9, Equations)>,
     last_step: Motion9,
     share: f64,
@@ -20,6 +25,8 @@ impl Track {
     pub fn new(motion: Motion9) -> Self {
         Self {
             motion,
+            window: motion,
+            choices: 0,
             evaluated: None,
             last_step: Motion9::zeros(),
             share: 1.0,
@@ -40,7 +47,19 @@ impl Track {
         })
     }
 
+    /// The motion with which the stone's window moves at the next evaluation: the stone's, until that is known well enough; then
+    /// points no longer come and go, and the iteration settles.
+    pub fn window(&self) -> Motion9 {
+        if self.choices < CHOICES {
+            self.motion
+        } else {
+            self.window
+        }
+    }
+
     pub fn set(&mut self, equations: Equations) {
+        self.window = self.window();
+        self.choices += 1;
         self.evaluated = Some((self.motion, equations));
     }
 

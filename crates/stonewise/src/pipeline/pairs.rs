@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use std::sync::Arc;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{NearPoint, PairPoints, PairSource, local_shifts, stone_points};
+use stonewise_core::registration::{NearPoint, PairPoints, PairSource, Window, local_shifts, stone_points};
 use stonewise_core::stone::Stone;
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
@@ -30,6 +31,8 @@ const BOX_MARGIN_M: f64 = 0.02;
 pub struct DiskPairs {
     dir: PathBuf,
     batches: Vec<Vec<Pair>>,
+    /// Where the points of each pair count, per batch.
+    windows: Vec<Vec<Option<Arc<Window>>>>,
 }
 
 /// A matched stone in both epochs.
@@ -54,9 +57,10 @@ impl DiskPairs {
         step: &StepDir,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let pairs = Self {
+        let mut pairs = Self {
             dir: step.path().to_path_buf(),
             batches: batches(first, second, matches),
+            windows: Vec::new(),
         };
         let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
         let extents = match border_noises > 0.0 {
@@ -66,9 +70,10 @@ impl DiskPairs {
         pairs.spill(first, 0, &extents, &mut spill, progress)?;
         pairs.spill(second, 1, &extents, &mut spill, progress)?;
         let bins = spill.finish()?;
-        (0..pairs.batches.len())
+        pairs.windows = (0..pairs.batches.len())
             .into_par_iter()
-            .try_for_each(|b| pairs.write_batch(&bins, b, border_noises))?;
+            .map(|b| pairs.write_batch(&bins, b, border_noises))
+            .collect::<Result<_>>()?;
         Ok(pairs)
     }
 
@@ -80,8 +85,13 @@ impl DiskPairs {
         })
     }
 
-    /// Writes the points of a batch: slot, epoch (0 or 1), x, y, z.
-    fn write_batch(&self, bins: &SpillBins<u32>, batch: usize, border_noises: f64) -> Result<()> {
+    /// Writes the points of a batch: slot, part ([`FIRST`], [`SECOND`], [`NEARBY`]), x, y, z; the windows in which they count.
+    fn write_batch(
+        &self,
+        bins: &SpillBins<u32>,
+        batch: usize,
+        border_noises: f64,
+    ) -> Result<Vec<Option<Arc<Window>>>> {
         let key = batch as u32;
         let bytes = if bins.keys().contains(&key) {
             bins.read(&key)?
@@ -93,25 +103,33 @@ impl DiskPairs {
             let (slot, epoch, point) = decode(record);
             near[slot][epoch].push(point);
         }
-        let (mut slots, mut epochs, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut slots, mut parts, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
+        let mut windows = Vec::new();
         for (slot, ([one, two], pair)) in near.iter().zip(&self.batches[batch]).enumerate() {
             let chosen = stone_points([one, two], &pair.first.normal, &pair.shift, border_noises);
-            for (epoch, points) in chosen.into_iter().enumerate() {
+            windows.push(chosen.window.map(Arc::new));
+            let lists = [
+                (FIRST, chosen.first),
+                (SECOND, chosen.second),
+                (NEARBY, chosen.nearby_second),
+            ];
+            for (part, points) in lists {
                 slots.extend(std::iter::repeat_n(slot as u32, points.len()));
-                epochs.extend(std::iter::repeat_n(epoch as u32, points.len()));
+                parts.extend(std::iter::repeat_n(part, points.len()));
                 offsets.extend(points);
             }
         }
         let mut table = Table::new();
         table.push("slot", slots)?;
-        table.push("epoch", epochs)?;
+        table.push("part", parts)?;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
             table.push(
                 name,
                 offsets.iter().map(|o: &[f32; 3]| o[axis]).collect::<Vec<f32>>(),
             )?;
         }
-        Ok(write_parquet(&self.file(batch), &table)?)
+        write_parquet(&self.file(batch), &table)?;
+        Ok(windows)
     }
 
     fn file(&self, batch: usize) -> PathBuf {
@@ -220,29 +238,33 @@ impl PairSource for DiskPairs {
 
     fn load(&self, batch: usize) -> Result<Vec<PairPoints>> {
         let pairs = &self.batches[batch];
-        let table = read_columns(&self.file(batch), &["slot", "epoch", "x", "y", "z"])?;
-        let (slot, epoch) = (table.required::<u32>("slot")?, table.required::<u32>("epoch")?);
+        let table = read_columns(&self.file(batch), &["slot", "part", "x", "y", "z"])?;
+        let (slot, part) = (table.required::<u32>("slot")?, table.required::<u32>("part")?);
         let (x, y, z) = (
             table.required::<f32>("x")?,
             table.required::<f32>("y")?,
             table.required::<f32>("z")?,
         );
-        let mut offsets = vec![[Vec::new(), Vec::new()]; pairs.len()];
+        let mut offsets = vec![[const { Vec::new() }; 3]; pairs.len()];
         for i in 0..slot.len() {
-            offsets[slot[i] as usize][epoch[i] as usize].push([x[i], y[i], z[i]]);
+            offsets[slot[i] as usize][part[i] as usize].push([x[i], y[i], z[i]]);
         }
-        let loaded = pairs
-            .iter()
-            .zip(offsets)
-            .map(|(pair, [first, second])| PairPoints {
+        let loaded = pairs.iter().zip(offsets).zip(&self.windows[batch]);
+        let loaded = loaded.map(|((pair, offsets), window)| {
+            let [points_first, points_second, nearby_second] =
+                offsets.map(|o| Cloud::new(pair.first.centroid, o));
+            PairPoints {
                 first: pair.first.id,
                 second: pair.second.id,
                 centroid: pair.first.centroid,
                 centroid_second: pair.second.centroid,
                 normal: pair.first.normal,
-                points_first: Cloud::new(pair.first.centroid, first),
-                points_second: Cloud::new(pair.first.centroid, second),
-            });
+                points_first,
+                points_second,
+                nearby_second,
+                window: window.clone(),
+            }
+        });
         Ok(loaded.collect())
     }
 }
@@ -271,6 +293,11 @@ fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) 
     pairs.sort_by_key(|p| (cell_of(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
     pairs.chunks(BATCH).map(<[_]>::to_vec).collect()
 }
+
+/// Parts of a stone's points in a batch's file: the first epoch's, the second's, and those near it in the second without its label.
+const FIRST: u32 = 0;
+const SECOND: u32 = 1;
+const NEARBY: u32 = 2;
 
 const RECORD: usize = 16;
 
