@@ -14,8 +14,8 @@ pub struct TilingOptions {
     pub overlap_px: u32,
     /// Sizes at which the photo is looked at, 1 = as it is; see [`Self::scales_for`].
     pub scales: Vec<f64>,
-    /// Pixels across (square root of the area) at which stones are found well. A size above 1 is looked at only where a quarter of the stones found
-    /// at sizes up to 1 would be smaller than this even there; a size below the largest up to 1 only where the stones that would be larger than this even
+    /// Pixels across (square root of the area) at which stones are found well. A size above 1 is looked at only where stones found at sizes up to 1 cover a
+    /// tenth of a tile and a quarter of them would be smaller than this even there; a size below the largest up to 1 only where the stones that would be larger than this even
     /// there hold a quarter of the area found, or nothing was found.
     pub stone_px: f64,
     /// Masks with a lower score are dropped.
@@ -33,7 +33,7 @@ impl Default for TilingOptions {
             overlap_px: 160,
             scales: vec![2.0, 1.0, 0.5, 0.25],
             stone_px: 60.0,
-            min_score: 0.4,
+            min_score: 0.5,
             min_area_px: 40,
             min_new_share: 0.6,
         }

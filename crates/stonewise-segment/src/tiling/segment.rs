@@ -45,6 +45,13 @@ pub fn segment_photo<D: Detector>(
     for (place, &index) in order.iter().enumerate() {
         let size = Size::of(photo, &scales, index);
         let limit = options.stone_px / scales[index];
+        let is_reduced = place > 0 && scales[index] <= 1.0;
+        // Stones up to the overlap are whole in a tile of the next larger size, which shows them better.
+        let least = if is_reduced {
+            f64::from(options.overlap_px) / scales[order[place - 1]]
+        } else {
+            0.0
+        };
         let seen = Seen::of(&candidates);
         for tile in size.tiles(options) {
             let part = size.scaling.rect(&tile);
@@ -54,7 +61,11 @@ pub fn segment_photo<D: Detector>(
                 (_, false) => seen.has_large(&part, limit),
             };
             if is_needed {
-                size.look(detector, &tile, options, progress, &mut candidates)?;
+                size.look(detector, &tile, options, progress, &mut |found| {
+                    if longer_side(&found) >= least {
+                        candidates.push(found);
+                    }
+                })?;
             } else {
                 progress.advance(1);
             }
@@ -89,24 +100,31 @@ impl Size {
         )
     }
 
-    /// Adds what the detector finds in a tile.
+    /// Hands on what the detector finds in a tile.
     fn look<D: Detector>(
         &self,
         detector: &D,
         tile: &Rect,
         options: &TilingOptions,
         progress: &dyn Progress,
-        candidates: &mut Vec<Candidate>,
+        take: &mut dyn FnMut(Candidate),
     ) -> Result<(), TilingError<D::Error>> {
         progress.check()?;
         let found = detector
             .detect(&crop(&self.image, tile))
             .map_err(TilingError::Detector)?;
         let good = found.iter().filter(|d| f64::from(d.score) >= options.min_score);
-        candidates.extend(good.filter_map(|d| candidate(d, tile, &self.scaling)));
+        good.filter_map(|d| candidate(d, tile, &self.scaling))
+            .for_each(take);
         progress.advance(1);
         Ok(())
     }
+}
+
+/// The longer side of a mask's box, pixels of the photo.
+fn longer_side(candidate: &Candidate) -> f64 {
+    let pixels = &candidate.mask.pixels;
+    f64::from(pixels.width().max(pixels.height()))
 }
 
 /// Where stones were seen, and how large.
@@ -140,15 +158,17 @@ impl Seen {
         self.0.iter().filter(is_inside)
     }
 
-    /// Whether at least a quarter of the stones in a part of the photo are less than `limit` across.
+    /// Whether a part of the photo shows a wall, a tenth of it stones, of which at least a quarter are less than `limit` across.
     fn has_small(&self, part: &Rect, limit: f64) -> bool {
         let whole = self.inside(part).filter(|s| !s.is_cut);
-        let (mut all, mut small) = (0, 0);
+        let (mut all, mut small, mut area) = (0, 0, 0.0);
         for stone in whole {
             all += 1;
             small += usize::from(stone.area < limit * limit);
+            area += stone.area;
         }
-        all > 0 && 4 * small >= all
+        let is_wall = 10.0 * area >= f64::from(part.width) * f64::from(part.height);
+        is_wall && 4 * small >= all
     }
 
     /// Whether stones of more than `limit` across, cut ones too, hold a quarter of the area found in a part of the photo; also where there is none.
