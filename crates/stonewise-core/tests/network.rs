@@ -7,13 +7,10 @@
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::sync::Arc;
 use stonewise_core::cloud::Cloud;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::{
-    MemoryPairs, NearPoint, NetworkParams, NetworkReport, PairPoints, adjust, stone_points,
-};
+use stonewise_core::registration::{MemoryPairs, NetworkParams, NetworkReport, PairPoints, adjust};
 use stonewise_core::stone::{MotionFailure, StoneMotion};
 
 /// A wall of stones facing x (radius: of its plan, infinite where flat), its sensor and its motion.
@@ -492,63 +489,4 @@ fn a_flat_wall_does_not_show_motion_in_its_plane() {
 #[test]
 fn nothing_in_nothing_out() {
     assert!(run(Vec::new()).results.is_empty());
-}
-
-/// Noisy stones in still surroundings, of which only the middle of each scanned patch has the label; the place of the second epoch's
-/// borders is thought to be `wrong` of the truth.
-fn bordered(wall: &Wall, shift: Vector3<f64>, wrong: Vector3<f64>) -> Vec<PairPoints> {
-    const MASK_M: f64 = 0.14;
-    let whole = wall.pairs(|_, _| (shift, Vector3::zeros()));
-    whole
-        .into_iter()
-        .map(|pair| {
-            let (a, u) = wall.centre(pair.first.0 - 1);
-            let middle = wall.place(a, u, 0.0);
-            let near = |cloud: &Cloud, moved: Vector3<f64>| -> Vec<NearPoint> {
-                (0..cloud.len())
-                    .map(|i| {
-                        let from_middle = cloud.world(i) - moved - middle;
-                        NearPoint {
-                            offset: (cloud.world(i) - pair.centroid).cast::<f32>().into(),
-                            labelled: from_middle.y.abs().max(from_middle.z.abs()) < MASK_M / 2.0,
-                        }
-                    })
-                    .collect()
-            };
-            let near = [
-                near(&pair.points_first, Vector3::zeros()),
-                near(&pair.points_second, shift),
-            ];
-            let chosen = stone_points([&near[0], &near[1]], &pair.normal, &(shift + wrong), 1.0);
-            PairPoints {
-                points_first: Cloud::new(pair.centroid, chosen.first),
-                points_second: Cloud::new(pair.centroid, chosen.second),
-                nearby_second: Cloud::new(pair.centroid, chosen.nearby_second),
-                window: chosen.window.map(Arc::new),
-                ..pair
-            }
-        })
-        .collect()
-}
-
-#[test]
-fn a_window_put_beside_the_stone_does_not_pull_its_motion() {
-    let wall = Wall {
-        noise_m: 0.008,
-        points: 500,
-        ..Wall::default()
-    };
-    let shift = Vector3::new(0.0, 0.02, 0.03);
-    let common = |wrong: Vector3<f64>| {
-        let report = run(bordered(&wall, shift, wrong));
-        (report.common_motion, report.common_covariance)
-    };
-    let (right, covariance) = common(Vector3::zeros());
-    let (beside, _) = common(Vector3::new(0.0, 0.006, -0.006));
-    for axis in 1..3 {
-        let sd = covariance[(axis, axis)].sqrt();
-        assert!(sd < 2e-3, "{sd}");
-        assert!((right - shift)[axis].abs() < 3.0 * sd, "{right}");
-        assert!((beside - right)[axis].abs() < 1.0 * sd, "{beside} {right}");
-    }
 }

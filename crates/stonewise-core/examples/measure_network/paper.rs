@@ -33,8 +33,9 @@ pub fn gicp(trial: &Trial, pairs: &MemoryPairs) -> Vec<PairResult> {
             second: p.second,
             centroid: p.centroid,
             centroid_second: p.centroid_second,
-            points: (start[&p.first.0]..start[&p.first.0] + p.points_first.len() as u32).collect(),
-            points_second: p.points_second.len(),
+            points: (start[&p.first.0]..start[&p.first.0] + trial.stones[0][&p.first.0].len() as u32)
+                .collect(),
+            points_second: trial.stones[1][&p.first.0].len(),
         })
         .collect();
     let mut results = align(&first, &second, &stones, &params);

@@ -461,7 +461,11 @@ impl Compare {
 
 #[cfg(test)]
 mod tests {
+    use super::super::border::{NearPoint, stone_points};
     use super::*;
+    use crate::cloud::Cloud;
+    use crate::geometry::FaceFrame;
+    use crate::id::StoneId;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -517,5 +521,56 @@ mod tests {
                 assert!(difference < allowed, "{beside} {k}: {difference}");
             }
         }
+    }
+
+    #[test]
+    fn points_of_the_second_epoch_count_where_the_window_moved_with_the_stone() {
+        let normal = Vector3::x();
+        let frame = FaceFrame::from_normal(&normal).face_from_world();
+        let shift = Vector3::new(0.0, 0.03, -0.02);
+        // A plane of 0.4 m, points every 5 mm; the mask takes the middle 0.2 m.
+        let plane = |moved: Vector3<f64>| -> Vec<NearPoint> {
+            let place = |i: i32| f64::from(i) * 0.005 - 0.2;
+            (0..81 * 81)
+                .map(|i| Vector3::new(0.0, place(i % 81), place(i / 81)))
+                .map(|p| NearPoint {
+                    offset: (p + moved).cast::<f32>().into(),
+                    labelled: p.y.abs().max(p.z.abs()) < 0.101,
+                })
+                .collect()
+        };
+        let near = [plane(Vector3::zeros()), plane(shift)];
+        let chosen = stone_points([&near[0], &near[1]], &normal, &shift, 3.0);
+        let cloud = |offsets: Vec<[f32; 3]>| Cloud::new(Point3::origin(), offsets);
+        let pair = PairPoints {
+            first: StoneId(1),
+            second: StoneId(1),
+            centroid: Point3::origin(),
+            centroid_second: Point3::origin() + shift,
+            normal,
+            points_first: cloud(chosen.first),
+            points_second: cloud(chosen.second),
+            nearby_second: cloud(chosen.nearby_second),
+            window: chosen.window.map(Arc::new),
+        };
+        let local = LocalPair::new(&pair, &frame);
+        let mut there = Motion9::zeros();
+        there.fixed_rows_mut::<3>(0).copy_from(&(frame * shift));
+        let moved = Moved::new(&there);
+        let counted: Vec<[f64; 3]> = local.second_moved_back(&moved, &moved).collect();
+        assert_eq!(counted.len(), local.first.len());
+        let largest = |points: &[[f64; 3]]| {
+            points
+                .iter()
+                .fold(0.0, |m: f64, p| m.max(p[0].abs()).max(p[1].abs()))
+        };
+        assert!((largest(&counted) - largest(&local.first)).abs() < 1e-6);
+        let still = Moved::new(&Motion9::zeros());
+        let left_behind = local.second_moved_back(&moved, &still).count();
+        assert!(
+            left_behind + 200 < counted.len(),
+            "{left_behind} {}",
+            counted.len()
+        );
     }
 }
