@@ -1,6 +1,6 @@
 //! The motion of every matched stone.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::label::Labelled;
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::registration::{DatumError, NetworkReport, adjust};
-use stonewise_core::stone::PairResult;
+use stonewise_core::stone::{MotionFailure, PairResult};
 
 /// Motions of a pair of epochs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -23,8 +23,10 @@ pub struct Registered {
     pub results: Vec<PairResult>,
     /// What the estimator says about itself: noise, datum, breaks.
     pub summary: serde_json::Value,
-    /// What the project's stable areas say of the epochs' registration; `None` without such areas.
+    /// What the project's stable areas say of the epochs' registration; `None` without such areas, and where they say nothing.
     pub datum: Option<DatumError>,
+    /// Why stable areas that the project names say nothing.
+    pub stable_areas_fail: Option<String>,
 }
 
 /// Measures the motion of every matched stone.
@@ -70,7 +72,11 @@ pub fn register(
                 )?)
             }
         };
-        registered.datum = datum_error(context, first, second)?;
+        match datum_error(context, first, second)? {
+            Some(Ok(datum)) => registered.datum = Some(datum),
+            Some(Err(reason)) => registered.stable_areas_fail = Some(reason.to_string()),
+            None => {}
+        }
         registered.summary["stable_areas"] = json!(registered.datum);
         write_json(&step.file("motions.json"), &registered)
     })?;
@@ -80,7 +86,11 @@ pub fn register(
 }
 
 /// The registration error of two epochs, where the project names areas that did not move.
-fn datum_error(context: &Context, first: &Labelled, second: &Labelled) -> Result<Option<DatumError>> {
+fn datum_error(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+) -> Result<Option<std::result::Result<DatumError, MotionFailure>>> {
     let params = &context.project.settings.registration;
     let boxes = params.stable.iter().filter_map(StableArea::bounds);
     let Some(region) = boxes.reduce(|a, b| a.union(&b)) else {
@@ -98,14 +108,7 @@ fn datum_error(context: &Context, first: &Labelled, second: &Labelled) -> Result
         }
         clouds.push(stable);
     }
-    DatumError::of(&clouds[0], &clouds[1], &params.gicp)
-        .map(Some)
-        .map_err(|reason| {
-            Error::Survey(format!(
-                "[[registration.stable]]: the stable areas do not show the epochs' registration: {reason}; name areas with \
-                 points in both epochs and faces in three directions"
-            ))
-        })
+    Ok(Some(DatumError::of(&clouds[0], &clouds[1], &params.gicp)))
 }
 
 /// Says how the stones moved in common, and what the stable areas seem to have done.
@@ -133,6 +136,13 @@ fn tell_datum(context: &Context, number: usize, registered: &Registered) {
         let message = format!("registration error from the stable areas: {shift}");
         context.warnings.notice("register", epoch, message);
     }
+    if let Some(reason) = &registered.stable_areas_fail {
+        let message = format!(
+            "[[registration.stable]] does not show the epochs' registration: {reason}; it is taken as unknown. Name areas with \
+             points in both epochs and faces in three directions, or state epoch_error_m"
+        );
+        context.warnings.skipped("register", epoch, message);
+    }
 }
 
 fn of_network(mut report: NetworkReport) -> Registered {
@@ -155,6 +165,7 @@ fn of_network(mut report: NetworkReport) -> Registered {
         results: report.results,
         summary,
         datum: None,
+        stable_areas_fail: None,
     }
 }
 
@@ -170,5 +181,6 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
         results,
         summary,
         datum: None,
+        stable_areas_fail: None,
     }
 }
