@@ -28,14 +28,16 @@ pub fn gicp(trial: &Trial, pairs: &MemoryPairs) -> Vec<PairResult> {
     let stones: Vec<GicpStone> = pairs
         .pairs()
         .iter()
-        .map(|p| GicpStone {
-            first: p.first,
-            second: p.second,
-            centroid: p.centroid,
-            centroid_second: p.centroid_second,
-            points: (start[&p.first.0]..start[&p.first.0] + trial.stones[0][&p.first.0].len() as u32)
-                .collect(),
-            points_second: trial.stones[1][&p.first.0].len(),
+        .map(|p| {
+            let (id, from) = (p.first.0, start[&p.first.0]);
+            GicpStone {
+                first: p.first,
+                second: p.second,
+                centroid: p.centroid,
+                centroid_second: p.centroid_second,
+                points: (from..from + trial.stones[0][&id].len() as u32).collect(),
+                points_second: trial.stones[1][&id].len(),
+            }
         })
         .collect();
     let mut results = align(&first, &second, &stones, &params);

@@ -1,6 +1,7 @@
 //! Symmetric positive definite band matrices: Cholesky factor, solves, log determinant.
 
 use pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
 
 /// Columns that are eliminated together: each later column is then read and written once for all of them.
 const PANEL: usize = 4;
@@ -32,14 +33,17 @@ impl Band {
     }
 
     /// Rows `first ..= first + count - 1` of column `column`; all must lie in the band and not above the diagonal.
-    #[inline(always)]
     pub fn column_part(&mut self, column: usize, first: usize, count: usize) -> &mut [f64] {
+        let range = self.range(column, first, count);
+        &mut self.columns[range]
+    }
+
+    fn range(&self, column: usize, first: usize, count: usize) -> Range<usize> {
         let start = column * self.stride + first - column;
-        &mut self.columns[start..start + count]
+        start..start + count
     }
 
     /// Adds to one entry of the lower triangle.
-    #[inline(always)]
     pub fn add(&mut self, row: usize, column: usize, value: f64) {
         self.column_part(column, row, 1)[0] += value;
     }
@@ -131,6 +135,16 @@ fn subtract<S: Simd>(simd: S, target: &mut [f64], [a, b, c, d]: [&[f64]; PANEL])
     }
 }
 
+/// The entries of an inverse that lie in the band of the matrix.
+pub(super) struct BandInverse(Band);
+
+impl BandInverse {
+    /// Rows `first ..= first + count - 1` of column `column`, all in the band and not above the diagonal.
+    pub fn column_part(&self, column: usize, first: usize, count: usize) -> &[f64] {
+        &self.0.columns[self.0.range(column, first, count)]
+    }
+}
+
 impl BandFactor {
     /// log |A|.
     pub fn log_det(&self) -> f64 {
@@ -160,20 +174,7 @@ impl BandFactor {
             rhs[j][0] = (rhs[j][0] - dot(&column[1..], known)) * column[0];
         }
     }
-}
 
-/// The entries of an inverse that lie in the band of the matrix.
-pub(super) struct BandInverse(Band);
-
-impl BandInverse {
-    /// Rows `first ..= first + count - 1` of column `column`, all in the band and not above the diagonal.
-    pub fn column_part(&self, column: usize, first: usize, count: usize) -> &[f64] {
-        let start = column * self.0.stride + first - column;
-        &self.0.columns[start..start + count]
-    }
-}
-
-impl BandFactor {
     /// The inverse within the band, column by column from the last (Takahashi, Fagan & Chen 1973). Cost: size * half^2
     /// multiplications.
     pub fn inverse(&self) -> BandInverse {

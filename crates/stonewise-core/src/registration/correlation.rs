@@ -38,20 +38,15 @@ impl Correlation {
 
     /// `fitted`: how many unknowns each stone's own points determined, which their cells lack.
     pub fn of(stones: &[(&Equations, f64)]) -> Self {
-        let at = |cells: fn(&Equations) -> &[f64]| {
-            let mut ratios: Vec<f64> = stones
-                .iter()
-                .filter_map(|(e, fitted)| excess(cells(e), *fitted))
-                .collect();
+        let middle = |of: &dyn Fn(&Equations, f64) -> Option<f64>| {
+            let mut ratios: Vec<f64> = stones.iter().filter_map(|(e, fitted)| of(e, *fitted)).collect();
             let middle = median(&mut ratios).filter(|_| ratios.len() >= STONES);
             middle.unwrap_or(1.0).max(1.0)
         };
-        let mut slopes: Vec<f64> = stones.iter().filter_map(|(e, _)| slope_excess(e)).collect();
-        let middle = median(&mut slopes).filter(|_| slopes.len() >= STONES);
         Self {
-            small: at(|e| &e.differences),
-            large: at(|e| &e.coarse_differences),
-            slopes: middle.unwrap_or(1.0).max(1.0),
+            small: middle(&|e, fitted| excess(&e.differences, fitted)),
+            large: middle(&|e, fitted| excess(&e.coarse_differences, fitted)),
+            slopes: middle(&|e, _| slope_excess(e)),
         }
     }
 

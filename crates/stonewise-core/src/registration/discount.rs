@@ -13,35 +13,37 @@ const ACROSS: [usize; 6] = [2, 3, 4, 6, 7, 8];
 /// Keeps unknowns that no point determines solvable; far below any information that counts.
 const RIDGE: f64 = 1e-12;
 
-/// The term with the variances of the motion in the face times `factor`; its optimum, and what is known of the other unknowns once
+/// The term with the variances of the motion in the face times `factor`, at least 1; its optimum, and what is known of the other unknowns once
 /// that motion is given, stay.
 ///
 /// With A, B, D the blocks of the information (in the face, both, across), S = A - B D^-1 B' is what is known of the motion in the
 /// face alone; the log likelihood is its quadratic form plus one that depends on the others given it. S is divided by `factor`.
-pub(super) fn discounted(term: &StoneTerm, factor: f64) -> StoneTerm {
+pub(super) fn discounted(mut term: StoneTerm, factor: f64) -> StoneTerm {
+    if factor <= 1.0 {
+        return term;
+    }
     let a = Matrix3::from_fn(|r, c| term.information[(INSIDE[r], INSIDE[c])]);
     let b = Matrix3x6::from_fn(|r, c| term.information[(INSIDE[r], ACROSS[c])]);
     let d = Matrix6::from_fn(|r, c| term.information[(ACROSS[r], ACROSS[c])]);
     let of_inside = Vector3::from_fn(|r, _| term.vector[INSIDE[r]]);
     let of_across = Vector6::from_fn(|r, _| term.vector[ACROSS[r]]);
     let Some(inverse) = inverted(d) else {
-        return term.clone();
+        return term;
     };
     let known = a - b * inverse * b.transpose();
     let pull = of_inside - b * inverse * of_across;
     let Some(optimum) = inverted(known).map(|i| i * pull) else {
-        return term.clone();
+        return term;
     };
     let taken = 1.0 - 1.0 / factor;
-    let mut out = term.clone();
     for r in 0..3 {
-        out.vector[INSIDE[r]] -= taken * pull[r];
+        term.vector[INSIDE[r]] -= taken * pull[r];
         for c in 0..3 {
-            out.information[(INSIDE[r], INSIDE[c])] -= taken * known[(r, c)];
+            term.information[(INSIDE[r], INSIDE[c])] -= taken * known[(r, c)];
         }
     }
-    out.constant += 0.5 * taken * pull.dot(&optimum);
-    out
+    term.constant += 0.5 * taken * pull.dot(&optimum);
+    term
 }
 
 /// Inverse of a positive semi-definite matrix whose rows have different units.
@@ -85,7 +87,7 @@ mod tests {
     #[test]
     fn variances_in_the_face_grow_and_the_rest_stays() {
         let (before, factor) = (term(30), 1.7);
-        let after = discounted(&before, factor);
+        let after = discounted(before.clone(), factor);
         let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
         for &i in &INSIDE {
             for &j in &INSIDE {
@@ -103,7 +105,7 @@ mod tests {
     #[test]
     fn what_no_point_determines_stays_undetermined() {
         let before = term(4);
-        let after = discounted(&before, 2.0);
+        let after = discounted(before.clone(), 2.0);
         let eigen = before.information.symmetric_eigen();
         for k in 0..9 {
             let direction = eigen.eigenvectors.column(k);

@@ -390,10 +390,10 @@ pub(super) fn robust_fit(
     for _ in 0..2 {
         let mut changed = false;
         for (observations, sigma) in epochs.iter_mut().zip(noise.sigma_m) {
+            let limit = layout.outlier_sigmas * sigma;
             for o in observations {
                 let [h, hu, hv] = fit.surface(o.position[0], o.position[1]);
                 let steepness = steepness([hu, hv]);
-                let limit = layout.outlier_sigmas * sigma;
                 let r = (o.position[2] - h).abs() * steepness.sqrt();
                 let weight = steepness * if r > limit { (limit / r).powi(2) } else { 1.0 };
                 changed |= (weight - o.weight).abs() > 0.05;

@@ -244,11 +244,9 @@ impl Network {
         source: &S,
         progress: &dyn Progress,
     ) -> Result<(), AdjustError<S::Error>> {
-        let mut start = 0;
-        for batch in 0..source.batch_count() {
+        for (batch, range) in self.survey.batches.clone().into_iter().enumerate() {
             progress.check()?;
-            let count = self.survey.batch_sizes[batch];
-            let range = start..start + count;
+            let count = range.len();
             let tracks = || range.clone().map(|i| (&self.tight[i], self.free[i].as_ref()));
             if tracks().any(|(tight, free)| self.is_due(tight) || free.is_some_and(|f| self.is_due(f))) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
@@ -267,7 +265,6 @@ impl Network {
                 }
             }
             progress.advance(count as u64);
-            start += count;
         }
         let known: Vec<(&Equations, f64)> = (0..self.tight.len())
             .filter_map(|i| Some((self.tight[i].equations()?, self.determined[i])))
@@ -304,11 +301,8 @@ impl Network {
         params: &NetworkParams,
         progress: &dyn Progress,
     ) -> Result<(), AdjustError<S::Error>> {
-        let mut start = 0;
-        for batch in 0..source.batch_count() {
+        for (batch, range) in self.survey.batches.clone().into_iter().enumerate() {
             progress.check()?;
-            let range = start..start + self.survey.batch_sizes[batch];
-            start = range.end;
             if range.clone().any(|i| self.is_open(i, params)) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
                 let found: Vec<(usize, Option<Motion9>)> = pairs
@@ -370,7 +364,7 @@ impl Network {
             true => {
                 let inflation = self.inflation(i);
                 let inside = self.inflation_inside(i) / inflation;
-                discounted(&track.term(&self.common_in(i), inflation), inside.max(1.0))
+                discounted(track.term(&self.common_in(i), inflation), inside)
             }
             false => StoneTerm::nothing(),
         };

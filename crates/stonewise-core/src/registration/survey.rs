@@ -8,6 +8,7 @@ use crate::id::StoneId;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// A pair without its points.
 pub(super) struct StoneInfo {
@@ -23,7 +24,8 @@ pub(super) struct StoneInfo {
 /// All pairs without their points.
 pub(super) struct Survey {
     pub stones: Vec<StoneInfo>,
-    pub batch_sizes: Vec<usize>,
+    /// The stones of each batch.
+    pub batches: Vec<Range<usize>>,
     /// Median point spacing of the sparser epoch, metres.
     pub spacing_m: f64,
     /// Pairs kept in memory for the noise estimate, with their index.
@@ -43,13 +45,13 @@ pub(super) fn survey<S: PairSource>(
     params: &NetworkParams,
 ) -> Result<Survey, AdjustError<S::Error>> {
     let mut stones = Vec::new();
-    let mut batch_sizes = Vec::new();
+    let mut batches = Vec::new();
     let mut spacings = Vec::new();
     let mut sample: Vec<(usize, PairPoints)> = Vec::new();
     let mut stride = 1;
     for batch in 0..source.batch_count() {
         let pairs = source.load(batch).map_err(AdjustError::Source)?;
-        batch_sizes.push(pairs.len());
+        batches.push(stones.len()..stones.len() + pairs.len());
         spacings.extend(pairs.par_iter().filter_map(spacing).collect::<Vec<f64>>());
         for pair in pairs {
             let index = stones.len();
@@ -70,7 +72,7 @@ pub(super) fn survey<S: PairSource>(
     let spacing_m = spacings.get(spacings.len() / 2).copied().unwrap_or(0.005);
     Ok(Survey {
         stones,
-        batch_sizes,
+        batches,
         spacing_m,
         sample,
     })

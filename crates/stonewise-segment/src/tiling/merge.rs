@@ -14,7 +14,8 @@ const SAME_STONE_SHARE: f64 = 0.5;
 /// Chooses among candidates and lays them on a photo from best to worst.
 ///
 /// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone, and come after all whole
-/// ones: only stones larger than the overlap at every scale are made of them. A cut mask of which the neighbouring tile knows nothing is dropped. Of the rest the higher score wins, then the finer scale.
+/// ones: only stones larger than the overlap at every scale are made of them. A cut mask of which the neighbouring tile knows nothing
+/// is dropped. Of the rest the higher score wins, then the finer scale.
 pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &TilingOptions) -> Segmentation {
     let (cut, whole): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
     let mut all = choose(best_first(whole));
