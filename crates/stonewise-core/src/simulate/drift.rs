@@ -31,6 +31,11 @@ impl DriftGrid {
         Self { origin, size, nodes }
     }
 
+    /// Most that the mortar moved outwards anywhere, metres.
+    pub fn top(&self) -> f64 {
+        self.nodes.iter().map(|d| d[2]).fold(f64::MIN, f64::max)
+    }
+
     /// Drift (along, up, out) at a place on the face, metres.
     #[inline]
     pub fn at(&self, a: f64, u: f64) -> [f64; 3] {

@@ -56,7 +56,7 @@ impl Outline {
             }
         }
         if second > 0.0 {
-            first.hypot(second) - r
+            (first * first + second * second).sqrt() - r
         } else {
             first - r
         }

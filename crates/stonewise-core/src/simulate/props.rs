@@ -88,9 +88,7 @@ impl Default for SurroundingsParams {
 impl Prop {
     /// Distance along the ray to the first hit within `limit`, and the outward normal there.
     pub fn trace(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<(f64, Vector3<f64>)> {
-        let to = self.middle - from;
-        let t = to.dot(along);
-        if to.norm_squared() - t * t > self.radius_m * self.radius_m || t - self.radius_m > limit {
+        if !self.is_near_ray(from, along, limit) {
             return None;
         }
         match &self.shape {
@@ -108,6 +106,14 @@ impl Prop {
                 .filter_map(|d| trace_disc(from, along, d, limit))
                 .min_by(|p, q| p.0.total_cmp(&q.0)),
         }
+    }
+
+    /// Whether the body may lie on a ray, within `limit`.
+    #[inline]
+    pub(super) fn is_near_ray(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> bool {
+        let to = self.middle - from;
+        let t = to.dot(along);
+        to.norm_squared() - t * t <= self.radius_m * self.radius_m && t - self.radius_m <= limit
     }
 
     /// Whether the point lies inside the body, leaves apart.

@@ -1,7 +1,7 @@
 //! What every simulated scanner shares: beams, footprints, noise, and the cloud that comes out.
 
 use crate::cloud::Cloud;
-use crate::simulate::noise::normal;
+use crate::simulate::noise::normals;
 use crate::simulate::scene::{Hit, Scene};
 use nalgebra::{Point3, Vector3};
 use rand::RngExt;
@@ -96,21 +96,23 @@ pub(super) fn shoot(
         .unwrap_or_else(Vector3::x);
     let upward = across.cross(along);
     // All numbers are drawn whether they are needed or not, so that one beam never changes the next one's noise.
-    let draws: [f64; 5] = std::array::from_fn(|_| normal(rng));
+    let [pointing, spot, [noise, _]] = [(); 3].map(|()| normals(rng));
     let share: f64 = rng.random::<f64>() * 0.5;
     let off = |x: f64, y: f64| (along + across * x + upward * y).normalize();
 
     let true_along = off(
-        draws[0] * beam.pointing_noise_rad,
-        draws[1] * beam.pointing_noise_rad,
+        pointing[0] * beam.pointing_noise_rad,
+        pointing[1] * beam.pointing_noise_rad,
     );
-    let hit = scene.trace(from, &true_along)?;
+    // Half of the footprint is one standard deviation.
+    let spread = [beam.exit_radius_m, beam.divergence_rad].map(|v| 1.5 * v);
+    let (hit, free_m) = scene.trace_beam(from, &true_along, spread)?;
     let mut range = hit.range_m;
     let radius_rad = beam.exit_radius_m / hit.range_m + beam.divergence_rad;
     if radius_rad > 0.0 {
-        let beside = off(0.5 * radius_rad * draws[2], 0.5 * radius_rad * draws[3]);
-        if let Some(second) = scene.trace(from, &beside) {
-            let apart = second.range_m - hit.range_m;
+        let beside = off(0.5 * radius_rad * spot[0], 0.5 * radius_rad * spot[1]);
+        if let Some(second) = scene.range(from, &beside, free_m) {
+            let apart = second - hit.range_m;
             if apart.abs() < beam.mixing_m {
                 range += share * apart;
             }
@@ -118,7 +120,7 @@ pub(super) fn shoot(
     }
     let cos_incidence = (-hit.normal.dot(&true_along)).clamp(0.05, 1.0);
     let sigma = beam.range_noise_m + beam.range_noise_per_m * (hit.range_m - 10.0).max(0.0);
-    range += draws[4] * sigma / cos_incidence.sqrt();
+    range += noise * sigma / cos_incidence.sqrt();
     Some(Shot {
         hit,
         // The scanner believes that the beam went where it aimed.

@@ -19,6 +19,8 @@ pub struct Hit {
     pub point: Point3<f64>,
     /// Outward unit normal there.
     pub normal: Vector3<f64>,
+    /// Where on the face.
+    pub face: FacePoint,
     /// What it is.
     pub target: Target,
 }
@@ -52,6 +54,8 @@ pub struct Scene<'a> {
     drift: DriftGrid,
     /// No part of the wall lies outside these heights over the face, metres.
     layer: [f64; 2],
+    /// No mortar lies higher over the face, metres.
+    mortar_top: f64,
 }
 
 /// World to stone, as rows, for speed.
@@ -71,6 +75,10 @@ struct Clearance {
 }
 
 const CELL_M: f64 = 0.04;
+/// Steepest surface that rays are sure not to jump over, metres per metre.
+const SLOPE: f64 = 1.1;
+/// A ray is at the surface when it is this close, metres.
+const CLOSE_M: f64 = 1e-6;
 
 impl<'a> Scene<'a> {
     /// The scene with stone `i` of the wall moved by `motions[i]`.
@@ -106,6 +114,7 @@ impl<'a> Scene<'a> {
             props: props_near(wall, surface, props),
             stones,
             cells,
+            mortar_top: surface.mortar.top() + drift.top(),
             drift,
             layer,
         }
@@ -121,8 +130,46 @@ impl<'a> Scene<'a> {
         self.surface.window
     }
 
-    /// The first thing on the ray; `along` is a unit vector. Cost: about a microsecond.
+    /// The first thing on the ray; `along` is a unit vector. Cost: about half a microsecond.
     pub fn trace(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<Hit> {
+        self.trace_beam(from, along, [0.0; 2]).map(|(hit, _)| hit)
+    }
+
+    /// The same, and from which distance on the other rays of a beam have to be looked at: before it they meet nothing. The beam is
+    /// `spread[0]` metres wide to either side where it starts, and `spread[1]` a metre wider.
+    pub(super) fn trace_beam(
+        &self,
+        from: &Point3<f64>,
+        along: &Vector3<f64>,
+        spread: [f64; 2],
+    ) -> Option<(Hit, f64)> {
+        let prop = self.first_prop(from, along);
+        let limit = prop.map_or(f64::MAX, |n| n.0);
+        if let Some(met) = self.march(from, along, 0.0, limit, spread) {
+            let hit = self.wall_hit(from + along * met.range_m, met.range_m);
+            return Some((hit, if prop.is_none() { met.free_m } else { 0.0 }));
+        }
+        prop.map(|(range_m, normal, material)| {
+            let point = from + along * range_m;
+            let hit = Hit {
+                range_m,
+                point,
+                normal,
+                face: self.wall.face.face_of(&point),
+                target: Target::Other(material, [point.y, point.z]),
+            };
+            (hit, 0.0)
+        })
+    }
+
+    /// How far away a ray meets the first thing, where nothing lies before `start_m`.
+    pub(super) fn range(&self, from: &Point3<f64>, along: &Vector3<f64>, start_m: f64) -> Option<f64> {
+        let prop = self.first_prop(from, along).map(|(range, ..)| range);
+        let wall = self.march(from, along, start_m, prop.unwrap_or(f64::MAX), [0.0; 2]);
+        wall.map(|met| met.range_m).or(prop)
+    }
+
+    fn first_prop(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<(f64, Vector3<f64>, Material)> {
         let mut nearest: Option<(f64, Vector3<f64>, Material)> = None;
         for prop in &self.props {
             let limit = nearest.map_or(f64::MAX, |n| n.0);
@@ -130,69 +177,116 @@ impl<'a> Scene<'a> {
                 nearest = Some((t, normal, prop.material));
             }
         }
-        let limit = nearest.map_or(f64::MAX, |n| n.0);
-        if let Some(range_m) = self.march(from, along, limit) {
-            return Some(self.wall_hit(from + along * range_m, range_m));
+        nearest
+    }
+
+    /// Whether a ray can meet anything whose place on the face lies within `part` (smallest a, largest a, smallest u, largest u,
+    /// metres); says yes in doubt.
+    pub(super) fn may_meet(&self, from: &Point3<f64>, along: &Vector3<f64>, part: [f64; 4]) -> bool {
+        if self.props.iter().any(|p| p.is_near_ray(from, along, f64::MAX)) {
+            return true;
         }
-        nearest.map(|(range_m, normal, material)| {
-            let point = from + along * range_m;
-            Hit {
-                range_m,
-                point,
-                normal,
-                target: Target::Other(material, [point.y, point.z]),
-            }
-        })
+        let face = &self.wall.face;
+        let at = |height_m: f64| {
+            let t = face.come_down(from, along, height_m)?;
+            Some(face.face_of(&(from + along * t)))
+        };
+        // What is between the two places lies on the way through the layer that holds the wall.
+        let (Some(high), Some(low)) = (at(self.layer[1]), at(self.layer[0])) else {
+            return true;
+        };
+        let beside = |p: f64, q: f64, least: f64, most: f64| p.max(q) < least || p.min(q) > most;
+        !(beside(high.a, low.a, part[0], part[1]) || beside(high.u, low.u, part[2], part[3]))
     }
 
     /// Whether anything stands on the ray within `limit` metres.
     pub fn blocked(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> bool {
         self.props.iter().any(|p| p.trace(from, along, limit).is_some())
-            || self.march(from, along, limit).is_some()
+            || self.march(from, along, 0.0, limit, [0.0; 2]).is_some()
     }
 
     /// The wall's surface straight below or above a place on the face; `None` outside the masonry.
     pub fn on_face(&self, a: f64, u: f64) -> Option<Hit> {
-        let top = self.wall.face.world_of(&FacePoint {
+        let (point, down) = self.come_down_at(a, u)?;
+        Some(self.wall_hit(point, down))
+    }
+
+    /// The same without the normal: the place, and what is there.
+    pub(super) fn target_on_face(&self, a: f64, u: f64) -> Option<(Point3<f64>, Target)> {
+        let (point, _) = self.come_down_at(a, u)?;
+        let found = self.clearance(&point, &self.wall.face.face_of(&point));
+        Some((point, self.target(&found)))
+    }
+
+    /// Where one who comes down on the face at a place reaches the surface, and how far that is from the top of the layer, metres.
+    fn come_down_at(&self, a: f64, u: f64) -> Option<(Point3<f64>, f64)> {
+        let face = &self.wall.face;
+        let top = FacePoint {
             a,
             u,
             n: self.layer[1],
-        });
-        let inwards = -self.wall.face.frame(a).out;
-        let t = self.march(&top, &inwards, 1.0)?;
-        Some(self.wall_hit(top + inwards * t, t))
+        };
+        let (from, inwards) = (face.world_of(&top), -face.frame(a).out);
+        // Stones lie almost level, so that the height over the surface hardly changes on the way down but for the way itself.
+        let mut down = 0.0;
+        for _ in 0..8 {
+            let point = from + inwards * down;
+            let n = top.n - down;
+            let gap = self.gap(&point, &FacePoint { a, u, n })?;
+            if gap.abs() < CLOSE_M {
+                return Some((point, down));
+            }
+            down += gap;
+        }
+        // But not on the steep side of a stone that leans.
+        let met = self.march(&from, &inwards, 0.0, 1.0, [0.0; 2])?;
+        Some((from + inwards * met.range_m, met.range_m))
+    }
+
+    fn target(&self, found: &Clearance) -> Target {
+        match found.stone {
+            Some(k) => Target::Stone(self.stones[k].wall_index, found.at),
+            None => Target::Other(Material::Mortar, found.at),
+        }
     }
 
     fn wall_hit(&self, point: Point3<f64>, range_m: f64) -> Hit {
         let f = self.wall.face.face_of(&point);
         let found = self.clearance(&point, &f);
-        let (normal, target) = match found.stone {
+        let normal = match found.stone {
             Some(k) => {
                 let stone = &self.stones[k];
                 let grid = &self.surface.stones[stone.patch].1;
-                let normal = stone.world_from_stone * grid.normal(found.at[0], found.at[1]);
-                (normal, Target::Stone(stone.wall_index, found.at))
+                stone.world_from_stone * grid.normal(found.at[0], found.at[1])
             }
             None => {
                 let frame = self.wall.face.frame(f.a);
                 let local = self.surface.mortar.normal(found.at[0], found.at[1]);
-                let normal = frame.face_from_world().transpose() * local;
-                (normal, Target::Other(Material::Mortar, found.at))
+                frame.face_from_world().transpose() * local
             }
         };
         Hit {
             range_m,
             point,
             normal,
-            target,
+            face: f,
+            target: self.target(&found),
         }
     }
 
-    /// Marches along the ray to the wall's surface and then closes in on it to a micrometre.
-    fn march(&self, from: &Point3<f64>, along: &Vector3<f64>, limit: f64) -> Option<f64> {
+    /// Marches along the ray to the wall's surface and then closes in on it to a micrometre. Nothing lies before `start_m`.
+    fn march(
+        &self,
+        from: &Point3<f64>,
+        along: &Vector3<f64>,
+        start_m: f64,
+        limit: f64,
+        spread: [f64; 2],
+    ) -> Option<Met> {
         let face = &self.wall.face;
-        let mut t = face.come_down(from, along, self.layer[1])?;
+        let mut t = face.come_down(from, along, self.layer[1])?.max(start_m);
         let mut above: Option<(f64, f64)> = None;
+        let mut free_m = 0.0;
         for _ in 0..200 {
             if t > limit {
                 return None;
@@ -211,11 +305,15 @@ impl<'a> Scene<'a> {
             if gap <= 0.0 {
                 // A ray that starts inside, or comes in from beside the masonry, meets nothing it could see.
                 let (t0, g0) = above?;
-                return Some(self.close_in(from, along, (t0, g0), (t, gap)));
+                let range_m = self.close_in(from, along, (t0, g0), (t, gap));
+                return Some(Met { range_m, free_m });
             }
             above = Some((t, gap));
+            if gap > SLOPE * (spread[0] + spread[1] * t) {
+                free_m = t;
+            }
             let sideways = (1.0 - descent * descent).max(0.0).sqrt();
-            t += (gap / (descent.max(0.0) + 1.1 * sideways)).max(4e-4);
+            t += (gap / (descent.max(0.0) + SLOPE * sideways)).max(4e-4);
         }
         None
     }
@@ -234,7 +332,7 @@ impl<'a> Scene<'a> {
             let t = (t0 * g1 - t1 * g0) / (g1 - g0);
             let p = from + along * t;
             let g = self.gap(&p, &self.wall.face.face_of(&p)).unwrap_or(g0);
-            if g.abs() < 1e-7 || (t1 - t0).abs() < 1e-7 {
+            if g.abs() < CLOSE_M || (t1 - t0).abs() < CLOSE_M {
                 return t;
             }
             if g > 0.0 {
@@ -263,13 +361,10 @@ impl<'a> Scene<'a> {
 
     #[inline]
     fn clearance(&self, p: &Point3<f64>, f: &FacePoint) -> Clearance {
-        let drift = self.drift.at(f.a, f.u);
-        let (a, u) = (f.a - drift[0], f.u - drift[1]);
-        let mortar = self.surface.mortar.height(a, u).unwrap_or(-0.02) + drift[2];
         let mut lowest = Clearance {
-            height_m: f.n - mortar,
+            height_m: f64::MAX,
             stone: None,
-            at: [a, u],
+            at: [0.0; 2],
         };
         for &k in self.cells.at(f.a, f.u) {
             let stone = &self.stones[k as usize];
@@ -284,8 +379,29 @@ impl<'a> Scene<'a> {
                 };
             }
         }
+        // Mortar is recessed: most of the time that says enough.
+        if f.n - self.mortar_top < lowest.height_m {
+            let drift = self.drift.at(f.a, f.u);
+            let (a, u) = (f.a - drift[0], f.u - drift[1]);
+            let mortar = self.surface.mortar.height(a, u).unwrap_or(-0.02) + drift[2];
+            if f.n - mortar <= lowest.height_m {
+                lowest = Clearance {
+                    height_m: f.n - mortar,
+                    stone: None,
+                    at: [a, u],
+                };
+            }
+        }
         lowest
     }
+}
+
+/// Where a ray met the wall.
+struct Met {
+    /// Distance along the ray, metres.
+    range_m: f64,
+    /// Up to here the other rays of the beam meet nothing, metres.
+    free_m: f64,
 }
 
 impl Placed {

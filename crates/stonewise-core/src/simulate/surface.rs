@@ -1,6 +1,7 @@
 //! The part of a wall that is worked on, sampled once so that rays can ask it millions of times.
 
-use crate::simulate::wall::{HIDDEN_M, Wall};
+use crate::simulate::noise::Row;
+use crate::simulate::wall::Wall;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -8,8 +9,6 @@ use std::sync::Arc;
 
 /// Sample distance of a stone's face, metres: between samples the surface is bilinear, and that surface is the truth.
 const STONE_STEP_M: f64 = 0.0025;
-/// Sample distance of the waves that bend the layout, metres; the shortest of them are 22 mm long and a millimetre high.
-const LAYOUT_STEP_M: f64 = 0.005;
 /// Sample distance of the mortar, metres.
 const MORTAR_STEP_M: f64 = 0.004;
 
@@ -23,20 +22,29 @@ pub struct HeightGrid {
 }
 
 impl HeightGrid {
-    /// Samples `height(x, y)` over smallest x, largest x, smallest y, largest y.
-    fn sample(extent: [f64; 4], step_m: f64, height: impl Fn(f64, f64) -> f64) -> Self {
+    /// Samples heights over smallest x, largest x, smallest y, largest y; `heights` says those of a row.
+    fn sample(extent: [f64; 4], step_m: f64, heights: impl Fn(Row, &mut [f64]) + Sync) -> Self {
         let size = [0, 2].map(|i| ((extent[i + 1] - extent[i]) / step_m).ceil() as usize + 2);
-        let heights = (0..size[0] * size[1])
-            .map(|k| {
-                let (i, j) = (k % size[0], k / size[0]);
-                height(extent[0] + i as f64 * step_m, extent[2] + j as f64 * step_m) as f32
-            })
-            .collect();
+        let mut all = vec![0.0f32; size[0] * size[1]];
+        all.par_chunks_mut(size[0])
+            .enumerate()
+            .for_each_init(Vec::new, |row, (j, kept)| {
+                row.resize(size[0], 0.0);
+                let places = Row {
+                    x: extent[0],
+                    y: extent[2] + j as f64 * step_m,
+                    step: step_m,
+                };
+                heights(places, row);
+                for (k, v) in kept.iter_mut().zip(row.iter()) {
+                    *k = *v as f32;
+                }
+            });
         Self {
             origin: [extent[0], extent[2]],
             step_m,
             size,
-            heights,
+            heights: all,
         }
     }
 
@@ -73,7 +81,7 @@ impl HeightGrid {
     }
 
     /// Largest height.
-    fn top(&self) -> f64 {
+    pub(super) fn top(&self) -> f64 {
         f64::from(self.heights.iter().copied().fold(f32::MIN, f32::max))
     }
 }
@@ -125,7 +133,7 @@ impl Surface {
         let top_m = stones.iter().map(|(_, g)| g.top()).fold(0.0, f64::max);
         Self {
             stones,
-            mortar: HeightGrid::sample(around, MORTAR_STEP_M, |a, u| wall.mortar_height(a, u)),
+            mortar: HeightGrid::sample(around, MORTAR_STEP_M, |row, out| wall.mortar_heights(row, out)),
             window,
             top_m,
         }
@@ -142,14 +150,12 @@ fn stone_grid(wall: &Wall, i: usize) -> HeightGrid {
         u0 - margin - stone.middle[1],
         u1 + margin - stone.middle[1],
     ];
-    // The waves of the courses are slow: sampling them apart saves half of the time.
-    let waves = [0, 1].map(|axis| {
-        HeightGrid::sample(local, LAYOUT_STEP_M, |x, y| {
-            wall.wave(axis, stone.middle[0] + x, stone.middle[1] + y)
-        })
-    });
-    HeightGrid::sample(local, STONE_STEP_M, |x, y| {
-        let wave = waves.each_ref().map(|grid| grid.height(x, y).unwrap_or(0.0));
-        wall.stone_height(i, x, y, wave).unwrap_or(HIDDEN_M)
+    HeightGrid::sample(local, STONE_STEP_M, |row, out| {
+        let waves = [0, 1].map(|axis| {
+            let mut wave = vec![0.0; out.len()];
+            wall.waves(axis, row.moved(stone.middle[0], stone.middle[1], 1.0), &mut wave);
+            wave
+        });
+        wall.stone_heights(i, row, waves.each_ref().map(Vec::as_slice), out);
     })
 }

@@ -72,15 +72,23 @@ struct Station {
 pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
     for station in stations(scene, params, seed) {
-        let Some([west, east, low, high]) = station.field(scene, window, params.margin_m) else {
+        let Some(part) = station.part(scene, window, params.margin_m) else {
             continue;
         };
+        let [west, east, low, high] = station.field(scene, part);
+        let sweep = Sweep {
+            scene,
+            window,
+            params,
+            station: &station,
+            part: grown(part, ASTRAY_M),
+            azimuths: [west, east],
+            seed,
+        };
         // Rows and columns belong to the station's one grid, whatever the window.
-        let rows = (low / station.step_rad).floor() as i64..=(high / station.step_rad).ceil() as i64;
-        let measured: Vec<Vec<_>> = rows
-            .into_par_iter()
-            .map(|row| station.row(scene, window, params, row, [west, east], seed))
-            .collect();
+        let step = station.step_rad;
+        let rows = (low / step).floor() as i64..=(high / step).ceil() as i64;
+        let measured: Vec<Vec<_>> = rows.into_par_iter().map(|row| sweep.row(row)).collect();
         for shots in measured {
             scan.push(shots, station.number);
         }
@@ -91,50 +99,70 @@ pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed
 /// Middle of the range of rows, so that their numbers are positive: more rows than a grid of 5 mm at 10 m has.
 const ROW_ZERO: i64 = 1 << 20;
 
-impl Station {
-    fn row(
-        &self,
-        scene: &Scene,
-        window: &Window,
-        params: &TlsParams,
-        row: i64,
-        [west, east]: [f64; 2],
-        seed: u64,
-    ) -> Vec<(Shot, Point3<f64>)> {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(window.stream(u64::from(self.number), (row + ROW_ZERO) as u64));
-        let elevation = row as f64 * self.step_rad;
+/// Further than a beam points astray, metres.
+const ASTRAY_M: f64 = 0.05;
+
+/// What one station measures of a window.
+struct Sweep<'a> {
+    scene: &'a Scene<'a>,
+    window: &'a Window,
+    params: &'a TlsParams,
+    station: &'a Station,
+    /// The part of the face that is looked at: smallest a, largest a, smallest u, largest u, metres.
+    part: [f64; 4],
+    /// Smallest and largest azimuth of its beams, radians.
+    azimuths: [f64; 2],
+    seed: u64,
+}
+
+impl Sweep<'_> {
+    /// The beams of one elevation.
+    fn row(&self, row: i64) -> Vec<(Shot, Point3<f64>)> {
+        let Station {
+            number,
+            place,
+            step_rad,
+            reach,
+            error,
+        } = self.station;
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(self.window.stream(u64::from(*number), (row + ROW_ZERO) as u64));
+        let elevation = row as f64 * step_rad;
         // Columns closer together in azimuth away from the horizon, so that points keep their distance.
-        let step = self.step_rad / elevation.cos();
-        ((west / step).floor() as i64..=(east / step).ceil() as i64)
+        let step = step_rad / elevation.cos();
+        let [first, last] = self.azimuths.map(|azimuth| azimuth / step);
+        (first.floor() as i64..=last.ceil() as i64)
             .filter_map(|column| {
                 let along = direction(column as f64 * step, elevation);
-                let shot = shoot(scene, &self.place, &along, &params.beam, &mut rng)?;
-                let measured = self.error * shot.measured;
-                let face = scene.wall().face.face_of(&shot.hit.point);
-                let wanted = window.holds(face.a, face.u)
-                    && (self.reach[0]..=self.reach[1]).contains(&face.a)
-                    && near_section(scene, &shot.hit.point, params.margin_m);
+                if !self.scene.may_meet(place, &along, self.part) {
+                    return None;
+                }
+                let shot = shoot(self.scene, place, &along, &self.params.beam, &mut rng)?;
+                let measured = error * shot.measured;
+                let face = &shot.hit.face;
+                let wanted = self.window.holds(face.a, face.u)
+                    && (reach[0]..=reach[1]).contains(&face.a)
+                    && near_section(self.scene, face, self.params.margin_m);
                 wanted.then_some((shot, measured))
             })
             .collect()
     }
+}
 
-    /// The part of the sphere around the station that holds the window, within its reach, and what stands in front of
-    /// it: smallest and largest azimuth, smallest and largest elevation, radians; `None` where it does not reach.
-    fn field(&self, scene: &Scene, window: &Window, margin_m: f64) -> Option<[f64; 4]> {
-        const STEPS: i32 = 32;
+impl Station {
+    /// The part of the window that the station reaches: smallest a, largest a, smallest u, largest u, metres.
+    fn part(&self, scene: &Scene, window: &Window, margin_m: f64) -> Option<[f64; 4]> {
         let mut limits = grown(scene.wall().extent(), margin_m);
-        limits = [
-            limits[0].max(self.reach[0]),
-            limits[1].min(self.reach[1]),
-            limits[2],
-            limits[3],
-        ];
+        limits[0] = limits[0].max(self.reach[0]);
+        limits[1] = limits[1].min(self.reach[1]);
         let w = window.grown(0.0, limits);
-        if w[0] >= w[1] || w[2] >= w[3] {
-            return None;
-        }
+        (w[0] < w[1] && w[2] < w[3]).then_some(w)
+    }
+
+    /// The part of the sphere around the station that holds a part of the face and what stands in front of it: smallest and
+    /// largest azimuth, smallest and largest elevation, radians.
+    fn field(&self, scene: &Scene, w: [f64; 4]) -> [f64; 4] {
+        const STEPS: i32 = 32;
         let mut field = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
         for i in 0..=STEPS {
             for j in 0..=STEPS {
@@ -153,7 +181,7 @@ impl Station {
                 }
             }
         }
-        Some(field)
+        field
     }
 }
 
@@ -212,8 +240,7 @@ fn direction(azimuth: f64, elevation: f64) -> Vector3<f64> {
 }
 
 /// Whether a point belongs to the delivered cloud: near the section, also where things stand in front of it.
-pub(super) fn near_section(scene: &Scene, p: &Point3<f64>, margin_m: f64) -> bool {
-    let f = scene.wall().face.face_of(p);
+pub(super) fn near_section(scene: &Scene, f: &FacePoint, margin_m: f64) -> bool {
     let [a0, a1, u0, u1] = grown(scene.wall().extent(), margin_m);
     a0 < f.a && f.a < a1 && u0 < f.u && f.u < u1 && DEPTH_M[0] < f.n && f.n < DEPTH_M[2]
 }

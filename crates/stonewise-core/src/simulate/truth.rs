@@ -106,6 +106,8 @@ pub struct SeenCells {
     /// World to stone, in the epoch of the scans.
     to_stone: Vec<Rigid3>,
     hit: Vec<BTreeSet<[i32; 2]>>,
+    /// The cell that was hit last: most points lie in the same one as the point before.
+    last: Vec<Option<[i32; 2]>>,
     points: Vec<u32>,
 }
 
@@ -125,6 +127,7 @@ impl SeenCells {
         Self {
             to_stone: to_stone.collect(),
             hit: vec![BTreeSet::new(); count],
+            last: vec![None; count],
             points: vec![0; count],
         }
     }
@@ -136,7 +139,10 @@ impl SeenCells {
             self.points[stone] += 1;
             let exact = scan.cloud.origin() + Vector3::from(scan.exact[i]).cast::<f64>();
             let local = self.to_stone[stone] * exact;
-            self.hit[stone].insert(cell([local.x, local.y]));
+            let at = cell([local.x, local.y]);
+            if self.last[stone].replace(at) != Some(at) {
+                self.hit[stone].insert(at);
+            }
         }
     }
 
@@ -206,11 +212,11 @@ fn face_samples(scene: &Scene, window: &Window) -> BTreeMap<u32, Vec<FaceSample>
         .map(|j| {
             let u = w[2] + (j as f64 + 0.5) * STEP_M;
             let sample = |i: usize| {
-                let hit = scene.on_face(w[0] + (i as f64 + 0.5) * STEP_M, u)?;
-                match hit.target {
+                let (point, target) = scene.target_on_face(w[0] + (i as f64 + 0.5) * STEP_M, u)?;
+                match target {
                     Target::Stone(k, at) => {
                         let [a, u] = scene.wall().stones[k].middle;
-                        window.holds(a, u).then_some((k as u32 + 1, (hit.point, at)))
+                        window.holds(a, u).then_some((k as u32 + 1, (point, at)))
                     }
                     Target::Other(..) => None,
                 }

@@ -79,7 +79,7 @@ pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u
             .collect();
         for mut shots in measured {
             shots.retain(|(shot, _)| {
-                let face = scene.wall().face.face_of(&shot.hit.point);
+                let face = &shot.hit.face;
                 window.holds(face.a, face.u)
             });
             scan.push(shots, strip as u16);
@@ -143,7 +143,7 @@ impl Path {
                 let along = (face.world_of(&FacePoint { a, u, n: 0.0 }) - sensor).normalize();
                 let shot = shoot(scene, &sensor, &along, &params.beam, rng)?;
                 let measured = shot.measured + error;
-                near_section(scene, &shot.hit.point, params.margin_m).then_some((shot, measured))
+                near_section(scene, &shot.hit.face, params.margin_m).then_some((shot, measured))
             })
             .collect()
     }

@@ -4,7 +4,7 @@ use crate::geometry::Rigid3;
 use crate::id::StoneId;
 use crate::simulate::face::Face;
 use crate::simulate::layout::{Outline, lay_stones};
-use crate::simulate::noise::{Noise, normal};
+use crate::simulate::noise::{Noise, Octaves, Row, normal};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -159,56 +159,87 @@ impl Wall {
         [-half, half, -self.params.foot_m, self.params.height_m]
     }
 
-    /// Height of the mortar over the idealised face at (a, u) in the first epoch, metres; negative, it is recessed.
-    pub fn mortar_height(&self, a: f64, u: f64) -> f64 {
+    /// Height of the mortar over the idealised face along a row of face coordinates (a, u) of the first epoch, metres; negative, it
+    /// is recessed.
+    pub(super) fn mortar_heights(&self, row: Row, out: &mut [f64]) {
         let [shallow, deep] = self.params.joint_depth_m;
-        let slow = (0.5 + 1.1 * self.mortar.octaves(a / 0.5, u / 0.5, 2, 0.6)).clamp(0.0, 1.0);
-        let rough = 0.0022 * self.mortar.octaves(a / 0.03 + 7.0, u / 0.03, 3, 0.6);
-        -(shallow + (deep - shallow) * slow) + rough
+        out.fill(0.5);
+        self.mortar
+            .add_octaves(row.moved(0.0, 0.0, 0.5), octaves(2, 0.6, 1.1), out);
+        for v in out.iter_mut() {
+            *v = -(shallow + (deep - shallow) * v.clamp(0.0, 1.0));
+        }
+        self.mortar
+            .add_octaves(row.moved(0.21, 0.0, 0.03), octaves(3, 0.6, 0.0022), out);
     }
 
-    /// Height of stone `i`'s surface at (x, y) of its own frame, metres; `None` where it is hidden in the mortar. `wave`: what
-    /// [`Wall::wave`] says about the place.
-    pub(super) fn stone_height(&self, i: usize, x: f64, y: f64, wave: [f64; 2]) -> Option<f64> {
+    /// Height of stone `i`'s surface along a row of its own frame, metres; [`HIDDEN_M`] where it is hidden in the mortar. `waves`:
+    /// what [`Wall::waves`] says about the places.
+    pub(super) fn stone_heights(&self, i: usize, row: Row, waves: [&[f64]; 2], out: &mut [f64]) {
         let stone = &self.stones[i];
-        let (a, u) = (stone.middle[0] + x, stone.middle[1] + y);
-        let distance = stone.outline.distance(a + wave[0], u + wave[1]);
         let shape = &stone.shape;
-        let edge = shape.edge_drop(distance);
-        if edge > 0.1 {
-            return None;
+        let u = stone.middle[1] + row.y;
+        // How far the edge has fallen; then, only where any of the stone is left, the rest of its shape.
+        for (k, v) in out.iter_mut().enumerate() {
+            let a = stone.middle[0] + row.at(k);
+            *v = -shape.edge_drop(stone.outline.distance(a + waves[0][k], u + waves[1][k]));
         }
+        let there = |v: &f64| *v >= -0.1;
+        let Some(first) = out.iter().position(there) else {
+            out.fill(HIDDEN_M);
+            return;
+        };
+        let end = out.iter().rposition(there).map_or(first, |last| last + 1);
+        out[..first].fill(HIDDEN_M);
+        out[end..].fill(HIDDEN_M);
+        let (row, out) = (
+            Row {
+                x: row.at(first),
+                ..row
+            },
+            &mut out[first..end],
+        );
         // A place of its own in the noise, so that relief does not go on from stone to stone.
         let place = f64::from(stone.id.0) * 13.7;
-        let (rx, ry) = ((x + place) / RELIEF_M, (y - place) / RELIEF_M);
-        let relief = shape.relief_m * self.relief.octaves(rx, ry, 6, shape.gain);
-        let facet = shape
-            .facets
-            .iter()
-            .map(|f| f[2] + f[0] * x + f[1] * y)
-            .fold(0.0, f64::min);
-        // However long a facet is, it takes no more than this off the stone.
-        let facet = FACET_M * ((facet / FACET_M).exp() - 1.0);
-        let height = shape.offset_m + shape.tilt[0] * x + shape.tilt[1] * y + facet + relief - edge;
-        (height > HIDDEN_M).then_some(height)
+        self.relief.add_octaves(
+            row.moved(place, -place, RELIEF_M),
+            octaves(6, shape.gain, shape.relief_m),
+            out,
+        );
+        for (k, v) in out.iter_mut().enumerate() {
+            *v = (*v + shape.plain_height(row.at(k), row.y)).max(HIDDEN_M);
+        }
     }
 
     /// Distance from stone `i`'s outline at face coordinates (a, u) of the first epoch, metres, negative inside.
     pub fn outline_distance(&self, i: usize, a: f64, u: f64) -> f64 {
-        self.stones[i].outline_distance(self, a, u)
+        let wave = [0, 1].map(|axis| {
+            let mut wave = [0.0];
+            self.waves(
+                axis,
+                Row {
+                    x: a,
+                    y: u,
+                    step: 1.0,
+                },
+                &mut wave,
+            );
+            wave[0]
+        });
+        self.stones[i].outline.distance(a + wave[0], u + wave[1])
     }
 
-    /// What bends the straight layout at a place on the face: layout coordinate along (0) or up (1) less face coordinate, metres.
-    pub(super) fn wave(&self, axis: usize, a: f64, u: f64) -> f64 {
-        let (noise, size) = (&self.warp[axis], self.params.course_m);
-        let wave = 0.62 * size * noise.octaves(a / WAVE_M, u / WAVE_M, 2, 0.5)
-            + 0.045 * size * noise.octaves(a / 0.09, u / 0.09, 3, 0.55);
-        [1.0, 1.15][axis] * wave
-    }
-
-    /// Layout coordinates of a place on the face: the courses are straight there and wavy here.
-    fn layout_of(&self, a: f64, u: f64) -> [f64; 2] {
-        [a + self.wave(0, a, u), u + self.wave(1, a, u)]
+    /// What bends the straight layout along a row of face coordinates: layout coordinate along (0) or up (1) less face coordinate,
+    /// metres.
+    pub(super) fn waves(&self, axis: usize, row: Row, out: &mut [f64]) {
+        let size = [1.0, 1.15][axis] * self.params.course_m;
+        out.fill(0.0);
+        for (unit, sum) in [
+            (WAVE_M, octaves(2, 0.5, 0.62 * size)),
+            (0.09, octaves(3, 0.55, 0.045 * size)),
+        ] {
+            self.warp[axis].add_octaves(row.moved(0.0, 0.0, unit), sum, out);
+        }
     }
 
     /// Measures an outline on the face; `None` where nothing is left of it.
@@ -220,12 +251,20 @@ impl Wall {
         let mut bounds = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
         let (mut count, mut sum_a, mut sum_u, mut cut) = (0usize, 0.0, 0.0, false);
         let steps = |from: f64, to: f64| ((to - from + 2.0 * reach) / STEP) as usize;
+        let mut waves = [0, 1].map(|_| vec![0.0; steps(x0, x1) + 1]);
         for j in 0..=steps(y0, y1) {
             let u = y0 - reach + j as f64 * STEP;
-            for i in 0..=steps(x0, x1) {
-                let a = x0 - reach + i as f64 * STEP;
-                let [x, y] = self.layout_of(a, u);
-                if outline.distance(x, y) > 0.0 {
+            let row = Row {
+                x: x0 - reach,
+                y: u,
+                step: STEP,
+            };
+            for (axis, wave) in waves.iter_mut().enumerate() {
+                self.waves(axis, row, wave);
+            }
+            for (i, (x, y)) in waves[0].iter().zip(&waves[1]).enumerate() {
+                let a = row.at(i);
+                if outline.distance(a + x, u + y) > 0.0 {
                     continue;
                 }
                 if a < extent[0] || a > extent[1] || u < extent[2] || u > extent[3] {
@@ -273,10 +312,12 @@ impl Wall {
     }
 }
 
-impl SimStone {
-    fn outline_distance(&self, wall: &Wall, a: f64, u: f64) -> f64 {
-        let [x, y] = wall.layout_of(a, u);
-        self.outline.distance(x, y)
+/// Octaves of noise, written short.
+fn octaves(count: u32, gain: f64, amplitude: f64) -> Octaves {
+    Octaves {
+        count,
+        gain,
+        amplitude,
     }
 }
 
@@ -307,6 +348,20 @@ impl Shape {
                 })
                 .collect(),
         }
+    }
+
+    /// Height of the face without its relief and its edges, in its own frame, metres.
+    fn plain_height(&self, x: f64, y: f64) -> f64 {
+        let mut height = self.offset_m + self.tilt[0] * x + self.tilt[1] * y;
+        if !self.facets.is_empty() {
+            let facet = self.facets.iter().map(|f| f[2] + f[0] * x + f[1] * y);
+            let facet = facet.fold(0.0, f64::min);
+            // However long a facet is, it takes no more than this off the stone.
+            if facet < 0.0 {
+                height += FACET_M * ((facet / FACET_M).exp() - 1.0);
+            }
+        }
+        height
     }
 
     /// How far the surface falls at this distance from the outline (negative inside), metres.
@@ -361,9 +416,15 @@ mod tests {
     fn mortar_is_recessed_as_asked() {
         let params = WallParams::default();
         let wall = Wall::new(&params);
-        let heights: Vec<f64> = (0..2000)
-            .map(|k| wall.mortar_height(0.013 * f64::from(k % 150) - 1.0, 0.017 * f64::from(k / 150)))
-            .collect();
+        let mut heights = vec![0.0; 2000];
+        for (k, part) in heights.chunks_mut(150).enumerate() {
+            let row = Row {
+                x: -1.0,
+                y: 0.017 * k as f64,
+                step: 0.013,
+            };
+            wall.mortar_heights(row, part);
+        }
         let mean = heights.iter().sum::<f64>() / heights.len() as f64;
         assert!((-0.025..-0.015).contains(&mean), "{mean}");
         assert!(heights.iter().all(|h| (-0.035..-0.005).contains(h)));
