@@ -187,7 +187,7 @@ pub fn true_labels(scene: &Scene, view: &View) -> LabelImage {
     let mut labels = LabelImage::filled(width, height, 0);
     let stone = |x: usize, y: usize| {
         let (from, along) = view.ray([x as f64 + 0.5, y as f64 + 0.5])?;
-        scene.trace(&from, &along)?.target.stone()
+        scene.target_of(&from, &along)?.stone()
     };
     labels
         .data_mut()

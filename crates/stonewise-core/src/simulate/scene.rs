@@ -162,6 +162,20 @@ impl<'a> Scene<'a> {
         })
     }
 
+    /// What the first thing on the ray is.
+    pub fn target_of(&self, from: &Point3<f64>, along: &Vector3<f64>) -> Option<Target> {
+        let prop = self.first_prop(from, along);
+        let limit = prop.map_or(f64::MAX, |n| n.0);
+        let Some(met) = self.march(from, along, 0.0, limit, [0.0; 2]) else {
+            return prop.map(|(range_m, _, material)| {
+                let point = from + along * range_m;
+                Target::Other(material, [point.y, point.z])
+            });
+        };
+        let point = from + along * met.range_m;
+        Some(self.target(&self.clearance(&point, &self.wall.face.face_of(&point))))
+    }
+
     /// How far away a ray meets the first thing, where nothing lies before `start_m`.
     pub(super) fn range(&self, from: &Point3<f64>, along: &Vector3<f64>, start_m: f64) -> Option<f64> {
         let prop = self.first_prop(from, along).map(|(range, ..)| range);

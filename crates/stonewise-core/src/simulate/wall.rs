@@ -114,8 +114,10 @@ pub struct Wall {
     mortar: Noise,
 }
 
-/// Wavelength of the waves of the courses, metres.
-const WAVE_M: f64 = 0.75;
+/// Wavelengths of the waves that bend courses of [`WAVED_COURSE_M`], metres; larger stones have longer ones.
+const WAVES_M: [f64; 2] = [0.75, 0.09];
+/// Height of a course with these waves, metres.
+const WAVED_COURSE_M: f64 = 0.21;
 /// Wavelength of the coarsest relief, metres.
 const RELIEF_M: f64 = 0.16;
 /// Most that a facet takes off a stone, metres.
@@ -233,12 +235,11 @@ impl Wall {
     /// metres.
     pub(super) fn waves(&self, axis: usize, row: Row, out: &mut [f64]) {
         let size = [1.0, 1.15][axis] * self.params.course_m;
+        let scale = self.params.course_m / WAVED_COURSE_M;
+        let sums = [octaves(2, 0.5, 0.62 * size), octaves(3, 0.55, 0.045 * size)];
         out.fill(0.0);
-        for (unit, sum) in [
-            (WAVE_M, octaves(2, 0.5, 0.62 * size)),
-            (0.09, octaves(3, 0.55, 0.045 * size)),
-        ] {
-            self.warp[axis].add_octaves(row.moved(0.0, 0.0, unit), sum, out);
+        for (unit, sum) in WAVES_M.into_iter().zip(sums) {
+            self.warp[axis].add_octaves(row.moved(0.0, 0.0, scale * unit), sum, out);
         }
     }
 

@@ -246,9 +246,13 @@ type Append<'a> = Box<dyn FnMut(&Scan) -> Result<(), SimulateError> + 'a>;
 
 fn append(cloud: &mut PointSink<'_>, known: &mut PointSink<'_>, scan: &Scan) -> Result<(), SimulateError> {
     let positions: Vec<Point3<f64>> = (0..scan.len()).map(|i| scan.cloud.world(i)).collect();
-    cloud.append(&positions, &[])?;
     let columns = [ExtraColumn::U32(&scan.stone), ExtraColumn::U16(&scan.station)];
-    Ok(known.append(&positions, &columns)?)
+    let (measured, truth) = rayon::join(
+        || cloud.append(&positions, &[]),
+        || known.append(&positions, &columns),
+    );
+    measured?;
+    Ok(truth?)
 }
 
 fn write_projects(folder: &Path, params: &SurveyParams) -> Result<(PathBuf, Option<PathBuf>), SimulateError> {
