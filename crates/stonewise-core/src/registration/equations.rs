@@ -61,6 +61,23 @@ impl LocalPair {
         }
     }
 
+    /// The points that count where the window moved by `window`, and no others: of the second epoch those in the window, of both those
+    /// whose place in the first epoch `keep` takes.
+    pub fn counting(&self, window: &Motion9, keep: impl Fn(&[f64; 3]) -> bool) -> Self {
+        let window = Moved::new(window);
+        let still = Moved::new(&Motion9::zeros());
+        let second: Vec<[f64; 3]> = self
+            .second_moved_back(&still, &window)
+            .filter(|q| keep(&window.undo(q)))
+            .collect();
+        Self {
+            first: self.first.iter().filter(|p| keep(p)).copied().collect(),
+            labelled: second.len(),
+            second,
+            window: None,
+        }
+    }
+
     /// The second epoch's points in the window, where that moved by `window`, moved back by `motion`.
     fn second_moved_back<'a>(
         &'a self,
@@ -176,6 +193,29 @@ pub(super) fn equations(
         sum.rms_m = noise.sigma_m[1] * (sum.scatter[1].0 / sum.scatter[1].1).sqrt();
     }
     sum
+}
+
+/// [`Equations::deviance`] alone, at motion `x`, of all of these points.
+pub(super) fn deviance(pair: &LocalPair, x: &Motion9, noise: &SurfaceNoise, layout: &Layout) -> f64 {
+    let motion = Moved::new(x);
+    let of_patch = |patch: &PatchPoints| {
+        let mut epochs = patch.epochs.clone();
+        robust_fit(patch.grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
+            let of_points = |(observations, sigma): (&Vec<Observation>, f64)| -> f64 {
+                let of_point = |o: &Observation| {
+                    let r = o.position[2] - fit.surface(o.position[0], o.position[1])[0];
+                    o.weight * r * r / (sigma * sigma) - 1.0
+                };
+                observations.iter().map(of_point).sum()
+            };
+            fit.surface_deviance(noise) + epochs.iter().zip(noise.sigma_m).map(of_points).sum::<f64>()
+        })
+    };
+    cut(pair, &motion, &motion, layout)
+        .list
+        .iter()
+        .map(of_patch)
+        .sum()
 }
 
 /// A motion ready to be undone.

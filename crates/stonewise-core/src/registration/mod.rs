@@ -21,6 +21,7 @@ mod outcome;
 mod pairs;
 mod params;
 mod patch;
+mod rivals;
 mod sparse;
 mod survey;
 mod track;

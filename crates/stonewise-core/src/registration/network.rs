@@ -13,6 +13,7 @@ use super::outcome;
 use super::pairs::{PairPoints, PairSource};
 use super::params::{NetworkParams, NetworkReport};
 use super::patch::SurfaceNoise;
+use super::rivals::{Comparison, Rivals};
 use super::sparse::BlockPattern;
 use super::survey::{self, Survey, survey};
 use super::track::Track;
@@ -69,13 +70,6 @@ const SUSPECT: f64 = 1.5;
 const LINEAR_M: f64 = 1e-8;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
-
-/// An optimum within so many cells of the field's motion lies where the stone's equations there still hold.
-const NEAR_CELLS: f64 = 0.5;
-/// Square of a distance, in units of its covariance, which chance alone makes less than once in a million: optima farther away are many.
-const FAR_EXCESS: f64 = 30.7;
-/// A test that finds no less than this found nothing.
-const UNREMARKABLE: f64 = 0.05;
 /// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what is known of loose
 /// stones beforehand) has learnt too little from its points to be told from its neighbours.
 const BLIND_SHARE: f64 = 0.85;
@@ -99,6 +93,8 @@ pub(super) struct Network {
     /// Each stone that may have moved on its own, doing so: its likelihood has several maxima, and what it says
     /// at one must not be read off at another.
     pub free: Vec<Option<Track>>,
+    /// What the points of each stone that is followed on its own say between the two.
+    comparisons: Vec<Comparison>,
     /// Common translation about which the field is solved, world.
     pub common: Vector3<f64>,
     pub correlation: Correlation,
@@ -159,6 +155,13 @@ pub(super) struct Terms {
     pub free: Vec<Option<StoneTerm>>,
 }
 
+/// What a stone's points say where it moved since the last evaluation.
+struct Evaluation {
+    tight: Option<Equations>,
+    free: Option<Equations>,
+    comparison: Option<Comparison>,
+}
+
 /// A stone's motion with its looseness averaged out.
 pub(super) struct Estimate {
     /// In the stone's frame, about the common translation.
@@ -210,6 +213,7 @@ impl Network {
             lines: Vec::new(),
             common: survey::middle(&start),
             free: vec![None; tight.len()],
+            comparisons: vec![Comparison::default(); tight.len()],
             tight,
             correlation: Correlation::NONE,
             determined: vec![0.0; places.len()],
@@ -250,12 +254,21 @@ impl Network {
             let tracks = || range.clone().map(|i| (&self.tight[i], self.free[i].as_ref()));
             if tracks().any(|(tight, free)| self.is_due(tight) || free.is_some_and(|f| self.is_due(f))) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
-                let new: Vec<[Option<Equations>; 2]> = pairs
+                let new: Vec<Option<Evaluation>> = pairs
                     .par_iter()
                     .zip(range.clone())
                     .map(|(pair, i)| self.evaluate_one(i, pair))
                     .collect();
-                for ([tight, free], i) in new.into_iter().zip(range) {
+                for (new, i) in new.into_iter().zip(range) {
+                    let Some(Evaluation {
+                        tight,
+                        free,
+                        comparison,
+                    }) = new
+                    else {
+                        continue;
+                    };
+                    self.comparisons[i] = comparison.unwrap_or_default();
                     if let Some(tight) = tight {
                         self.tight[i].set(tight);
                     }
@@ -273,15 +286,28 @@ impl Network {
         Ok(())
     }
 
-    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> [Option<Equations>; 2] {
-        let tracks = [Some(&self.tight[i]), self.free[i].as_ref()];
-        if !tracks.iter().flatten().any(|t| self.is_due(t)) {
-            return [None, None];
+    /// What changed at a stone; `None` if nothing did.
+    fn evaluate_one(&self, i: usize, pair: &PairPoints) -> Option<Evaluation> {
+        let (tight, free) = (&self.tight[i], self.free[i].as_ref());
+        if !self.is_due(tight) && !free.is_some_and(|t| self.is_due(t)) {
+            return None;
         }
         let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
-        tracks.map(|t| {
-            t.filter(|t| self.is_due(t))
-                .map(|t| equations(&local, &t.motion, &t.window(), &self.noise, &self.layout))
+        let anew = |t: &Track| equations(&local, &t.motion, &t.window(), &self.noise, &self.layout);
+        let compare = |free: &Track| {
+            let rivals = Rivals {
+                pair: &local,
+                tight,
+                free,
+                noise: &self.noise,
+                layout: &self.layout,
+            };
+            rivals.compare(self.inflation(i))
+        };
+        Some(Evaluation {
+            tight: Some(tight).filter(|t| self.is_due(t)).map(anew),
+            free: free.filter(|t| self.is_due(t)).map(anew),
+            comparison: free.map(compare),
         })
     }
 
@@ -334,10 +360,11 @@ impl Network {
         self.survey.stones[i].usable && known > least && known < least * OPEN_SHARE.powi(-2)
     }
 
-    /// The place, of those tried, where the stone's points are best explained after one more step; `None` if that is where it is.
+    /// The place, of those tried, where the stone's points, those that count where it is, are best explained after one more step; `None`
+    /// if that is where it is.
     fn probe_one(&self, i: usize, pair: &PairPoints, params: &NetworkParams) -> Option<Motion9> {
         let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
-        let here = self.tight[i].motion;
+        let (here, window) = (self.tight[i].motion, self.tight[i].window());
         let expected = |e: &Equations| {
             let held = e.information + Matrix9::identity() * self.inflation(i) / params.loose_move_m.powi(2);
             held.cholesky().map_or(f64::INFINITY, |c| {
@@ -350,7 +377,7 @@ impl Network {
             let mut place = here;
             place[0] += params.loose_move_m * c;
             place[1] += params.loose_move_m * s;
-            let value = expected(&equations(&local, &place, &place, &self.noise, &self.layout));
+            let value = expected(&equations(&local, &place, &window, &self.noise, &self.layout));
             if value < best.0 {
                 best = (value, Some(place));
             }
@@ -374,9 +401,19 @@ impl Network {
                 .free
                 .iter()
                 .enumerate()
-                .map(|(i, t)| t.as_ref().map(|t| term(i, t)))
+                .map(|(i, t)| t.as_ref().map(|t| self.compared(i, term(i, t))))
                 .collect(),
         }
+    }
+
+    /// The term of a stone on its own, with the likelihood that it has against the field's motion on the same points.
+    fn compared(&self, i: usize, mut term: StoneTerm) -> StoneTerm {
+        let free = self.free[i].as_ref().and_then(Track::equations);
+        if let (Some(tight), Some(free)) = (self.tight[i].equations(), free) {
+            let on_its_own_points = 0.5 * (tight.deviance - free.deviance);
+            term.constant += (self.comparisons[i].advantage - on_its_own_points) / self.inflation(i);
+        }
+        term
     }
 
     /// Variances of errors that all points of a stone share, beyond what its own cells show: translation, rotation. `octaves` of
@@ -483,7 +520,7 @@ impl Network {
                     &self.loose,
                     &self.shared_variances(1.0, params),
                 );
-                self.disbelieve(terms, &field, params);
+                self.disbelieve(terms, &field);
                 field::learn_ties(
                     &self.graph,
                     &field,
@@ -520,25 +557,16 @@ impl Network {
         true
     }
 
-    /// Lets stones move with the field whose own optimum means nothing: those whose own points hardly know their motion (few noisy
-    /// points have optima far away), and those whose test at the field's motion finds nothing, while their optimum lies so near that
-    /// this test answers for it, or is so vague that one of many places far away would look like it.
-    fn disbelieve(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) {
+    /// Lets stones move with the field whose own optimum means nothing: those whose points hardly know their motion (few noisy points
+    /// have optima far away), and those of which one half speaks against it.
+    fn disbelieve(&mut self, terms: &Terms, field: &Field) {
         let wide = field::loose_variances(&self.components, &self.loose);
-        let p_values = outcome::own_motion_tests(self, terms, field, params);
-        for (i, p) in p_values.into_iter().enumerate() {
+        for i in 0..self.tight.len() {
             let term = terms.free[i].as_ref().unwrap_or(&terms.tight[i]);
-            let prediction = &field.from_others[i];
-            let own = field::posterior(term, prediction, &wide);
+            let own = field::posterior(term, &field.from_others[i], &wide);
             let known = own.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-            let is_blind = known.symmetric_eigenvalues().max().sqrt() > BLIND_SHARE * params.loose_move_m;
-            let apart = own.mean.fixed_rows::<3>(0) - prediction.mean.fixed_rows::<3>(0);
-            let spread = known + prediction.covariance.fixed_view::<3, 3>(0, 0);
-            let is_near = apart.norm() < NEAR_CELLS * self.layout.cell_m;
-            let is_vague = spread
-                .cholesky()
-                .is_none_or(|c| apart.dot(&c.solve(&apart)) < FAR_EXCESS);
-            if is_blind || ((is_near || is_vague) && p.is_none_or(|p| p > UNREMARKABLE)) {
+            let is_blind = known.symmetric_eigenvalues().max().sqrt() > BLIND_SHARE * self.loose.move_m;
+            if is_blind || self.comparisons[i].contradicted {
                 self.beliefs.tight[i] = 1.0;
             }
         }

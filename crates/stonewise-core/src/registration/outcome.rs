@@ -19,8 +19,6 @@ const BAD_SHARE: f64 = 0.25;
 const BAD_CELLS: usize = 2;
 /// The same share where the stone is thought loose: what still disagrees at its own optimum was not moved, but spoilt.
 const BAD_SHARE_LOOSE: f64 = 0.2;
-/// A stone less likely than this to move with the field is loose, whatever its test at the field's motion says.
-const SURELY_LOOSE: f64 = 0.05;
 /// Factor by which the bending's variance is raised in the test for loose stones.
 const BENDING_SLACK: f64 = 100.0;
 /// Squared jump over the variance that a whole tie gives it: chance alone exceeds it once in a million ties.
@@ -97,7 +95,7 @@ pub(super) fn report(
 
 /// Tests each stone against its neighbours: probability of so large a departure where it moves with them. `None` where its
 /// points say nothing.
-pub(super) fn own_motion_tests(
+fn own_motion_tests(
     network: &Network,
     terms: &Terms,
     field: &Field,
@@ -134,11 +132,32 @@ fn loose_stones(network: &Network, p_values: &[Option<f64>], params: &NetworkPar
         .iter()
         .enumerate()
         .rposition(|(k, p)| p.0 <= params.false_discovery_rate * (k + 1) as f64 / tests);
-    let mut loose: Vec<bool> = (0..p_values.len())
-        .map(|i| network.free[i].is_some() && network.beliefs.tight[i] < SURELY_LOOSE)
-        .collect();
+    let mut loose = surely_loose(network, params.false_discovery_rate);
     for &(_, i) in sorted.iter().take(last.map_or(0, |k| k + 1)) {
         loose[i] |= network.beliefs.tight[i] < 0.5;
+    }
+    loose
+}
+
+/// Stones followed to their own optimum, as many as can be called loose so that the mean probability of an error among them is no
+/// more than `rate` (Newton et al. 2004).
+fn surely_loose(network: &Network, rate: f64) -> Vec<bool> {
+    let mut followed: Vec<(f64, usize)> = network
+        .free
+        .iter()
+        .enumerate()
+        .filter(|(_, free)| free.is_some())
+        .map(|(i, _)| (network.beliefs.tight[i], i))
+        .collect();
+    followed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut loose = vec![false; network.free.len()];
+    let mut errors = 0.0;
+    for (k, &(tight, i)) in followed.iter().enumerate() {
+        errors += tight;
+        if errors > rate * (k + 1) as f64 {
+            break;
+        }
+        loose[i] = true;
     }
     loose
 }
