@@ -30,6 +30,11 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
     let (halves, exact) = if case.is_split() {
         let field = prescribed(case);
         let (one, two) = split(&first, seed);
+        // Joints go with their side of the crack.
+        let shared = world.motions.iter().map(|m| m.shared);
+        let of_joints = shared
+            .max_by(|a, b| a.norm().total_cmp(&b.norm()))
+            .unwrap_or_default();
         let mut moved = Stones::new();
         for (id, points) in two {
             let rigid = world
@@ -39,6 +44,7 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
             let there = points.into_iter().map(|p| match (&field, rigid) {
                 (Some(field), _) => field.apply(&p),
                 (None, Some(motion)) => motion * p,
+                (None, None) if p.y > CRACK_AT => p + of_joints,
                 (None, None) => p,
             });
             moved.insert(id, there.collect());
