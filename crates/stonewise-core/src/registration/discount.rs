@@ -13,15 +13,13 @@ const ACROSS: [usize; 6] = [2, 3, 4, 6, 7, 8];
 /// Keeps unknowns that no point determines solvable; far below any information that counts.
 const RIDGE: f64 = 1e-12;
 
-/// The term with the variances of the motion in the face times `factor`, at least 1; its optimum, and what is known of the other unknowns once
-/// that motion is given, stay.
+/// The term with the variances of the motion in the face times `factor`, at least 1, and those of the translation in it larger by
+/// `error_m` squared; its optimum, and what is known of the other unknowns once that motion is given, stay.
 ///
 /// With A, B, D the blocks of the information (in the face, both, across), S = A - B D^-1 B' is what is known of the motion in the
-/// face alone; the log likelihood is its quadratic form plus one that depends on the others given it. S is divided by `factor`.
-pub(super) fn discounted(mut term: StoneTerm, factor: f64) -> StoneTerm {
-    if factor <= 1.0 {
-        return term;
-    }
+/// face alone; the log likelihood is its quadratic form plus one that depends on the others given it. S becomes
+/// (factor S^-1 + E)^-1, E the covariance of the error.
+pub(super) fn discounted(mut term: StoneTerm, factor: f64, error_m: f64) -> StoneTerm {
     let a = Matrix3::from_fn(|r, c| term.information[(INSIDE[r], INSIDE[c])]);
     let b = Matrix3x6::from_fn(|r, c| term.information[(INSIDE[r], ACROSS[c])]);
     let d = Matrix6::from_fn(|r, c| term.information[(ACROSS[r], ACROSS[c])]);
@@ -35,14 +33,22 @@ pub(super) fn discounted(mut term: StoneTerm, factor: f64) -> StoneTerm {
     let Some(optimum) = inverted(known).map(|i| i * pull) else {
         return term;
     };
-    let taken = 1.0 - 1.0 / factor;
+    let scaled = known / factor.max(1.0);
+    let error = Matrix3::from_diagonal(&Vector3::new(error_m, error_m, 0.0));
+    // (S^-1 + E)^-1 = S - S e (I + e S e)^-1 e S with E = e e, which holds for a singular S too.
+    let Some(inner) = (Matrix3::identity() + error * scaled * error).try_inverse() else {
+        return term;
+    };
+    let left = scaled - scaled * error * inner * error * scaled;
+    let taken = known - 0.5 * (left + left.transpose());
+    let pull_taken = taken * optimum;
     for r in 0..3 {
-        term.vector[INSIDE[r]] -= taken * pull[r];
+        term.vector[INSIDE[r]] -= pull_taken[r];
         for c in 0..3 {
-            term.information[(INSIDE[r], INSIDE[c])] -= taken * known[(r, c)];
+            term.information[(INSIDE[r], INSIDE[c])] -= taken[(r, c)];
         }
     }
-    term.constant += 0.5 * taken * pull.dot(&optimum);
+    term.constant += 0.5 * pull_taken.dot(&optimum);
     term
 }
 
@@ -87,7 +93,7 @@ mod tests {
     #[test]
     fn variances_in_the_face_grow_and_the_rest_stays() {
         let (before, factor) = (term(30), 1.7);
-        let after = discounted(before.clone(), factor);
+        let after = discounted(before.clone(), factor, 0.0);
         let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
         for &i in &INSIDE {
             for &j in &INSIDE {
@@ -105,7 +111,7 @@ mod tests {
     #[test]
     fn what_no_point_determines_stays_undetermined() {
         let before = term(4);
-        let after = discounted(before.clone(), 2.0);
+        let after = discounted(before.clone(), 2.0, 1e-3);
         let eigen = before.information.symmetric_eigen();
         for k in 0..9 {
             let direction = eigen.eigenvectors.column(k);

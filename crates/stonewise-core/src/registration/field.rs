@@ -116,12 +116,12 @@ fn normal_equations<'a>(
     pattern: &'a BlockPattern,
     terms: &[StoneTerm],
     components: &VarianceComponents,
-    loose: &LoosePrior,
+    classes: &[[f64; 9]; 2],
     beliefs: &Beliefs,
 ) -> Option<Normal<'a>> {
     let mut matrix = prior(graph, pattern, components, beliefs);
     let mut rhs = vec![Motion9::zeros(); terms.len()];
-    let reduced = reduce(terms, components, loose, beliefs);
+    let reduced = reduce(terms, classes, beliefs);
     for (i, (m, v, _)) in reduced.iter().enumerate() {
         let a = motion_of_field(&graph.nodes[i].face_from_world);
         matrix.diagonal[i] += a.transpose() * m * a;
@@ -149,7 +149,14 @@ pub(super) fn solve(
         factor,
         state,
         reduced,
-    } = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
+    } = normal_equations(
+        graph,
+        pattern,
+        terms,
+        components,
+        &classes(components, loose),
+        beliefs,
+    )?;
     let inverse = factor.selected_inverse()?;
     let from_others = (0..terms.len())
         .into_par_iter()
@@ -210,7 +217,14 @@ pub(super) fn test_jumps(
     beliefs: &Beliefs,
     sides: &[Vec<bool>],
 ) -> Option<Vec<Jump>> {
-    let normal = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
+    let normal = normal_equations(
+        graph,
+        pattern,
+        terms,
+        components,
+        &classes(components, loose),
+        beliefs,
+    )?;
     let of_stone: Vec<(Matrix9, Motion9)> = normal
         .reduced
         .iter()
@@ -450,7 +464,7 @@ pub(super) fn estimate_components(
             for sign in [-1.0, 1.0] {
                 let mut l = log;
                 l[k] += sign * width;
-                probes.push(l);
+                probes.push(clamp(l));
             }
         }
         let values: Vec<f64> = probes.par_iter().map(value).collect();
@@ -493,7 +507,11 @@ fn deviance(
     let prior_log_det = pattern
         .factor(&prior(graph, pattern, components, beliefs))?
         .log_det();
-    let normal = normal_equations(graph, pattern, terms, components, loose, beliefs)?;
+    // The terms are those of the points alone: the error in the face is among what is estimated.
+    let error = [components.error_m * components.error_m, 0.0];
+    let with_error = |v: [f64; 9]| std::array::from_fn(|k| v[k] + error[usize::from(k > 1)]);
+    let classes = classes(components, loose).map(with_error);
+    let normal = normal_equations(graph, pattern, terms, components, &classes, beliefs)?;
     let (mut quadratic, mut evidence) = (0.0, 0.0);
     for ((state, (_, v, c)), node) in normal.state.iter().zip(&normal.reduced).zip(&graph.nodes) {
         quadratic += (motion_of_field(&node.face_from_world) * state).dot(v);
@@ -502,14 +520,13 @@ fn deviance(
     Some(normal.factor.log_det() - prior_log_det - quadratic - 2.0 * evidence)
 }
 
+/// Variances of what stones do beside the field: those that move with it, and loose ones.
+fn classes(components: &VarianceComponents, loose: &LoosePrior) -> [[f64; 9]; 2] {
+    [components.own_variances(), loose_variances(components, loose)]
+}
+
 /// Eliminates each stone's own motion: information and vector about the field, and log evidence.
-fn reduce(
-    terms: &[StoneTerm],
-    components: &VarianceComponents,
-    loose: &LoosePrior,
-    beliefs: &Beliefs,
-) -> Vec<(Matrix9, Motion9, f64)> {
-    let classes = [components.own_variances(), loose_variances(components, loose)];
+fn reduce(terms: &[StoneTerm], classes: &[[f64; 9]; 2], beliefs: &Beliefs) -> Vec<(Matrix9, Motion9, f64)> {
     terms
         .iter()
         .zip(&beliefs.tight)

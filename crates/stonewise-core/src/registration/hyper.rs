@@ -11,8 +11,11 @@ pub struct VarianceComponents {
     pub drift: [f64; 2],
     /// The motion's gradient itself, metre per metre: in the face, out of it.
     pub strain: [f64; 2],
-    /// A stone's own translation beside the common field, metres: in the face, out of it.
-    pub own_m: [f64; 2],
+    /// A stone's own translation beside the common field, across the face, metres.
+    pub own_m: f64,
+    /// Error of a stone's motion in the face that no number of its points averages away, metres: relief finer than the points lie,
+    /// mixed pixels, the mix of stations. Locked stones cannot slide, so what they seem to do in the face beside the field is this.
+    pub error_m: f64,
     /// A stone's own rotation beside that of the field, radians.
     pub own_rad: f64,
     /// Bending of a stone's face, 1/m.
@@ -28,7 +31,8 @@ impl VarianceComponents {
         Self {
             drift: [5e-3, 1e-2],
             strain: [3e-3, 1e-2],
-            own_m: [5e-4; 2],
+            own_m: 5e-4,
+            error_m: 5e-4,
             own_rad: 2e-3,
             bending_per_m: 0.01,
         }
@@ -40,8 +44,8 @@ impl VarianceComponents {
             self.drift[1],
             self.strain[0],
             self.strain[1],
-            self.own_m[0],
-            self.own_m[1],
+            self.error_m,
+            self.own_m,
             self.own_rad,
             self.bending_per_m,
         ]
@@ -53,26 +57,29 @@ impl VarianceComponents {
         Self {
             drift: [v[0], v[1]],
             strain: [v[2], v[3]],
-            own_m: [v[4], v[5]],
+            error_m: v[4],
+            own_m: v[5],
             own_rad: v[6],
             bending_per_m: v[7],
         }
     }
 
-    /// Minus twice the log prior: stones have no motion of their own unless the survey says so (Simpson et al.
+    /// Minus twice the log prior: stones have neither motions nor errors of their own unless the survey says so (Simpson et al.
     /// 2017; one in a hundred surveys beyond half a millimetre and five milliradians).
     pub(super) fn penalty(&self) -> f64 {
         const RATE: f64 = 2.0 * 4.6;
-        RATE * ((self.own_m[0] + self.own_m[1]) / 5e-4 + self.own_rad / 5e-3)
+        RATE * ((self.error_m + self.own_m) / 5e-4 + self.own_rad / 5e-3)
     }
 
     /// Variances of a stone's own (translation, rotation, bending) in its frame.
     pub(super) fn own_variances(&self) -> [f64; 9] {
-        let [i, o] = self.own_m;
-        let (r, b) = (self.own_rad, self.bending_per_m);
+        let (i, o, r, b) = (NONE_M, self.own_m, self.own_rad, self.bending_per_m);
         [i, i, o, r, r, r, b, b, b].map(|s| s * s)
     }
 }
+
+/// As good as no motion, metres.
+const NONE_M: f64 = 2e-6;
 
 /// Bounds of the logarithms: below, a component is as good as absent; above, neighbours say nothing.
 pub(super) const BOUNDS: [[f64; 2]; COUNT] = [

@@ -128,10 +128,10 @@ pub fn adjust<S: PairSource>(
         if iterations == PROBED_AT {
             network.probe(source, params, progress)?;
         }
-        let terms = network.terms();
         if COMPONENTS_AT.contains(&stage) {
-            network.estimate_components(&terms);
+            network.estimate_components();
         }
+        let terms = network.terms();
         let Some(field) = network.solve(&terms, stage < FIXED_FROM, params) else {
             return Err(unsolvable);
         };
@@ -387,11 +387,16 @@ impl Network {
 
     /// Equations about the common translation, with correlation between points accounted for.
     fn terms(&self) -> Terms {
+        self.terms_with(self.components.error_m)
+    }
+
+    /// The same for another error of the motions in the face.
+    fn terms_with(&self, error_m: f64) -> Terms {
         let term = |i: usize, track: &Track| match self.survey.stones[i].usable {
             true => {
                 let inflation = self.inflation(i);
                 let inside = self.inflation_inside(i) / inflation;
-                discounted(track.term(&self.common_in(i), inflation), inside)
+                discounted(track.term(&self.common_in(i), inflation), inside, error_m)
             }
             false => StoneTerm::nothing(),
         };
@@ -467,7 +472,8 @@ impl Network {
         x
     }
 
-    fn estimate_components(&mut self, terms: &Terms) {
+    fn estimate_components(&mut self) {
+        let terms = self.terms_with(0.0);
         self.components = match &self.excerpt {
             None => field::estimate_components(
                 &self.graph,
@@ -607,7 +613,11 @@ impl Network {
     pub fn estimate(&self, i: usize, terms: &Terms, field: &Field) -> Estimate {
         let p = self.beliefs.tight[i];
         let prediction = &field.from_others[i];
-        let tight = field::posterior(&terms.tight[i], prediction, &self.components.own_variances());
+        let mut tight = field::posterior(&terms.tight[i], prediction, &self.components.own_variances());
+        // What is taken for an error might be a motion after all.
+        for k in 0..2 {
+            tight.covariance[(k, k)] += self.components.error_m * self.components.error_m;
+        }
         let Some(free) = &terms.free[i] else {
             return Estimate {
                 mean: tight.mean,
