@@ -109,6 +109,20 @@ mod tests {
     }
 
     #[test]
+    fn an_error_in_the_face_adds_to_the_variances_of_the_translation_there() {
+        let (before, error_m) = (term(30), 2e-4);
+        let after = discounted(before.clone(), 1.0, error_m);
+        let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
+        for &i in &INSIDE {
+            for &j in &INSIDE {
+                let added = if i == j && i < 2 { error_m * error_m } else { 0.0 };
+                assert!((d[(i, j)] - c[(i, j)] - added).abs() < 1e-6 * d[(i, i)].max(d[(j, j)]));
+            }
+        }
+        assert!((d * after.vector - c * before.vector).norm() < 1e-6);
+    }
+
+    #[test]
     fn what_no_point_determines_stays_undetermined() {
         let before = term(4);
         let after = discounted(before.clone(), 2.0, 1e-3);

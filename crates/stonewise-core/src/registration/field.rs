@@ -739,7 +739,7 @@ mod tests {
         )
         .unwrap()[0];
         let mut matrix = prior(&graph, &pattern, &components, &beliefs);
-        let of_stone: Vec<(Matrix9, Motion9)> = reduce(&terms, &components, &loose, &beliefs)
+        let of_stone: Vec<(Matrix9, Motion9)> = reduce(&terms, &classes(&components, &loose), &beliefs)
             .iter()
             .zip(&graph.nodes)
             .map(|((m, v, _), node)| {
