@@ -6,7 +6,7 @@
 //! right to left: `second_from_first * point_in_first`.
 //!
 //! A module uses only those to its left:
-//! `id < progress < geometry < raster < cloud < stone < {transfer | matching | registration | change} < evaluate < simulate`.
+//! `id < progress < parallel < geometry < raster < cloud < stone < {transfer | matching | registration | change} < evaluate < simulate`.
 
 pub mod change;
 pub mod cloud;
@@ -14,6 +14,7 @@ pub mod evaluate;
 pub mod geometry;
 pub mod id;
 pub mod matching;
+pub mod parallel;
 pub mod progress;
 pub mod raster;
 pub mod registration;

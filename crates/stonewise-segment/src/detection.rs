@@ -27,7 +27,7 @@ pub struct Patch {
 /// Finds the stones of one image that is small enough to be looked at as a whole.
 pub trait Detector: Sync {
     /// What went wrong.
-    type Error;
+    type Error: Send;
 
     /// The stones of an image, best score first.
     ///

@@ -7,6 +7,7 @@ use super::options::TilingOptions;
 use super::pyramid::{at_scale, crop};
 use crate::{Detector, Segmentation};
 use std::cmp::Ordering;
+use stonewise_core::parallel::{in_parallel, on_one_thread};
 use stonewise_core::progress::{Interrupted, Progress};
 use stonewise_core::raster::RgbImage;
 
@@ -25,8 +26,8 @@ pub enum TilingError<E> {
 ///
 /// The photo is looked at as it is first; where its stones are too small or too large for the detector, also enlarged or reduced
 /// ([`TilingOptions::stone_px`]).
-/// `progress` advances by one for every tile, [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, one
-/// tile in the detector, and the masks found. The result does not depend on the number of threads if the detector's does not.
+/// `progress` advances by one for every tile, [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, a
+/// tile a thread in the detector, and the masks found. The result does not depend on the number of threads if the detector's does not.
 ///
 /// # Errors
 /// The detector could not run, or the caller stopped it.
@@ -53,23 +54,18 @@ pub fn segment_photo<D: Detector>(
             0.0
         };
         let seen = Seen::of(&candidates);
-        for tile in size.tiles(options) {
-            let part = size.scaling.rect(&tile);
-            let is_needed = match (place, scales[index] > 1.0) {
+        let is_needed = |tile: &Rect| {
+            let part = size.scaling.rect(tile);
+            match (place, scales[index] > 1.0) {
                 (0, _) => true,
                 (_, true) => seen.has_small(&part, limit),
                 (_, false) => seen.has_large(&part, limit),
-            };
-            if is_needed {
-                size.look(detector, &tile, options, progress, &mut |found| {
-                    if longer_side(&found) >= least {
-                        candidates.push(found);
-                    }
-                })?;
-            } else {
-                progress.advance(1);
             }
-        }
+        };
+        let (needed, others): (Vec<Rect>, Vec<Rect>) = size.tiles(options).into_iter().partition(is_needed);
+        progress.advance(others.len() as u64);
+        let found = size.look(detector, &needed, options, progress)?;
+        candidates.extend(found.into_iter().filter(|c| longer_side(c) >= least));
     }
     Ok(merge(candidates, photo.width(), photo.height(), options))
 }
@@ -100,24 +96,28 @@ impl Size {
         )
     }
 
-    /// Hands on what the detector finds in a tile.
+    /// What the detector finds in some tiles, in their order. Tiles side by side take half of the time of threads in a layer.
     fn look<D: Detector>(
         &self,
         detector: &D,
-        tile: &Rect,
+        tiles: &[Rect],
         options: &TilingOptions,
         progress: &dyn Progress,
-        take: &mut dyn FnMut(Candidate),
-    ) -> Result<(), TilingError<D::Error>> {
-        progress.check()?;
-        let found = detector
-            .detect(&crop(&self.image, tile))
-            .map_err(TilingError::Detector)?;
-        let good = found.iter().filter(|d| f64::from(d.score) >= options.min_score);
-        good.filter_map(|d| candidate(d, tile, &self.scaling))
-            .for_each(take);
-        progress.advance(1);
-        Ok(())
+    ) -> Result<Vec<Candidate>, TilingError<D::Error>> {
+        let in_tile = |tile: &Rect| -> Result<Vec<Candidate>, TilingError<D::Error>> {
+            progress.check()?;
+            let found = detector
+                .detect(&crop(&self.image, tile))
+                .map_err(TilingError::Detector)?;
+            progress.advance(1);
+            let good = found.iter().filter(|d| f64::from(d.score) >= options.min_score);
+            Ok(good.filter_map(|d| candidate(d, tile, &self.scaling)).collect())
+        };
+        let found = match tiles {
+            [one] => vec![in_tile(one)?],
+            _ => in_parallel(tiles.len(), |i| on_one_thread(|| in_tile(&tiles[i])))?,
+        };
+        Ok(found.into_iter().flatten().collect())
     }
 }
 

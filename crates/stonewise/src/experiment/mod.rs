@@ -6,7 +6,6 @@
 mod halves;
 mod known_motion;
 mod paper;
-mod parallel;
 mod quiet;
 mod sensitivity;
 mod settings_with;

@@ -7,7 +7,6 @@ mod page;
 pub use cases::Influence;
 
 use crate::error::{Error, Result};
-use crate::experiment::parallel::in_parallel;
 use crate::experiment::quiet::Quiet;
 use crate::pipeline::{Context, Keeps, StepStore, Until, run_in};
 use crate::project::{Estimator, Project};
@@ -18,6 +17,7 @@ use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::evaluate::{ErrorStatistics, TruthScore};
 use stonewise_core::matching::MatchParams;
+use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
 /// What is varied, on what.
@@ -91,7 +91,7 @@ pub fn sensitivity(
         let folder = out.join("runs").join(i.to_string());
         let points = measure(variant, options, *seed, &folder, &store, progress)?;
         progress.advance(1);
-        Ok(points)
+        Ok::<_, Error>(points)
     })?;
     let seeds = options.seeds.max(1) as usize;
     let points: Vec<SensitivityPoint> = measured.chunks(seeds).flat_map(pooled).collect();

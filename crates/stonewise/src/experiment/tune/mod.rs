@@ -9,7 +9,6 @@ pub use grid::{Dimension, DimensionError, default_grid};
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
 use crate::experiment::known_motion::paper_motions;
-use crate::experiment::parallel::in_parallel;
 use crate::experiment::quiet::Quiet;
 use crate::experiment::settings_with::{count_changes, project_lines, settings_with};
 use crate::files::write_text;
@@ -20,6 +19,7 @@ use front::{Worth, front, recommended};
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::evaluate::MotionScore;
+use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
 /// What is tuned, on what.
@@ -108,7 +108,7 @@ pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn
         progress.check()?;
         let point = measure(&cases, &grid, &values[i], &store, &out.join("points"), progress)?;
         progress.advance(1);
-        Ok(point)
+        Ok::<_, Error>(point)
     })?;
     let ranked: Vec<Worth> = points
         .iter()
