@@ -508,9 +508,10 @@ fn deviance(
         .factor(&prior(graph, pattern, components, beliefs))?
         .log_det();
     // The terms are those of the points alone: the error in the face is among what is estimated.
-    let error = [components.error_m * components.error_m, 0.0];
-    let with_error = |v: [f64; 9]| std::array::from_fn(|k| v[k] + error[usize::from(k > 1)]);
-    let classes = classes(components, loose).map(with_error);
+    let mut classes = classes(components, loose);
+    for v in classes.iter_mut().flat_map(|c| &mut c[..2]) {
+        *v += components.error_m * components.error_m;
+    }
     let normal = normal_equations(graph, pattern, terms, components, &classes, beliefs)?;
     let (mut quadratic, mut evidence) = (0.0, 0.0);
     for ((state, (_, v, c)), node) in normal.state.iter().zip(&normal.reduced).zip(&graph.nodes) {

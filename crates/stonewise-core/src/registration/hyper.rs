@@ -76,6 +76,15 @@ impl VarianceComponents {
         let (i, o, r, b) = (NONE_M, self.own_m, self.own_rad, self.bending_per_m);
         [i, i, o, r, r, r, b, b, b].map(|s| s * s)
     }
+
+    /// The same with the error in the face.
+    pub(super) fn own_and_error_variances(&self) -> [f64; 9] {
+        let mut variances = self.own_variances();
+        for v in &mut variances[..2] {
+            *v += self.error_m * self.error_m;
+        }
+        variances
+    }
 }
 
 /// As good as no motion, metres.

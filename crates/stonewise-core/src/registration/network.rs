@@ -581,7 +581,9 @@ impl Network {
     /// Moves every stone to its posterior mean; whether the network has settled.
     fn step(&mut self, terms: &Terms, field: &Field, params: &NetworkParams) -> bool {
         let mut restless = 0;
-        let own = self.components.own_variances();
+        // What passes for an error might be the start of a motion: the equations follow it, so that a loose stone shows itself.
+        let followed = self.terms_with(0.0);
+        let own = self.components.own_and_error_variances();
         let wide = field::loose_variances(&self.components, &self.loose);
         for i in 0..self.tight.len() {
             let origin = self.common_in(i);
@@ -593,7 +595,7 @@ impl Network {
                 restless += usize::from(belief * step > params.tolerance_m.max(SETTLED * sd));
             };
             let prediction = &field.from_others[i];
-            let tight = field::posterior(&terms.tight[i], prediction, &own);
+            let tight = field::posterior(&followed.tight[i], prediction, &own);
             self.determined[i] = tight.determined;
             follow(&mut self.tight[i], &tight, p);
             if let (Some(track), Some(term)) = (&mut self.free[i], &terms.free[i]) {
