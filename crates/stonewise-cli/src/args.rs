@@ -14,6 +14,10 @@ pub struct Args {
     /// Threads to use; all cores when absent. Results do not depend on it.
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
+    /// Write into a folder that holds other things (files of the same names are replaced; inputs never are),
+    /// and run a survey that cannot be right.
+    #[arg(long, global = true)]
+    pub force: bool,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -28,6 +32,11 @@ pub enum Command {
     /// Make a small survey with known motion, and measure it.
     #[command(after_help = "Example:\n  stonewise demo --out demo")]
     Demo(DemoArgs),
+    /// Look at a survey in seconds, and say what will go wrong: units, frames, overlap, photos, cameras,
+    /// disk.
+    #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
+        The table goes to stdout, a page with pictures beside the project file. Exit code 3 where something is doubtful.")]
+    Check(CheckArgs),
     /// Write a project file from the surveys found in a folder.
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
@@ -39,7 +48,7 @@ pub enum Command {
         stonewise segment photos/ --out stones/ --model training/model.safetensors --reference masks.json\n  \
         stonewise segment survey/stonewise.toml --out results/")]
     Segment(SegmentArgs),
-    /// Teach the network that finds stones: a wall from a few labelled photos, or masonry in general from rendered ones.
+    /// Train the stone detector: on a few labelled photos of a wall, or on rendered photos of masonry in general.
     #[command(
         after_help = "Examples:\n  stonewise train --rendered --from none --minutes 60 --out training/\n\n\
         A training goes on where it stopped when the same command is given again."
@@ -101,6 +110,19 @@ pub struct ProjectArgs {
     pub out: PathBuf,
 }
 
+/// Arguments of `check`.
+#[derive(Debug, ClapArgs)]
+pub struct CheckArgs {
+    /// The project file.
+    pub project: PathBuf,
+    /// Where the results are to go: its disk's free space is looked at.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub out: PathBuf,
+    /// The page with pictures; PROJECT.check.html beside the project file when absent.
+    #[arg(long, value_name = "FILE")]
+    pub page: Option<PathBuf>,
+}
+
 /// Arguments of `demo`.
 #[derive(Debug, ClapArgs)]
 pub struct DemoArgs {
@@ -160,13 +182,13 @@ pub struct SegmentArgs {
     /// Folder of the results; made if need be.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// The network: `built-in`, or a file that `train` wrote.
+    /// The detector: `built-in`, or a file that `train` wrote.
     #[arg(long, value_name = "FILE", default_value = "built-in")]
     pub model: PathBuf,
     /// Sizes at which photos are looked at, 1 = as they are.
     #[arg(long, value_name = "S,...", value_delimiter = ',')]
     pub scales: Option<Vec<f64>>,
-    /// Stones of which the network is less sure are left out, 0 to 1.
+    /// Leave out stones with a lower score, 0 to 1.
     #[arg(long, value_name = "P")]
     pub min_score: Option<f64>,
     /// Masks to measure the result on: COCO json or a folder of label PNGs.
@@ -180,10 +202,10 @@ pub struct SegmentArgs {
 /// Arguments of `train`.
 #[derive(Debug, ClapArgs)]
 pub struct TrainArgs {
-    /// Learn from photos that are rendered on the way.
+    /// Train on photos that are rendered during the training.
     #[arg(long, conflicts_with = "data", required_unless_present = "data")]
     pub rendered: bool,
-    /// Masks to learn from: COCO json or a folder of label PNGs.
+    /// Masks to train on: COCO json or a folder of label PNGs.
     #[arg(long, value_name = "FILE", requires = "images")]
     pub data: Option<PathBuf>,
     /// Folder of the photos that the masks name.
@@ -195,7 +217,7 @@ pub struct TrainArgs {
     /// Weights to start from: `built-in`, a file that `train` wrote, or `none`.
     #[arg(long, value_name = "WEIGHTS", default_value = "built-in")]
     pub from: PathBuf,
-    /// Folder of the checkpoint, the curves and the trained network (model.safetensors); made if need be.
+    /// Folder of the checkpoint, the curves and the trained detector (model.safetensors); created if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// Stop after so many minutes; the same command goes on.
@@ -325,7 +347,7 @@ pub struct TuneArgs {
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     /// A parameter and its values, key=a,b,c or key=from..to..step; may be given several times. Absent: ratio
-    /// threshold, area ratio and buffer, as in the paper (for the network the border instead of the buffer).
+    /// threshold, area ratio and buffer, as in the paper (for the adjustment the border instead of the buffer).
     #[arg(long, value_name = "KEY=VALUES")]
     pub grid: Vec<Dimension>,
     /// Use only a part: x0,y0,z0,x1,y1,z1 (metres, world frame), or WIDTHxHEIGHT in the middle of the wall, such as 5x5.

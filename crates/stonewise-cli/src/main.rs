@@ -10,8 +10,10 @@ use std::process::ExitCode;
 const DONE: u8 = 0;
 /// Something failed.
 const FAILED: u8 = 1;
-/// Finished, but some inputs were left out.
-const SKIPPED_INPUTS: u8 = 3;
+/// Wrong arguments, or a wrong project file.
+const WRONG_USAGE: u8 = 2;
+/// Finished, but some inputs were left out, or the results as a whole are in doubt.
+const IN_DOUBT: u8 = 3;
 
 fn main() -> ExitCode {
     let args = <args::Args as clap::Parser>::parse();
@@ -20,12 +22,24 @@ fn main() -> ExitCode {
     printer.finish();
     match outcome {
         Ok(commands::Outcome::Done) => ExitCode::from(DONE),
-        Ok(commands::Outcome::SkippedInputs) => ExitCode::from(SKIPPED_INPUTS),
+        Ok(commands::Outcome::InDoubt) => ExitCode::from(IN_DOUBT),
         Err(error) => {
             printer::note(&format!("error: {}", explain(&error)));
-            ExitCode::from(FAILED)
+            ExitCode::from(if is_wrong_usage(&error) {
+                WRONG_USAGE
+            } else {
+                FAILED
+            })
         }
     }
+}
+
+/// Whether the command was given something that cannot be.
+fn is_wrong_usage(error: &anyhow::Error) -> bool {
+    let known = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref().is_some_and(stonewise::Error::is_wrong_usage)
+    };
+    error.chain().any(known)
 }
 
 /// The error and its causes in one line; a cause that is part of the text already is not said twice.

@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::Instant;
 use stonewise_core::progress::Progress;
 
@@ -13,31 +13,42 @@ pub struct Printer {
     quiet: bool,
     terminal: bool,
     cancelled: Arc<AtomicBool>,
+    listening: Once,
     started: Instant,
 }
 
 impl Printer {
-    /// A printer that listens for Ctrl-C and for the system's request to end; a second Ctrl-C ends at once.
+    /// A printer for this command.
     pub fn new(quiet: bool) -> Self {
-        let cancelled = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&cancelled);
-        let handler = move || {
-            if flag.swap(true, Ordering::SeqCst) {
-                std::process::exit(130);
-            }
-            note("stopping; what is finished is kept (once more to stop at once)");
-        };
-        if ctrlc::set_handler(handler).is_err() {
-            note("Ctrl-C cannot be caught here; it will stop at once");
-        }
         let terminal = std::io::stderr().is_terminal();
         Self {
             bar: Mutex::new(ProgressBar::hidden()),
             quiet,
             terminal,
-            cancelled,
+            cancelled: Arc::new(AtomicBool::new(false)),
+            listening: Once::new(),
             started: Instant::now(),
         }
+    }
+
+    /// Listens for Ctrl-C and for the system's request to end from now on; a second one ends at once.
+    ///
+    /// Before work begins that looks whether it should stop, either ends the program as always.
+    fn listen(&self) {
+        self.listening.call_once(|| {
+            let flag = Arc::clone(&self.cancelled);
+            let handler = move || {
+                if flag.swap(true, Ordering::SeqCst) {
+                    std::process::exit(130);
+                }
+                // On a thread of its own: a reader of stderr that is stuck must not hold up the second
+                // signal.
+                std::thread::spawn(|| note("stopping; what is finished is kept (once more to stop at once)"));
+            };
+            if ctrlc::set_handler(handler).is_err() {
+                note("Ctrl-C cannot be caught here; it will stop at once");
+            }
+        });
     }
 
     /// One line of the log.
@@ -59,6 +70,7 @@ impl Printer {
 
 impl Progress for Printer {
     fn begin(&self, what: &str, total: u64) {
+        self.listen();
         if self.quiet {
             return;
         }
@@ -82,6 +94,10 @@ impl Progress for Printer {
         if self.terminal && !self.quiet {
             self.bar().inc(units);
         }
+    }
+
+    fn note(&self, line: &str) {
+        self.log(line);
     }
 
     fn is_cancelled(&self) -> bool {

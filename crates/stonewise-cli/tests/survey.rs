@@ -263,7 +263,7 @@ fn wrong_usage_and_wrong_project_files_say_where() {
     for (text, place, message) in cases {
         fs::write(&project, text).unwrap();
         let (code, log) = run(dir.path(), &dir.path().join("out"), &[]);
-        assert_eq!(code, 1, "{log}");
+        assert_eq!(code, 2, "{log}");
         assert!(log.contains(place) && log.contains(message), "{log}");
     }
 }
@@ -271,7 +271,7 @@ fn wrong_usage_and_wrong_project_files_say_where() {
 #[test]
 fn bad_inputs_are_named_and_nothing_half_written_stays() {
     type Spoil = fn(&Path);
-    let cases: [(&str, Spoil, i32, &str); 6] = [
+    let cases: [(&str, Spoil, i32, &str); 8] = [
         (
             "a truncated cloud",
             |dir| {
@@ -322,6 +322,36 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
             },
             1,
             "epoch1.json",
+        ),
+        (
+            "a photo whose head lies about its size",
+            |dir| {
+                let images = dir.join("epoch1/images");
+                let first = fs::read_dir(&images).unwrap().next().unwrap().unwrap().path();
+                let lie = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/hostile/lie.jpg");
+                fs::copy(lie, first).unwrap();
+            },
+            3,
+            "the photo cannot be shown in the report: cannot read the image",
+        ),
+        (
+            "points strewn over 2,000 km",
+            |dir| {
+                let line = |i: u64| {
+                    format!(
+                        "{} {} {}\n",
+                        i * 7919 % 2_000_000,
+                        i * 104_729 % 2_000_000,
+                        i % 97
+                    )
+                };
+                fs::write(dir.join("far.xyz"), (0..60_000).map(line).collect::<String>()).unwrap();
+                let path = dir.join("stonewise.toml");
+                let text = fs::read_to_string(&path).unwrap();
+                fs::write(&path, text.replace("epoch2/cloud_tls.laz", "far.xyz")).unwrap();
+            },
+            1,
+            "are the coordinates in metres? Cut the cloud to the structure",
         ),
         (
             "epochs that lie apart",
@@ -385,13 +415,13 @@ fn init_writes_a_project_that_runs_need_no_change_in() {
         assert!(text.contains(expected), "{expected} is not in\n{text}");
     }
     stonewise().arg("init").arg(survey.path()).assert().code(1);
-    // Without masks a network is needed.
+    // Without masks a detector is needed.
     let with_model = format!("{text}\n[segment]\nmodel = \"missing.safetensors\"\n");
     fs::write(survey.path().join("stonewise.toml"), with_model).unwrap();
     let out = tempfile::tempdir().unwrap();
     let (code, log) = run(survey.path(), out.path(), &[]);
     assert!(
-        code == 1 && log.contains("no such file") && log.contains("missing.safetensors"),
+        code == 2 && log.contains("no such file") && log.contains("missing.safetensors"),
         "{log}"
     );
 }

@@ -11,6 +11,8 @@ pub trait Progress: Sync {
     fn begin(&self, what: &str, total: u64);
     /// `units` more are done.
     fn advance(&self, units: u64);
+    /// Something that a person should read now, in one line.
+    fn note(&self, _line: &str) {}
     /// True once the caller wants the work to stop.
     fn is_cancelled(&self) -> bool;
 

@@ -69,6 +69,8 @@ pub struct StoneMotion {
     pub own_motion_p: f64,
     /// Moves unlike its neighbours, significantly (false discovery rate controlled).
     pub loose: bool,
+    /// Posterior probability that the stone is loose; `None` where the estimator gives none.
+    pub p_loose: Option<f64>,
     /// Share of the least observable direction of the displacement, 0 (not observable) to 1; `sep_obs`.
     pub observability: f64,
     /// RMS of the final residuals along the normal, metres.

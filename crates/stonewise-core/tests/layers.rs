@@ -1,13 +1,16 @@
-//! Keeps the modules of core in their order: a module uses only those below it, and the stages never each other.
-#![allow(clippy::unwrap_used)] // a test that cannot read the sources must stop
+//! Keeps the modules of core in their order: a module uses only those below it, the stages never each other,
+//! and no files use each other in a circle.
+#![allow(clippy::unwrap_used, clippy::panic)] // a test that cannot read the sources must stop
 
-use std::fs;
+#[path = "../../../testing/module_graph.rs"]
+mod module_graph;
+
+use module_graph::ModuleGraph;
 use std::path::Path;
 
 /// Modules from the bottom up; those on one line do not see each other.
-const LAYERS: [&[&str]; 9] = [
-    &["id"],
-    &["progress"],
+const LAYERS: [&[&str]; 8] = [
+    &["id", "statistics", "linalg", "progress", "parallel"],
     &["geometry"],
     &["raster"],
     &["cloud"],
@@ -18,48 +21,14 @@ const LAYERS: [&[&str]; 9] = [
 ];
 
 #[test]
-fn modules_use_only_those_below_them() {
+fn modules_use_only_those_below_them_and_never_in_a_circle() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut uses = 0;
-    for (level, modules) in LAYERS.iter().enumerate() {
-        for module in *modules {
-            for file in rust_files(&src, module) {
-                for used in used_modules(&fs::read_to_string(&file).unwrap()) {
-                    let below = LAYERS[..level].iter().any(|l| l.contains(&used.as_str()));
-                    assert!(
-                        below || used == *module,
-                        "{} uses {used}, which is not below {module}",
-                        file.display()
-                    );
-                    uses += 1;
-                }
-            }
-        }
-    }
-    assert!(uses > 10, "only {uses} uses found: the search is broken");
-}
-
-fn rust_files(src: &Path, module: &str) -> Vec<std::path::PathBuf> {
-    let mut found = vec![];
-    let mut open = vec![src.join(module), src.join(format!("{module}.rs"))];
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            open.extend(fs::read_dir(&path).unwrap().map(|e| e.unwrap().path()));
-        } else if path.extension().is_some_and(|e| e == "rs") && path.exists() {
-            found.push(path);
-        }
-    }
-    found
-}
-
-/// First path segment after every `crate::`, outside comments.
-fn used_modules(text: &str) -> Vec<String> {
-    let code = text.lines().map(|line| line.split("//").next().unwrap_or(""));
-    let name = |rest: &str| {
-        rest.chars()
-            .take_while(|c| c.is_alphanumeric() || *c == '_')
-            .collect::<String>()
-    };
-    code.flat_map(|line| line.split("crate::").skip(1).map(name).collect::<Vec<_>>())
-        .collect()
+    let graph = ModuleGraph::read(&src);
+    assert!(
+        graph.use_count() > 100,
+        "only {} uses found: the search is broken",
+        graph.use_count()
+    );
+    graph.assert_layers(&LAYERS);
+    graph.assert_no_circle();
 }

@@ -78,5 +78,5 @@ fn m3c2_sees_a_bulge_but_not_a_shift_in_the_plane() {
     assert!(bulged.significance.still > 2000);
     assert!((bulged.significance.false_alarm_rate.unwrap() - 0.05).abs() < 0.015);
     assert!(bulged.significance.detectable_hit_rate.unwrap() > 0.95);
-    assert!(bulged.calibration.coverage_95.along.is_none());
+    assert!(bulged.calibration.unwrap().coverage_95.along.is_none());
 }

@@ -1,4 +1,5 @@
 //! What the simulator promises about its clouds, measured back from them.
+#![allow(clippy::unwrap_used)] // helpers outside the tests fail like them
 
 use nalgebra::{Point3, Vector3};
 use stonewise_core::cloud::GridIndex;
@@ -121,9 +122,9 @@ fn a_drone_adds_its_own_noise_and_an_error_per_strip() {
         ..small(3)
     };
     let scan = World::new(&params).scan(&params, 0).uav.unwrap();
-    for strip in 0..uav.strips as u16 {
+    for strip in 1..=uav.strips {
         let errors: Vec<Vector3<f64>> = (0..scan.len())
-            .filter(|&i| scan.station[i] == strip && scan.cos_incidence[i] > 0.8)
+            .filter(|&i| scan.source[i] == strip && scan.cos_incidence[i] > 0.8)
             .map(|i| scan.cloud.world(i) - exact(&scan, i))
             .collect();
         let n = errors.len() as f64;
@@ -328,8 +329,8 @@ fn incidence_follows_from_where_the_station_stands() {
             n += 1.0;
         }
         assert!(n > 1000.0, "{n}");
-        // Relief, facets and rounded edges turn faces by some 20 degrees: seen square on that costs a few hundredths of the
-        // cosine, seen at an angle faces turn towards the beam as well as away.
+        // Relief, facets and rounded edges turn faces by some 20 degrees: seen square on that costs a few
+        // hundredths of the cosine, seen at an angle faces turn towards the beam as well as away.
         let ratio = stated / plane;
         assert!(
             (0.88..1.2).contains(&ratio),
@@ -362,7 +363,7 @@ fn a_station_scans_no_further_than_it_reaches() {
     let world = World::new(&params);
     let scan = world.scan(&params, 0).tls.unwrap();
     for i in 0..scan.len() {
-        let station = -4.5 + 3.0 * f64::from(scan.station[i]);
+        let station = -4.5 + 3.0 * f64::from(scan.source[i] - 1);
         assert!((exact(&scan, i).y - station).abs() < 3.01);
     }
     // Two stations see each place but for the ends; square on the merged spacing is as asked.
@@ -394,10 +395,177 @@ fn the_number_of_threads_changes_nothing_and_the_seed_does() {
         assert_eq!(a_tls.as_ref().unwrap().cloud, b_tls.as_ref().unwrap().cloud);
         assert_eq!(a_uav.as_ref().unwrap().cloud, b_uav.as_ref().unwrap().cloud);
         assert_eq!(a_tls.as_ref().unwrap().stone, b_tls.as_ref().unwrap().stone);
+        assert_eq!(a_tls.as_ref().unwrap().time, b_tls.as_ref().unwrap().time);
     }
     let other = simulate_scans(&small(8)).1;
     assert_ne!(
         other[0].tls.as_ref().unwrap().cloud,
         one[0].tls.as_ref().unwrap().cloud
+    );
+}
+
+/// The points of each source in turn: the source, and the places of its points in the scan.
+fn sources(scan: &Scan) -> Vec<(u32, Vec<usize>)> {
+    let mut found: Vec<(u32, Vec<usize>)> = Vec::new();
+    for (i, &source) in scan.source.iter().enumerate() {
+        match found.iter_mut().find(|(s, _)| *s == source) {
+            Some((_, points)) => points.push(i),
+            None => found.push((source, vec![i])),
+        }
+    }
+    found
+}
+
+#[test]
+fn every_source_has_a_number_and_its_times_rise_and_follow_the_scan() {
+    let params = SceneParams {
+        tls: Some(TlsParams {
+            stations: 3,
+            ..TlsParams::default()
+        }),
+        uav: Some(UavParams::default()),
+        ..small(12)
+    };
+    let world = World::new(&params);
+    let mut last = 0.0;
+    for epoch in 0..2 {
+        let scans = world.scan(&params, epoch);
+        let (tls, uav) = (scans.tls.unwrap(), scans.uav.unwrap());
+        for scan in [&tls, &uav] {
+            let sources = sources(scan);
+            assert_eq!(sources.iter().map(|(s, _)| *s).collect::<Vec<_>>(), [1, 2, 3]);
+            for (_, points) in sources {
+                let times: Vec<f64> = points.iter().map(|&i| scan.time[i]).collect();
+                assert!(times[0] > last, "sources come one after the other");
+                assert!(times.windows(2).all(|w| w[0] < w[1]));
+                last = times[times.len() - 1];
+            }
+        }
+        // A strip is flown at an even speed: its points' places along the face are linear in time but for the
+        // width of a fan.
+        for (_, points) in sources(&uav) {
+            let mean = |get: &dyn Fn(usize) -> f64| {
+                points.iter().map(|&i| get(i)).sum::<f64>() / points.len() as f64
+            };
+            let (t0, y0) = (mean(&|i| uav.time[i]), mean(&|i| exact(&uav, i).y));
+            let moment = |p: &dyn Fn(usize) -> f64, q: &dyn Fn(usize) -> f64| mean(&|i| p(i) * q(i));
+            let (t, y) = (|i: usize| uav.time[i] - t0, |i: usize| exact(&uav, i).y - y0);
+            let (tt, yy, ty) = (moment(&t, &t), moment(&y, &y), moment(&t, &y));
+            assert!(ty / (tt * yy).sqrt() > 0.99, "{}", ty / (tt * yy).sqrt());
+        }
+    }
+}
+
+/// Errors of the ranges of a scan without registration errors, with the range and the cosine of the
+/// incidence.
+fn range_errors(world: &World, params: &SceneParams, source: u32) -> Vec<[f64; 3]> {
+    let scan = world.scan(params, 0).tls.unwrap();
+    let tls = params.tls.as_ref().unwrap();
+    let apart = 1.8 / f64::from(tls.stations);
+    let a = -0.9 + apart * (f64::from(source) - 0.5);
+    let n = tls.distance_m;
+    let mut station = world.wall.face.world_of(&FacePoint { a, u: 0.0, n });
+    // The scanner's height is known to 10 cm.
+    station.z = tls.height_m;
+    (0..scan.len())
+        .filter(|&i| scan.source[i] == source)
+        .map(|i| {
+            let beam = exact(&scan, i) - station;
+            let error = (scan.cloud.world(i) - exact(&scan, i)).dot(&beam.normalize());
+            [error, beam.norm(), f64::from(scan.cos_incidence[i])]
+        })
+        .collect()
+}
+
+#[test]
+fn scales_differ_between_stations_and_lengthen_ranges_in_proportion() {
+    let tls = |scale_error: f64| {
+        let mut tls = TlsParams {
+            stations: 2,
+            scale_error,
+            ..plain_tls()
+        };
+        tls.beam.range_noise_m = 0.0;
+        tls.beam.range_noise_per_m = 0.0;
+        tls
+    };
+    let params = |scale_error: f64| SceneParams {
+        tls: Some(tls(scale_error)),
+        ..small(13)
+    };
+    let world = World::new(&params(0.0));
+    let mut scales = Vec::new();
+    for station in [1, 2] {
+        let with: Vec<f64> = range_errors(&world, &params(1e-3), station)
+            .iter()
+            .map(|[error, range, _]| error / range)
+            .collect();
+        let scale = with.iter().sum::<f64>() / with.len() as f64;
+        let spread = rms(with.iter().map(|s| s - scale));
+        assert!(spread < 1e-2 * scale.abs() + 1e-7, "{scale} {spread}");
+        scales.push(scale);
+        assert!(rms(range_errors(&world, &params(0.0), station).iter().map(|e| e[0])) < 1e-6);
+    }
+    assert!(
+        scales.iter().all(|s| (1e-5..4e-3).contains(&s.abs())),
+        "{scales:?}"
+    );
+    assert!((scales[0] - scales[1]).abs() > 1e-5, "{scales:?}");
+}
+
+#[test]
+fn ranges_err_by_incidence_and_on_dark_surfaces_as_stated() {
+    let params = |incidence_m: f64, darkness_m: f64| {
+        let mut tls = plain_tls();
+        tls.beam.range_noise_m = 0.0;
+        tls.beam.incidence_m = incidence_m;
+        tls.beam.darkness_m = darkness_m;
+        SceneParams {
+            tls: Some(tls),
+            ..small(14)
+        }
+    };
+    let world = World::new(&params(0.0, 0.0));
+    for [error, _, cos_incidence] in range_errors(&world, &params(0.004, 0.0), 1) {
+        assert!(
+            (error - 0.004 * (1.0 - cos_incidence)).abs() < 2e-5,
+            "{error} {cos_incidence}"
+        );
+    }
+    let dark = range_errors(&world, &params(0.0, 0.001), 1);
+    // Reflectances lie between 0.004 and 0.9, so the error between log2(0.25 / 0.9) and log2(0.25 / 0.004)
+    // millimetres.
+    assert!(dark.iter().all(|[error, ..]| (-1.9e-3..6.0e-3).contains(error)));
+    let mean = dark.iter().map(|d| d[0]).sum::<f64>() / dark.len() as f64;
+    assert!(rms(dark.iter().map(|d| d[0] - mean)) > 3e-4, "surfaces differ");
+}
+
+#[test]
+fn stations_share_the_datum_of_their_epoch() {
+    let params = |datum_m: f64| {
+        let mut tls = TlsParams {
+            stations: 2,
+            datum_m,
+            ..plain_tls()
+        };
+        tls.beam.range_noise_m = 0.0;
+        SceneParams {
+            tls: Some(tls),
+            ..small(15)
+        }
+    };
+    let world = World::new(&params(0.0));
+    let datum = |epoch: usize| {
+        let scan = world.scan(&params(0.005), epoch).tls.unwrap();
+        let errors: Vec<Vector3<f64>> = (0..scan.len())
+            .map(|i| scan.cloud.world(i) - exact(&scan, i))
+            .collect();
+        assert!(errors.iter().all(|e| (e - errors[0]).norm() < 2e-6));
+        errors[0]
+    };
+    let (first, second) = (datum(0), datum(1));
+    assert!(
+        (0.001..0.03).contains(&first.norm()) && (first - second).norm() > 1e-3,
+        "{first} {second}"
     );
 }

@@ -4,10 +4,10 @@
 
 use crate::atomic::write_atomically;
 use crate::folder::files_below;
-use crate::photo_name::is_photo;
+pub use crate::photo_name::is_photo;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder, ImageError, ImageReader};
+use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader};
 use std::fs::File;
 use std::io::{BufWriter, Cursor};
 use std::path::{Path, PathBuf};
@@ -73,15 +73,46 @@ pub fn photos_in(folder: &Path) -> Result<Vec<PathBuf>, ImageIoError> {
     Ok(photos)
 }
 
+/// What the head of a picture says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PictureHead {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// A greyscale PNG, as label images are.
+    pub is_label: bool,
+}
+
+/// Reads the head of a JPEG or PNG alone.
+///
+/// # Errors
+/// The file is missing or in another format.
+pub fn picture_head(path: &Path) -> Result<PictureHead, ImageIoError> {
+    let read = || -> Result<PictureHead, ImageError> {
+        let reader = ImageReader::open(path)?.with_guessed_format()?;
+        let is_png = reader.format() == Some(ImageFormat::Png);
+        let decoder = reader.into_decoder()?;
+        let (width, height) = decoder.dimensions();
+        let is_grey = matches!(
+            decoder.original_color_type(),
+            ExtendedColorType::L8 | ExtendedColorType::L16
+        );
+        Ok(PictureHead {
+            width,
+            height,
+            is_label: is_png && is_grey,
+        })
+    };
+    read().map_err(|source| read_error(path, source))
+}
+
 /// Width and height, pixels, from the file's header alone.
 ///
 /// # Errors
 /// The file is missing or in another format.
 pub fn image_size(path: &Path) -> Result<(u32, u32), ImageIoError> {
-    let read = || -> Result<(u32, u32), ImageError> {
-        ImageReader::open(path)?.with_guessed_format()?.into_dimensions()
-    };
-    read().map_err(|source| read_error(path, source))
+    picture_head(path).map(|head| (head.width, head.height))
 }
 
 /// Writes an RGB PNG.
@@ -117,7 +148,8 @@ pub fn write_jpeg(path: &Path, picture: &RgbImage, quality: u8) -> Result<(), Im
     })
 }
 
-/// Whether a JPEG lacks the end-of-image marker after its last scan; decoders paint the missing part grey without a word.
+/// Whether a JPEG lacks the end-of-image marker after its last scan; decoders paint the missing part grey
+/// without a word.
 fn is_cut_off(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     bytes.starts_with(&[0xff, 0xd8]) && last([0xff, 0xd9]) < last([0xff, 0xda])

@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod cameras;
 pub mod cloud;
+pub mod crs;
 mod folder;
 pub mod image_io;
 pub mod layers;

@@ -24,8 +24,8 @@ pub struct ColouredMesh {
 /// Scalars are named `scalar_NAME`, which CloudCompare shows as scalar fields.
 ///
 /// # Errors
-/// Columns differ in length, a triangle names a vertex that is not there, or the file cannot be written; an earlier
-/// file is kept then.
+/// Columns differ in length, a triangle names a vertex that is not there, or the file cannot be written; an
+/// earlier file is kept then.
 pub fn write_coloured_mesh(path: &Path, mesh: &ColouredMesh) -> io::Result<()> {
     let n = mesh.vertices.len();
     let even = mesh.colours.len() == n && mesh.scalars.iter().all(|(_, v)| v.len() == n);

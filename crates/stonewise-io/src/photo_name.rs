@@ -8,7 +8,8 @@ pub(crate) struct PhotoName {
     file: String,
 }
 
-/// How well two names fit; larger is better. First whether the files' names are the same, then how many folders are.
+/// How well two names fit; larger is better. First whether the files' names are the same, then how many
+/// folders are.
 pub(crate) type Fit = (u8, usize);
 
 impl PhotoName {
@@ -61,7 +62,7 @@ impl PhotoName {
 }
 
 /// Whether the extension is a photo's.
-pub(crate) fn is_photo(path: &Path) -> bool {
+pub fn is_photo(path: &Path) -> bool {
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     matches!(
         extension.as_deref(),

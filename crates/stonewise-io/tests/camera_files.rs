@@ -150,7 +150,7 @@ fn metashape_files_that_cannot_be_read_say_why() {
     );
     check(
         good.replace("LOCAL_CS[", "PROJCS["),
-        &["PROJCS", "local coordinates"],
+        &["names no geographic system", "local coordinates"],
     );
     let scaled = good.replace("<scale locked=\"true\">", "<scale locked=\"true\">-");
     check(scaled, &["scale must be positive"]);

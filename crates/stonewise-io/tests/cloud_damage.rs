@@ -241,17 +241,17 @@ fn points_that_cannot_be_written_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.laz");
     let points = [Point3::origin(), Point3::new(1.0, f64::NAN, 0.0)];
-    let error = write_points_laz(&path, &points, &[]).unwrap_err();
+    let error = write_points_laz(&path, None, &points, &[]).unwrap_err();
     assert!(error.to_string().ends_with("point 1 has no position"), "{error}");
     let long = "a name that is longer than 32 bytes";
-    let error = write_points_laz(&path, &points[..1], &[(long, ExtraColumn::F32(&[0.0]))]);
+    let error = write_points_laz(&path, None, &points[..1], &[(long, ExtraColumn::F32(&[0.0]))]);
     assert!(
         error
             .unwrap_err()
             .to_string()
             .contains("not a name of a dimension")
     );
-    let error = write_points_laz(&path, &points[..1], &[("d", ExtraColumn::U32(&[]))]);
+    let error = write_points_laz(&path, None, &points[..1], &[("d", ExtraColumn::U32(&[]))]);
     assert!(
         error
             .unwrap_err()

@@ -9,7 +9,8 @@ use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cloud::{
-    CloudError, ExtraColumn, ExtraType, cloud_info, read_cloud, stream_points_laz, write_points_laz,
+    CloudError, ExtraColumn, ExtraType, Observed, cloud_info, read_cloud, stream_points_laz, stream_scan_laz,
+    write_points_laz,
 };
 
 /// Keeps a file for `testdata/clouds/check_written.py`, where asked to.
@@ -28,10 +29,10 @@ fn points_that_come_in_pieces_make_the_same_file_and_strays_are_refused() {
         .map(|i| Point3::new(f64::from(i) * 0.01, 2.0, -1.0))
         .collect();
     let ids: Vec<u32> = (0..1000).collect();
-    write_points_laz(&whole, &points, &[("stone_id", ExtraColumn::U32(&ids))]).unwrap();
+    write_points_laz(&whole, None, &points, &[("stone_id", ExtraColumn::U32(&ids))]).unwrap();
     let bounds = Bounds::of(points.iter().copied()).unwrap();
     let columns = [("stone_id", ExtraType::U32)];
-    stream_points_laz(&pieces, &bounds, &columns, |sink| {
+    stream_points_laz(&pieces, None, &bounds, &columns, |sink| {
         for (p, i) in points.chunks(300).zip(ids.chunks(300)) {
             sink.append(p, &[ExtraColumn::U32(i)])?;
         }
@@ -42,7 +43,9 @@ fn points_that_come_in_pieces_make_the_same_file_and_strays_are_refused() {
 
     let refused = |positions: &[Point3<f64>], values: &[ExtraColumn<'_>]| {
         let path = folder.path().join("refused.laz");
-        let result = stream_points_laz(&path, &bounds, &columns, |sink| sink.append(positions, values));
+        let result = stream_points_laz(&path, None, &bounds, &columns, |sink| {
+            sink.append(positions, values)
+        });
         assert!(!path.exists());
         result.unwrap_err().to_string()
     };
@@ -50,6 +53,36 @@ fn points_that_come_in_pieces_make_the_same_file_and_strays_are_refused() {
     assert!(refused(&outside, &[ExtraColumn::U32(&ids[..1])]).contains("outside"));
     assert!(refused(&points[..1], &[ExtraColumn::F64(&[1.0])]).contains("dimensions"));
     assert!(refused(&points[..2], &[ExtraColumn::U32(&ids[..1])]).contains("1 values"));
+}
+
+#[test]
+fn sources_and_times_of_a_scan_come_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.laz");
+    let points: Vec<_> = (0..500)
+        .map(|i| Point3::new(f64::from(i) * 0.01, 2.0, -1.0))
+        .collect();
+    let sources: Vec<u16> = (0..500).map(|i| 1 + i / 200).collect();
+    let times: Vec<f64> = (0..500).map(|i| 428_652_818.25 + f64::from(i) * 5e-6).collect();
+    let bounds = Bounds::of(points.iter().copied()).unwrap();
+    stream_scan_laz(&path, &bounds, &[], |sink| {
+        let short = Observed {
+            sources: &sources[1..],
+            times: &times,
+        };
+        assert!(sink.append_observed(&points, short, &[]).is_err());
+        let observed = Observed {
+            sources: &sources,
+            times: &times,
+        };
+        sink.append_observed(&points, observed, &[])
+    })
+    .unwrap();
+    let mut reader = Reader::from_path(&path).unwrap();
+    assert!(reader.header().gps_time_type().is_standard());
+    let data = reader.read_all().unwrap();
+    assert!(data.point_source_id().eq(sources));
+    assert!(data.gps_time().unwrap().eq(times));
 }
 
 #[test]
@@ -69,7 +102,7 @@ fn core_points_come_back_with_their_dimensions() {
         ("m3c2_count1", ExtraColumn::U32(&count)),
         ("m3c2_significant", ExtraColumn::U16(&flag)),
     ];
-    write_points_laz(&path, &points, &columns).unwrap();
+    write_points_laz(&path, None, &points, &columns).unwrap();
     let data = Reader::from_path(&path).unwrap().read_all().unwrap();
     assert_eq!((data.len(), data.record_len()), (n, 30 + 18));
     for (i, record) in data.raw_bytes().chunks(48).enumerate() {
@@ -85,7 +118,7 @@ fn core_points_come_back_with_their_dimensions() {
     let bounds = cloud_info(&path).unwrap().bounds.unwrap();
     assert!((bounds.max.y - 5e6).abs() < 1e-6 && (bounds.min.z - 90.123_456).abs() < 1e-6);
     let first = std::fs::read(&path).unwrap();
-    write_points_laz(&path, &points, &columns).unwrap();
+    write_points_laz(&path, None, &points, &columns).unwrap();
     assert!(
         std::fs::read(&path).unwrap() == first,
         "the same points gave other bytes"
@@ -97,7 +130,7 @@ fn core_points_come_back_with_their_dimensions() {
 fn no_points_and_far_points_can_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m3c2.laz");
-    write_points_laz(&path, &[], &[("d", ExtraColumn::F32(&[]))]).unwrap();
+    write_points_laz(&path, None, &[], &[("d", ExtraColumn::F32(&[]))]).unwrap();
     let info = cloud_info(&path).unwrap();
     assert_eq!((info.records, info.bounds), (0, None));
     assert_eq!(
@@ -107,13 +140,13 @@ fn no_points_and_far_points_can_be_written() {
         0
     );
     let points = [Point3::new(-9e6, 0.0, 0.0), Point3::new(9e6, 1.0, 2.0)];
-    write_points_laz(&path, &points, &[]).unwrap();
+    write_points_laz(&path, None, &points, &[]).unwrap();
     read_cloud(&path, 10, |chunk| {
         assert!((chunk.positions[1] - points[1]).amax() < 0.01);
         Ok::<(), CloudError>(())
     })
     .unwrap();
-    assert!(write_points_laz(&path, &[Point3::new(1e300, 0.0, 0.0), points[0]], &[]).is_err());
+    assert!(write_points_laz(&path, None, &[Point3::new(1e300, 0.0, 0.0), points[0]], &[]).is_err());
 }
 
 #[test]

@@ -76,8 +76,8 @@ fn positions(path: &Path) -> Vec<Point3<f64>> {
 /// Marks points of things that are not the wall: ground, building, railing, shrubs.
 const OCCLUDER: u32 = 1 << 31;
 
-/// True stone of every point of a simulated cloud, or [`OCCLUDER`]; the extra dimensions are the stone in 32 bits, the
-/// material in 8 (0 is masonry) and a flag.
+/// True stone of every point of a simulated cloud, or [`OCCLUDER`]; the extra dimensions are the stone in 32
+/// bits, the material in 8 (0 is masonry) and a flag.
 fn true_stones(path: &Path) -> Vec<u32> {
     let data = las::Reader::from_path(path).unwrap().read_all().unwrap();
     let number = |record: &[u8]| {

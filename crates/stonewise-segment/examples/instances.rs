@@ -1,5 +1,5 @@
-//! Writes what a network with torchvision's weights finds in images, as JSON, and how long it took:
-//! `instances WEIGHTS.safetensors OUT.json IMAGE...`. testdata/mask_rcnn/compare_photos.py compares it with torchvision.
+//! Writes what a model with torchvision's weights finds in images, as JSON, and how long it took: `instances
+//! WEIGHTS.safetensors OUT.json IMAGE...`. testdata/mask_rcnn/compare_photos.py compares it with torchvision.
 #![allow(clippy::expect_used, clippy::print_stdout)]
 
 use burn::backend::Flex;

@@ -1,6 +1,7 @@
 //! Renders a sheet of the photos that the built-in weights learn from, to look at beside real ones.
 //!
-//! `cargo run --release -p stonewise-segment --example masonry_sheet -- SHEET.png [FIRST_SEED] [COLUMNS] [ROWS] [SIZE] [overlay]`
+//! `cargo run --release -p stonewise-segment --example masonry_sheet -- SHEET.png [FIRST_SEED] [COLUMNS]
+//! [ROWS] [SIZE] [overlay]`
 
 use std::error::Error;
 use stonewise_segment::Sample;

@@ -1,5 +1,6 @@
-//! Learns a few rendered photos by heart: `overfit [PHOTOS] [SIDE] [STEPS] [WEIGHTS]`. Losses fall and AP50 nears 1 where losses,
-//! matching and the gradients of RoIAlign are right. `WEIGHTS` is `none`, `built-in` or a file of `train`.
+//! Learns a few rendered photos by heart: `overfit [PHOTOS] [SIDE] [STEPS] [WEIGHTS]`. Losses fall and AP50
+//! nears 1 where losses, matching and the gradients of RoIAlign are right. `WEIGHTS` is `none`, `built-in` or
+//! a file of `train`.
 #![allow(clippy::expect_used, clippy::print_stdout)]
 
 use burn::backend::{Autodiff, Flex};

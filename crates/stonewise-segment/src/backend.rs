@@ -1,4 +1,4 @@
-//! What the network runs on.
+//! What the detector runs on.
 
 use burn::backend::Autodiff;
 use burn::tensor::Device;

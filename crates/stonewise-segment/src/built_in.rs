@@ -1,15 +1,16 @@
-//! The network that comes with the program.
+//! The detector that comes with the program.
 
 use crate::model::{MaskRcnn, ModelBackend, WeightsError, load_model, model_from_bytes};
 use burn::tensor::Device;
 use std::path::{Path, PathBuf};
 
-/// Weights trained on rendered photos, see docs/src/method/segmentation.md.
-const BUILT_IN: &[u8] = include_bytes!("../weights/built-in.safetensors");
-/// What the built-in network is called where a file could be given.
+/// Weights trained on rendered photos, see docs/src/method/segmentation.md. A static, because a constant
+/// would lie in the program once for each use.
+static BUILT_IN: &[u8] = include_bytes!("../weights/built-in.safetensors");
+/// What the built-in detector is called where a file could be given.
 const NAME: &str = "built-in";
 
-/// Which network finds the stones.
+/// Which detector finds the stones.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Weights {
     /// The one that comes with the program.
@@ -19,7 +20,7 @@ pub enum Weights {
 }
 
 impl Weights {
-    /// The network of this name: `built-in`, or a file.
+    /// The detector of this name: `built-in`, or a file.
     pub fn named(name: &Path) -> Self {
         if name == Path::new(NAME) {
             Self::BuiltIn
@@ -28,7 +29,7 @@ impl Weights {
         }
     }
 
-    /// All bytes of the network.
+    /// All bytes of the detector.
     ///
     /// # Errors
     /// The file cannot be read.
@@ -43,7 +44,7 @@ impl Weights {
     }
 }
 
-/// The network, ready to run.
+/// The detector, ready to run.
 ///
 /// # Errors
 /// The file cannot be read or does not fit.

@@ -12,7 +12,7 @@ use stonewise_core::raster::{Raster, RgbImage};
 /// Probability from which a pixel is part of a stone.
 const THRESHOLD: f32 = 0.5;
 
-/// A network that cannot be opened or run.
+/// A model that cannot be opened or run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OnnxError {
@@ -24,30 +24,31 @@ pub enum OnnxError {
         /// What went wrong.
         source: ort::LoadDynamicError,
     },
-    /// The network could not be loaded.
-    #[error("ONNX network {path}")]
-    Network {
+    /// The model could not be loaded.
+    #[error("ONNX model {path}")]
+    Model {
         /// The file.
         path: PathBuf,
         /// What went wrong.
         source: ort::Error,
     },
-    /// The network could not run.
-    #[error("ONNX network")]
+    /// The model could not run.
+    #[error("ONNX model")]
     Run(#[from] ort::Error),
     /// An output is missing or has another shape than Mask R-CNN's.
     #[error(
-        "ONNX network: {0}; outputs must be boxes [n, 4], scores [n] and masks [n, 1, rows, columns] of 32-bit floats"
+        "ONNX model: {0}; outputs must be boxes [n, 4], scores [n] and masks [n, 1, rows, columns] of 32-bit floats"
     )]
     Output(String),
 }
 
-/// A Mask R-CNN with the interface of torchvision's export: in, one image [3, rows, columns] or [1, 3, rows, columns], red
-/// green blue, 0 to 1; out, in any order, boxes [n, 4] (left, top, right, bottom, pixels), scores [n] and masks
-/// [n, 1, rows, columns], which cover either the image or each its box. Classes are not told apart: what it finds is a stone.
+/// A Mask R-CNN with the interface of torchvision's export: in, one image [3, rows, columns] or [1, 3, rows,
+/// columns], red green blue, 0 to 1; out, in any order, boxes [n, 4] (left, top, right, bottom, pixels),
+/// scores [n] and masks [n, 1, rows, columns], which cover either the image or each its box. Classes are not
+/// told apart: what it finds is a stone.
 pub struct OnnxDetector {
     session: Mutex<Session>,
-    /// The network expects a batch of images, of which there is one.
+    /// The model expects a batch of images, of which there is one.
     batched: bool,
 }
 
@@ -55,19 +56,19 @@ pub struct OnnxDetector {
 static ENVIRONMENT: Mutex<Option<Environment>> = Mutex::new(None);
 
 impl OnnxDetector {
-    /// Opens a network with the ONNX Runtime library (1.17 or later) at `library`; the first library of a process serves all
-    /// later calls.
+    /// Opens a model with the ONNX Runtime library (1.17 or later) at `library`; the first library of a
+    /// process serves all later calls.
     ///
     /// # Errors
-    /// Library or network cannot be loaded.
-    pub fn open(library: &Path, network: &Path) -> Result<Self, OnnxError> {
-        let failed = |source| OnnxError::Network {
-            path: network.to_owned(),
+    /// Library or model cannot be loaded.
+    pub fn open(library: &Path, model: &Path) -> Result<Self, OnnxError> {
+        let failed = |source| OnnxError::Model {
+            path: model.to_owned(),
             source,
         };
         let environment = environment(library)?;
         let mut builder = Session::builder(&environment).map_err(failed)?;
-        let session = builder.commit_from_file(network).map_err(failed)?;
+        let session = builder.commit_from_file(model).map_err(failed)?;
         let shape = session
             .inputs()
             .first()
@@ -117,7 +118,7 @@ impl Detector for OnnxDetector {
     }
 }
 
-/// The detections among a network's outputs.
+/// The detections among a model's outputs.
 fn read(outputs: &SessionOutputs, size: [u32; 2]) -> Result<Vec<Detection>, OnnxError> {
     let (mut boxes, mut scores, mut masks) = (None, None, None);
     for place in 0..outputs.len() {

@@ -16,8 +16,8 @@ pub struct Sample {
 pub struct SampleError([u32; 2], [u32; 2], [u32; 2]);
 
 impl Sample {
-    /// A sample of an image, the stone of every pixel (0 = none), and the pixels about which nothing is known: there an
-    /// unlabelled pixel may be a stone.
+    /// A sample of an image, the stone of every pixel (0 = none), and the pixels about which nothing is
+    /// known: there an unlabelled pixel may be a stone.
     ///
     /// # Errors
     /// The three differ in size.

@@ -1,4 +1,4 @@
-//! A network learns, repeats itself, and goes to a file and back.
+//! A detector learns, repeats itself, and goes to a file and back.
 #![allow(clippy::unwrap_used)]
 
 use burn::backend::{Autodiff, Flex};

@@ -1,4 +1,4 @@
-//! A network in ONNX with a known answer (testdata/onnx).
+//! A model in ONNX with a known answer (testdata/onnx).
 #![cfg(feature = "onnx")]
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -37,5 +37,5 @@ fn bright_pixels_in_given_boxes_are_found() {
     }
     assert!(found[1].mask.pixels.data().iter().all(|inside| !inside));
     let missing = OnnxDetector::open(&library, &folder.join("none.onnx"));
-    assert!(matches!(missing, Err(OnnxError::Network { .. })));
+    assert!(matches!(missing, Err(OnnxError::Model { .. })));
 }

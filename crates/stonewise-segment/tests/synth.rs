@@ -1,4 +1,4 @@
-//! What photos of the generator must be for a network to learn stones from them, and nothing else.
+//! What photos of the generator must be for a detector to learn stones from them, and nothing else.
 
 use std::collections::BTreeMap;
 use stonewise_core::raster::connected_components;
@@ -79,7 +79,8 @@ fn ignored_pixels_carry_no_stone() {
     }
 }
 
-/// Largest mean of the rates of right answers on stones and on joints, over all thresholds on a channel and both directions.
+/// Largest mean of the rates of right answers on stones and on joints, over all thresholds on a channel and
+/// both directions.
 fn best_threshold(values: &[(u8, bool)]) -> f64 {
     let mut counts = [[0.0f64; 2]; 256];
     for &(value, stone) in values {

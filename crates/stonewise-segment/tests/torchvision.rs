@@ -130,8 +130,8 @@ fn image(width: u32, height: u32) -> RgbImage {
     Raster::from_vec(width, height, (0..width * height).map(pixel).collect()).unwrap()
 }
 
-/// A network whose every parameter follows from its name in torchvision.
-fn network(depth: ResnetDepth) -> MaskRcnn<Flex> {
+/// A model whose every parameter follows from its name in torchvision.
+fn model(depth: ResnetDepth) -> MaskRcnn<Flex> {
     let model = MaskRcnn::<Flex>::zeros(&config(depth), &Default::default()).unwrap();
     let bytes = weights_to_bytes(&model, Precision::Single).unwrap();
     let file = SafeTensors::deserialize(&bytes).unwrap();
@@ -182,7 +182,7 @@ fn objects_are_those_of_torchvision() {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../testdata/mask_rcnn/expected.json");
     let expected: Expected = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     for (depth, expected) in [(ResnetDepth::R18, expected.r18), (ResnetDepth::R50, expected.r50)] {
-        let model = network(depth);
+        let model = model(depth);
         compare(&model, &expected);
         // Folding the normalisation into the convolutions changes nothing.
         compare(&model.for_inference(), &expected);

@@ -4,13 +4,20 @@
 //! from inputs that try to be markup, and makes the report and the layers from them.
 
 use nalgebra::{Matrix3, Point3, Vector3};
-use serde_json::json;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
-use stonewise::report::{
-    Crop, Cut, PosedPhoto, ReportError, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint,
-    crop_side_px, detection_limit_m, write_cameras, write_crops, write_layers, write_outlines, write_report,
-    write_sections, write_stones, write_thin_cloud,
+use stonewise::export::write_layers;
+use stonewise::report::write_report;
+use stonewise::results::names::{PairFile, RUN, audit};
+use stonewise::results::records::{
+    CrsRecord, Datum, DatumState, EpochRecord, EstimatorRecord, GicpRecord, InputRecord, ProjectRecord,
+    RegistrationRecord, RunRecord, StepTime, Timestamp,
+};
+use stonewise::results::{
+    Crop, Cut, PosedPhoto, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint, crop_side_px,
+    detection_limit_m, write_cameras, write_crops, write_outlines, write_sections, write_stones,
+    write_thin_cloud,
 };
 use stonewise_core::geometry::FaceFrame;
 
@@ -27,7 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (stones, dir) = (stones.parse()?, Path::new(dir));
     std::fs::create_dir_all(dir)?;
     let wall = Wall::new(stones);
-    write_stones(dir, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
+    write_stones(dir, 1, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
     write_outlines(dir, &(0..stones).map(|i| wall.outline(i)).collect::<Vec<_>>())?;
     std::fs::write(dir.join("m3c2.csv"), wall.core_points())?;
     wall.write_evidence(dir, stones)?;
@@ -92,6 +99,8 @@ impl Wall {
         StoneRow {
             stone_id: i as u32 + 1,
             centroid: self.world(place),
+            along_m: place[0],
+            up_m: place[1],
             area_m2: (PITCH_M[0] - 2.0 * JOINT_M) * (PITCH_M[1] - 2.0 * JOINT_M),
             points_1: 3000 + (i % 500) as u32,
             points_2: matched.then_some(2900),
@@ -117,11 +126,15 @@ impl Wall {
             face,
             rotation: world_from_face * Vector3::new(0.0004, noise(i, 4), 0.001),
             covariance,
+            face_sd: sigma,
+            rotation_covariance: Matrix3::identity() * 1e-8,
             relative: world_from_face
                 * Vector3::new(if i % 97 == 40 { 0.012 } else { noise(i, 5) }, 0.0, 0.0),
+            relative_covariance: covariance,
             detection_limit_m: limit,
             significant: displacement.norm() > limit,
             loose: i % 97 == 40,
+            p_loose: Some(if i % 97 == 40 { 0.99 } else { 0.01 }),
             observability: 0.6,
         }
     }
@@ -147,7 +160,7 @@ impl Wall {
     }
 
     /// Crops, sections, clouds and cameras of both epochs.
-    fn write_evidence(&self, dir: &Path, stones: usize) -> Result<(), ReportError> {
+    fn write_evidence(&self, dir: &Path, stones: usize) -> stonewise::Result<()> {
         let side = crop_side_px(stones, 160.0);
         let points = (400_000 / stones.max(1)).clamp(40, 160);
         let mut sections = Vec::new();
@@ -274,24 +287,77 @@ fn noise(i: usize, salt: u64) -> f64 {
 }
 
 /// The other files of a run, with hostile names.
-fn write_records(dir: &Path) -> std::io::Result<()> {
-    let run = json!({
-        "version": "0.0.0",
-        "crs": { "epsg": 25832, "name": "ETRS89 / UTM zone 32N", "wkt": "" },
-        "project": { "name": "Sample </title><script>alert(1)</script> wall" },
-        "epochs": [{ "name": "2025 <b>", "photos": 12, "points": 1_000_000, "stones": 200 },
-                   { "name": "2026", "photos": 12, "points": 1_000_000, "stones": 200 }],
-        "parameters": { "registration": { "epoch_error_m": 0.0 } },
-        "steps": [{ "step": "ingest-1", "seconds": 1.5, "resumed": false, "peak_memory_bytes": 1000 }],
-        "warnings": [{ "step": "segment", "subject": "<script>.jpg", "message": "cut off: \"'&", "skipped_input": true }],
-    });
-    std::fs::write(dir.join("run.json"), run.to_string())?;
+fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let epoch = |name: &str| EpochRecord {
+        name: name.to_owned(),
+        date: None,
+        conditions: BTreeMap::new(),
+        clouds: vec![input("<i>cloud.laz")],
+        cameras: input("cameras.xml"),
+        masks: None,
+        images: "photos".into(),
+        motion: None,
+        points: 1_000_000,
+        photos: 12,
+        stones: 200,
+    };
+    let run = RunRecord {
+        version: "0.0.0".to_owned(),
+        finished_at: Timestamp::EPOCH,
+        project: ProjectRecord {
+            name: "Sample </title><script>alert(1)</script> wall".to_owned(),
+            file: "stonewise.toml".into(),
+        },
+        crs: Some(CrsRecord {
+            epsg: 25832,
+            name: "ETRS89 / UTM zone 32N".to_owned(),
+            wkt: String::new(),
+        }),
+        datum: [("2026".to_owned(), DatumState::Unknown)].into(),
+        epochs: vec![epoch("2025 <b>"), epoch("2026")],
+        part: None,
+        parameters: stonewise::Settings::default(),
+        steps: vec![StepTime {
+            step: "ingest-1".to_owned(),
+            seconds: 1.5,
+            processor_seconds: Some(2.0),
+            resumed: false,
+            peak_memory_bytes: Some(1000),
+        }],
+        warnings: vec![stonewise::Warning {
+            step: "segment".to_owned(),
+            subject: "<script>.jpg".to_owned(),
+            message: "cut off: \"'&".to_owned(),
+            skipped_input: true,
+            doubt: false,
+        }],
+    };
+    let gicp = GicpRecord {
+        stones: 200,
+        measured: 190,
+        loose: 2,
+    };
+    let registration = RegistrationRecord {
+        estimator: EstimatorRecord::Gicp(gicp),
+        datum: Datum::unknown(&Point3::origin(), "unknown".to_owned()),
+        observers: None,
+    };
+    std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;
     std::fs::write(
-        dir.join("registration.json"),
-        r#"{"converged":true,"noise_m":[0.001,0.001]}"#,
+        dir.join(PairFile::Registration.name(1)),
+        serde_json::to_string(&registration)?,
     )?;
     std::fs::write(
-        dir.join("audit_epoch1.csv"),
+        dir.join(audit(1)),
         "event,photo,instance,stones,share,points\nsplit_instance,<script>.jpg,4,1 2,,\n",
-    )
+    )?;
+    Ok(())
+}
+
+fn input(path: &str) -> InputRecord {
+    InputRecord {
+        path: path.into(),
+        bytes: 123_456,
+        blake3: String::new(),
+    }
 }

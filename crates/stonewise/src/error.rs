@@ -1,6 +1,5 @@
 //! Everything that can stop a run.
 
-use crate::report::ReportError;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::SurveyError;
@@ -41,9 +40,26 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// An output folder that must not be written into.
+    #[error("{message}: {path}", path = .path.display())]
+    Output {
+        /// The folder.
+        path: PathBuf,
+        /// Why, and the fix.
+        message: String,
+    },
+    /// Another process writes into the output folder.
+    #[error("another run works in this folder; wait for its end, or give another --out: {path}", path = .path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The inputs are fine one by one and impossible together.
     #[error("{0}")]
     Survey(String),
+    /// What a look at the survey found cannot be right.
+    #[error("{0}")]
+    Check(String),
     /// Two epochs have no stone in common.
     #[error(
         "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both epochs show the same wall, in one frame?",
@@ -67,7 +83,7 @@ pub enum Error {
     /// Masks could not be read.
     #[error(transparent)]
     Masks(#[from] stonewise_io::masks::MaskError),
-    /// The network that finds stones could not be read.
+    /// The weights of the detector could not be read.
     #[error(transparent)]
     Weights(#[from] stonewise_segment::model::WeightsError),
     /// A picture could not be read or written.
@@ -85,9 +101,20 @@ pub enum Error {
     /// Clouds could not be compared.
     #[error(transparent)]
     Compare(SurveyError),
-    /// Results could not be written or read.
+    /// Layers could not be written.
     #[error(transparent)]
-    Report(#[from] ReportError),
+    Layers(#[from] stonewise_io::layers::LayerError),
+    /// A result file does not hold what it should.
+    #[error("{message}; make it anew with `stonewise run`: {path}", path = .path.display())]
+    Results {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// There is nothing to report on.
+    #[error("no stones.parquet here; give the folder that `stonewise run --out` wrote: {path}", path = .0.display())]
+    NoResults(PathBuf),
     /// The user stopped the run.
     #[error("interrupted; run the same command again to continue")]
     Interrupted,
@@ -146,12 +173,25 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
+    /// Whether the command was used wrongly: a project file that cannot be, or an output folder of something else.
+    pub fn is_wrong_usage(&self) -> bool {
+        matches!(self, Self::Project { .. } | Self::Output { .. })
+    }
+
     /// Turns a system error into one that names the file.
     pub(crate) fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Self + 'a {
         move |source| Self::Io {
             action,
             path: path.to_path_buf(),
             source,
+        }
+    }
+
+    /// A result file that does not hold what it should.
+    pub(crate) fn results(path: &Path, message: impl Into<String>) -> Self {
+        Self::Results {
+            path: path.to_path_buf(),
+            message: message.into(),
         }
     }
 }

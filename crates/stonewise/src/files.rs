@@ -5,6 +5,14 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 
+/// Makes the folder for the results, where it is not there yet.
+pub(crate) fn create_results_folder(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|error| Error::Input {
+        path: folder.to_path_buf(),
+        message: format!("cannot create the results folder ({error}): give another one with --out"),
+    })
+}
+
 /// Writes a text file.
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
     stonewise_io::atomic::write_atomically(path, |partial| fs::write(partial, text))

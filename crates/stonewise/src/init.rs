@@ -1,32 +1,43 @@
 //! A project file from what lies in a folder.
 
+mod epoch;
+mod listing;
+
 use crate::error::{Error, Result};
 use crate::files::write_text;
+use epoch::{CLOUDS, Found, look};
+use listing::{folders, is_made_by_stonewise, name};
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Extensions of point clouds.
-const CLOUDS: [&str; 8] = ["laz", "las", "e57", "ply", "xyz", "txt", "csv", "asc"];
-/// Extensions of photos.
-const PHOTOS: [&str; 3] = ["jpg", "jpeg", "png"];
-/// Names of the files that make a folder a COLMAP model.
-const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
-
-/// What was found of one epoch; paths relative to the project's folder.
-#[derive(Default)]
-struct Found {
-    name: String,
-    clouds: Vec<PathBuf>,
-    images: Option<PathBuf>,
-    cameras: Option<PathBuf>,
-    masks: Option<PathBuf>,
+/// What [`init()`] wrote, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Initialised {
+    /// The project file.
+    pub path: PathBuf,
+    /// What was chosen for each epoch, and what was left out with the reason, one line each.
+    pub lines: Vec<String>,
 }
 
-/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud, in order of name.
+/// Names of folders that hold no survey.
+const NO_EPOCHS: [&str; 8] = [
+    "truth",
+    "results",
+    "report",
+    "evidence",
+    "work",
+    "previous",
+    "masks",
+    "unfinished",
+];
+
+/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in order of name.
 ///
-/// Of what is missing the file says so in a comment. An existing file is not overwritten. Returns its path.
-pub fn init(dir: &Path) -> Result<PathBuf> {
+/// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that stonewise made, and those
+/// of truth, are left out. An existing file is not overwritten.
+///
+/// Errors: there is a project file; no folder holds a cloud; a folder cannot be read.
+pub fn init(dir: &Path) -> Result<Initialised> {
     let path = dir.join("stonewise.toml");
     if path.exists() {
         return Err(Error::Input {
@@ -34,13 +45,22 @@ pub fn init(dir: &Path) -> Result<PathBuf> {
             message: "there is a project file already; remove it to start anew".into(),
         });
     }
-    let epochs: Vec<Found> = folders(dir)?
-        .into_iter()
-        .map(|folder| look(dir, &folder))
-        .collect::<Result<Vec<_>>>()?
-        .into_iter()
-        .filter(|f| !f.clouds.is_empty())
-        .collect();
+    let mut lines = Vec::new();
+    let mut epochs = Vec::new();
+    for folder in folders(dir)? {
+        let folder_name = name(&folder);
+        if NO_EPOCHS.contains(&folder_name.as_str()) {
+            lines.push(format!("left out: {folder_name}/ (by its name no epoch)"));
+        } else if is_made_by_stonewise(&folder) {
+            lines.push(format!("left out: {folder_name}/ (stonewise made it)"));
+        } else {
+            let found = look(dir, &folder)?;
+            match found.clouds.is_empty() {
+                true => lines.push(format!("left out: {folder_name}/ (no point cloud in it)")),
+                false => epochs.push(found),
+            }
+        }
+    }
     if epochs.is_empty() {
         let message = format!(
             "no folder with a point cloud ({}) in it; make one folder per epoch",
@@ -51,8 +71,12 @@ pub fn init(dir: &Path) -> Result<PathBuf> {
             message,
         });
     }
+    epoch::agree_on_sensor(&mut epochs);
+    for epoch in &epochs {
+        lines.extend(epoch.lines());
+    }
     write_text(&path, &project_text(dir, &epochs))?;
-    Ok(path)
+    Ok(Initialised { path, lines })
 }
 
 fn project_text(dir: &Path, epochs: &[Found]) -> String {
@@ -68,12 +92,11 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
     );
     for epoch in epochs {
         let _ = writeln!(text, "\n[[epochs]]\nname = {}", quoted(&epoch.name));
-        let clouds: Vec<String> = epoch
-            .clouds
-            .iter()
-            .map(|c| quoted(&c.to_string_lossy()))
-            .collect();
-        let _ = writeln!(text, "clouds = [{}]", clouds.join(", "));
+        let _ = writeln!(text, "clouds = {}", quoted_list(&epoch.clouds));
+        if !epoch.other_clouds.is_empty() {
+            let others = quoted_list(&epoch.other_clouds);
+            let _ = writeln!(text, "# clouds = {others}   # of another sensor");
+        }
         for (key, found, what) in [
             ("images", &epoch.images, "folder of the photos"),
             (
@@ -100,78 +123,105 @@ pub(crate) fn quoted(text: &str) -> String {
     toml::Value::String(text.replace('\\', "/")).to_string()
 }
 
-fn look(root: &Path, folder: &Path) -> Result<Found> {
-    let relative = |path: &Path| path.strip_prefix(root).unwrap_or(path).to_path_buf();
-    let mut found = Found {
-        name: folder
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned(),
-        ..Found::default()
-    };
-    let mut open = vec![folder.to_path_buf()];
-    while let Some(dir) = open.pop() {
-        let files = files(&dir)?;
-        let count = |extensions: &[&str]| files.iter().filter(|f| has_extension(f, extensions)).count();
-        let is_colmap = files.iter().any(|f| COLMAP.contains(&name(f).as_str()));
-        let is_masks = name(&dir).contains("mask");
-        if is_colmap {
-            found.cameras.get_or_insert(relative(&dir));
-        } else if count(&PHOTOS) > 0 {
-            let slot = if is_masks {
-                &mut found.masks
-            } else {
-                &mut found.images
-            };
-            slot.get_or_insert(relative(&dir));
+fn quoted_list(paths: &[PathBuf]) -> String {
+    let all: Vec<String> = paths.iter().map(|p| quoted(&p.to_string_lossy())).collect();
+    format!("[{}]", all.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn survey(files: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = dir.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "x").unwrap();
         }
-        for file in &files {
-            if has_extension(file, &["xml"]) {
-                found.cameras = Some(relative(file));
-            } else if has_extension(file, &["json"]) {
-                let slot = if name(file).contains("reconstruction") {
-                    &mut found.cameras
-                } else {
-                    &mut found.masks
-                };
-                slot.get_or_insert(relative(file));
-            } else if has_extension(file, &CLOUDS) && !is_colmap {
-                found.clouds.push(relative(file));
-            }
-        }
-        open.extend(folders(&dir)?.into_iter().rev());
+        dir
     }
-    Ok(found)
-}
 
-fn name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase()
-}
+    fn written(files: &[&str]) -> (String, String) {
+        let dir = survey(files);
+        let done = init(dir.path()).unwrap();
+        (fs::read_to_string(done.path).unwrap(), done.lines.join("\n"))
+    }
 
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    path.extension()
-        .is_some_and(|e| extensions.contains(&e.to_string_lossy().to_lowercase().as_str()))
-}
+    #[test]
+    fn folders_of_results_and_truth_are_no_epochs_and_are_named() {
+        let (text, lines) = written(&[
+            "2024/wall.laz",
+            "2025/wall.laz",
+            "truth/wall.laz",
+            "out/work/marker.json",
+            "out/epoch1/wall.laz",
+            "old/run.json",
+            "old/stones.csv",
+            "old/epoch1/wall.laz",
+            "notes/a.txt.bak",
+        ]);
+        assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
+        for left in [
+            "truth/",
+            "out/ (stonewise made it)",
+            "old/ (stonewise made it)",
+            "notes/ (no point cloud",
+        ] {
+            assert!(lines.contains(&format!("left out: {left}")), "{left}: {lines}");
+        }
+        assert!(lines.contains("2024: clouds 2024/wall.laz"), "{lines}");
+    }
 
-fn folders(dir: &Path) -> Result<Vec<PathBuf>> {
-    Ok(entries(dir)?.into_iter().filter(|p| p.is_dir()).collect())
-}
+    #[test]
+    fn one_sensor_is_chosen_for_all_epochs_and_the_other_is_offered() {
+        let (text, lines) = written(&[
+            "a/cloud_tls.laz",
+            "a/cloud_uav.laz",
+            "b/cloud_uav.laz",
+            "c/cloud_tls.laz",
+            "c/cloud_uav.laz",
+        ]);
+        assert!(
+            text.contains("\nclouds = [\"a/cloud_uav.laz\"]")
+                && text.contains("# clouds = [\"a/cloud_tls.laz\"]")
+        );
+        assert!(
+            lines.contains("left out: a/cloud_tls.laz (another sensor"),
+            "{lines}"
+        );
+        let (text, _) = written(&["a/cloud_tls.laz", "a/cloud_uav.laz", "b/x_TLS.laz", "b/x_uav.laz"]);
+        assert!(
+            text.contains("\nclouds = [\"a/cloud_tls.laz\"]")
+                && text.contains("\nclouds = [\"b/x_TLS.laz\"]")
+        );
+    }
 
-fn files(dir: &Path) -> Result<Vec<PathBuf>> {
-    Ok(entries(dir)?.into_iter().filter(|p| p.is_file()).collect())
-}
+    #[test]
+    fn two_flights_are_taken_by_the_folder_above_them() {
+        let (text, _) = written(&[
+            "a/photos/flight1/1.jpg",
+            "a/photos/flight2/2.jpg",
+            "a/x.laz",
+            "b/flight/1.jpg",
+            "b/masks/1.png",
+            "b/scans/day 1/x.laz",
+        ]);
+        assert!(text.contains("images = \"a/photos\""), "{text}");
+        assert!(
+            text.contains("images = \"b/flight\"") && text.contains("masks = \"b/masks\""),
+            "{text}"
+        );
+        assert!(text.contains("b/scans/day 1/x.laz"), "{text}");
+    }
 
-fn entries(dir: &Path) -> Result<Vec<PathBuf>> {
-    let mut entries = fs::read_dir(dir)
-        .and_then(|all| {
-            all.map(|e| e.map(|e| e.path()))
-                .collect::<std::io::Result<Vec<_>>>()
-        })
-        .map_err(Error::io("listing", dir))?;
-    entries.sort();
-    Ok(entries)
+    #[test]
+    fn masks_beside_the_epochs_are_found_by_their_name() {
+        let (text, _) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/b/1.png"]);
+        assert!(
+            text.contains("masks = \"masks/a.json\"") && text.contains("masks = \"masks/b\""),
+            "{text}"
+        );
+    }
 }

@@ -1,15 +1,20 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
+pub mod check;
 mod error;
 pub mod experiment;
+pub mod export;
 mod figure;
 mod files;
 mod init;
+mod kept;
 mod limits;
+mod output;
 mod part;
 mod pipeline;
 mod project;
 pub mod report;
+pub mod results;
 pub mod segmentation;
 pub mod simulate;
 mod split;
@@ -18,10 +23,11 @@ mod truth;
 mod warnings;
 
 pub use error::{Error, Result};
-pub use init::init;
+pub use init::{Initialised, init};
+pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{Comparison, PairSummary, Summary, Until, compare_clouds, run};
-pub use project::{Epoch, Project, RegistrationParams, SegmentParams, Settings, TileParams};
+pub use project::{Epoch, IngestParams, Project, RegistrationParams, SegmentParams, Settings};
 pub use split::split;
 pub use stable::StableArea;
 pub use truth::evaluate_truth;

@@ -27,8 +27,17 @@ const POSITIVE: [&str; 18] = [
 /// Parameters that are shares or rates without saying so in their names.
 const SHARES: [&str; 4] = ["min_iou", "min_area_ratio", "false_discovery_rate", "min_overlap"];
 
+/// Edges of tiles that can work, metres. Offsets in a tile are single precision: at 100 m they are exact to 3 micrometres.
+/// Below half a metre a wall of 200 m falls into more than 20,000 files.
+const TILE_SIZE_M: [f64; 2] = [0.5, 100.0];
+
 /// The first parameter whose value is impossible: its key, and what it must be.
 pub fn impossible(settings: &Settings) -> Option<(String, String)> {
+    let (size_m, [least, most]) = (settings.ingest.size_m, TILE_SIZE_M);
+    if !(least..=most).contains(&size_m) {
+        let message = format!("size_m = {size_m} is not possible: tiles have edges of {least} to {most} m");
+        return Some(("size_m".to_owned(), message));
+    }
     let all = serde_json::to_value(settings).ok()?;
     let mut open: Vec<(&str, &Value)> = vec![("", &all)];
     while let Some((key, value)) = open.pop() {
@@ -64,14 +73,16 @@ mod tests {
     #[test]
     fn defaults_are_possible_and_senseless_values_are_named() {
         assert_eq!(impossible(&Settings::default()), None);
+        for size_m in [0.0, 0.05, 1e5, f64::NAN] {
+            let mut settings = Settings::default();
+            settings.ingest.size_m = size_m;
+            assert_eq!(impossible(&settings).unwrap().0, "size_m");
+        }
         let mut settings = Settings::default();
-        settings.tiles.size_m = 0.0;
-        assert_eq!(impossible(&settings).unwrap().0, "size_m");
-        let mut settings = Settings::default();
-        settings.transfer.island_share = 1.5;
+        settings.label.island_share = 1.5;
         assert!(impossible(&settings).unwrap().1.contains("0 to 1"));
         let mut settings = Settings::default();
-        settings.registration.epoch_error_m = -0.001;
+        settings.registration.epoch_error_m = Some(-0.001);
         assert_eq!(impossible(&settings).unwrap().0, "epoch_error_m");
     }
 

@@ -2,13 +2,13 @@
 
 use crate::error::{Error, Result};
 use nalgebra::{Point3, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cloud::read_cloud;
 
 /// Points that take part; all others are as if they had not been measured.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Part {
     /// Inside a box along the axes of the world.
     Box(Bounds),

@@ -3,19 +3,29 @@
 use crate::error::{Error, Result};
 use crate::limits::impossible;
 use crate::part::Part;
+use crate::pipeline::SourceRule;
 use crate::stable::StableArea;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
-use stonewise_core::registration::{GicpParams, NetworkParams};
+use stonewise_core::registration::observers::EpochErrorParams;
+use stonewise_core::registration::{AdjustmentParams, GicpParams};
 use stonewise_core::transfer::{StoneParams, TransferParams};
+use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
+use stonewise_io::cloud::cloud_crs;
+use stonewise_io::crs::MapSystem;
 use stonewise_segment::Weights;
 use stonewise_segment::tiling::TilingOptions;
 use toml::Spanned;
+use toml::value::Datetime;
+
+/// What to do about backslashes.
+const SLASHES: &str = "use / or single quotes in paths";
 
 /// A checked project: paths exist, values are possible.
 #[derive(Clone, Debug)]
@@ -28,6 +38,8 @@ pub struct Project {
     pub epochs: Vec<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
+    /// Keys of the file that have a new name, one sentence each.
+    pub notes: Vec<String>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -37,6 +49,10 @@ pub struct Project {
 pub struct Epoch {
     /// Name, as reports show it.
     pub name: String,
+    /// Date of the survey, ISO 8601.
+    pub date: Option<String>,
+    /// Conditions during the survey by name, such as `reservoir_level_m`.
+    pub conditions: BTreeMap<String, f64>,
     /// Point clouds, all in one frame.
     pub clouds: Vec<PathBuf>,
     /// Folder of the photos.
@@ -47,13 +63,30 @@ pub struct Epoch {
     pub masks: Option<PathBuf>,
     /// Known motion of the points, applied after labelling.
     pub motion: Option<MotionField>,
+    /// What counts as one station or strip.
+    pub sources: SourceRule,
+    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same error in both.
+    pub same_survey_as: Option<usize>,
+    /// What the project file says about where the clouds lie on the map.
+    pub map: MapFrame,
+}
+
+impl Epoch {
+    /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
+    pub fn read_cameras(&self) -> Result<CameraFile> {
+        let mut map = self.map.clone();
+        for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {
+            map.crs = map.crs.or(cloud_crs(cloud)?);
+        }
+        Ok(read_cameras_on_map(&self.cameras, &map)?)
+    }
 }
 
 /// How stones are found in photos without masks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentParams {
-    /// The network: `built-in`, or a file that `stonewise train` wrote.
+    /// The detector: `built-in`, or a file that `stonewise train` wrote.
     pub model: PathBuf,
     /// How photos are cut into tiles.
     pub tiling: TilingOptions,
@@ -73,32 +106,45 @@ impl Default for SegmentParams {
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// How clouds are cut.
-    pub tiles: TileParams,
+    #[serde(alias = "tiles")]
+    pub ingest: IngestParams,
     /// Stones in photos without masks.
     pub segment: SegmentParams,
     /// Photo labels to points.
-    pub transfer: TransferParams,
+    #[serde(alias = "transfer")]
+    pub label: TransferParams,
     /// The table of stones.
     pub stones: StoneParams,
     /// Stones across epochs.
-    pub matching: MatchParams,
+    #[serde(alias = "matching")]
+    pub r#match: MatchParams,
     /// One motion per stone.
     pub registration: RegistrationParams,
     /// Comparison along normals.
     pub m3c2: M3c2Params,
     /// Scoring against a known motion.
-    pub evaluation: EvaluationParams,
+    #[serde(alias = "evaluation")]
+    pub evaluate: EvaluationParams,
 }
+
+/// Tables of the project file by the names that they had, with the names of today; both are read.
+const RENAMED: [(&str, &str); 5] = [
+    ("tiles", "ingest"),
+    ("transfer", "label"),
+    ("matching", "match"),
+    ("evaluation", "evaluate"),
+    ("registration.network", "registration.adjustment"),
+];
 
 /// How clouds are cut into tiles.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct TileParams {
+pub struct IngestParams {
     /// Edge of a tile, metres. 4 m keeps offsets exact to a micrometre and a dense tile under 20 MB.
     pub size_m: f64,
 }
 
-impl Default for TileParams {
+impl Default for IngestParams {
     fn default() -> Self {
         Self { size_m: 4.0 }
     }
@@ -110,7 +156,8 @@ impl Default for TileParams {
 pub enum Estimator {
     /// All stones together, each sharing with its neighbours as much as the noise demands.
     #[default]
-    Network,
+    #[serde(alias = "network")]
+    Adjustment,
     /// Each stone by itself with its surroundings, by plane-to-plane ICP: the paper's way.
     Gicp,
 }
@@ -119,10 +166,12 @@ pub enum Estimator {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationParams {
-    /// Which estimator. The network: it is the better by far on noisy clouds, and where stones move singly.
+    /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move singly.
     pub estimator: Estimator,
-    /// Standard deviation of the epochs' common registration, per axis, metres; it enters absolute uncertainty.
-    pub epoch_error_m: f64,
+    /// Standard deviation of the registration of an epoch, per axis, metres, as the user states it; 0 states that there is none.
+    /// Absent: not stated, and without stable areas uncertainties hold for motions against the common motion of the stones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub epoch_error_m: Option<f64>,
     /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs' registration.
     /// It is reported apart and enters absolute uncertainty. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -131,21 +180,25 @@ pub struct RegistrationParams {
     /// its label. 3: farther inside, noise does not change a label; with 0 (labels alone) the whole wall of a UAV survey
     /// seems to move by 1 to 2 mm.
     pub border_noises: f64,
-    /// Parameters of the network adjustment.
-    pub network: NetworkParams,
+    /// Parameters of the adjustment of all stones together.
+    #[serde(alias = "network")]
+    pub adjustment: AdjustmentParams,
     /// Parameters of plane-to-plane ICP.
     pub gicp: GicpParams,
+    /// How the errors of stations, strips and whole epochs are found.
+    pub observers: EpochErrorParams,
 }
 
 impl Default for RegistrationParams {
     fn default() -> Self {
         Self {
             estimator: Estimator::default(),
-            epoch_error_m: 0.0,
+            epoch_error_m: None,
             stable: Vec::new(),
             border_noises: 3.0,
-            network: NetworkParams::default(),
+            adjustment: AdjustmentParams::default(),
             gicp: GicpParams::default(),
+            observers: EpochErrorParams::default(),
         }
     }
 }
@@ -155,39 +208,48 @@ impl Default for RegistrationParams {
 struct RawProject {
     project: RawHeader,
     epochs: Vec<RawEpoch>,
-    #[serde(default)]
-    tiles: TileParams,
+    #[serde(default, alias = "tiles")]
+    ingest: IngestParams,
     #[serde(default)]
     segment: SegmentParams,
-    #[serde(default)]
-    transfer: TransferParams,
+    #[serde(default, alias = "transfer")]
+    label: TransferParams,
     #[serde(default)]
     stones: StoneParams,
-    #[serde(default)]
-    matching: MatchParams,
+    #[serde(default, alias = "matching")]
+    r#match: MatchParams,
     #[serde(default)]
     registration: RegistrationParams,
     #[serde(default)]
     m3c2: M3c2Params,
-    #[serde(default)]
-    evaluation: EvaluationParams,
+    #[serde(default, alias = "evaluation")]
+    evaluate: EvaluationParams,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawHeader {
     name: Spanned<String>,
+    crs: Option<Spanned<String>>,
+    #[serde(default)]
+    false_origin: [f64; 3],
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawEpoch {
     name: Spanned<String>,
+    date: Option<Spanned<Datetime>>,
+    #[serde(default)]
+    conditions: BTreeMap<String, f64>,
     clouds: Spanned<Vec<Spanned<PathBuf>>>,
     images: Spanned<PathBuf>,
     cameras: Spanned<PathBuf>,
     masks: Option<Spanned<PathBuf>>,
     motion: Option<MotionField>,
+    #[serde(default)]
+    sources: SourceRule,
+    same_survey_as: Option<Spanned<String>>,
 }
 
 impl Project {
@@ -204,10 +266,10 @@ impl Project {
     }
 
     fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
+        let path = &project_file(path);
         let text = fs::read_to_string(path).map_err(Error::io("reading the project file", path))?;
         let source = Source { path, text: &text };
-        let raw: RawProject = toml::from_str(&text)
-            .map_err(|e| source.error(e.span().unwrap_or(0..0), e.message().trim().replace('\n', "; ")))?;
+        let raw: RawProject = toml::from_str(&text).map_err(|e| source.not_toml(&e))?;
         if raw.epochs.len() < least_epochs {
             let at = text.find("[[epochs]]").unwrap_or(0);
             return Err(source.error(
@@ -216,41 +278,71 @@ impl Project {
             ));
         }
         let settings = Settings {
-            tiles: raw.tiles,
+            ingest: raw.ingest,
             segment: source.segment(raw.segment)?,
-            transfer: raw.transfer,
+            label: raw.label,
             stones: raw.stones,
-            matching: raw.matching,
+            r#match: raw.r#match,
             registration: raw.registration,
             m3c2: raw.m3c2,
-            evaluation: raw.evaluation,
+            evaluate: raw.evaluate,
         };
         source.check_settings(&settings)?;
-        let epochs = raw
-            .epochs
-            .into_iter()
-            .map(|e| source.epoch(e))
-            .collect::<Result<Vec<_>>>()?;
+        let map = source.map_frame(&raw.project)?;
+        source.check_names(&raw.epochs)?;
+        let mut epochs = Vec::new();
+        for epoch in raw.epochs {
+            epochs.push(source.epoch(epoch, &map, &epochs)?);
+        }
         Ok(Self {
             path: path.to_path_buf(),
             name: raw.project.name.into_inner(),
             epochs,
             settings,
+            notes: renamed_keys(&text),
             part: None,
         })
     }
 }
 
 impl Project {
+    /// Every file and folder that the project reads, the project file first.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let mut inputs = vec![self.path.clone()];
+        for epoch in &self.epochs {
+            inputs.extend(epoch.clouds.iter().cloned());
+            inputs.extend([epoch.images.clone(), epoch.cameras.clone()]);
+            inputs.extend(epoch.masks.clone());
+        }
+        if let Weights::File(file) = Weights::named(&self.settings.segment.model) {
+            inputs.push(file);
+        }
+        // Comparisons of clouds alone have neither photos nor cameras.
+        inputs.retain(|path| !path.as_os_str().is_empty());
+        inputs
+    }
+
+    /// Name of the structure in a project file that need not be valid otherwise.
+    pub(crate) fn name_in(path: &Path) -> Option<String> {
+        let text = fs::read_to_string(path).ok()?;
+        let table: toml::Table = toml::from_str(&text).ok()?;
+        Some(table.get("project")?.get("name")?.as_str()?.to_owned())
+    }
+
     /// Two clouds without photos, for comparisons of clouds alone.
     pub fn of_clouds(before: &Path, after: &Path, m3c2: M3c2Params) -> Self {
         let epoch = |name: &str, cloud: &Path| Epoch {
             name: name.to_owned(),
+            date: None,
+            conditions: BTreeMap::new(),
             clouds: vec![cloud.to_path_buf()],
             images: PathBuf::new(),
             cameras: PathBuf::new(),
             masks: None,
             motion: None,
+            sources: SourceRule::default(),
+            same_survey_as: None,
+            map: MapFrame::default(),
         };
         Self {
             path: before.to_path_buf(),
@@ -260,8 +352,39 @@ impl Project {
                 m3c2,
                 ..Settings::default()
             },
+            notes: Vec::new(),
             part: None,
         }
+    }
+}
+
+/// One sentence for each table or value that still has its former name.
+fn renamed_keys(text: &str) -> Vec<String> {
+    let Ok(file) = text.parse::<toml::Table>() else {
+        return Vec::new();
+    };
+    let at = |path: &str| {
+        let mut names = path.split('.');
+        let first = file.get(names.next()?)?;
+        names.try_fold(first, |value, name| value.get(name))
+    };
+    let mut notes: Vec<String> = RENAMED
+        .iter()
+        .filter(|(old, _)| at(old).is_some())
+        .map(|(old, new)| format!("[{old}] is now called [{new}]; both names work"))
+        .collect();
+    if at("registration.estimator").and_then(toml::Value::as_str) == Some("network") {
+        notes.push("estimator = \"network\" is now called \"adjustment\"; both names work".to_owned());
+    }
+    notes
+}
+
+/// The project file itself, where a folder is given.
+fn project_file(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("stonewise.toml")
+    } else {
+        path.to_path_buf()
     }
 }
 
@@ -281,7 +404,21 @@ impl Source<'_> {
         }
     }
 
-    fn epoch(&self, raw: RawEpoch) -> Result<Epoch> {
+    fn map_frame(&self, header: &RawHeader) -> Result<MapFrame> {
+        if let Some(crs) = &header.crs {
+            MapSystem::parse(crs.get_ref()).map_err(|reason| {
+                let message = format!("crs: {reason}; give a WKT or a code such as \"EPSG:25832\"");
+                self.error(crs.span(), message)
+            })?;
+        }
+        Ok(MapFrame {
+            crs: header.crs.as_ref().map(|crs| crs.get_ref().clone()),
+            false_origin: header.false_origin,
+        })
+    }
+
+    /// `earlier`: the epochs before it.
+    fn epoch(&self, raw: RawEpoch, map: &MapFrame, earlier: &[Epoch]) -> Result<Epoch> {
         if raw.clouds.get_ref().is_empty() {
             return Err(self.error(raw.clouds.span(), "an epoch needs one cloud at least"));
         }
@@ -291,6 +428,8 @@ impl Source<'_> {
         let clouds = raw.clouds.into_inner();
         Ok(Epoch {
             name: raw.name.into_inner(),
+            date: raw.date.map(|d| d.into_inner().to_string()),
+            conditions: raw.conditions,
             clouds: clouds
                 .into_iter()
                 .map(|c| self.existing(c))
@@ -299,10 +438,26 @@ impl Source<'_> {
             cameras: self.existing(raw.cameras)?,
             masks: raw.masks.map(|m| self.existing(m)).transpose()?,
             motion: raw.motion,
+            map: map.clone(),
+            sources: raw.sources,
+            same_survey_as: raw
+                .same_survey_as
+                .map(|name| self.earlier(&name, earlier))
+                .transpose()?,
         })
     }
 
-    /// The network's file, like all paths, is relative to the project file.
+    /// The index of the epoch of that name.
+    fn earlier(&self, name: &Spanned<String>, earlier: &[Epoch]) -> Result<usize> {
+        let found = earlier.iter().position(|e| e.name == *name.get_ref());
+        found.ok_or_else(|| {
+            let names: Vec<&str> = earlier.iter().map(|e| e.name.as_str()).collect();
+            let message = format!("same_survey_as must name an earlier epoch: {}", names.join(", "));
+            self.error(name.span(), message)
+        })
+    }
+
+    /// The detector's file, like all paths, is relative to the project file.
     fn segment(&self, mut params: SegmentParams) -> Result<SegmentParams> {
         let at = |key: &str| self.text.find(key).unwrap_or(0);
         if let Weights::File(file) = Weights::named(&params.model) {
@@ -315,8 +470,34 @@ impl Source<'_> {
         Ok(params)
     }
 
+    /// What the reader of TOML says, with the fix where it is a usual slip.
+    fn not_toml(&self, error: &toml::de::Error) -> Error {
+        let span = error.span().unwrap_or(0..0);
+        let message = error.message().trim().replace('\n', "; ");
+        let start = self
+            .text
+            .get(..span.start)
+            .unwrap_or("")
+            .rfind('\n')
+            .map_or(0, |i| i + 1);
+        let line = self.text.get(start..).unwrap_or("").lines().next().unwrap_or("");
+        let fix = match line.split_once('=') {
+            Some((key, value))
+                if message.contains("expected a sequence") && value.trim().starts_with(['"', '\'']) =>
+            {
+                format!(": write it as a list: {} = [{}]", key.trim(), value.trim())
+            }
+            _ if message.contains("escape") => format!(": {SLASHES}"),
+            _ => String::new(),
+        };
+        self.error(span, message + &fix)
+    }
+
     /// The path relative to the project file, which must exist.
     fn existing(&self, raw: Spanned<PathBuf>) -> Result<PathBuf> {
+        if raw.get_ref().to_string_lossy().contains(char::is_control) {
+            return Err(self.error(raw.span(), format!("a path with control characters: {SLASHES}")));
+        }
         let path = self.path.parent().unwrap_or(Path::new("")).join(raw.get_ref());
         if path.exists() {
             return Ok(path);
@@ -330,6 +511,19 @@ impl Source<'_> {
         ))
     }
 
+    /// Names of epochs stand in tables and layers: no two may be alike.
+    fn check_names(&self, epochs: &[RawEpoch]) -> Result<()> {
+        for (number, epoch) in epochs.iter().enumerate() {
+            let name = epoch.name.get_ref().trim();
+            if epochs[..number].iter().any(|e| e.name.get_ref().trim() == name) {
+                let message =
+                    format!("two epochs are named {name:?}: give each its own name, such as its date");
+                return Err(self.error(epoch.name.span(), message));
+            }
+        }
+        Ok(())
+    }
+
     /// Values that the types do not exclude.
     fn check_settings(&self, settings: &Settings) -> Result<()> {
         let Some((key, message)) = impossible(settings) else {
@@ -337,5 +531,26 @@ impl Source<'_> {
         };
         let at = self.text.find(&key).unwrap_or(0);
         Err(self.error(at..at, message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn former_names_are_read_and_noted() {
+        let text = "[registration]\nestimator = \"network\"\n[registration.network]\nmin_points = 30\n[tiles]\nsize_m = 3.0\n";
+        let file: toml::Table = text.parse().unwrap();
+        let former: RegistrationParams = file["registration"].clone().try_into().unwrap();
+        assert_eq!(former.estimator, Estimator::Adjustment);
+        assert_eq!(former.adjustment.min_points, 30);
+        let notes = renamed_keys(text);
+        assert_eq!(notes.len(), 3, "{notes:?}");
+        assert!(notes.iter().any(|n| n.contains("[registration.adjustment]")));
+        let today = text.replace("network", "adjustment").replace("tiles", "ingest");
+        assert!(renamed_keys(&today).is_empty());
+        let written = toml::to_string(&former).unwrap();
+        assert!(written.contains("[adjustment]") && !written.contains("network"));
     }
 }

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
-use stonewise_io::cameras::{find_photos, read_cameras};
-use stonewise_io::cloud::{cloud_info, select_points};
+use stonewise_io::cameras::find_photos;
+use stonewise_io::cloud::{claimed_records, select_points};
 
 /// Divides the points and the photos of an epoch at random into two halves, and writes them as a project of two epochs.
 ///
@@ -40,6 +40,12 @@ pub fn split(
         "[project]\nname = {}\n",
         quoted(&format!("{}, {} split", project.name, epoch.name))
     );
+    if let Some(crs) = &epoch.map.crs {
+        let _ = writeln!(text, "crs = {}", quoted(crs));
+    }
+    if epoch.map.false_origin != [0.0; 3] {
+        let _ = writeln!(text, "false_origin = {:?}", epoch.map.false_origin);
+    }
     for half in 0..2usize {
         let folder = out.join(format!("half{}", half + 1));
         let images = folder.join("images");
@@ -52,7 +58,10 @@ pub fn split(
         let mut clouds = Vec::new();
         for (number, cloud) in epoch.clouds.iter().enumerate() {
             let name = format!("half{}/cloud_{}.laz", half + 1, number + 1);
-            progress.begin(&format!("split {}", cloud.display()), cloud_info(cloud)?.records);
+            progress.begin(
+                &format!("split {}", cloud.display()),
+                claimed_records(cloud)?.unwrap_or(0),
+            );
             let salt = seed ^ (number as u64) << 32;
             select_points(cloud, &out.join(&name), |index| {
                 progress.advance(1);
@@ -72,6 +81,11 @@ pub fn split(
         if let Some(masks) = &epoch.masks {
             let _ = writeln!(text, "masks = {}", absolute(masks)?);
         }
+        if half == 1 {
+            text.push_str(
+                "same_survey_as = \"half 1\"   # the same stations and strips, with the same errors\n",
+            );
+        }
     }
     text.push_str(
         "# motion = { kind = \"translation\", d = [0.0, 0.02, 0.05] }   # moves the points of half 2 after labelling\n",
@@ -83,7 +97,7 @@ pub fn split(
 
 /// Posed photos of the epoch in an order that the seed decides.
 fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PathBuf>> {
-    let photos = find_photos(&epoch.images, &read_cameras(&epoch.cameras)?)?;
+    let photos = find_photos(&epoch.images, &epoch.read_cameras()?)?;
     let mut posed: Vec<PathBuf> = photos.paths.into_iter().flatten().collect();
     posed.sort();
     let mut keyed: Vec<(u64, PathBuf)> = posed

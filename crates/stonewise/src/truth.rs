@@ -2,8 +2,10 @@
 
 use crate::error::{Error, Result};
 use crate::files::write_readable_json;
-use crate::report::{ResultSet, StoneRow};
-use nalgebra::{Point3, Vector3};
+use crate::results::names::EVALUATION_TRUTH;
+use crate::results::records::Datum;
+use crate::results::{ResultSet, StoneRow};
+use nalgebra::{Matrix3, Point3, Vector3};
 use std::fs;
 use std::path::Path;
 use stonewise_core::evaluate::{
@@ -25,24 +27,31 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     let set = ResultSet::read(results)?;
     let stones = read_truth(truth)?;
     let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
-    let outcomes: Vec<StoneOutcome> = set.stones.iter().map(|row| outcome(row, normal(row))).collect();
+    let outcomes: Vec<StoneOutcome> = set
+        .stones
+        .iter()
+        .map(|row| outcome(row, normal(row), set.datum()))
+        .collect();
     let centroids: Vec<Point3<f64>> = outcomes.iter().map(|o| o.centroid).collect();
     let owners = owners_by_centroid(&centroids, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
-    write_readable_json(&results.join("evaluation_truth.json"), &evaluation)?;
+    write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
 }
 
-/// A row as the evaluation takes it.
-pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>) -> StoneOutcome {
+/// A row as the evaluation takes it; `datum`: what is known about the registration of its epoch.
+pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>, datum: Option<&Datum>) -> StoneOutcome {
     let motion = row.motion.as_ref();
+    let registration = datum.and_then(|d| d.covariance_at(&row.centroid));
     StoneOutcome {
         stone: StoneId(row.stone_id),
         centroid: row.centroid,
         normal,
         displacement: motion.map(|m| m.displacement),
         covariance: motion.map(|m| m.covariance),
+        covariance_without_datum: motion.map(|m| m.covariance - registration.unwrap_or_else(Matrix3::zeros)),
+        datum_known: registration.is_some(),
         detection_limit_m: motion.map(|m| m.detection_limit_m),
         significant: motion.map(|m| m.significant),
         loose: motion.map(|m| m.loose),

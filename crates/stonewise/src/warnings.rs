@@ -14,6 +14,9 @@ pub struct Warning {
     pub message: String,
     /// An input that was asked for was left out: the run ends with exit code 3.
     pub skipped_input: bool,
+    /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything else.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub doubt: bool,
 }
 
 /// Collects warnings from all threads.
@@ -28,6 +31,7 @@ impl Warnings {
             subject: subject.into(),
             message: message.into(),
             skipped_input: false,
+            doubt: false,
         });
     }
 
@@ -38,6 +42,18 @@ impl Warnings {
             subject: subject.into(),
             message: message.into(),
             skipped_input: true,
+            doubt: false,
+        });
+    }
+
+    /// The results as a whole cannot be relied on.
+    pub fn doubt(&self, step: &str, subject: impl Into<String>, message: impl Into<String>) {
+        self.push(Warning {
+            step: step.into(),
+            subject: subject.into(),
+            message: message.into(),
+            skipped_input: false,
+            doubt: true,
         });
     }
 

@@ -8,7 +8,7 @@ use stonewise::experiment::{
     Influence, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
 };
 use stonewise::simulate::{SurveyParams, write_survey};
-use stonewise::{Part, Project, Until, run};
+use stonewise::{OutputFolder, Part, Project, Until, run};
 use stonewise_core::evaluate::MotionField;
 use stonewise_core::progress::Silent;
 use stonewise_core::simulate::{PhotoParams, SceneParams, SurroundingsParams, TlsParams, WallParams};
@@ -65,10 +65,10 @@ fn column(path: &Path, name: &str) -> Vec<String> {
 fn a_grid_finds_what_single_runs_find_and_resumes() {
     let (dir, mut project) = survey();
     project.epochs[1].motion = Some(MotionField::translation(Vector3::new(0.0, 0.01, 0.02)).unwrap());
-    project.settings.matching.min_overlap = 1.0;
+    project.settings.r#match.min_overlap = 1.0;
     let options = TuneOptions {
         grid: [
-            "matching.min_area_ratio=0.9999,0.5",
+            "match.min_area_ratio=0.9999,0.5",
             "registration.border_noises=0..3..3",
         ]
         .map(|d| d.parse().unwrap())
@@ -80,7 +80,7 @@ fn a_grid_finds_what_single_runs_find_and_resumes() {
     assert_eq!(tuned.points.len(), 4);
     let table = out.join("tune.csv");
     assert_eq!(
-        column(&table, "matching.min_area_ratio"),
+        column(&table, "match.min_area_ratio"),
         ["0.9999", "0.9999", "0.5", "0.5"]
     );
     assert!(tuned.lines.contains("min_area_ratio = 0.5"), "{}", tuned.lines);
@@ -90,7 +90,8 @@ fn a_grid_finds_what_single_runs_find_and_resumes() {
     );
 
     // The last combination is the project's own: a run by itself must come to the same.
-    let alone = run(&project, &dir.path().join("alone"), Until::Registered, &Silent).unwrap();
+    let folder = OutputFolder::of_project(&dir.path().join("alone"), &project, false).unwrap();
+    let alone = run(&project, &folder, Until::Registered, &Silent).unwrap();
     let score = alone.pairs[0]
         .evaluation
         .as_ref()
@@ -128,7 +129,7 @@ fn a_grid_says_what_cannot_be() {
         grid: vec!["max_ratio=0.4".parse().unwrap()],
         ..TuneOptions::default()
     });
-    assert!(unknown.contains("matching.max_ratio"), "{unknown}");
+    assert!(unknown.contains("match.max_ratio"), "{unknown}");
     let far = fail(TuneOptions {
         part: Some(Part::between([100.0; 3], [101.0; 3])),
         ..TuneOptions::default()

@@ -1,4 +1,5 @@
-//! A folder of photos through a small network with random weights: what it finds is nonsense, but files, resuming and threads can be seen.
+//! A folder of photos through a small detector with random weights: what it finds is nonsense, but files,
+//! resuming and threads can be seen.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
 use std::fs;
@@ -16,7 +17,7 @@ use stonewise_segment::model::{
 use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::tiling::TilingOptions;
 
-fn network(path: &Path) -> Weights {
+fn weights(path: &Path) -> Weights {
     let light = MaskRcnnConfig::light();
     let config = MaskRcnnConfig {
         backbone: BackboneConfig {
@@ -38,7 +39,7 @@ fn network(path: &Path) -> Weights {
     Weights::File(path.to_owned())
 }
 
-/// Two photos in folders of their own, and a network.
+/// Two photos in folders of their own, and a detector.
 fn input(dir: &Path) -> (PathBuf, Weights) {
     let photos = dir.join("photos");
     for (seed, name) in [(1, "a/one.png"), (2, "b/two.png")] {
@@ -46,7 +47,7 @@ fn input(dir: &Path) -> (PathBuf, Weights) {
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         write_png_rgb(&path, masonry_photo(seed, 150, 110).image()).unwrap();
     }
-    (photos, network(&dir.join("network.safetensors")))
+    (photos, weights(&dir.join("weights.safetensors")))
 }
 
 fn segment(photos: &Path, out: &Path, weights: &Weights, reference: Option<&Reference>) -> FolderSummary {
@@ -102,7 +103,7 @@ fn masks_come_back_as_written_and_score_fully_against_themselves() {
 }
 
 #[test]
-fn photos_that_are_done_are_not_done_again_unless_the_network_is_another() {
+fn photos_that_are_done_are_not_done_again_unless_the_detector_is_another() {
     let dir = tempfile::tempdir().unwrap();
     let (photos, weights) = input(dir.path());
     let out = dir.path().join("out");

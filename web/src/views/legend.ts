@@ -15,7 +15,7 @@ export function legend(report: Report, store: Store, quantities: readonly Quanti
     const marks: Node[] = quantity.scale === "outcomes" ? outcomes(report) : [bar(report, quantity)];
     if (quantity.fades && fade) marks.push(mark("pale", "below its 95 % limit"));
     if (quantity.scale !== "outcomes" && quantity.key !== "opening") marks.push(mark("hatched", "not measured"));
-    marks.push(mark("ring", "unlike its neighbours"));
+    marks.push(mark("ring", "loose"));
     element.replaceChildren(...marks, el("span", { class: "note" }, quantity.note));
   };
   store.on((state, before) => {

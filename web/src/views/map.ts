@@ -12,7 +12,7 @@ const ARROW_PX = 46;
 const ARROW_SPACING_PX = 16;
 /** Opacity of what is below its detection limit. */
 const FADED = 0.28;
-/** Outline of what moves unlike its neighbours. */
+/** Outline of loose stones. */
 const LIGHT = "#ffffff";
 const DARK = "#14181c";
 /** Half the edge of an M3C2 square, metres. */

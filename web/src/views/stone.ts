@@ -79,7 +79,7 @@ export class StonePanel {
     const badge = (text: string, kind: string) => el("span", { class: `badge ${kind}` }, text);
     const badges = isMeasured(stones, stone)
       ? [stones.significant[stone] ? badge("moved significantly", "strong") : badge("below its limit", "weak"),
-        ...(stones.loose[stone] ? [badge("unlike its neighbours", "alarm")] : [])]
+        ...(stones.loose[stone] ? [badge("loose", "alarm")] : [])]
       : [badge(statuses[stones.state[stone]!]!.word, "weak")];
     return el("div", { class: "stone-head" },
       el("div", { class: "stone-title" },
@@ -115,7 +115,7 @@ export class StonePanel {
           cell(`LoD ${mm(stones.limit[stone]!)}`), cell(mm(norm(stones.relative, stone))),
           cell(fixed(norm(stones.rotation, stone) * 1e3, 2)))));
     return registrationKnown ? table : el("div", {}, table,
-      el("p", { class: "note" }, "95 % and LoD hold against other stones: the error of the epochs' registration is not known."));
+      el("p", { class: "note" }, "95 % and LoD hold against the common motion of the measured stones: the registration error of the epochs is unknown."));
   }
 
   /** The displacement with the projections of its 95 % ellipsoid, from the front and from the side. */

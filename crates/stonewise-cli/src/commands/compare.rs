@@ -5,11 +5,11 @@ use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
-use stonewise::{Comparison, Project, compare_clouds};
+use stonewise::{Comparison, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
 /// M3C2 of a project or of two clouds.
-pub fn m3c2(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let params = args.params.as_deref().map(cloudcompare_params).transpose()?;
     if args.inputs.len() == 2 && params.is_none() {
         printer.log("normals point upwards (no cameras tell the outside); parameters are the defaults");
@@ -18,19 +18,25 @@ pub fn m3c2(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
     if let Some(params) = params {
         project.settings.m3c2 = params;
     }
-    compare(&project, Comparison::M3c2, args, printer)
+    compare(
+        &project,
+        Comparison::M3c2,
+        &claim(&project, args, force)?,
+        printer,
+    )
 }
 
 /// C2C of a project or of two clouds.
-pub fn c2c(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+pub fn c2c(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let what = Comparison::C2c {
         max_m: args.max_distance,
     };
-    compare(&project(args, M3c2Params::default())?, what, args, printer)
+    let project = project(args, M3c2Params::default())?;
+    compare(&project, what, &claim(&project, args, force)?, printer)
 }
 
 /// C2M of a mesh and a cloud.
-pub fn c2m(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
+pub fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let [mesh, cloud] = args.inputs.as_slice() else {
         bail!("c2m needs a mesh and a cloud: stonewise c2m mesh.ply cloud.laz --out DIR");
     };
@@ -41,15 +47,32 @@ pub fn c2m(args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
             mesh,
             max_m: args.max_distance,
         },
-        args,
+        &claim(&project, args, force)?,
         printer,
     )
 }
 
-fn compare(project: &Project, what: Comparison, args: &CompareArgs, printer: &Printer) -> Result<Outcome> {
-    compare_clouds(project, what, &args.out, printer)?;
-    printer.log(&format!("results: {}", args.out.display()));
+fn compare(project: &Project, what: Comparison, folder: &OutputFolder, printer: &Printer) -> Result<Outcome> {
+    compare_clouds(project, what, folder, printer)?;
+    printer.log(&format!("results: {}", folder.path().display()));
     Ok(Outcome::Done)
+}
+
+/// Results of a project go where its other results are; those of two clouds into a folder of these clouds.
+fn claim(project: &Project, args: &CompareArgs, force: bool) -> Result<OutputFolder> {
+    Ok(match args.inputs.as_slice() {
+        [_] => OutputFolder::of_project(&args.out, project, force)?,
+        clouds => {
+            let written = ["m3c2.laz", "m3c2.csv", "c2c.laz", "c2m.laz", "work"];
+            OutputFolder::of_inputs(
+                &args.out,
+                &Owner::inputs("clouds", clouds),
+                clouds,
+                &written,
+                force,
+            )?
+        }
+    })
 }
 
 fn project(args: &CompareArgs, params: M3c2Params) -> Result<Project> {

@@ -6,11 +6,12 @@ use crate::printer::Printer;
 use anyhow::Result;
 use std::io::Write;
 use std::path::Path;
-use stonewise::evaluate_truth;
+use stonewise::{OutputFolder, evaluate_truth};
 use stonewise_core::evaluate::EvaluationParams;
 
 /// Scores a finished run; the evaluation goes to stdout as JSON.
 pub fn evaluate(args: &EvaluateArgs, printer: &Printer) -> Result<Outcome> {
+    let _folder = OutputFolder::of_results(&args.results)?;
     let evaluation = evaluate_truth(&args.results, &args.truth, &EvaluationParams::default())?;
     printer.finish();
     writeln!(

@@ -5,23 +5,31 @@ use crate::commands::{Outcome, part::part, simulate};
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
-use std::path::Path;
-use stonewise::Project;
+use std::path::{Path, PathBuf};
 use stonewise::experiment::{
     PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
 };
 use stonewise::simulate::SurveyParams;
+use stonewise::{OutputFolder, Owner, Project};
 
 /// Runs an experiment.
-pub fn experiment(which: &ExperimentCommand, printer: &Printer) -> Result<Outcome> {
+pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> Result<Outcome> {
     match which {
-        ExperimentCommand::Paper(args) => paper(args, printer),
-        ExperimentCommand::Sensitivity(args) => sensitivity(args, printer),
+        ExperimentCommand::Paper(args) => paper(args, force, printer),
+        ExperimentCommand::Sensitivity(args) => sensitivity(args, force, printer),
     }
 }
 
 /// The paper's experiment; its tables go to stdout.
-fn paper(args: &PaperArgs, printer: &Printer) -> Result<Outcome> {
+fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    // A survey is given as NAME=FILE or FILE.
+    let files = args
+        .surveys
+        .iter()
+        .map(|s| PathBuf::from(s.rsplit('=').next().unwrap_or(s)));
+    let files: Vec<PathBuf> = files.collect();
+    let owner = Owner::inputs("experiment paper", &files);
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &files, &["work"], force)?;
     let mut surveys: Vec<PaperSurvey> = match args.surveys.as_slice() {
         [] => simulated(args, printer)?,
         given => given.iter().map(|s| survey(s)).collect::<Result<_>>()?,
@@ -31,7 +39,7 @@ fn paper(args: &PaperArgs, printer: &Printer) -> Result<Outcome> {
             survey.paper_part = Some(part("--paper-part", text, &survey.project)?);
         }
     }
-    let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, &args.out, printer)?;
+    let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, folder.path(), printer)?;
     printer.finish();
     write!(std::io::stdout(), "{}", tables.markdown())?;
     printer.log(&format!("open {}", args.out.join("index.html").display()));
@@ -39,14 +47,16 @@ fn paper(args: &PaperArgs, printer: &Printer) -> Result<Outcome> {
 }
 
 /// Curves of what the results depend on.
-fn sensitivity(args: &SensitivityArgs, printer: &Printer) -> Result<Outcome> {
+fn sensitivity(args: &SensitivityArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let options = SensitivityOptions {
         influences: args.influence.clone(),
         size_m: args.size,
         seeds: args.seeds,
         with_paper: args.with_paper,
     };
-    let points = run_sensitivity(&options, &args.out, printer)?;
+    let owner = Owner::inputs("experiment sensitivity", &[]);
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &[], &[], force)?;
+    let points = run_sensitivity(&options, folder.path(), printer)?;
     printer.log(&format!(
         "{} points of curves: open {}",
         points.len(),
@@ -81,7 +91,8 @@ fn simulated(args: &PaperArgs, printer: &Printer) -> Result<Vec<PaperSurvey>> {
         epochs: 1,
         ..SurveyParams::dam(args.size).seeded(args.seed)
     };
-    simulate::make_once(&folder, &params, printer)?;
+    // The experiment's own: another seed or size makes it anew.
+    simulate::make_once(&folder, &params, true, printer)?;
     let read = |name: &str, file: &str| -> Result<PaperSurvey> {
         Ok(PaperSurvey {
             name: name.to_owned(),

@@ -5,9 +5,10 @@ use crate::commands::Outcome;
 use crate::printer::note;
 use anyhow::Result;
 
-/// Writes a project file and says where.
+/// Writes a project file; says what was chosen and what was left out.
 pub fn init(args: &InitArgs) -> Result<Outcome> {
-    let path = stonewise::init(&args.dir)?;
-    note(&format!("wrote {}", path.display()));
+    let done = stonewise::init(&args.dir)?;
+    done.lines.iter().for_each(|line| note(line));
+    note(&format!("wrote {}", done.path.display()));
     Ok(Outcome::Done)
 }

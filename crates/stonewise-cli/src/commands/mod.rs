@@ -1,5 +1,6 @@
 //! One file per subcommand: parse, call the library, print.
 
+mod check;
 mod compare;
 mod evaluate;
 mod experiment;
@@ -24,8 +25,8 @@ use stonewise::Until;
 pub enum Outcome {
     /// Everything that was asked for was done.
     Done,
-    /// Done, but for inputs that were left out.
-    SkippedInputs,
+    /// Done, but for inputs that were left out, or with a doubt about the whole.
+    InDoubt,
 }
 
 /// Runs the command that was asked for.
@@ -35,23 +36,25 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
             .num_threads(threads)
             .build_global()?;
     }
+    let force = args.force;
     match args.command {
-        Command::Run(args) => run::run(&args, Until::Reported, printer),
-        Command::Segment(args) => segment::segment(args, printer),
-        Command::Train(args) => train::train(&args, printer),
-        Command::Label(args) => run::run(&args, Until::Labelled, printer),
-        Command::Match(args) => run::run(&args, Until::Matched, printer),
-        Command::Register(args) => run::run(&args, Until::Registered, printer),
-        Command::M3c2(args) => compare::m3c2(&args, printer),
-        Command::C2c(args) => compare::c2c(&args, printer),
-        Command::C2m(args) => compare::c2m(&args, printer),
+        Command::Run(args) => run::run(&args, Until::Reported, force, printer),
+        Command::Segment(args) => segment::segment(args, force, printer),
+        Command::Train(args) => train::train(&args, force, printer),
+        Command::Label(args) => run::run(&args, Until::Labelled, force, printer),
+        Command::Match(args) => run::run(&args, Until::Matched, force, printer),
+        Command::Register(args) => run::run(&args, Until::Registered, force, printer),
+        Command::M3c2(args) => compare::m3c2(&args, force, printer),
+        Command::C2c(args) => compare::c2c(&args, force, printer),
+        Command::C2m(args) => compare::c2m(&args, force, printer),
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
         Command::Report(args) => report::report(&args, printer),
-        Command::Demo(args) => simulate::demo(&args, printer),
-        Command::Simulate(args) => simulate::simulate(&args, printer),
-        Command::Split(args) => split::split(&args, printer),
-        Command::Tune(args) => tune::tune(&args, printer),
-        Command::Experiment(which) => experiment::experiment(&which, printer),
+        Command::Demo(args) => simulate::demo(&args, force, printer),
+        Command::Simulate(args) => simulate::simulate(&args, force, printer),
+        Command::Split(args) => split::split(&args, force, printer),
+        Command::Tune(args) => tune::tune(&args, force, printer),
+        Command::Experiment(which) => experiment::experiment(&which, force, printer),
+        Command::Check(args) => check::check(&args, force, printer),
         Command::Init(args) => init::init(&args),
         Command::Info(args) => info::info(&args),
     }

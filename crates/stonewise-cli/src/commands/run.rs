@@ -2,31 +2,55 @@
 
 use crate::args::ProjectArgs;
 use crate::commands::Outcome;
-use crate::printer::Printer;
+use crate::printer::{Printer, note};
 use anyhow::{Context, Result};
-use stonewise::report::{Status, StoneRow};
-use stonewise::{Project, Summary, Until};
+use std::path::Path;
+use stonewise::results::{Status, StoneRow};
+use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
 
 /// Runs a project as far as asked.
-pub fn run(args: &ProjectArgs, until: Until, printer: &Printer) -> Result<Outcome> {
+pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read(&args.project)?;
-    let summary = stonewise::run(&project, &args.out, until, printer)
+    let folder = OutputFolder::of_project(&args.out, &project, force)?;
+    run_in(&folder, &project, until, printer)
+}
+
+/// The same in a folder that is claimed already.
+pub fn run_in(folder: &OutputFolder, project: &Project, until: Until, printer: &Printer) -> Result<Outcome> {
+    let out = folder.path();
+    let summary = stonewise::run(project, folder, until, printer)
+        .with_context(|| unfinished(out))
         .with_context(|| format!("{} is not finished", project.name))?;
     printer.finish();
-    tell(&project, &summary, printer);
+    tell(project, &summary, printer);
     if until == Until::Reported {
-        printer.log(&format!("results: {}", args.out.display()));
+        printer.log(&format!("results: {}", out.display()));
     }
-    Ok(if summary.skipped_inputs() {
-        Outcome::SkippedInputs
+    Ok(if summary.skipped_inputs() || summary.doubts().next().is_some() {
+        Outcome::InDoubt
     } else {
         Outcome::Done
     })
 }
 
-/// Says in a few lines what came out.
+/// Where results of an earlier run are now.
+fn unfinished(out: &Path) -> String {
+    let previous = out.join(PREVIOUS_DIR);
+    match previous.exists() {
+        true => format!(
+            "the results of the last finished run lie in {}",
+            previous.display()
+        ),
+        false => format!("{} holds no finished results", out.display()),
+    }
+}
+
+/// Says in a few lines what came out; doubts first, and also where nothing but errors is wanted.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
-    for warning in &summary.warnings {
+    for doubt in summary.doubts() {
+        note(&format!("DOUBT: {}: {}", doubt.subject, doubt.message));
+    }
+    for warning in summary.warnings.iter().filter(|w| !w.doubt) {
         let word = if warning.skipped_input { "skipped" } else { "note" };
         printer.log(&format!("{word}: {}: {}", warning.subject, warning.message));
     }

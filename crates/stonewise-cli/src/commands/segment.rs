@@ -5,15 +5,15 @@ use crate::commands::{Outcome, run};
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
-use stonewise::Until;
 use stonewise::segmentation::{FolderJob, MaskEvaluation, segment_folder};
+use stonewise::{OutputFolder, Owner, Until};
 use stonewise_segment::Weights;
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::evaluation::MaskScore;
 use stonewise_segment::tiling::TilingOptions;
 
 /// Segments photos, or the photos of a project.
-pub fn segment(args: SegmentArgs, printer: &Printer) -> Result<Outcome> {
+pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     if args
         .input
         .extension()
@@ -23,7 +23,7 @@ pub fn segment(args: SegmentArgs, printer: &Printer) -> Result<Outcome> {
             project: args.input,
             out: args.out,
         };
-        return run::run(&project, Until::Segmented, printer);
+        return run::run(&project, Until::Segmented, force, printer);
     }
     let mut tiling = TilingOptions::default();
     tiling.scales = args.scales.unwrap_or(tiling.scales);
@@ -35,10 +35,19 @@ pub fn segment(args: SegmentArgs, printer: &Printer) -> Result<Outcome> {
         Some(masks) => Some(Reference::open(masks, args.valid.as_deref())?),
         None => None,
     };
+    let inputs = [args.input.clone()];
+    let written = ["labels", "overlays", "masks.json", "evaluation.json", "work"];
+    let folder = OutputFolder::of_inputs(
+        &args.out,
+        &Owner::inputs("stones", &inputs),
+        &inputs,
+        &written,
+        force,
+    )?;
     let summary = segment_folder(
         &FolderJob {
             photos: &args.input,
-            out: &args.out,
+            out: folder.path(),
             weights: &Weights::named(&args.model),
             tiling: &tiling,
             reference: reference.as_ref(),
@@ -61,7 +70,7 @@ pub fn segment(args: SegmentArgs, printer: &Printer) -> Result<Outcome> {
     Ok(if summary.warnings.is_empty() {
         Outcome::Done
     } else {
-        Outcome::SkippedInputs
+        Outcome::InDoubt
     })
 }
 

@@ -1,48 +1,55 @@
 //! `simulate` and `demo`.
 
-use crate::args::{DemoArgs, Preset, ProjectArgs, SimulateArgs};
+use crate::args::{DemoArgs, Preset, SimulateArgs};
 use crate::commands::{Outcome, run};
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
-use stonewise::Until;
 use stonewise::simulate::{SurveyParams, write_survey};
+use stonewise::{OutputFolder, Owner, Project, Until};
 
 /// Makes a small survey, runs it and scores it against its truth.
-pub fn demo(args: &DemoArgs, printer: &Printer) -> Result<Outcome> {
+pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let mut params = SurveyParams::demo();
     params.scene.seed = args.seed;
     params.scene.wall.seed = args.seed;
-    let folder = args.out.join("survey");
-    let project = folder.join("stonewise.toml");
-    make_once(&folder, &params, printer)?;
-    let outcome = run::run(
-        &ProjectArgs {
-            project,
-            out: args.out.clone(),
-        },
-        Until::Reported,
-        printer,
-    )?;
-    let truth = folder.join("truth/stones.csv");
-    super::evaluate::score(&args.out, &truth, printer)?;
+    let survey = args.out.join("survey");
+    let path = survey.join("stonewise.toml");
+    let owner = Owner::project(&path, &params.name);
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &[], &[], force)?;
+    make_once(&survey, &params, force, printer)?;
+    let project = Project::read(&path)?;
+    let outcome = run::run_in(&folder, &project, Until::Reported, printer)?;
+    super::evaluate::score(&args.out, &survey.join("truth/stones.csv"), printer)?;
     printer.log(&format!("open {}", args.out.join("report/index.html").display()));
     Ok(outcome)
 }
 
 /// Makes a simulated survey, unless the folder holds the one with these parameters.
-pub fn make_once(folder: &Path, params: &SurveyParams, printer: &Printer) -> Result<()> {
-    let written = std::fs::read_to_string(folder.join("simulation.toml")).ok();
-    let is_there = folder.join("stonewise.toml").exists()
+pub fn make_once(path: &Path, params: &SurveyParams, force: bool, printer: &Printer) -> Result<()> {
+    let folder = claim(path, params, force)?;
+    let written = std::fs::read_to_string(folder.path().join("simulation.toml")).ok();
+    let is_there = folder.path().join("stonewise.toml").exists()
         && written.and_then(|t| toml::from_str::<SurveyParams>(&t).ok()) == Some(params.clone());
     if !is_there {
-        write_survey(folder, params, printer)?;
+        write_survey(folder.path(), params, printer)?;
     }
     Ok(())
 }
 
+/// The folder of the survey with these parameters.
+fn claim(path: &Path, params: &SurveyParams, force: bool) -> Result<OutputFolder> {
+    Ok(OutputFolder::of_inputs(
+        path,
+        &Owner::survey(params),
+        &[],
+        &[],
+        force,
+    )?)
+}
+
 /// Makes a simulated survey.
-pub fn simulate(args: &SimulateArgs, printer: &Printer) -> Result<Outcome> {
+pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let mut params = match &args.params {
         None if args.preset == Preset::Dam => SurveyParams::dam(args.size),
         None => SurveyParams::default(),
@@ -55,7 +62,8 @@ pub fn simulate(args: &SimulateArgs, printer: &Printer) -> Result<Outcome> {
     if let Some(seed) = args.seed {
         params = params.seeded(seed);
     }
-    let summary = write_survey(&args.out, &params, printer)?;
+    let folder = claim(&args.out, &params, force)?;
+    let summary = write_survey(folder.path(), &params, printer)?;
     printer.log(&format!(
         "{} stones, {} points, {} photos: {}",
         summary.stones,

@@ -5,12 +5,12 @@ use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
-use std::path::Path;
-use stonewise_segment::backend::{Training, device};
+use std::path::{Path, PathBuf};
+use stonewise::{OutputFolder, Owner};
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
 use stonewise_segment::train::{
-    Rendered, Run, SampleSource, Start, Stop, Total, TrainParams, Trainer, model_path, open_training,
+    Rendered, Run, SampleSource, Session, Start, Stop, Total, TrainParams, model_path,
 };
 use stonewise_segment::{Sample, Weights};
 
@@ -21,7 +21,7 @@ const VALIDATION_IMAGES: u64 = 24;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// The network, where it starts from nothing.
+    /// The detector, where training starts from random weights.
     #[serde(default = "MaskRcnnConfig::light")]
     model: MaskRcnnConfig,
     /// How it is trained.
@@ -29,7 +29,7 @@ struct Config {
 }
 
 /// Trains, or goes on training, until the time is up.
-pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
+pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let config = match &args.config {
         Some(path) => read_config(path)?,
         None => Config {
@@ -42,11 +42,16 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
     } else {
         Start::Weights(Weights::named(&args.from))
     };
-    std::fs::create_dir_all(&args.out).with_context(|| format!("making {}", args.out.display()))?;
+    let inputs: Vec<PathBuf> = [&args.data, &args.images, &args.valid]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
+    let owner = Owner::inputs("training", &inputs);
+    let _folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &[], force)?;
     let total = args.total_minutes.map(Total::Minutes);
-    let mut trainer: Trainer<Training> =
-        open_training(&args.out, &start, config.training, total, args.minutes, &device())?;
-    let elapsed = trainer.elapsed();
+    let mut session = Session::open(&args.out, &start, config.training, total, args.minutes)?;
+    let elapsed = session.elapsed();
     if elapsed.steps > 0 {
         let minutes = elapsed.seconds / 60.0;
         printer.log(&format!(
@@ -54,7 +59,7 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
             elapsed.steps
         ));
     }
-    let training = trainer.config().training.clone();
+    let training = session.config().training.clone();
     let (photos, source): (LabelledPhotos, PhotoCrops);
     let rendered = Rendered {
         seed: training.seed,
@@ -78,10 +83,10 @@ pub fn train(args: &TrainArgs, printer: &Printer) -> Result<Outcome> {
         threads: 1,
         progress: printer,
     };
-    let stop = run.train(&mut trainer)?;
-    let elapsed = trainer.elapsed();
+    let stop = session.train(&run)?;
+    let elapsed = session.elapsed();
     printer.log(&format!(
-        "{} steps, {:.1} minutes; the network: {}",
+        "{} steps, {:.1} minutes; the detector: {}",
         elapsed.steps,
         elapsed.seconds / 60.0,
         model_path(&args.out).display()

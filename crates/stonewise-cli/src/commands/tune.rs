@@ -5,11 +5,11 @@ use crate::commands::{Outcome, part::part};
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
-use stonewise::Project;
 use stonewise::experiment::{TuneOptions, tune as tune_grid};
+use stonewise::{OutputFolder, Owner, Project};
 
 /// Tries a grid of parameters; the recommended lines go to stdout.
-pub fn tune(args: &TuneArgs, printer: &Printer) -> Result<Outcome> {
+pub fn tune(args: &TuneArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read_for_split(&args.project)?;
     let part = match &args.part {
         Some(text) => Some(part("--part", text, &project)?),
@@ -20,7 +20,9 @@ pub fn tune(args: &TuneArgs, printer: &Printer) -> Result<Outcome> {
         part,
         seed: args.seed,
     };
-    let tuned = tune_grid(&project, &options, &args.out, printer)?;
+    let owner = Owner::inputs("tune", std::slice::from_ref(&project.path));
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &project.inputs(), &["work", "points"], force)?;
+    let tuned = tune_grid(&project, &options, folder.path(), printer)?;
     printer.finish();
     let Some(best) = tuned.recommended else {
         bail!(

@@ -1,7 +1,7 @@
 //! Whether claimed uncertainties are honest.
 
 use crate::evaluate::MotionSample;
-use crate::evaluate::statistics::quantile;
+use crate::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
 /// 95 % quantile of chi-square with 3 degrees of freedom.
@@ -100,6 +100,8 @@ mod tests {
                     normal: wall,
                     displacement: Some(truth + error),
                     covariance: Some(root * root.transpose()),
+                    covariance_without_datum: None,
+                    datum_known: true,
                     detection_limit_m: None,
                     significant: None,
                     loose: None,

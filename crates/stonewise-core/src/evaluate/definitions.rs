@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-const WORDS: [(&str, &str); 22] = [
+const WORDS: [(&str, &str); 23] = [
     ("error", "estimate minus truth; all lengths in metres"),
     (
         "truth",
@@ -43,6 +43,10 @@ const WORDS: [(&str, &str); 22] = [
     (
         "coverage_95",
         "share of true components inside the estimate +- 1.96 standard deviations; for M3C2 out of plane inside +- its detection limit; 0.95 is right",
+    ),
+    (
+        "calibration",
+        "the claims against the truth; null where the error of the epochs' registration is not known; calibration_without_datum: after the least-squares rigid motion of the stones that are not loose, weighted by their inverse covariances, is taken off estimates and truths, with covariances that leave the registration error out",
     ),
     (
         "chi_square",

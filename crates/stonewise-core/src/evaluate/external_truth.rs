@@ -208,6 +208,8 @@ mod tests {
             normal: Vector3::x(),
             displacement,
             covariance: None,
+            covariance_without_datum: None,
+            datum_known: true,
             detection_limit_m: None,
             significant: None,
             loose: Some(true),

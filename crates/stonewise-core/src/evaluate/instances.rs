@@ -29,9 +29,16 @@ pub struct InstanceScore {
     pub mean_iou_all: Option<f64>,
 }
 
+impl LabelConfusion {
+    /// Precision, recall, F1 and IoU of the predicted stones against the true ones.
+    pub fn score_instances(&self) -> InstanceScore {
+        InstanceScore::of(self)
+    }
+}
+
 impl InstanceScore {
     /// Pairs predicted and true instances one to one by descending IoU.
-    pub(super) fn of(confusion: &LabelConfusion) -> Self {
+    fn of(confusion: &LabelConfusion) -> Self {
         let (predicted, truth) = (confusion.predicted_sizes(), confusion.true_sizes());
         let size = |sizes: &BTreeMap<u32, u64>, id: u32| sizes.get(&id).copied().unwrap_or(0);
         let mut pairs: Vec<(f64, u32, u32)> = confusion

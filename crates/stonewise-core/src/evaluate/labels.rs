@@ -1,7 +1,6 @@
 //! Point or pixel labels against true labels.
 
 use crate::evaluate::detection::share;
-use crate::evaluate::instances::InstanceScore;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -130,11 +129,6 @@ impl LabelConfusion {
             .filter_map(|(t, right)| Some((t, right as f64 / *sizes.get(&t)? as f64)))
             .collect();
         score
-    }
-
-    /// Precision, recall, F1 and IoU of the predicted stones against the true ones.
-    pub fn score_instances(&self) -> InstanceScore {
-        InstanceScore::of(self)
     }
 
     fn sizes(&self, label: impl Fn(&(u32, u32)) -> u32) -> BTreeMap<u32, u64> {

@@ -31,4 +31,4 @@ pub use motion_field::{MotionField, MotionFieldError};
 pub use moved_tiles::MovedTiles;
 pub use sample::{EvaluationParams, EvaluationParamsError, MotionSample, StoneOutcome};
 pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};
-pub use statistics::{ErrorStatistics, quantile};
+pub use statistics::ErrorStatistics;

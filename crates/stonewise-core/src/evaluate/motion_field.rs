@@ -44,6 +44,14 @@ impl MotionField {
         Ok(Self(Kind::Translation(d)))
     }
 
+    /// The displacement that all points share, metres; `None` for a bulge.
+    pub fn common_displacement(&self) -> Option<Vector3<f64>> {
+        match &self.0 {
+            Kind::Translation(d) => Some(*d),
+            Kind::Bulge { .. } => None,
+        }
+    }
+
     /// A round bulge: depth * cos^2(pi r / diameter) along `direction` (any length but zero) for r < diameter / 2.
     ///
     /// r is measured from `centre`, perpendicular to `direction`; the bulge reaches through the whole wall.

@@ -1,7 +1,7 @@
 //! One estimated motion beside the truth.
 
 use crate::change::ChangePoint;
-use crate::geometry::FaceFrame;
+use crate::geometry::{DisplacementSample, FaceFrame, SmallMotion};
 use crate::id::StoneId;
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -75,8 +75,13 @@ pub struct StoneOutcome {
     pub normal: Vector3<f64>,
     /// Displacement of the centroid, metres; `None` where there is no estimate, for whatever reason.
     pub displacement: Option<Vector3<f64>>,
-    /// Covariance of the displacement, m^2, registration error included.
+    /// Covariance of the displacement, m^2, registration error included where it is known.
     pub covariance: Option<Matrix3<f64>>,
+    /// The same without registration error of the epochs, m^2.
+    pub covariance_without_datum: Option<Matrix3<f64>>,
+    /// Whether the registration error is known; else limits and alarms hold for motions against the common rigid motion of the
+    /// stones that are not reported as loose.
+    pub datum_known: bool,
     /// Smallest significant displacement at 95 %, metres.
     pub detection_limit_m: Option<f64>,
     /// Reported as moved, at 95 %.
@@ -94,8 +99,16 @@ pub struct MotionSample {
     pub estimated: Vector3<f64>,
     /// True displacement, world frame, metres.
     pub truth: Vector3<f64>,
+    /// The place, world frame, metres.
+    pub place: Point3<f64>,
     /// Covariance of the estimate, world frame, m^2.
     pub covariance: Option<Matrix3<f64>>,
+    /// The same without registration error of the epochs, m^2.
+    pub covariance_without_datum: Option<Matrix3<f64>>,
+    /// Whether claims are about absolute motions, not about motions against the common one.
+    pub is_absolute: bool,
+    /// Whether the sample takes part in the common motion: it is not reported as loose.
+    pub is_common: bool,
     /// Half-widths of the claimed 95 % intervals along, up and out, metres; `None` where nothing is claimed.
     pub half_width_m: [Option<f64>; 3],
     /// Smallest significant displacement at 95 %, metres.
@@ -125,12 +138,12 @@ impl MotionSample {
             frame,
             estimated: outcome.displacement?,
             truth,
+            place: outcome.centroid,
             covariance: outcome.covariance,
-            half_width_m: axes.map(|axis| {
-                outcome
-                    .covariance
-                    .map(|c| Z95 * axis.dot(&(c * axis)).max(0.0).sqrt())
-            }),
+            covariance_without_datum: outcome.covariance_without_datum,
+            is_absolute: outcome.datum_known,
+            is_common: outcome.loose != Some(true),
+            half_width_m: half_widths(&axes, outcome.covariance.as_ref()),
             detection_limit_m: outcome.detection_limit_m,
             significant: outcome.significant,
             loose: outcome.loose.zip(truly_loose),
@@ -146,12 +159,51 @@ impl MotionSample {
             frame: FaceFrame::from_normal(normal),
             estimated: point.displacement()?,
             truth,
+            place: point.position,
             covariance: None,
+            covariance_without_datum: None,
+            is_absolute: true,
+            is_common: true,
             half_width_m: [None, None, point.detection_limit_m],
             detection_limit_m: point.detection_limit_m,
             significant: point.detection_limit_m.map(|_| point.is_significant()),
             loose: None,
         })
+    }
+
+    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the claims that hold without a
+    /// datum; samples without such a claim are left out.
+    pub(super) fn without_datum(samples: &[Self]) -> Vec<Self> {
+        let claimed = samples.iter().filter(|s| s.covariance_without_datum.is_some());
+        let common = |of: fn(&Self) -> Vector3<f64>| {
+            let fitted: Vec<DisplacementSample> = claimed
+                .clone()
+                .filter(|s| s.is_common)
+                .filter_map(|s| {
+                    Some(DisplacementSample {
+                        place: s.place,
+                        displacement: of(s),
+                        covariance: s.covariance_without_datum?,
+                    })
+                })
+                .collect();
+            SmallMotion::fit(&fitted)
+        };
+        let (estimated, truth) = (common(|s| s.estimated), common(|s| s.truth));
+        let at = |fitted: &Option<SmallMotion>, p: &Point3<f64>| {
+            fitted.as_ref().map_or_else(Vector3::zeros, |f| f.at(p))
+        };
+        let relative = |s: &Self| Self {
+            estimated: s.estimated - at(&estimated, &s.place),
+            truth: s.truth - at(&truth, &s.place),
+            covariance: s.covariance_without_datum,
+            half_width_m: half_widths(
+                &[s.frame.along, s.frame.up, s.frame.out],
+                s.covariance_without_datum.as_ref(),
+            ),
+            ..s.clone()
+        };
+        claimed.clone().map(relative).collect()
     }
 
     /// Estimate minus truth in (along, up, out), metres.
@@ -163,6 +215,11 @@ impl MotionSample {
     pub fn local_truth(&self) -> Vector3<f64> {
         self.frame.face_from_world() * self.truth
     }
+}
+
+/// Half-widths of the 95 % intervals along these axes.
+fn half_widths(axes: &[Vector3<f64>; 3], covariance: Option<&Matrix3<f64>>) -> [Option<f64>; 3] {
+    axes.map(|axis| covariance.map(|c| Z95 * axis.dot(&(c * axis)).max(0.0).sqrt()))
 }
 
 #[cfg(test)]

@@ -18,9 +18,12 @@ pub struct MotionScore {
     pub errors: Directions,
     /// Share of estimates whose 3D error is beyond the outlier limit.
     pub outlier_rate: Option<f64>,
-    /// Honesty of the claimed uncertainties.
-    pub calibration: Calibration,
-    /// Alarms against truth.
+    /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have no claim.
+    pub calibration: Option<Calibration>,
+    /// The same against the common rigid motion, registration error left out; `None` where nothing is claimed about it.
+    #[serde(default)]
+    pub calibration_without_datum: Option<Calibration>,
+    /// Alarms against truth; where no datum is known, of motions against the common rigid motion.
     pub significance: Detection,
     /// Loose stones against truth.
     pub loose: Option<LooseDetection>,
@@ -46,13 +49,17 @@ pub struct Directions {
 /// Scores samples; `expected` is how many there would be without failures.
 pub fn score_motions(samples: &[MotionSample], expected: usize, params: &EvaluationParams) -> MotionScore {
     let errors = directions(samples, params.outlier_m);
+    let relative = MotionSample::without_datum(samples);
+    let is_absolute = samples.iter().all(|s| s.is_absolute);
+    let tested = if is_absolute { samples } else { &relative };
     MotionScore {
         expected,
         estimated: samples.len(),
         outlier_rate: errors.norm_3d.as_ref().map(|s| s.outlier_rate),
         errors,
-        calibration: Calibration::of(samples),
-        significance: Detection::of(samples, params.still_m),
+        calibration: is_absolute.then(|| Calibration::of(samples)),
+        calibration_without_datum: (!relative.is_empty()).then(|| Calibration::of(&relative)),
+        significance: Detection::of(tested, params.still_m),
         loose: LooseDetection::of(samples),
     }
 }
@@ -112,6 +119,7 @@ fn directions(samples: &[MotionSample], outlier_m: f64) -> Directions {
 mod tests {
     use super::*;
     use crate::id::StoneId;
+    use nalgebra::Matrix3;
 
     /// A wall that looks along x: along is y, up is z.
     fn outcome(displacement: Option<Vector3<f64>>) -> StoneOutcome {
@@ -121,6 +129,8 @@ mod tests {
             normal: Vector3::x(),
             displacement,
             covariance: None,
+            covariance_without_datum: None,
+            datum_known: true,
             detection_limit_m: Some(0.004),
             significant: Some(displacement.is_some_and(|d| d.norm() > 0.004)),
             loose: None,
@@ -161,6 +171,39 @@ mod tests {
     }
 
     #[test]
+    fn without_a_datum_a_common_motion_is_neither_error_nor_alarm() {
+        let moved = |i: u32, error: f64| {
+            let place = Point3::new(0.0, f64::from(i % 4), f64::from(i / 4));
+            let common = Vector3::new(0.001 * place.y, 0.02, 0.05);
+            let own = Vector3::new(error, 0.0, 0.0);
+            let covariance = Matrix3::identity() * 1e-6;
+            StoneOutcome {
+                centroid: place,
+                covariance: Some(covariance),
+                covariance_without_datum: Some(covariance),
+                datum_known: false,
+                significant: Some(error > 0.003),
+                ..outcome(Some(common + own))
+            }
+        };
+        let mut outcomes: Vec<StoneOutcome> = (0..16).map(|i| moved(i, 0.0)).collect();
+        outcomes.push(StoneOutcome {
+            loose: Some(true),
+            ..moved(17, 0.004)
+        });
+        // The estimates tilt by a millimetre per metre and shift; the wall truly stood still.
+        let score = score_stones(&outcomes, |_| Vector3::zeros(), &EvaluationParams::default());
+        assert!(score.calibration.is_none());
+        let calibration = score.calibration_without_datum.unwrap();
+        assert_eq!(calibration.coverage_95.along, Some(1.0));
+        assert_eq!(calibration.coverage_95.out, Some(16.0 / 17.0));
+        assert_eq!(
+            (score.significance.still, score.significance.false_alarms),
+            (17, 1)
+        );
+    }
+
+    #[test]
     fn m3c2_is_blind_in_the_plane_and_claims_nothing_there() {
         let point = ChangePoint {
             position: Point3::origin(),
@@ -182,7 +225,7 @@ mod tests {
         assert_eq!((score.expected, score.estimated), (2, 1));
         assert!((score.errors.out_of_plane.unwrap().rmse_m - 0.001).abs() < 1e-15);
         assert!((score.errors.up.unwrap().rmse_m - 0.05).abs() < 1e-15);
-        let coverage = score.calibration.coverage_95;
+        let coverage = score.calibration.unwrap().coverage_95;
         assert_eq!(
             (coverage.along, coverage.up, coverage.out),
             (None, None, Some(1.0))

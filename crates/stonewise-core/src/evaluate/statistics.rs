@@ -1,5 +1,6 @@
 //! Statistics of errors.
 
+use crate::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
 /// Makes the median absolute deviation estimate the standard deviation of a normal distribution.
@@ -50,17 +51,6 @@ impl ErrorStatistics {
             zero_predictor_rmse_m: root_mean_square(truths),
         })
     }
-}
-
-/// Quantile `q` (0..1) of ascending values, interpolated between order statistics (Hyndman & Fan 1996,
-/// definition 7); NaN without values.
-pub fn quantile(sorted: &[f64], q: f64) -> f64 {
-    if sorted.is_empty() {
-        return f64::NAN;
-    }
-    let at = q * (sorted.len() - 1) as f64;
-    let (low, high) = (at.floor() as usize, at.ceil() as usize);
-    sorted[low] + (sorted[high] - sorted[low]) * (at - low as f64)
 }
 
 fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {

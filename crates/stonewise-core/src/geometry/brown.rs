@@ -2,11 +2,10 @@
 
 /// Radial, rational and tangential distortion (Brown 1971; rational terms as in OpenCV).
 ///
-/// With r^2 = x^2 + y^2:
-/// s = (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6),
-/// x' = s x + 2 p1 x y + p2 (r^2 + 2 x^2), y' = s y + p1 (r^2 + 2 y^2) + 2 p2 x y.
-/// OpenCV's k1, k2, k3 are `radial[..3]` and its k4, k5, k6 are `rational`; Metashape's k4 is `radial[3]` and its
-/// (p1, p2) are `tangential` in reverse order.
+/// With r^2 = x^2 + y^2: s = (1 + k1 r^2 + k2 r^4 + k3 r^6 + k4 r^8) / (1 + d1 r^2 + d2 r^4 + d3 r^6), x' = s
+/// x + 2 p1 x y + p2 (r^2 + 2 x^2), y' = s y + p1 (r^2 + 2 y^2) + 2 p2 x y. OpenCV's k1, k2, k3 are
+/// `radial[..3]` and its k4, k5, k6 are `rational`; Metashape's k4 is `radial[3]` and its (p1, p2) are
+/// `tangential` in reverse order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Brown {
     radial: [f64; 4],
@@ -18,8 +17,8 @@ pub struct Brown {
 impl Brown {
     /// The terms, and the largest radius at or below `limit` where the image does not fold over.
     ///
-    /// A polynomial fitted inside the photo turns back somewhere outside it, and a point there would land in the photo
-    /// again. Cost: some 10^5 operations, once per camera.
+    /// A polynomial fitted inside the photo turns back somewhere outside it, and a point there would land in
+    /// the photo again. Cost: some 10^5 operations, once per camera.
     pub fn new(radial: [f64; 4], rational: [f64; 3], tangential: [f64; 2], limit: f64) -> Self {
         let mut brown = Self {
             radial,
@@ -138,7 +137,8 @@ impl Brown {
         (self.evaluate(x, y, r2), jacobian)
     }
 
-    /// Undistorted radius of a distorted one, without tangential terms; the end of the range where it lies beyond.
+    /// Undistorted radius of a distorted one, without tangential terms; the end of the range where it lies
+    /// beyond.
     fn invert_radius(&self, rd: f64) -> f64 {
         let (mut low, mut high) = (0.0, self.max_radius);
         let mut r = rd.min(high);

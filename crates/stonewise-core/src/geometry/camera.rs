@@ -1,6 +1,7 @@
 //! Camera models: from a point in the camera frame to a pixel and back.
 //!
-//! Camera frame: x right, y down, z along the view. Pixel frame: x right, y down, first pixel centre (0.5, 0.5).
+//! Camera frame: x right, y down, z along the view. Pixel frame: x right, y down, first pixel centre (0.5,
+//! 0.5).
 
 use super::distortion::Distortion;
 use nalgebra::{Point3, Vector3};
@@ -37,8 +38,8 @@ impl Camera {
 
     /// Pixel of a point in the camera frame, which may lie outside the image.
     ///
-    /// `None` behind the camera and where the distortion folds over, that is, where a point outside the field of view
-    /// would seem to be inside it.
+    /// `None` behind the camera and where the distortion folds over, that is, where a point outside the field
+    /// of view would seem to be inside it.
     #[inline]
     pub fn project_camera_point(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         if point.z.is_nan() || point.z <= 0.0 {

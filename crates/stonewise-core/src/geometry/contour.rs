@@ -1,8 +1,10 @@
 //! Distances and contours on a small raster; both are what [`super::outline()`] is made of.
 
+use super::ring::signed_area;
 use nalgebra::Point2;
 
-/// Euclidean distance, in cells, from every cell to the nearest marked one (Felzenszwalb & Huttenlocher 2012).
+/// Euclidean distance, in cells, from every cell to the nearest marked one (Felzenszwalb & Huttenlocher
+/// 2012).
 ///
 /// `marked`: row-major, `width * height`. Infinite where nothing is marked.
 pub(super) fn distance(marked: &[bool], width: usize, height: usize) -> Vec<f64> {
@@ -64,8 +66,9 @@ fn lower_envelope(f: &[f64]) -> Vec<f64> {
 
 /// The largest outer contour of `values` at `level`, in cell coordinates, counter-clockwise, simple.
 ///
-/// Marching squares with linear interpolation (Lorensen & Cline 1987, in the plane); where two opposite corners of a
-/// square are inside, they stay apart. "Largest" is by enclosed area. `values` must be below `level` along the border.
+/// Marching squares with linear interpolation (Lorensen & Cline 1987, in the plane); where two opposite
+/// corners of a square are inside, they stay apart. "Largest" is by enclosed area. `values` must be below
+/// `level` along the border.
 pub(super) fn trace_largest(
     values: &[f64],
     width: usize,
@@ -82,7 +85,7 @@ pub(super) fn trace_largest(
                 continue;
             }
             let ring = follow(values, width, level, (x, y), &mut visited);
-            let area = super::signed_area(&ring);
+            let area = signed_area(&ring);
             if area > 0.0 && best.as_ref().is_none_or(|(a, _)| area > *a) {
                 best = Some((area, ring));
             }
@@ -143,7 +146,8 @@ fn shift((x, y): (usize, usize), (dx, dy): (isize, isize)) -> (usize, usize) {
     (x.saturating_add_signed(dx), y.saturating_add_signed(dy))
 }
 
-/// Where the level lies between the centres of two neighbouring cells; never at a centre, so that no two coincide.
+/// Where the level lies between the centres of two neighbouring cells; never at a centre, so that no two
+/// coincide.
 fn crossing(a: (usize, usize), va: f64, b: (usize, usize), vb: f64, level: f64) -> Point2<f64> {
     let t = ((level - va) / (vb - va)).clamp(0.01, 0.99);
     let t = if t.is_finite() { t } else { 0.5 };
@@ -191,6 +195,6 @@ mod tests {
         values[12] = 1.0;
         let ring = trace_largest(&values, 5, 5, 0.5).unwrap();
         assert_eq!(ring.len(), 4);
-        assert!((super::super::signed_area(&ring) - 0.5).abs() < 1e-12);
+        assert!((signed_area(&ring) - 0.5).abs() < 1e-12);
     }
 }

@@ -1,6 +1,7 @@
 //! Lens distortion: from the direction of a ray to where the lens puts it, and back.
 //!
-//! Coordinates are normalised: (x, y) = (X/Z, Y/Z) of a point in the camera frame, before the focal length is applied.
+//! Coordinates are normalised: (x, y) = (X/Z, Y/Z) of a point in the camera frame, before the focal length is
+//! applied.
 
 use super::brown::Brown;
 
@@ -13,8 +14,9 @@ pub enum Distortion {
     Brown(Brown),
     /// An equidistant fisheye whose angle then goes through Brown's terms.
     ///
-    /// With zero tangential terms this is the model of Kannala & Brandt (2006) as OpenCV's fisheye module and COLMAP's
-    /// OPENCV_FISHEYE use it; with them it is Metashape's fisheye. Rays at 90 degrees and more are not covered.
+    /// With zero tangential terms this is the model of Kannala & Brandt (2006) as OpenCV's fisheye module and
+    /// COLMAP's OPENCV_FISHEYE use it; with them it is Metashape's fisheye. Rays at 90 degrees and more are
+    /// not covered.
     Fisheye(Brown),
 }
 
@@ -29,8 +31,8 @@ impl Distortion {
         }
     }
 
-    /// A fisheye: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8), tangential terms (p1, p2) in
-    /// OpenCV's order.
+    /// A fisheye: theta_d = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8), tangential terms
+    /// (p1, p2) in OpenCV's order.
     pub fn fisheye(radial: [f64; 4], tangential: [f64; 2]) -> Self {
         Self::Fisheye(Brown::new(radial, [0.0; 3], tangential, MAX_FISHEYE_ANGLE))
     }

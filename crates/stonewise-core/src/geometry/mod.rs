@@ -9,7 +9,10 @@ mod distortion;
 mod face_frame;
 mod outline;
 mod plane;
+mod rigid;
+mod ring;
 mod rotation;
+mod small_motion;
 mod triangulate;
 mod view;
 
@@ -19,11 +22,11 @@ pub use camera::Camera;
 pub use cell::cell_of;
 pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
-pub use outline::{OutlineParams, face_outline, is_simple, outline, signed_area};
+pub use outline::{OutlineParams, face_outline, outline};
 pub use plane::Plane;
+pub use rigid::Rigid3;
+pub use ring::{is_simple, signed_area};
 pub use rotation::nearest_rotation;
+pub use small_motion::{DisplacementSample, SmallMotion, lever};
 pub use triangulate::triangulate;
 pub use view::{Projection, View};
-
-/// A rigid motion in metres: `p_b = b_from_a * p_a`.
-pub type Rigid3 = nalgebra::Isometry3<f64>;

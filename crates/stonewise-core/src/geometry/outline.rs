@@ -1,5 +1,6 @@
 //! The outline of a patch of points.
 
+use crate::geometry::ring::{is_simple, signed_area};
 use crate::geometry::{FaceFrame, contour};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -8,11 +9,11 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct OutlineParams {
-    /// Gaps and bays narrower than twice this many point spacings are closed. Scanned points are irregular, so 3
-    /// spacings close the holes of a real cloud and keep the bays of a real stone.
+    /// Gaps and bays narrower than twice this many point spacings are closed. Scanned points are irregular,
+    /// so 3 spacings close the holes of a real cloud and keep the bays of a real stone.
     pub closing_spacings: f64,
-    /// Largest distance between the traced and the simplified outline, in point spacings. The border of irregular
-    /// points is not known better.
+    /// Largest distance between the traced and the simplified outline, in point spacings. The border of
+    /// irregular points is not known better.
     pub simplify_spacings: f64,
     /// Raster cells along the longer side at most; bounds the cost of a patch with one far outlier.
     pub max_cells: usize,
@@ -30,10 +31,10 @@ impl Default for OutlineParams {
 
 /// Outline of points in their plane, a simple polygon, counter-clockwise, first vertex not repeated.
 ///
-/// The points grow to discs, the union of the discs shrinks again until the border lies half a point spacing outside
-/// the outermost points (a closing on a distance raster), and the largest piece is traced and simplified
-/// (Douglas & Peucker 1973). Holes are dropped. The point spacing is sqrt(area / n) of the convex hull.
-/// `None` under four points or where they cover no area. Cost: O(n log n + cells).
+/// The points grow to discs, the union of the discs shrinks again until the border lies half a point spacing
+/// outside the outermost points (a closing on a distance raster), and the largest piece is traced and
+/// simplified (Douglas & Peucker 1973). Holes are dropped. The point spacing is sqrt(area / n) of the convex
+/// hull. `None` under four points or where they cover no area. Cost: O(n log n + cells).
 pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Point2<f64>>> {
     let hull = convex_hull(points);
     let area = signed_area(&hull);
@@ -58,7 +59,8 @@ pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Poi
     }
     let to_points = contour::distance(&seeds, width, height);
     let outside: Vec<bool> = to_points.iter().map(|d| d * cell > radius).collect();
-    // Depth inside the union of discs; the border of the patch lies half a spacing outside its outermost points.
+    // Depth inside the union of discs; the border of the patch lies half a spacing outside its outermost
+    // points.
     let depth = contour::distance(&outside, width, height);
     let level = ((radius - 0.5 * spacing) / cell).max(0.5);
     let traced = contour::trace_largest(&depth, width, height, level)?;
@@ -66,7 +68,8 @@ pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Poi
     Some(simplify_ring(ring, params.simplify_spacings * spacing))
 }
 
-/// Outline of points on a face, as a polygon in the plane through their mean, counter-clockwise for a viewer in front.
+/// Outline of points on a face, as a polygon in the plane through their mean, counter-clockwise for a viewer
+/// in front.
 ///
 /// `outward`: normal of the face. See [`outline`].
 pub fn face_outline(
@@ -87,26 +90,6 @@ pub fn face_outline(
             .map(|p| mean + frame.along * p.x + frame.up * p.y)
             .collect(),
     )
-}
-
-/// Area of a polygon, positive where it runs counter-clockwise (the shoelace formula).
-pub fn signed_area(ring: &[Point2<f64>]) -> f64 {
-    let Some(base) = ring.first() else { return 0.0 };
-    let cross = |i: usize| (ring[i] - base).perp(&(ring[(i + 1) % ring.len()] - base));
-    (0..ring.len()).map(cross).sum::<f64>() / 2.0
-}
-
-/// Whether no two sides of the polygon touch, apart from neighbours at their common corner. Cost: O(sides^2).
-pub fn is_simple(ring: &[Point2<f64>]) -> bool {
-    let n = ring.len();
-    let side = |i: usize| (ring[i], ring[(i + 1) % n]);
-    n >= 3
-        && (0..n).all(|i| {
-            (i + 1..n).all(|j| {
-                let adjacent = j == i + 1 || (i == 0 && j == n - 1);
-                adjacent || !touches(side(i), side(j))
-            })
-        })
 }
 
 /// Corners of the smallest convex polygon around the points, counter-clockwise (Andrew 1979, monotone chain).
@@ -137,7 +120,8 @@ fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     hull
 }
 
-/// The simplest polygon within the tolerance that is still simple; the ring itself where simplifying breaks it.
+/// The simplest polygon within the tolerance that is still simple; the ring itself where simplifying breaks
+/// it.
 fn simplify_ring(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
     let mut tolerance = tolerance;
     for _ in 0..4 {
@@ -150,7 +134,8 @@ fn simplify_ring(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
     ring
 }
 
-/// Douglas-Peucker on a ring, cut at two opposite corners: the vertex of smallest x and the one farthest from it.
+/// Douglas-Peucker on a ring, cut at two opposite corners: the vertex of smallest x and the one farthest from
+/// it.
 fn douglas_peucker_ring(ring: &[Point2<f64>], tolerance: f64) -> Vec<Point2<f64>> {
     let n = ring.len();
     let first = (0..n)
@@ -187,22 +172,6 @@ fn distance_to_segment(p: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> f64
         0.0
     };
     (ap - ab * along).norm()
-}
-
-/// Whether two segments share a point.
-fn touches((a, b): (Point2<f64>, Point2<f64>), (c, d): (Point2<f64>, Point2<f64>)) -> bool {
-    let side = |p: &Point2<f64>, q: &Point2<f64>, r: &Point2<f64>| (q - p).perp(&(r - p));
-    let (s1, s2, s3, s4) = (
-        side(&a, &b, &c),
-        side(&a, &b, &d),
-        side(&c, &d, &a),
-        side(&c, &d, &b),
-    );
-    let boxes = a.inf(&b).x <= c.sup(&d).x
-        && c.inf(&d).x <= a.sup(&b).x
-        && a.inf(&b).y <= c.sup(&d).y
-        && c.inf(&d).y <= a.sup(&b).y;
-    boxes && s1 * s2 <= 0.0 && s3 * s4 <= 0.0
 }
 
 #[cfg(test)]
@@ -295,13 +264,6 @@ mod tests {
             .sum();
         assert!((twice_area.dot(&frame.out) / 3.2 - 1.0).abs() < 0.04);
         assert!(ring.iter().all(|p| (p - origin).dot(&frame.out).abs() < 1e-6));
-    }
-
-    #[test]
-    fn a_bow_tie_is_not_simple() {
-        let p = |x: f64, y: f64| Point2::new(x, y);
-        assert!(is_simple(&[p(0.0, 0.0), p(1.0, 0.0), p(1.0, 1.0), p(0.0, 1.0)]));
-        assert!(!is_simple(&[p(0.0, 0.0), p(1.0, 1.0), p(1.0, 0.0), p(0.0, 1.0)]));
     }
 
     proptest! {

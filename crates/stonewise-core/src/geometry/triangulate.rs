@@ -4,8 +4,8 @@ use nalgebra::Point2;
 
 /// Triangles (vertex numbers, counter-clockwise) that cover a simple counter-clockwise polygon.
 ///
-/// Ear clipping (Meisters 1975). A ring that is not simple gives some covering of its vertices; under three vertices
-/// there is none. Cost: O(n^2) for the outlines of stones, O(n^3) at worst.
+/// Ear clipping (Meisters 1975). A ring that is not simple gives some covering of its vertices; under three
+/// vertices there is none. Cost: O(n^2) for the outlines of stones, O(n^3) at worst.
 pub fn triangulate(ring: &[Point2<f64>]) -> Vec<[usize; 3]> {
     let mut left: Vec<usize> = (0..ring.len()).collect();
     let mut triangles = Vec::with_capacity(ring.len().saturating_sub(2));

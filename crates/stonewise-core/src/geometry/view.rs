@@ -34,8 +34,8 @@ impl View {
 
     /// Where the photo would show a world point if nothing stood in front of it.
     ///
-    /// `None` behind the camera and outside the range of the lens model; the pixel may still lie outside the image, see
-    /// [`View::is_inside`].
+    /// `None` behind the camera and outside the range of the lens model; the pixel may still lie outside the
+    /// image, see [`View::is_inside`].
     #[inline]
     pub fn project(&self, world: &Point3<f64>) -> Option<Projection> {
         let point = self.cam_from_world * world;

@@ -1,6 +1,7 @@
 //! Stones of one epoch, ready to be searched by place.
 
 use crate::cloud::GridIndex;
+use crate::statistics::upper_median;
 use crate::stone::Stone;
 use nalgebra::Point3;
 
@@ -21,7 +22,8 @@ impl<'a> Centroids<'a> {
 
     /// The stones as if they were at other places.
     pub(super) fn at(stones: &'a [Stone], places: &[Point3<f64>]) -> Self {
-        let size = median(stones.iter().map(|s| s.area_m2.max(0.0).sqrt()).collect());
+        let mut sizes: Vec<f64> = stones.iter().map(|s| s.area_m2.max(0.0).sqrt()).collect();
+        let size = upper_median(&mut sizes).unwrap_or(0.0);
         Self {
             stones,
             index: GridIndex::new(places, (2.0 * size).max(0.05)),
@@ -47,12 +49,4 @@ impl<'a> Centroids<'a> {
 pub(super) fn area_ratio(a: &Stone, b: &Stone) -> f64 {
     let (small, large) = (a.area_m2.min(b.area_m2), a.area_m2.max(b.area_m2));
     if large > 0.0 { small / large } else { 0.0 }
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

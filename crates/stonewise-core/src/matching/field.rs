@@ -1,7 +1,8 @@
 //! A smooth field of shifts that follows settlements and bulges.
 
 use super::MatchParams;
-use super::centroids::{Centroids, area_ratio, median};
+use super::centroids::{Centroids, area_ratio};
+use crate::statistics::component_median;
 use crate::stone::Stone;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -77,7 +78,7 @@ fn smooth(stones: &[Stone], pairs: &[Pair], neighbours: usize) -> Vec<Vector3<f6
         .par_iter()
         .map(|stone| {
             let around = index.nearest(&stone.centroid, neighbours);
-            Vector3::from_fn(|axis, _| median(around.iter().map(|n| pairs[n.0].1[axis]).collect()))
+            component_median(&around.iter().map(|n| pairs[n.0].1).collect::<Vec<_>>())
         })
         .collect()
 }

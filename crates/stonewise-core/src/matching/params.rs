@@ -14,6 +14,7 @@ pub struct MatchParams {
     pub min_area_ratio: f64,
     /// Largest distance of a match after the local shift, in units of the square root of the larger area. 0.5: the centroid
     /// stays within the stone.
+    #[serde(deserialize_with = "unlimited")]
     pub max_offset_sizes: f64,
     /// Largest common motion that is looked for, metres; 0 for none. 1: several stones.
     pub max_shift_m: f64,
@@ -25,6 +26,7 @@ pub struct MatchParams {
     /// Least overlap, where the caller can tell it, that makes a pair of two stones that centroids and areas leave alone:
     /// ambiguous ones, and stones that one epoch shows only in part. 0.75: of a stone and one that a mask merges with an
     /// equal neighbour two thirds of the cells agree.
+    #[serde(deserialize_with = "unlimited")]
     pub min_overlap: f64,
 }
 
@@ -55,4 +57,9 @@ impl MatchParams {
             min_overlap: f64::INFINITY,
         }
     }
+}
+
+/// JSON has no infinity: `null` stands for "no limit" where results are read again.
+fn unlimited<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
 }

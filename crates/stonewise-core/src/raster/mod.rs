@@ -5,9 +5,11 @@ mod contour;
 mod polygon;
 mod raster_type;
 mod rle;
+mod srgb;
 
 pub use components::{Component, connected_components};
 pub use contour::{Ring, label_outlines, ring_area};
 pub use polygon::fill_polygon;
 pub use raster_type::{DepthMap, LabelImage, Raster, RgbImage};
 pub use rle::{Rle, RleError};
+pub use srgb::{linear_from_srgb, srgb_from_linear};

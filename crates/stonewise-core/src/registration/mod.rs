@@ -1,35 +1,15 @@
 //! The motion of every matched stone, from its points in both epochs.
 //!
-//! [`adjust`] is the default: all stones together, as surveyors adjust a network. [`align`] is the paper's way: every
-//! stone by itself, with its surroundings.
+//! [`adjust`] is the default: all stones together, as surveyors adjust a network. [`align`] is the paper's
+//! way: every stone by itself, with its surroundings.
 
-mod band;
-mod border;
-mod breaks;
-mod correlation;
-mod datum;
-mod discount;
-mod equations;
-mod excerpt;
-mod field;
+pub(crate) mod adjustment;
 mod gicp;
-mod graph;
-mod hyper;
-mod network;
-mod noise;
-mod outcome;
-mod pairs;
-mod params;
-mod patch;
-mod rivals;
-mod sparse;
-mod survey;
-mod track;
+pub mod observers;
+pub(crate) mod points;
 
-pub use border::{NearPoint, StonePoints, Window, local_shifts, stone_points};
-pub use datum::DatumError;
+pub use adjustment::{AdjustError, AdjustmentParams, AdjustmentReport, Break, VarianceComponents, adjust};
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
-pub use hyper::VarianceComponents;
-pub use network::{AdjustError, adjust};
-pub use pairs::{MemoryPairs, PairPoints, PairSource};
-pub use params::{Break, NetworkParams, NetworkReport};
+pub use points::{
+    MemoryPairs, NearPoint, PairPoints, PairSource, StonePoints, Window, local_shifts, stone_points,
+};

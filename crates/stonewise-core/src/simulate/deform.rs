@@ -1,4 +1,5 @@
-//! How the wall moved between the epochs: fields that every stone follows as a rigid body, and stones that are loose.
+//! How the wall moved between the epochs: fields that every stone follows as a rigid body, and stones that
+//! are loose.
 
 use crate::geometry::Rigid3;
 use crate::simulate::noise::normal;
@@ -36,7 +37,8 @@ pub enum WallMotion {
         /// Largest settlement, metres, positive downwards.
         depth_m: f64,
     },
-    /// The crown moves out against the foot, as a dam that the sun warms or the water loads: quadratic in height.
+    /// The crown moves out against the foot, as a dam that the sun warms or the water loads: quadratic in
+    /// height.
     Bending {
         /// Displacement of the crown along the outward normal, metres.
         crown_m: f64,
@@ -61,6 +63,13 @@ pub enum WallMotion {
         /// Largest rotation, radians.
         rotation_rad: f64,
     },
+    /// Every stone moves and turns a little on its own, about its middle; it does not count as loose.
+    Own {
+        /// Standard deviation of the displacement per axis, metres.
+        shift_m: f64,
+        /// Standard deviation of the rotation per axis, radians: unlike that of the neighbours.
+        rotation_rad: f64,
+    },
 }
 
 /// What one stone did, with its parts.
@@ -79,18 +88,30 @@ pub fn move_stones(wall: &Wall, motions: &[WallMotion], seed: u64) -> Vec<TrueMo
     let mut moved: Vec<TrueMotion> = wall.stones.iter().map(|s| follow(wall, s, motions)).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     for motion in motions {
-        if let WallMotion::Loose {
-            share,
-            at_least,
-            shift_m,
-            rotation_rad,
-        } = motion
-        {
-            let whole: Vec<usize> = (0..wall.stones.len()).filter(|&i| !wall.stones[i].edge).collect();
-            let wanted = ((share * whole.len() as f64).round() as usize).max(*at_least);
-            for i in choose(&whole, wanted, &mut rng) {
-                loosen(&mut moved[i], &wall.stones[i], *shift_m, *rotation_rad, &mut rng);
+        match *motion {
+            WallMotion::Loose {
+                share,
+                at_least,
+                shift_m,
+                rotation_rad,
+            } => {
+                let whole: Vec<usize> = (0..wall.stones.len()).filter(|&i| !wall.stones[i].edge).collect();
+                let wanted = ((share * whole.len() as f64).round() as usize).max(at_least);
+                for i in choose(&whole, wanted, &mut rng) {
+                    loosen(&mut moved[i], &wall.stones[i], shift_m, rotation_rad, &mut rng);
+                }
             }
+            WallMotion::Own {
+                shift_m,
+                rotation_rad,
+            } => {
+                for (stone, motion) in wall.stones.iter().zip(&mut moved) {
+                    let mut draw = |sd: f64| Vector3::from_fn(|_, _| sd * normal(&mut rng));
+                    let (shift, turn) = (draw(shift_m), draw(rotation_rad));
+                    motion.second_from_first *= about_middle(stone, shift, turn);
+                }
+            }
+            _ => {}
         }
     }
     moved
@@ -138,7 +159,7 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
                 frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2]
             }
         }
-        WallMotion::Loose { .. } => Vector3::zeros(),
+        WallMotion::Loose { .. } | WallMotion::Own { .. } => Vector3::zeros(),
     }
 }
 
@@ -202,7 +223,7 @@ fn choose(from: &[usize], count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::simulate::FacePoint;
-    use crate::simulate::wall::WallParams;
+    use crate::simulate::wall_params::WallParams;
     use nalgebra::Point3;
 
     fn wall() -> Wall {
@@ -240,6 +261,33 @@ mod tests {
                 assert!(error.norm() <= allowed + 1e-9, "{} above {allowed}", error.norm());
             }
         }
+    }
+
+    #[test]
+    fn own_motions_have_the_stated_size_about_each_middle() {
+        let wall = wall();
+        let own = WallMotion::Own {
+            shift_m: 3e-4,
+            rotation_rad: 1e-3,
+        };
+        let moved: Vec<TrueMotion> = (0..20)
+            .flat_map(|seed| move_stones(&wall, std::slice::from_ref(&own), seed))
+            .collect();
+        let stones = wall.stones.iter().cycle();
+        let (mut shifts, mut turns) = (0.0, 0.0);
+        for (stone, motion) in stones.zip(&moved) {
+            let middle = Point3::from(stone.world_from_stone.translation.vector);
+            shifts += (motion.second_from_first * middle - middle).norm_squared();
+            turns += motion.second_from_first.rotation.scaled_axis().norm_squared();
+            assert!(!motion.loose && motion.shared.norm() == 0.0);
+        }
+        let per_axis = |sum: f64| (sum / (3 * moved.len()) as f64).sqrt();
+        assert!(
+            (per_axis(shifts) / 3e-4 - 1.0).abs() < 0.03,
+            "{}",
+            per_axis(shifts)
+        );
+        assert!((per_axis(turns) / 1e-3 - 1.0).abs() < 0.03, "{}", per_axis(turns));
     }
 
     #[test]

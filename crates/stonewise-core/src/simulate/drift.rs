@@ -5,7 +5,8 @@ use crate::simulate::face::FacePoint;
 use crate::simulate::wall::Wall;
 use rayon::prelude::*;
 
-/// How the mortar follows its stones: the mean of the motions around, in face components, smooth between nodes.
+/// How the mortar follows its stones: the mean of the motions around, in face components, smooth between
+/// nodes.
 pub(super) struct DriftGrid {
     origin: [f64; 2],
     size: [usize; 2],

@@ -4,10 +4,11 @@ use crate::geometry::{FaceFrame, Rigid3};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// A battered face and its coordinates: `a` along the face from its middle, `u` up in the face, `n` out of it.
+/// A battered face and its coordinates: `a` along the face from its middle, `u` up in the face, `n` out of
+/// it.
 ///
-/// World frame: x downstream (out of the face, at the middle), y along the dam, z up; (0, 0, 0) has a = u = n = 0.
-/// Lengths along `a` are measured at u = n = 0.
+/// World frame: x downstream (out of the face, at the middle), y along the dam, z up; (0, 0, 0) has a = u = n
+/// = 0. Lengths along `a` are measured at u = n = 0.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Face {
     /// Cosine and sine of the lean.
@@ -28,8 +29,8 @@ pub struct FacePoint {
 }
 
 impl Face {
-    /// A face that leans back by `batter` metres per metre of height. `plan_radius_m`: radius of the plan, centre
-    /// downstream where positive (the visible face is hollow, as on most dams); 0 means straight.
+    /// A face that leans back by `batter` metres per metre of height. `plan_radius_m`: radius of the plan,
+    /// centre downstream where positive (the visible face is hollow, as on most dams); 0 means straight.
     pub fn new(batter: f64, plan_radius_m: f64) -> Self {
         let length = batter.hypot(1.0);
         Self {
@@ -78,10 +79,11 @@ impl Face {
         (at, out)
     }
 
-    /// Distance along a ray at which it first comes down to `height_m` over the face; 0 where it starts there or lower, `None`
-    /// where it never does. `along` is a unit vector.
+    /// Distance along a ray at which it first comes down to `height_m` over the face; 0 where it starts there
+    /// or lower, `None` where it never does. `along` is a unit vector.
     ///
-    /// Places of one height over a curved face lie on a cone about the axis of the plan: a quadratic equation.
+    /// Places of one height over a curved face lie on a cone about the axis of the plan: a quadratic
+    /// equation.
     pub fn come_down(&self, from: &Point3<f64>, along: &Vector3<f64>, height_m: f64) -> Option<f64> {
         let (at, out) = self.face_and_out(from);
         let above = at.n - height_m;
@@ -93,8 +95,8 @@ impl Face {
             let descent = -along.dot(&out);
             return (descent > 1e-9).then(|| above / descent);
         }
-        // The cone's signed radius at distance t is q + r t, the ray's distance from the axis in plan the root of
-        // (x - along.x t)^2 + (y + along.y t)^2.
+        // The cone's signed radius at distance t is q + r t, the ray's distance from the axis in plan the
+        // root of (x - along.x t)^2 + (y + along.y t)^2.
         let [c, s] = self.lean;
         let (x, y) = (self.radius_m - from.x, from.y);
         let (q, r) = (self.radius_m - (height_m - s * from.z) / c, s * along.z / c);

@@ -1,7 +1,8 @@
-//! How the mason laid the stones: rough courses, stones that span two, thin ones in pairs, corners knocked off.
+//! How the mason laid the stones: rough courses, stones that span two, thin ones in pairs, corners knocked
+//! off.
 
 use crate::simulate::noise::normal;
-use crate::simulate::wall::WallParams;
+use crate::simulate::wall_params::WallParams;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 

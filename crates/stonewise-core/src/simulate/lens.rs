@@ -1,6 +1,6 @@
 //! From light to a picture: blur, vignetting, exposure, sensor noise, tone curve.
 
-use crate::raster::Raster;
+use crate::raster::{Raster, srgb_from_linear};
 use crate::simulate::noise::normal;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -82,12 +82,7 @@ fn tone(linear: f64) -> u8 {
     } else {
         0.5 + 0.5 * (1.0 - (-(x - 0.5) / 0.5).exp())
     };
-    let s = if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    };
-    (255.0 * s + 0.5).clamp(0.0, 255.0) as u8
+    (255.0 * srgb_from_linear(x) + 0.5).clamp(0.0, 255.0) as u8
 }
 
 fn blur(data: &[[f32; 3]], width: usize, height: usize, sigma: f64) -> Vec<[f32; 3]> {

@@ -38,8 +38,8 @@ impl Light {
         }
     }
 
-    /// Light on a matt surface with this normal, as red, green, blue. `lit`: share of the sun that reaches it;
-    /// `open`: share of its sky that nothing hides.
+    /// Light on a matt surface with this normal, as red, green, blue. `lit`: share of the sun that reaches
+    /// it; `open`: share of its sky that nothing hides.
     pub fn on(&self, normal: &Vector3<f64>, lit: f64, open: f64) -> [f64; 3] {
         let sun = lit * normal.dot(&self.sun).max(0.0);
         let up = 0.5 + 0.5 * normal.z;

@@ -39,8 +39,8 @@ pub fn spoil_masks(labels: &LabelImage, error: MaskError, seed: u64) -> LabelIma
     }
 }
 
-/// Mean over the true instances of the largest IoU that any instance has with them, zero where none overlaps; `None`
-/// without true instances.
+/// Mean over the true instances of the largest IoU that any instance has with them, zero where none overlaps;
+/// `None` without true instances.
 pub fn mean_iou(labels: &LabelImage, truth: &LabelImage) -> Option<f64> {
     let mut confusion = LabelConfusion::default();
     confusion.extend(labels.data(), truth.data());

@@ -1,7 +1,8 @@
-//! What the surfaces look like: stones of several rocks, mortar of the same hues, stains, moss, lichen, grass.
+//! What the surfaces look like: stones of several rocks, mortar of the same hues, stains, moss, lichen,
+//! grass.
 //!
-//! Colours are linear reflectances. Everything on a stone is a function of a place in the stone's own frame, so that
-//! the texture moves with it.
+//! Colours are linear reflectances. Everything on a stone is a function of a place in the stone's own frame,
+//! so that the texture moves with it.
 
 use crate::simulate::noise::Noise;
 use crate::simulate::props::Material;
@@ -112,7 +113,8 @@ impl Painter {
         ]
     }
 
-    /// Water, dirt, moss and lichen, on stones and mortar alike. `distance`: from the stone's outline, negative inside.
+    /// Water, dirt, moss and lichen, on stones and mortar alike. `distance`: from the stone's outline,
+    /// negative inside.
     fn weather(&self, bare: Rgb, [a, u]: [f64; 2], distance: f64) -> Rgb {
         let near_joint = (1.0 + distance / 0.035).clamp(0.0, 1.0);
         let mut colour = bare;

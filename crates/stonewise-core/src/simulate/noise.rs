@@ -60,8 +60,8 @@ impl Noise {
         sum
     }
 
-    /// Adds `octaves` of noise, times their amplitude, at the places of a row: [`Noise::octaves`] for many places, at a
-    /// fraction of the cost, as places in one cell of the lattice share its gradients.
+    /// Adds `octaves` of noise, times their amplitude, at the places of a row: [`Noise::octaves`] for many
+    /// places, at a fraction of the cost, as places in one cell of the lattice share its gradients.
     pub fn add_octaves(&self, row: Row, octaves: Octaves, out: &mut [f64]) {
         pulp::Arch::new().dispatch(
             #[inline(always)]
@@ -88,7 +88,8 @@ impl Noise {
         let j = floor(row.y);
         let fy = row.y - j as f64;
         let (sy, scale) = (fade(fy), 1.3 * amplitude);
-        // At a height in a cell, what its left or right side adds is linear in the distance along x: height and slope.
+        // At a height in a cell, what its left or right side adds is linear in the distance along x: height
+        // and slope.
         let side = |i: i64| {
             let ([gx0, gy0], [gx1, gy1]) = (self.gradient(i, j), self.gradient(i, j + 1));
             [

@@ -46,7 +46,8 @@ pub struct PhotoParams {
     pub pose_noise_px: f64,
     /// Whether the last photo of an epoch has no orientation, as happens.
     pub last_unaligned: bool,
-    /// Whether photos are rendered; if not they are plain grey, which is quicker and enough where masks are given.
+    /// Whether photos are rendered; if not they are plain grey, which is quicker and enough where masks are
+    /// given.
     pub rendered: bool,
     /// Lens and sensor.
     pub sensor: SensorParams,
@@ -148,8 +149,8 @@ pub fn disturb_views(views: &[View], params: &PhotoParams, seed: u64) -> Vec<Vie
         .collect()
 }
 
-/// The part of the section that a photo shows, and a margin around it: smallest a, largest a, smallest u, largest u,
-/// metres; `None` where it shows nothing of the section.
+/// The part of the section that a photo shows, and a margin around it: smallest a, largest a, smallest u,
+/// largest u, metres; `None` where it shows nothing of the section.
 pub fn shown_part(wall: &Wall, view: &View) -> Option<[f64; 4]> {
     const STEPS: u32 = 12;
     const MARGIN_M: f64 = 1.5;

@@ -2,7 +2,8 @@
 
 use crate::geometry::Rigid3;
 use crate::simulate::face::FacePoint;
-use crate::simulate::wall::{Wall, WallParams};
+use crate::simulate::wall::Wall;
+use crate::simulate::wall_params::WallParams;
 use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -155,7 +156,8 @@ struct Site<'a> {
 }
 
 impl Site<'_> {
-    /// Adds a box that stands at `a` along the wall; corners relative to the foot of the face there: x out, y along, z up.
+    /// Adds a box that stands at `a` along the wall; corners relative to the foot of the face there: x out, y
+    /// along, z up.
     fn block(&mut self, material: Material, a: f64, min: [f64; 3], max: [f64; 3]) {
         let (min, max, foot) = (Point3::from(min), Point3::from(max), self.foot(a));
         self.props.push(Prop {

@@ -135,8 +135,9 @@ impl<'a> Scene<'a> {
         self.trace_beam(from, along, [0.0; 2]).map(|(hit, _)| hit)
     }
 
-    /// The same, and from which distance on the other rays of a beam have to be looked at: before it they meet nothing. The beam is
-    /// `spread[0]` metres wide to either side where it starts, and `spread[1]` a metre wider.
+    /// The same, and from which distance on the other rays of a beam have to be looked at: before it they
+    /// meet nothing. The beam is `spread[0]` metres wide to either side where it starts, and `spread[1]` a
+    /// metre wider.
     pub(super) fn trace_beam(
         &self,
         from: &Point3<f64>,
@@ -194,8 +195,8 @@ impl<'a> Scene<'a> {
         nearest
     }
 
-    /// Whether a ray can meet anything whose place on the face lies within `part` (smallest a, largest a, smallest u, largest u,
-    /// metres); says yes in doubt.
+    /// Whether a ray can meet anything whose place on the face lies within `part` (smallest a, largest a,
+    /// smallest u, largest u, metres); says yes in doubt.
     pub(super) fn may_meet(&self, from: &Point3<f64>, along: &Vector3<f64>, part: [f64; 4]) -> bool {
         if self.props.iter().any(|p| p.is_near_ray(from, along, f64::MAX)) {
             return true;
@@ -232,7 +233,8 @@ impl<'a> Scene<'a> {
         Some((point, self.target(&found)))
     }
 
-    /// Where one who comes down on the face at a place reaches the surface, and how far that is from the top of the layer, metres.
+    /// Where one who comes down on the face at a place reaches the surface, and how far that is from the top
+    /// of the layer, metres.
     fn come_down_at(&self, a: f64, u: f64) -> Option<(Point3<f64>, f64)> {
         let face = &self.wall.face;
         let top = FacePoint {
@@ -241,7 +243,8 @@ impl<'a> Scene<'a> {
             n: self.layer[1],
         };
         let (from, inwards) = (face.world_of(&top), -face.frame(a).out);
-        // Stones lie almost level, so that the height over the surface hardly changes on the way down but for the way itself.
+        // Stones lie almost level, so that the height over the surface hardly changes on the way down but for
+        // the way itself.
         let mut down = 0.0;
         for _ in 0..8 {
             let point = from + inwards * down;
@@ -288,7 +291,8 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Marches along the ray to the wall's surface and then closes in on it to a micrometre. Nothing lies before `start_m`.
+    /// Marches along the ray to the wall's surface and then closes in on it to a micrometre. Nothing lies
+    /// before `start_m`.
     fn march(
         &self,
         from: &Point3<f64>,
@@ -435,8 +439,8 @@ impl Placed {
     }
 }
 
-/// Things that can stand between the sampled part of the wall and whoever looks at it from the front; the others would
-/// only cost time.
+/// Things that can stand between the sampled part of the wall and whoever looks at it from the front; the
+/// others would only cost time.
 fn props_near<'a>(wall: &Wall, surface: &Surface, props: &'a [Prop]) -> Vec<&'a Prop> {
     /// More than anything stands out from the wall, metres.
     const OUT_M: f64 = 6.0;

@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Sample distance of a stone's face, metres: between samples the surface is bilinear, and that surface is the truth.
+/// Sample distance of a stone's face, metres: between samples the surface is bilinear, and that surface is
+/// the truth.
 const STONE_STEP_M: f64 = 0.0025;
 /// Sample distance of the mortar, metres.
 const MORTAR_STEP_M: f64 = 0.004;
@@ -106,8 +107,8 @@ pub struct Surface {
 pub struct SampledFaces(BTreeMap<usize, Arc<HeightGrid>>);
 
 impl Surface {
-    /// Samples the wall in a window; the same for any number of threads. Faces that `sampled` holds are taken from there; it
-    /// is left with those of this window alone.
+    /// Samples the wall in a window; the same for any number of threads. Faces that `sampled` holds are taken
+    /// from there; it is left with those of this window alone.
     pub fn new(wall: &Wall, window: [f64; 4], sampled: &mut SampledFaces) -> Self {
         let reaches =
             |b: &[f64; 4]| b[0] <= window[1] && b[1] >= window[0] && b[2] <= window[3] && b[3] >= window[2];

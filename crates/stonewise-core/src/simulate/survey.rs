@@ -8,7 +8,8 @@ use crate::simulate::scene::Scene;
 use crate::simulate::surface::{SampledFaces, Surface};
 use crate::simulate::tls::{TlsParams, scan_terrestrial};
 use crate::simulate::uav::{UavParams, scan_airborne};
-use crate::simulate::wall::{Wall, WallParams};
+use crate::simulate::wall::Wall;
+use crate::simulate::wall_params::WallParams;
 use crate::simulate::window::Window;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -91,7 +92,8 @@ impl World {
         }
     }
 
-    /// The scene of an epoch: 0 before the motion, 1 after it. The whole section, which a large dam is too large for.
+    /// The scene of an epoch: 0 before the motion, 1 after it. The whole section, which a large dam is too
+    /// large for.
     pub fn scene(&self, epoch: usize) -> Scene<'_> {
         let whole = self.whole.get_or_init(|| self.surface(self.wall.extent()));
         self.scene_of(whole, epoch)
@@ -147,7 +149,8 @@ impl Sensor {
 
 /// What one scanner measures of a piece of the section; `None` where the survey has no such scanner.
 ///
-/// `scene`: of the piece's [`Window::surroundings`] at least. The points of all pieces together are the cloud.
+/// `scene`: of the piece's [`Window::surroundings`] at least. The points of all pieces together are the
+/// cloud.
 pub fn scan_window(
     scene: &Scene,
     params: &SceneParams,
@@ -156,11 +159,20 @@ pub fn scan_window(
     window: &Window,
 ) -> Option<Scan> {
     let seed = epoch_seed(params.seed, epoch, sensor as u64);
-    match sensor {
-        Sensor::Tls => Some(scan_terrestrial(scene, window, params.tls.as_ref()?, seed)),
-        Sensor::Uav => Some(scan_airborne(scene, window, params.uav.as_ref()?, seed)),
-    }
+    let mut scan = match sensor {
+        Sensor::Tls => scan_terrestrial(scene, window, params.tls.as_ref()?, seed),
+        Sensor::Uav => scan_airborne(scene, window, params.uav.as_ref()?, seed),
+    };
+    scan.start_at(FIRST_SCAN_S + YEAR_S * epoch as f64 + FLIGHT_AFTER_S * f64::from(sensor as u8));
+    Some(scan)
 }
+
+/// When the first epoch's first scan begins: 2025-04-14 08:00 UTC in adjusted standard GPS time, seconds.
+const FIRST_SCAN_S: f64 = 428_652_818.0;
+/// From one epoch to the next, seconds.
+const YEAR_S: f64 = 365.0 * 86_400.0;
+/// The drone flies four hours after the terrestrial scans begin, seconds.
+const FLIGHT_AFTER_S: f64 = 4.0 * 3600.0;
 
 /// Clouds only, both epochs, with truth: fast enough for hundreds of seeds.
 ///

@@ -3,7 +3,7 @@
 use crate::geometry::Rigid3;
 use crate::simulate::face::FacePoint;
 use crate::simulate::noise::normal;
-use crate::simulate::scan::{BeamParams, Scan, Shot, shoot};
+use crate::simulate::scan::{BeamParams, Delivered, Instrument, Scan, shoot};
 use crate::simulate::scene::Scene;
 use crate::simulate::window::Window;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
@@ -34,6 +34,10 @@ pub struct TlsParams {
     pub registration_m: f64,
     /// Registration error of a station: rotation per axis, radians.
     pub registration_rad: f64,
+    /// Error that all stations of an epoch share, per axis, metres.
+    pub datum_m: f64,
+    /// Relative error of a station's ranges, standard deviation (1e-5 is 10 ppm).
+    pub scale_error: f64,
     /// The instrument.
     pub beam: BeamParams,
 }
@@ -50,6 +54,8 @@ impl Default for TlsParams {
             margin_m: 0.25,
             registration_m: 0.0003,
             registration_rad: 2e-5,
+            datum_m: 0.0,
+            scale_error: 0.0,
             beam: BeamParams::terrestrial(),
         }
     }
@@ -57,18 +63,29 @@ impl Default for TlsParams {
 
 /// One station: where it stands, and the grid of its rays.
 struct Station {
-    number: u16,
+    number: u32,
     place: Point3<f64>,
     step_rad: f64,
     /// Smallest and largest a that it scans, metres.
     reach: [f64; 2],
     /// What the registration gets wrong.
     error: Rigid3,
+    /// Relative error of its ranges.
+    scale: f64,
+    /// The sphere that it scans of the whole section: smallest and largest azimuth, smallest and largest
+    /// elevation, radians.
+    field: [f64; 4],
 }
+
+/// Beams a second.
+const BEAMS_PER_S: f64 = 2e5;
+/// From the start of one station's scan to the next one's, seconds.
+const STATION_S: f64 = 600.0;
 
 /// Scans a window of the section from all stations; `scene` holds the window's surroundings at least.
 ///
-/// The same points for any number of threads. Cost: about three microseconds a beam.
+/// The same points for any number of threads; times count from the start of the first station. Cost: about
+/// three microseconds a beam.
 pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
     for station in stations(scene, params, seed) {
@@ -81,6 +98,7 @@ pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed
             window,
             params,
             station: &station,
+            instrument: Instrument::new(scene, &params.beam, station.scale, seed),
             part: grown(part, ASTRAY_M),
             azimuths: [west, east],
             seed,
@@ -96,7 +114,8 @@ pub fn scan_terrestrial(scene: &Scene, window: &Window, params: &TlsParams, seed
     scan
 }
 
-/// Middle of the range of rows, so that their numbers are positive: more rows than a grid of 5 mm at 10 m has.
+/// Middle of the range of rows, so that their numbers are positive: more rows than a grid of 5 mm at 10 m
+/// has.
 const ROW_ZERO: i64 = 1 << 20;
 
 /// Further than a beam points astray, metres.
@@ -108,6 +127,7 @@ struct Sweep<'a> {
     window: &'a Window,
     params: &'a TlsParams,
     station: &'a Station,
+    instrument: Instrument<'a>,
     /// The part of the face that is looked at: smallest a, largest a, smallest u, largest u, metres.
     part: [f64; 4],
     /// Smallest and largest azimuth of its beams, radians.
@@ -117,13 +137,14 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     /// The beams of one elevation.
-    fn row(&self, row: i64) -> Vec<(Shot, Point3<f64>)> {
+    fn row(&self, row: i64) -> Vec<Delivered> {
         let Station {
             number,
             place,
             step_rad,
             reach,
             error,
+            ..
         } = self.station;
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(self.window.stream(u64::from(*number), (row + ROW_ZERO) as u64));
@@ -137,19 +158,32 @@ impl Sweep<'_> {
                 if !self.scene.may_meet(place, &along, self.part) {
                     return None;
                 }
-                let shot = shoot(self.scene, place, &along, &self.params.beam, &mut rng)?;
-                let measured = error * shot.measured;
+                let shot = shoot(self.scene, place, &along, &self.instrument, &mut rng)?;
                 let face = &shot.hit.face;
                 let wanted = self.window.holds(face.a, face.u)
                     && (reach[0]..=reach[1]).contains(&face.a)
                     && near_section(self.scene, face, self.params.margin_m);
-                wanted.then_some((shot, measured))
+                wanted.then(|| Delivered {
+                    place: error * shot.measured,
+                    shot,
+                    time_s: self.station.time_s(row, column),
+                })
             })
             .collect()
     }
 }
 
 impl Station {
+    /// When a beam is sent: rows from below, each from the left, all of the same duration.
+    fn time_s(&self, row: i64, column: i64) -> f64 {
+        let [west, east, low, _] = self.field;
+        let step = self.step_rad / (row as f64 * self.step_rad).cos();
+        let rows = row - (low / self.step_rad).floor() as i64;
+        let columns = column - (west / step).floor() as i64;
+        let longest_row = ((east - west) / self.step_rad).ceil() + 2.0;
+        STATION_S * f64::from(self.number) + (rows as f64 * longest_row + columns as f64) / BEAMS_PER_S
+    }
+
     /// The part of the window that the station reaches: smallest a, largest a, smallest u, largest u, metres.
     fn part(&self, scene: &Scene, window: &Window, margin_m: f64) -> Option<[f64; 4]> {
         let mut limits = grown(scene.wall().extent(), margin_m);
@@ -159,8 +193,8 @@ impl Station {
         (w[0] < w[1] && w[2] < w[3]).then_some(w)
     }
 
-    /// The part of the sphere around the station that holds a part of the face and what stands in front of it: smallest and
-    /// largest azimuth, smallest and largest elevation, radians.
+    /// The part of the sphere around the station that holds a part of the face and what stands in front of
+    /// it: smallest and largest azimuth, smallest and largest elevation, radians.
     fn field(&self, scene: &Scene, w: [f64; 4]) -> [f64; 4] {
         const STEPS: i32 = 32;
         let mut field = [f64::MAX, f64::MIN, f64::MAX, f64::MIN];
@@ -189,6 +223,7 @@ fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let extent = scene.wall().extent();
     let face = &scene.wall().face;
+    let datum = shared_error(params.datum_m, seed);
     let apart = (extent[1] - extent[0]) / f64::from(params.stations.max(1));
     // How many stations see a place.
     let cover = match params.reach_m {
@@ -216,15 +251,33 @@ fn stations(scene: &Scene, params: &TlsParams, seed: u64) -> Vec<Station> {
             } else {
                 f64::INFINITY
             };
-            Station {
-                number: k as u16,
+            let mut station = Station {
+                number: k,
                 place,
                 step_rad: params.spacing_m * cover.sqrt() / n,
                 reach: [a - reach, a + reach],
-                error: about(&front, turn, shift),
+                error: about(&front, turn, shift + datum),
+                scale: params.scale_error * normal(&mut of_its_own(seed, u64::from(k))),
+                field: [0.0; 4],
+            };
+            if let Some(part) = station.part(scene, &Window::whole(), params.margin_m) {
+                station.field = station.field(scene, part);
             }
+            station
         })
         .collect()
+}
+
+/// Random numbers of their own, so that these errors change no others.
+fn of_its_own(seed: u64, number: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(u64::MAX - number);
+    rng
+}
+
+fn shared_error(sd_m: f64, seed: u64) -> Vector3<f64> {
+    let mut rng = of_its_own(seed, 1 << 32);
+    Vector3::from_fn(|_, _| sd_m * normal(&mut rng))
 }
 
 /// Where things that belong to the cloud lie before and behind the face, metres.

@@ -61,8 +61,8 @@ pub fn stone_truths(world: &World) -> Vec<StoneTruth> {
     truths
 }
 
-/// The truth of the stones whose middle lies in a piece of the section; `scene`: of its [`Window::surroundings`] before the
-/// motion. Cost: about 30,000 rays a square metre.
+/// The truth of the stones whose middle lies in a piece of the section; `scene`: of its
+/// [`Window::surroundings`] before the motion. Cost: about 30,000 rays a square metre.
 pub fn window_truths(world: &World, scene: &Scene, window: &Window) -> Vec<StoneTruth> {
     let faces = face_samples(scene, window);
     let stones = world.wall.stones.iter().zip(&world.motions);
@@ -151,7 +151,8 @@ impl SeenCells {
         &self.points
     }
 
-    /// Cells of each stone's face that were measured, in the wall's order; [`StoneTruth::seen_share`] says what they are worth.
+    /// Cells of each stone's face that were measured, in the wall's order; [`StoneTruth::seen_share`] says
+    /// what they are worth.
     pub fn cells(&self, truths: &[StoneTruth]) -> Vec<u32> {
         let both = |(t, h): (&StoneTruth, &BTreeSet<_>)| h.intersection(&t.cells).count() as u32;
         truths.iter().zip(&self.hit).map(both).collect()
@@ -164,7 +165,8 @@ impl SeenCells {
     }
 }
 
-/// Stones of which a photo shows at least `pixels` pixels, ascending; `labels`: the stone's number at each pixel, 0 elsewhere.
+/// Stones of which a photo shows at least `pixels` pixels, ascending; `labels`: the stone's number at each
+/// pixel, 0 elsewhere.
 pub fn shown_stones(labels: &LabelImage, pixels: u32) -> Vec<u32> {
     let mut seen: BTreeMap<u32, u32> = BTreeMap::new();
     for &label in labels.data().iter().filter(|l| **l > 0) {

@@ -1,12 +1,13 @@
 //! A lidar under a drone that flies strips along the wall.
 
 use crate::simulate::face::FacePoint;
-use crate::simulate::noise::{Noise, normal};
-use crate::simulate::scan::{BeamParams, Scan, Shot, shoot};
+use crate::simulate::noise::Noise;
+use crate::simulate::scan::{BeamParams, Delivered, Instrument, Scan, shoot};
 use crate::simulate::scene::Scene;
+use crate::simulate::strip_error::{FlightErrorParams, StripDrift, StripErrors};
 use crate::simulate::tls::{grown, middle, near_section};
 use crate::simulate::window::Window;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -30,6 +31,11 @@ pub struct UavParams {
     pub drift_m: f64,
     /// Distance along the strip over which the drift changes, metres.
     pub drift_length_m: f64,
+    /// How it changes.
+    pub drift: StripDrift,
+    /// Whether software has adjusted the strips to each other: the difference of their mean errors is gone,
+    /// their common mean stays.
+    pub adjusted: bool,
     /// The instrument.
     pub beam: BeamParams,
 }
@@ -44,19 +50,35 @@ impl Default for UavParams {
             datum_m: 0.0015,
             drift_m: 0.0015,
             drift_length_m: 6.0,
+            drift: StripDrift::Smooth,
+            adjusted: false,
             beam: BeamParams::airborne(),
         }
     }
 }
 
-/// Scans a window of the section from all strips: fans across the flight line, one after the other. `scene` holds the
-/// window's surroundings at least.
+impl UavParams {
+    /// Errors of strips that begin and end at these places along the face, metres.
+    fn errors(&self, stretch: [f64; 2]) -> FlightErrorParams {
+        FlightErrorParams {
+            strips: self.strips,
+            stretch,
+            datum_m: self.datum_m,
+            drift: self.drift,
+            size_m: self.drift_m,
+            length_m: self.drift_length_m,
+            adjusted: self.adjusted,
+        }
+    }
+}
+
+/// Scans a window of the section from all strips: fans across the flight line, one after the other. `scene`
+/// holds the window's surroundings at least.
 ///
-/// The same points for any number of threads. Cost: about three microseconds a beam.
+/// The same points for any number of threads; times count from the start of the first strip. Cost: about
+/// three microseconds a beam.
 pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u64) -> Scan {
     let mut scan = Scan::empty(middle(scene));
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let datum = Vector3::from_fn(|_, _| params.datum_m * normal(&mut rng));
     let step = params.spacing_m * f64::from(params.strips).sqrt();
     let limits = grown(scene.wall().extent(), params.margin_m);
     // Beams that end on things before the face aim at places beside the window.
@@ -65,24 +87,27 @@ pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u
         let first = |v: f64| (v - limits[2 * axis]) / step;
         first(aimed[2 * axis]).floor().max(0.0) as usize..=first(aimed[2 * axis + 1]) as usize
     };
-    for strip in 0..params.strips {
-        let path = Path::new(scene, params, strip, seed);
+    let flight = Flight {
+        scene,
+        params,
+        instrument: Instrument::new(scene, &params.beam, 0.0, seed),
+        errors: StripErrors::new(&params.errors([limits[0], limits[1]]), seed),
+        limits,
+        step,
+        seed,
+    };
+    for number in 0..params.strips {
+        let strip = Strip::new(scene, params, number, seed);
         let measured: Vec<Vec<_>> = range(0)
             .into_par_iter()
-            .map(|fan| {
-                let mut rng = ChaCha8Rng::seed_from_u64(seed);
-                rng.set_stream(window.stream(u64::from(strip), fan as u64));
-                let a = limits[0] + fan as f64 * step;
-                let places = range(1).map(|k| limits[2] + (k as f64 + path.phase) * step);
-                path.fan(scene, params, (a, step), places, datum, &mut rng)
-            })
+            .map(|fan| flight.fan(&strip, window, fan, range(1)))
             .collect();
-        for mut shots in measured {
-            shots.retain(|(shot, _)| {
-                let face = &shot.hit.face;
+        for mut points in measured {
+            points.retain(|point| {
+                let face = &point.shot.hit.face;
                 window.holds(face.a, face.u)
             });
-            scan.push(shots, strip as u16);
+            scan.push(points, number);
         }
     }
     scan
@@ -91,60 +116,89 @@ pub fn scan_airborne(scene: &Scene, window: &Window, params: &UavParams, seed: u
 /// How far the place where a beam meets a thing 1.5 m before the face can lie from where it aims, metres.
 const PARALLAX_M: f64 = 1.0;
 
-/// A flight line and its error.
-struct Path {
+/// Speed along a strip, metres a second.
+const SPEED_M_S: f64 = 2.0;
+/// Time between two strips, seconds.
+const TURN_S: f64 = 60.0;
+
+/// What all strips share.
+struct Flight<'a> {
+    scene: &'a Scene<'a>,
+    params: &'a UavParams,
+    instrument: Instrument<'a>,
+    errors: StripErrors,
+    /// The part of the face that is scanned: smallest a, largest a, smallest u, largest u, metres.
+    limits: [f64; 4],
+    /// Distance of the fans, and of the beams in a fan, on the face, metres.
+    step: f64,
+    seed: u64,
+}
+
+/// A flight line.
+struct Strip {
+    number: u32,
     /// Height in the face, metres.
     u: f64,
     /// Strips start at odd places on the face.
     phase: f64,
     /// Looks a little ahead or back, so that strips differ in direction.
     squint: f64,
-    drift: [Noise; 3],
 }
 
-impl Path {
-    fn new(scene: &Scene, params: &UavParams, strip: u32, seed: u64) -> Self {
+impl Strip {
+    fn new(scene: &Scene, params: &UavParams, number: u32, seed: u64) -> Self {
         let w = scene.wall().extent();
-        let share = (f64::from(strip) + 0.8) / f64::from(params.strips);
-        let purpose = 100 + 3 * u64::from(strip);
+        let share = (f64::from(number) + 0.8) / f64::from(params.strips);
         Self {
+            number,
             u: w[2].max(0.0) + (w[3] - w[2].max(0.0)) * share + 0.8,
-            phase: Noise::new(seed, 99).uniform(u64::from(strip)),
-            squint: [0.0, 0.14, -0.14][strip as usize % 3],
-            drift: [0, 1, 2].map(|axis| Noise::new(seed, purpose + axis)),
+            phase: Noise::new(seed, 99).uniform(u64::from(number)),
+            squint: [0.0, 0.14, -0.14][number as usize % 3],
         }
     }
+}
 
-    /// One fan of beams at a, aimed at places up the face.
+impl Flight<'_> {
+    /// One fan of beams across a strip. `rows`: which of the beams.
     fn fan(
         &self,
-        scene: &Scene,
-        params: &UavParams,
-        (a, step): (f64, f64),
-        places: impl Iterator<Item = f64>,
-        datum: Vector3<f64>,
-        rng: &mut ChaCha8Rng,
-    ) -> Vec<(Shot, Point3<f64>)> {
+        strip: &Strip,
+        window: &Window,
+        fan: usize,
+        rows: impl Iterator<Item = usize>,
+    ) -> Vec<Delivered> {
+        let (scene, params, limits) = (self.scene, self.params, &self.limits);
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(window.stream(u64::from(strip.number), fan as u64));
         let face = &scene.wall().face;
-        let a = a + (self.phase - 0.5) * step;
+        let a = limits[0] + fan as f64 * self.step;
+        let a = a + (strip.phase - 0.5) * self.step;
         let sensor = face.world_of(&FacePoint {
-            a: a + self.squint * params.distance_m,
-            u: self.u,
+            a: a + strip.squint * params.distance_m,
+            u: strip.u,
             n: params.distance_m,
         });
-        // Standard deviation of the noise is 0.3.
-        let error = datum
-            + Vector3::from_fn(|axis, _| {
-                let along_strip = a / params.drift_length_m + 40.0 * self.drift[axis].uniform(0);
-                params.drift_m / 0.3 * self.drift[axis].at(along_strip, 0.5)
-            });
-        places
-            .filter_map(|u| {
-                let along = (face.world_of(&FacePoint { a, u, n: 0.0 }) - sensor).normalize();
-                let shot = shoot(scene, &sensor, &along, &params.beam, rng)?;
-                let measured = shot.measured + error;
-                near_section(scene, &shot.hit.face, params.margin_m).then_some((shot, measured))
+        let error: Vector3<f64> = self.errors.at(strip.number, a);
+        rows.filter_map(|row| {
+            let u = limits[2] + (row as f64 + strip.phase) * self.step;
+            let along = (face.world_of(&FacePoint { a, u, n: 0.0 }) - sensor).normalize();
+            let shot = shoot(scene, &sensor, &along, &self.instrument, &mut rng)?;
+            near_section(scene, &shot.hit.face, params.margin_m).then(|| Delivered {
+                place: shot.measured + error,
+                shot,
+                time_s: self.time_s(strip, fan, row),
             })
-            .collect()
+        })
+        .collect()
+    }
+
+    /// When a beam is sent: every strip is flown in the direction of a, and a fan ends before the next one
+    /// begins.
+    fn time_s(&self, strip: &Strip, fan: usize, row: usize) -> f64 {
+        let [a0, a1, u0, u1] = self.limits;
+        let rows = ((u1 - u0) / self.step).floor() + 1.0;
+        let strip_s = (a1 - a0) / SPEED_M_S + TURN_S;
+        let fans = fan as f64 + row as f64 / rows;
+        f64::from(strip.number) * strip_s + fans * self.step / SPEED_M_S
     }
 }

@@ -1,69 +1,15 @@
-//! A wall of rubble masonry: every stone's place, outline and shape, described so that any part can be evaluated alone.
+//! A wall of rubble masonry: every stone's place, outline and shape, described so that any part can be
+//! evaluated alone.
 
 use crate::geometry::Rigid3;
 use crate::id::StoneId;
 use crate::simulate::face::Face;
 use crate::simulate::layout::{Outline, lay_stones};
 use crate::simulate::noise::{Noise, Octaves, Row, normal};
+use crate::simulate::wall_params::WallParams;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
-
-/// Size and style of a wall.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct WallParams {
-    /// Length of the section along the dam, metres.
-    pub width_m: f64,
-    /// Height above ground, measured in the face, metres.
-    pub height_m: f64,
-    /// How far the masonry goes on below ground, metres: the lowest stones are half buried, as on real walls.
-    pub foot_m: f64,
-    /// Horizontal lean per metre of height; 1:0.2 as at gravity dams of about 1900.
-    pub batter: f64,
-    /// Radius of the plan, metres, 0 = straight; positive = the visible face is hollow.
-    pub plan_radius_m: f64,
-    /// Mean height of a course, metres.
-    pub course_m: f64,
-    /// Mean width of a stone over its height.
-    pub aspect: f64,
-    /// Share of stones that span two courses.
-    pub tall_share: f64,
-    /// Share of places of tall courses that hold two thin stones.
-    pub split_share: f64,
-    /// Smallest and largest joint width, metres.
-    pub joint_width_m: [f64; 2],
-    /// Smallest and largest depth of the mortar behind the idealised face, metres.
-    pub joint_depth_m: [f64; 2],
-    /// Factor on the relief of all stones; 1 gives slopes of about 0.2 rms.
-    pub relief: f64,
-    /// Share of stones that are almost flat, and so hardly show a motion in their own plane.
-    pub flat_share: f64,
-    /// Seed of everything in the wall.
-    pub seed: u64,
-}
-
-impl Default for WallParams {
-    fn default() -> Self {
-        Self {
-            width_m: 4.0,
-            height_m: 3.0,
-            foot_m: 0.25,
-            batter: 0.2,
-            plan_radius_m: 0.0,
-            course_m: 0.21,
-            aspect: 1.35,
-            tall_share: 0.17,
-            split_share: 0.14,
-            joint_width_m: [0.01, 0.03],
-            joint_depth_m: [0.01, 0.03],
-            relief: 1.0,
-            flat_share: 0.1,
-            seed: 1,
-        }
-    }
-}
 
 /// One stone of the simulated wall, in the first epoch.
 #[derive(Clone, Debug)]
@@ -161,8 +107,8 @@ impl Wall {
         [-half, half, -self.params.foot_m, self.params.height_m]
     }
 
-    /// Height of the mortar over the idealised face along a row of face coordinates (a, u) of the first epoch, metres; negative, it
-    /// is recessed.
+    /// Height of the mortar over the idealised face along a row of face coordinates (a, u) of the first
+    /// epoch, metres; negative, it is recessed.
     pub(super) fn mortar_heights(&self, row: Row, out: &mut [f64]) {
         let [shallow, deep] = self.params.joint_depth_m;
         out.fill(0.5);
@@ -175,8 +121,8 @@ impl Wall {
             .add_octaves(row.moved(0.21, 0.0, 0.03), octaves(3, 0.6, 0.0022), out);
     }
 
-    /// Height of stone `i`'s surface along a row of its own frame, metres; [`HIDDEN_M`] where it is hidden in the mortar. `waves`:
-    /// what [`Wall::waves`] says about the places.
+    /// Height of stone `i`'s surface along a row of its own frame, metres; [`HIDDEN_M`] where it is hidden in
+    /// the mortar. `waves`: what [`Wall::waves`] says about the places.
     pub(super) fn stone_heights(&self, i: usize, row: Row, waves: [&[f64]; 2], out: &mut [f64]) {
         let stone = &self.stones[i];
         let shape = &stone.shape;
@@ -213,7 +159,8 @@ impl Wall {
         }
     }
 
-    /// Distance from stone `i`'s outline at face coordinates (a, u) of the first epoch, metres, negative inside.
+    /// Distance from stone `i`'s outline at face coordinates (a, u) of the first epoch, metres, negative
+    /// inside.
     pub fn outline_distance(&self, i: usize, a: f64, u: f64) -> f64 {
         let wave = [0, 1].map(|axis| {
             let mut wave = [0.0];
@@ -231,8 +178,8 @@ impl Wall {
         self.stones[i].outline.distance(a + wave[0], u + wave[1])
     }
 
-    /// What bends the straight layout along a row of face coordinates: layout coordinate along (0) or up (1) less face coordinate,
-    /// metres.
+    /// What bends the straight layout along a row of face coordinates: layout coordinate along (0) or up (1)
+    /// less face coordinate, metres.
     pub(super) fn waves(&self, axis: usize, row: Row, out: &mut [f64]) {
         let size = [1.0, 1.15][axis] * self.params.course_m;
         let scale = self.params.course_m / WAVED_COURSE_M;

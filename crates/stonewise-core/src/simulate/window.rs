@@ -2,8 +2,8 @@
 
 /// Edge of a piece, metres: its surface takes about 90 MB.
 const WINDOW_M: f64 = 8.0;
-/// How much of the wall around a piece is there too, metres: all of a stone whose middle lies in it, and, as what stands out by
-/// 5 cm hides no more than that under all but grazing beams, all that hides any of it.
+/// How much of the wall around a piece is there too, metres: all of a stone whose middle lies in it, and, as
+/// what stands out by 5 cm hides no more than that under all but grazing beams, all that hides any of it.
 const AROUND_M: f64 = 1.0;
 
 /// A piece of a section.
@@ -24,7 +24,8 @@ impl Window {
         }
     }
 
-    /// Pieces of about 8 x 8 m that cover a section of this extent (smallest a, largest a, smallest u, largest u, metres).
+    /// Pieces of about 8 x 8 m that cover a section of this extent (smallest a, largest a, smallest u,
+    /// largest u, metres).
     pub fn cover(extent: [f64; 4]) -> Vec<Self> {
         let counts = [0, 2].map(|i| ((extent[i + 1] - extent[i]) / WINDOW_M).round().max(1.0) as u64);
         let edge = |axis: usize, i: u64| match i {

@@ -1,7 +1,7 @@
 //! Depth maps of photos by splatting.
 
 use super::frustum::Cone;
-use super::surface_cells::SurfaceCells;
+use super::surface_cells::{SurfaceCells, limit_spacings};
 use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::View;
@@ -73,7 +73,8 @@ impl SplatDepth {
     }
 }
 
-/// Depth maps of the photos and the local surface of all tiles, from one pass over the cloud.
+/// Depth maps of the photos and the local surface of all tiles, from two passes over the cloud: what spacing
+/// is usual is known after the first.
 ///
 /// Cost: one projection a point and photo whose cone touches the tile, and one write a pixel of each splat.
 pub(super) fn splat_all<T: TileSource>(
@@ -86,17 +87,22 @@ pub(super) fn splat_all<T: TileSource>(
     let mut maps: Vec<SplatDepth> = views.iter().map(|v| SplatDepth::new(v, scale)).collect();
     let cones: Vec<Cone> = views.iter().map(|v| Cone::of(v)).collect();
     let mut surfaces = Vec::with_capacity(tiles.tile_count());
-    progress.begin("depth maps", tiles.tile_count() as u64);
+    progress.begin("depth maps", 2 * tiles.tile_count() as u64);
     for tile in 0..tiles.tile_count() {
         progress.check()?;
         let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-        let surface = SurfaceCells::new(&cloud, params.cell_m);
+        surfaces.push(SurfaceCells::new(&cloud, params.cell_m));
+        progress.advance(1);
+    }
+    limit_spacings(&mut surfaces);
+    for (tile, surface) in surfaces.iter().enumerate() {
+        progress.check()?;
+        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
         let bounds = tiles.bounds(tile);
         maps.par_iter_mut()
             .zip(views.par_iter().zip(&cones))
             .filter(|(_, (_, cone))| cone.touches(&bounds))
-            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, &surface, params));
-        surfaces.push(surface);
+            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, surface, params));
         progress.advance(1);
     }
     Ok((maps, surfaces))

@@ -1,6 +1,8 @@
 //! Local spacing, noise and orientation of a tile's surface.
 
 use crate::cloud::{Cloud, GridIndex};
+use crate::geometry::cell_of;
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -14,10 +16,14 @@ pub(super) struct LocalSurface {
     pub spacing_m: f32,
     /// Standard deviation of points about a small plane, metres.
     pub noise_m: f32,
+    /// Points of the cell.
+    points: u32,
 }
 
 /// Local surface in cubic cells of a tile.
 pub(super) struct SurfaceCells {
+    /// Of the tile, world frame.
+    origin: Point3<f64>,
     cell_m: f64,
     cells: HashMap<[i32; 3], LocalSurface>,
 }
@@ -26,13 +32,17 @@ pub(super) struct SurfaceCells {
 const NEIGHBOURS: usize = 12;
 /// Samples per cell at most; the median of them is kept.
 const SAMPLES: usize = 5;
-/// A cell's spacing is at most this many times that around the usual point of the tile.
+/// A cell's spacing is at most this many times that around the usual point of its block.
 const MAX_SPACINGS: f32 = 2.0;
+/// Edge of the blocks of the world in which the usual spacing is sought, metres: not the tiles, whose size
+/// must not matter.
+const BLOCK_M: f64 = 4.0;
 /// Neighbours farther away than this say nothing about a surface, metres.
 const MAX_NEIGHBOUR_M: f64 = 0.5;
 
 impl SurfaceCells {
-    /// Measures the surface of a tile. Cost: one neighbour index and a few searches per cell.
+    /// Measures the surface of a tile; [`limit_spacings`] comes next. Cost: one neighbour index and a few
+    /// searches per cell.
     pub(super) fn new(cloud: &Cloud, cell_m: f64) -> Self {
         let points: Vec<Point3<f64>> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
         let mut members: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
@@ -42,18 +52,25 @@ impl SurfaceCells {
         let mut members: Vec<_> = members.into_iter().collect();
         members.sort_unstable_by_key(|(key, _)| *key);
         let index = GridIndex::new(&points, search_cell(&points, &members, cell_m));
-        let mut measured: Vec<LocalSurface> = members
+        let measured: Vec<LocalSurface> = members
             .par_iter()
             .map(|(_, ids)| measure(&points, &index, ids, cell_m))
             .collect();
-        limit_spacing(&mut measured, &members);
         let cells = members.iter().map(|m| m.0).zip(measured).collect();
-        Self { cell_m, cells }
+        Self {
+            origin: cloud.origin(),
+            cell_m,
+            cells,
+        }
     }
 
     /// Surface around a point given relative to the tile's origin.
     pub(super) fn at(&self, local: &Point3<f64>) -> Option<&LocalSurface> {
         self.cells.get(&key(local, self.cell_m))
+    }
+
+    fn block(&self, key: &[i32; 3]) -> [i64; 3] {
+        block_of(&self.origin, self.cell_m, key)
     }
 
     /// Spacings of all cells, in no particular order.
@@ -64,23 +81,45 @@ impl SurfaceCells {
 
 /// Takes lone points (leaves, birds, mixed returns) for what they are: points without a surface around them, not the
 /// corners of a large one, which would hide what lies behind.
-fn limit_spacing(measured: &mut [LocalSurface], members: &[([i32; 3], Vec<u32>)]) {
-    let mut by_point: Vec<(f32, usize)> = measured
-        .iter()
-        .zip(members)
-        .map(|(surface, (_, ids))| (surface.spacing_m, ids.len()))
+///
+/// A cell's spacing is limited by what is usual in its block of the world, whatever tiles that falls into.
+pub(super) fn limit_spacings(tiles: &mut [SurfaceCells]) {
+    let mut blocks: HashMap<[i64; 3], Vec<(f32, u32)>> = HashMap::new();
+    for tile in tiles.iter() {
+        for (key, surface) in &tile.cells {
+            let spacings = blocks.entry(tile.block(key)).or_default();
+            spacings.push((surface.spacing_m, surface.points));
+        }
+    }
+    let limits: HashMap<[i64; 3], f32> = blocks
+        .into_iter()
+        .map(|(block, spacings)| (block, MAX_SPACINGS * usual(spacings)))
         .collect();
-    by_point.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = by_point.iter().map(|c| c.1).sum::<usize>() / 2;
+    for tile in tiles {
+        let (origin, cell_m) = (tile.origin, tile.cell_m);
+        for (key, surface) in &mut tile.cells {
+            let limit = limits.get(&block_of(&origin, cell_m, key)).copied();
+            surface.spacing_m = surface.spacing_m.min(limit.unwrap_or(f32::INFINITY));
+        }
+    }
+}
+
+/// The spacing around the middle one of all points, of cells with their spacings and numbers of points.
+fn usual(mut spacings: Vec<(f32, u32)>) -> f32 {
+    spacings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = spacings.iter().map(|c| u64::from(c.1)).sum::<u64>() / 2;
     let mut passed = 0;
-    let usual = by_point.iter().find(|c| {
-        passed += c.1;
+    let middle = spacings.iter().find(|c| {
+        passed += u64::from(c.1);
         passed > half
     });
-    let limit = usual.map_or(f32::INFINITY, |c| MAX_SPACINGS * c.0);
-    for surface in measured {
-        surface.spacing_m = surface.spacing_m.min(limit);
-    }
+    middle.map_or(f32::INFINITY, |c| c.0)
+}
+
+/// The block of the world in which the middle of a tile's cell lies.
+fn block_of(origin: &Point3<f64>, cell_m: f64, key: &[i32; 3]) -> [i64; 3] {
+    let middle = [0, 1, 2].map(|a| origin[a] + (f64::from(key[a]) + 0.5) * cell_m);
+    cell_of(&Point3::from(middle), BLOCK_M)
 }
 
 fn key(p: &Point3<f64>, cell_m: f64) -> [i32; 3] {
@@ -112,7 +151,7 @@ fn measure(points: &[Point3<f64>], index: &GridIndex, ids: &[u32], cell_m: f64) 
             noises.push(spread * (around.len() as f64 / (around.len() - 3) as f64).sqrt());
         }
     }
-    let spacing = median(&mut spacings);
+    let spacing = upper_median(&mut spacings).unwrap_or(0.0);
     let cell: Vec<Point3<f64>> = thinned(points, ids);
     let normal = if cell.len() >= 3 {
         principal(&cell).0
@@ -122,7 +161,8 @@ fn measure(points: &[Point3<f64>], index: &GridIndex, ids: &[u32], cell_m: f64) 
     LocalSurface {
         normal: normal.cast(),
         spacing_m: spacing.min(cell_m) as f32,
-        noise_m: median(&mut noises) as f32,
+        noise_m: upper_median(&mut noises).unwrap_or(0.0) as f32,
+        points: ids.len() as u32,
     }
 }
 
@@ -145,18 +185,11 @@ fn principal(points: &[Point3<f64>]) -> (Vector3<f64>, f64) {
     (eigen.eigenvectors.column(smallest).into_owned(), value)
 }
 
-fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
+    use std::collections::BTreeMap;
 
     #[test]
     fn finds_spacing_noise_and_normal_of_a_noisy_plane() {
@@ -179,5 +212,51 @@ mod tests {
         );
         assert!((f64::from(surface.noise_m) - 0.001).abs() < 0.0005, "{surface:?}");
         assert!(surface.normal.cast::<f64>().cross(&normal).norm() < 0.05);
+    }
+
+    /// Spacings of the cells of one dense and one sparse patch, by their place, when the cloud is cut into
+    /// tiles of this size.
+    fn limited(tile_m: f64) -> Vec<([i64; 3], f32)> {
+        let grid = |step: f64, x0: f64, n: u32| {
+            (0..n * n).map(move |i| Point3::new(x0 + step * f64::from(i % n), step * f64::from(i / n), 0.1))
+        };
+        let points: Vec<_> = grid(0.01, 0.003, 100).chain(grid(0.15, 2.203, 6)).collect();
+        let mut tiles: BTreeMap<[i64; 3], Vec<Point3<f64>>> = BTreeMap::new();
+        for p in points {
+            tiles.entry(cell_of(&p, tile_m)).or_default().push(p);
+        }
+        let cut = tiles.into_iter().map(|(key, points)| {
+            let origin = Point3::from(key.map(|k| (k as f64 + 0.5) * tile_m));
+            SurfaceCells::new(&Cloud::from_world(origin, points), 0.25)
+        });
+        let mut cut: Vec<SurfaceCells> = cut.collect();
+        limit_spacings(&mut cut);
+        let place = |tile: &SurfaceCells, key: &[i32; 3]| {
+            cell_of(
+                &Point3::from([0, 1, 2].map(|a| tile.origin[a] + (f64::from(key[a]) + 0.5) * 0.25)),
+                0.25,
+            )
+        };
+        let mut all: Vec<_> = cut
+            .iter()
+            .flat_map(|tile| tile.cells.iter().map(|(key, c)| (place(tile, key), c.spacing_m)))
+            .collect();
+        all.sort_by_key(|c| c.0);
+        all
+    }
+
+    #[test]
+    fn what_spacing_is_usual_does_not_depend_on_the_size_of_tiles() {
+        let whole = limited(4.0);
+        // The sparse patch is a hundred times as sparse: it is limited by the dense one, in a tile of its own
+        // too.
+        assert!(whole.iter().all(|c| c.1 < 0.025), "{whole:?}");
+        for size in [2.0, 8.0] {
+            let cut = limited(size);
+            assert_eq!(cut.len(), whole.len());
+            for (a, b) in cut.iter().zip(&whole) {
+                assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-5, "{size}: {a:?} {b:?}");
+            }
+        }
     }
 }

@@ -65,16 +65,18 @@ pub enum CameraError {
         /// First photo that uses it.
         photo: String,
     },
-    /// The world frame is not Cartesian.
+    /// Poses that cannot be brought to the clouds.
     #[error(
-        "cameras refer to {crs}, in which Metashape stores poses geocentrically: set the chunk's reference to local \
-         coordinates, the frame of the point cloud, and export the cameras again: {}", path.display()
+        "cameras in {crs} cannot be brought to the clouds: {reason}; or set the chunk's reference to the clouds' system, or to \
+         local coordinates in their frame, and export the cameras again: {}", path.display()
     )]
     UnsupportedCrs {
         /// File.
         path: PathBuf,
         /// Name of the reference system.
         crs: String,
+        /// Why, and the fix.
+        reason: String,
     },
     /// No photo in the folder.
     #[error("no photo (jpg, jpeg, png, tif) in the folder: {}", folder.display())]

@@ -1,7 +1,8 @@
 //! OpenSfM's reconstruction.json.
 //!
-//! Poses take world to camera, rotation as angle times axis. Focal lengths and principal points are in units of the longer
-//! image side, the principal point counted from the image centre (OpenSfM documentation, "Coordinate Systems").
+//! Poses take world to camera, rotation as angle times axis. Focal lengths and principal points are in units
+//! of the longer image side, the principal point counted from the image centre (OpenSfM documentation,
+//! "Coordinate Systems").
 
 use super::{CameraError, CameraFile, malformed, read_text};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -33,7 +34,8 @@ struct Shot {
     camera: String,
 }
 
-/// Reads the reconstruction with most photos; views come sorted by name, as the order in JSON objects means nothing.
+/// Reads the reconstruction with most photos; views come sorted by name, as the order in JSON objects means
+/// nothing.
 pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
     let text = read_text(path)?;
     let parts: Vec<Reconstruction> = serde_json::from_str(&text).map_err(|e| {

@@ -17,9 +17,9 @@ pub struct Photos {
 
 /// Finds the photo of each view, in the folder and the folders below it.
 ///
-/// Upper and lower case are the same; a name in the camera file may lack its extension and may carry folders. A file of
-/// exactly that name is preferred to one that only shares the stem, then the one with more of the name's folders, then the one less
-/// deep in the folder.
+/// Upper and lower case are the same; a name in the camera file may lack its extension and may carry folders.
+/// A file of exactly that name is preferred to one that only shares the stem, then the one with more of the
+/// name's folders, then the one less deep in the folder.
 ///
 /// # Errors
 /// The folder cannot be read or holds no photo, or two files fit one view equally well.

@@ -5,6 +5,9 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 use std::path::Path;
 
+/// No camera file has elements inside elements to this depth.
+const MAX_DEPTH: usize = 64;
+
 /// An element with its attributes, children and own text.
 #[derive(Debug, Default)]
 pub struct Element {
@@ -47,6 +50,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Element, CameraError> {
         let broken =
             |problem: String| malformed(path, format!("line {line}"), format!("broken xml ({problem})"));
         match reader.read_event().map_err(|e| broken(e.to_string()))? {
+            Event::Start(_) if open.len() > MAX_DEPTH => {
+                return Err(broken(format!(
+                    "elements inside elements, more than {MAX_DEPTH} deep"
+                )));
+            }
             Event::Start(start) => open.push(element(&start, line).map_err(broken)?),
             Event::Empty(start) => {
                 let child = element(&start, line).map_err(broken)?;

@@ -5,7 +5,8 @@ use nalgebra::Point3;
 /// A run of points of one file, in the order of the file.
 ///
 /// Records without a finite position are left out, so `indices` may have gaps; the other columns are parallel
-/// to it. A chunk never crosses from one scan of an E57 file into the next.
+/// to it. A chunk never crosses from one scan of an E57 file into the next. Where a long part of a file holds
+/// no points, chunks without points pass by.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointChunk {
     /// Index of each point's record in the file, from 0, ascending; counts across the scans of an E57 file.
@@ -18,6 +19,10 @@ pub struct PointChunk {
     pub intensities: Option<Vec<f32>>,
     /// Index of the scan in [`CloudInfo::scans`](super::CloudInfo::scans), where the file keeps scans apart.
     pub scan: Option<usize>,
+    /// Number of the station or flight line of each point (LAS: point source ID), where the file has them.
+    pub sources: Option<Vec<u16>>,
+    /// Time of each point as the file has it, seconds (LAS: GPS time), where it has times.
+    pub times_s: Option<Vec<f64>>,
 }
 
 impl PointChunk {
@@ -48,6 +53,8 @@ pub(super) type Visit<'a, E> = &'a mut dyn FnMut(&PointChunk) -> Result<(), E>;
 pub(super) struct Chunker<'a, E> {
     chunk: PointChunk,
     capacity: usize,
+    /// Things of the file other than points that were read since the last visit.
+    passed: usize,
     visit: Visit<'a, E>,
     summary: ReadSummary,
 }
@@ -69,6 +76,7 @@ impl<'a, E> Chunker<'a, E> {
         Self {
             chunk,
             capacity: capacity.max(1),
+            passed: 0,
             visit,
             summary: ReadSummary::default(),
         }
@@ -88,7 +96,7 @@ impl<'a, E> Chunker<'a, E> {
         self.summary.records += 1;
         let Some(position) = record.position.filter(|p| p.iter().all(|c| c.is_finite())) else {
             self.summary.skipped += 1;
-            return Ok(());
+            return self.pass();
         };
         self.chunk.indices.push(index);
         self.chunk.positions.push(position);
@@ -104,6 +112,17 @@ impl<'a, E> Chunker<'a, E> {
         Ok(())
     }
 
+    /// Counts something that was read and is no point; many of them make a visit, so that the caller can
+    /// stop.
+    pub fn pass(&mut self) -> Result<(), E> {
+        self.passed += 1;
+        if self.passed < self.capacity {
+            return Ok(());
+        }
+        self.passed = 0;
+        (self.visit)(&PointChunk::default())
+    }
+
     pub fn finish(mut self) -> Result<ReadSummary, E> {
         self.flush()?;
         Ok(self.summary)
@@ -113,6 +132,7 @@ impl<'a, E> Chunker<'a, E> {
         if !self.chunk.is_empty() {
             (self.visit)(&self.chunk)?;
         }
+        self.passed = 0;
         self.chunk.indices.clear();
         self.chunk.positions.clear();
         if let Some(colors) = &mut self.chunk.colors {

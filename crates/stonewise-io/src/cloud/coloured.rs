@@ -7,7 +7,8 @@ use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::CloudError;
-use super::las::{Export, ExtraType, LazWriter, describe, export_header, transforms_for, wkt_record};
+use super::extra_bytes::{ExtraType, describe};
+use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
 use super::whole::write_whole;
 
 /// Finest step of coordinates, metres.
@@ -43,6 +44,7 @@ impl ColouredPoints {
             intensity: 0,
             color: Some(colour.map(|c| u16::from(c) * 257)),
             source: 0,
+            gps_time: 0.0,
         };
         record.append(&self.transforms, &mut self.records);
         self.records.extend(numbers.iter().flat_map(|v| v.to_le_bytes()));
@@ -62,16 +64,17 @@ impl ColouredPoints {
 
 /// Writes a LAZ file (LAS 1.4, point format 7) of coloured points with single-precision extra dimensions.
 ///
-/// `bounds`: a box around all points. `names`: of the dimensions, at most 32 ASCII characters. `wkt`: the coordinate
-/// system, where it is known. `fill` hands over the points.
+/// `bounds`: a box around all points. `names`: of the dimensions, at most 32 ASCII characters. `crs`: the
+/// coordinate system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points.
 ///
 /// # Errors
-/// A name does not fit, the box is too large, `fill` fails, or the file cannot be written; an earlier file is kept then.
+/// A name does not fit, the box is too large, `fill` fails, or the file cannot be written; an earlier file is
+/// kept then.
 pub fn write_coloured_laz<E: From<CloudError>>(
     path: &Path,
     bounds: &Bounds,
     names: &[&str],
-    wkt: Option<&str>,
+    crs: Option<&str>,
     fill: impl FnOnce(&mut ColouredPoints) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut descriptors = Vec::new();
@@ -84,7 +87,7 @@ pub fn write_coloured_laz<E: From<CloudError>>(
     write_whole(path, |partial| {
         let extra_bytes = names.len() as u16 * ExtraType::F32.size();
         let mut header = export_header(true, transforms, extra_bytes, descriptors);
-        header.vlrs.extend(wkt.map(wkt_record));
+        header.vlrs.extend(crs.and_then(crs_record));
         let mut points = ColouredPoints {
             writer: LazWriter::create(partial, path, header)?,
             transforms,

@@ -4,12 +4,12 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordName};
+use e57::{CartesianCoordinate, E57Reader, Point, PointCloud, RecordDataType, RecordName};
 use nalgebra::Point3;
 
 use super::chunk::{Chunker, PointRecord, Visit};
 use super::guard::guarded;
-use super::info::Scan;
+use super::scan::Scan;
 use super::{CloudError, ReadSummary};
 
 /// Points decoded between two looks at the caller's wish to stop.
@@ -66,6 +66,13 @@ fn read_scan<E: From<CloudError>>(
     scan: &PointCloud,
     chunker: &mut Chunker<'_, E>,
 ) -> Result<(), E> {
+    if scan.records > 0 && scan.prototype.iter().all(|record| is_constant(&record.data_type)) {
+        // Points without a bit of data have no end.
+        let name = scan.name.as_deref().unwrap_or("without a name");
+        let reason =
+            format!("all values of scan {name} are constants, so that nothing tells its points apart");
+        return Err(CloudError::malformed(path, reason).into());
+    }
     let mut points = guarded(path, || {
         reader.pointcloud_simple(scan).map_err(|e| e57_error(path, &e))
     })?;
@@ -81,6 +88,14 @@ fn read_scan<E: From<CloudError>>(
         for point in &step {
             chunker.push(record(point))?;
         }
+    }
+}
+
+/// Whether values of a type take no bits.
+fn is_constant(kind: &RecordDataType) -> bool {
+    match kind {
+        RecordDataType::Integer { min, max } | RecordDataType::ScaledInteger { min, max, .. } => min == max,
+        RecordDataType::Single { .. } | RecordDataType::Double { .. } => false,
     }
 }
 

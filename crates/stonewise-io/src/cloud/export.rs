@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::label::{Fill, LabelColumns, PointLabel};
-use super::las::{Export, LazWriter, export_header, transforms_for, wkt_record};
+use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
 use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, read_cloud};
 
 /// Step of the coordinates, metres.
@@ -31,7 +31,7 @@ pub(super) fn export_labelled<E: From<CloudError>>(
         columns.size(),
         columns.descriptors(),
     );
-    header.vlrs.extend(survey.crs.as_deref().map(wkt_record));
+    header.vlrs.extend(survey.crs.as_deref().and_then(crs_record));
     let mut writer = LazWriter::create(partial, name, header)?;
     let summary = read_cloud(input, CHUNK_POINTS, |chunk| {
         let labels = fill(chunk)?;
@@ -48,7 +48,7 @@ struct Survey {
     bounds: Bounds,
     has_color: bool,
     max_intensity: f32,
-    /// WKT.
+    /// WKT, or a code.
     crs: Option<String>,
 }
 
@@ -77,7 +77,7 @@ impl Survey {
             }),
             has_color,
             max_intensity,
-            crs: crs.filter(|text| text.contains('[')),
+            crs,
         })
     }
 
@@ -103,6 +103,7 @@ impl Survey {
                 intensity: intensity.unwrap_or(0),
                 color: self.has_color.then_some(color.unwrap_or_default()),
                 source: chunk.scan.map_or(0, |scan| (scan + 1) as u16),
+                gps_time: 0.0,
             };
             record.append(transforms, &mut out);
             columns.append(label, &mut out);

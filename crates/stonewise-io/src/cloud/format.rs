@@ -37,7 +37,7 @@ impl CloudFormat {
         match start.as_slice() {
             s if s.starts_with(b"LASF") => Ok(Self::Las),
             s if s.starts_with(b"ASTM-E57") => Ok(Self::E57),
-            s if s.starts_with(b"ply\n") || s.starts_with(b"ply\r") => Ok(Self::Ply),
+            [b'p', b'l', b'y', next, ..] if next.is_ascii_whitespace() => Ok(Self::Ply),
             _ if TEXT_EXTENSIONS.contains(&extension.as_str()) => Ok(Self::Text),
             _ => Err(wrong_start(path, &extension, start.is_empty())),
         }

@@ -7,8 +7,8 @@ use super::CloudError;
 
 /// Runs a step of another library's decoder; a panic in it becomes an error that names the file.
 ///
-/// The LAZ decoder asserts, indexes and subtracts unchecked in places, which damaged bytes can reach. Whatever
-/// the step left behind must not be used after an error.
+/// The LAZ decoder asserts, indexes and subtracts unchecked in places, which damaged bytes can reach.
+/// Whatever the step left behind must not be used after an error.
 pub(super) fn guarded<T>(path: &Path, step: impl FnOnce() -> Result<T, CloudError>) -> Result<T, CloudError> {
     catch_unwind(AssertUnwindSafe(step))
         .unwrap_or_else(|_| Err(CloudError::malformed(path, "the file is damaged")))

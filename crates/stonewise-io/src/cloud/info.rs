@@ -5,7 +5,8 @@ use std::path::Path;
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
-use super::{CloudError, CloudFormat, e57_file, las, read_cloud};
+use super::scan::Scan;
+use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, ply, read_cloud};
 
 /// Points per chunk of a pass that only looks.
 const CHUNK_POINTS: usize = 100_000;
@@ -25,17 +26,6 @@ pub struct CloudInfo {
     pub scans: Vec<Scan>,
 }
 
-/// One scan of an E57 file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Scan {
-    /// Its name, or its number where it has none.
-    pub name: String,
-    /// Number of records.
-    pub records: u64,
-    /// Position of the scanner in the world frame, where the file has a pose.
-    pub origin: Option<Point3<f64>>,
-}
-
 /// Describes a cloud file.
 ///
 /// Cost: LAS, LAZ and COPC need their header only; the other formats are read once from end to end.
@@ -47,13 +37,7 @@ pub fn cloud_info(path: &Path) -> Result<CloudInfo, CloudError> {
     if format == CloudFormat::Las {
         return las_info(path);
     }
-    let mut bounds: Option<Bounds> = None;
-    let summary = read_cloud(path, CHUNK_POINTS, |chunk| {
-        if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
-            bounds = Some(bounds.map_or(new, |b| b.union(&new)));
-        }
-        Ok::<(), CloudError>(())
-    })?;
+    let (summary, bounds) = measure_cloud(path)?;
     let (scans, crs) = match format {
         CloudFormat::E57 => e57_file::scans(path)?,
         _ => Default::default(),
@@ -65,6 +49,46 @@ pub fn cloud_info(path: &Path) -> Result<CloudInfo, CloudError> {
         crs,
         scans,
     })
+}
+
+/// Reads all points of a file, and gives the box around them.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn measure_cloud(path: &Path) -> Result<(ReadSummary, Option<Bounds>), CloudError> {
+    let mut bounds: Option<Bounds> = None;
+    let summary = read_cloud(path, CHUNK_POINTS, |chunk| {
+        if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
+            bounds = Some(bounds.map_or(new, |b| b.union(&new)));
+        }
+        Ok::<(), CloudError>(())
+    })?;
+    Ok((summary, bounds))
+}
+
+/// The coordinate system that a file names, from its head alone: WKT, or a code such as `EPSG:25832`.
+///
+/// # Errors
+/// The file cannot be read, or its head is damaged.
+pub fn cloud_crs(path: &Path) -> Result<Option<String>, CloudError> {
+    match CloudFormat::of(path)? {
+        CloudFormat::Las => Ok(las::Layout::open(path)?.crs()),
+        CloudFormat::E57 => Ok(e57_file::scans(path)?.1),
+        CloudFormat::Ply | CloudFormat::Text => Ok(None),
+    }
+}
+
+/// How many records a file claims to have, from its head alone; `None` for text, which claims nothing.
+///
+/// # Errors
+/// The file cannot be read, or its head is damaged.
+pub fn claimed_records(path: &Path) -> Result<Option<u64>, CloudError> {
+    match CloudFormat::of(path)? {
+        CloudFormat::Las => Ok(Some(las::Layout::open(path)?.header.number_of_points())),
+        CloudFormat::E57 => Ok(Some(e57_file::scans(path)?.0.iter().map(|s| s.records).sum())),
+        CloudFormat::Ply => Ok(Some(ply::vertex_count(path)?)),
+        CloudFormat::Text => Ok(None),
+    }
 }
 
 fn las_info(path: &Path) -> Result<CloudInfo, CloudError> {

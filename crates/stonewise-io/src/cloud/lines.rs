@@ -1,7 +1,7 @@
 //! Lines of text files, without trust in their length.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use super::CloudError;
@@ -44,6 +44,14 @@ impl Lines {
             Ok(line) => Ok(Some(line.trim_start_matches('\u{feff}').trim())),
             Err(_) => Err(self.error("the line is not text in UTF-8")),
         }
+    }
+
+    /// Bytes of the file after the line that was read last.
+    pub fn bytes_left(&mut self) -> Result<u64, CloudError> {
+        let length = self.reader.get_ref().metadata().map(|m| m.len());
+        let place = length.and_then(|length| Ok((length, self.reader.stream_position()?)));
+        let (length, position) = place.map_err(|e| CloudError::read(&self.path, e))?;
+        Ok(length.saturating_sub(position))
     }
 
     /// Number of the line that was read last, from 1.

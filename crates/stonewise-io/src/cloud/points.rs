@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use las::{Transform, Vector};
+use las::{GpsTimeType, Transform, Vector};
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::CloudError;
-use super::las::{Export, ExtraType, LazWriter, describe, export_header, transforms_for};
+use super::extra_bytes::{ExtraType, describe};
+use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
 use super::whole::write_whole;
 
 /// Finest step of coordinates, metres; large extents get a coarser one.
@@ -29,14 +30,16 @@ pub enum ExtraColumn<'a> {
 
 /// Writes points with extra dimensions as LAZ (LAS 1.4, point format 6).
 ///
-/// `positions` are in the world frame, metres; the step of the coordinates is 1 micrometre, coarser only where the
-/// extent is above 4 km, about an offset in the middle. Names of dimensions are at most 32 ASCII characters.
+/// `positions` are in the world frame, metres; the step of the coordinates is 1 micrometre, coarser only
+/// where the extent is above 4 km, about an offset in the middle. Names of dimensions are at most 32 ASCII
+/// characters. `crs`: the coordinate system, where it is known: WKT, or `EPSG:` and a code.
 ///
 /// # Errors
 /// A position is not finite, a column has another length, a name does not fit, or the file cannot be written;
 /// `path` then stays as it was.
 pub fn write_points_laz(
     path: &Path,
+    crs: Option<&str>,
     positions: &[Point3<f64>],
     columns: &[(&str, ExtraColumn<'_>)],
 ) -> Result<(), CloudError> {
@@ -51,20 +54,56 @@ pub fn write_points_laz(
     });
     let kinds: Vec<(&str, ExtraType)> = columns.iter().map(|(name, c)| (*name, c.kind())).collect();
     let values: Vec<ExtraColumn<'_>> = columns.iter().map(|(_, c)| *c).collect();
-    stream_points_laz(path, &bounds, &kinds, |sink| sink.append(positions, &values))
+    stream_points_laz(path, crs, &bounds, &kinds, |sink| sink.append(positions, &values))
 }
 
-/// Writes points that come piece by piece, as [`write_points_laz`] does; none of them needs to stay in memory.
+/// Writes points that come piece by piece, as [`write_points_laz`] does; none of them needs to stay in
+/// memory.
 ///
-/// `bounds`: a box that holds all points; the step of the coordinates follows from it. `columns`: names and types of the
-/// extra dimensions, in the order in which `write` gives their values.
+/// `bounds`: a box that holds all points; the step of the coordinates follows from it. `columns`: names and
+/// types of the extra dimensions, in the order in which `write` gives their values.
 ///
 /// # Errors
 /// As [`write_points_laz`], a point outside the box, or what `write` returns; `path` then stays as it was.
 pub fn stream_points_laz<E: From<CloudError>>(
     path: &Path,
+    crs: Option<&str>,
     bounds: &Bounds,
     columns: &[(&str, ExtraType)],
+    write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    stream(path, crs, bounds, columns, GpsTimeType::Week, write)
+}
+
+/// Where and when points were measured, as a scanner's software notes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// `point_source_id` of each point: its station or strip.
+    pub sources: &'a [u16],
+    /// `gps_time` of each point: adjusted standard GPS time (LAS 1.4), seconds.
+    pub times: &'a [f64],
+}
+
+/// Writes points with their sources and times ([`PointSink::append_observed`]), else as
+/// [`stream_points_laz`]; the header says that times are adjusted standard GPS times.
+///
+/// # Errors
+/// As [`stream_points_laz`].
+pub fn stream_scan_laz<E: From<CloudError>>(
+    path: &Path,
+    bounds: &Bounds,
+    columns: &[(&str, ExtraType)],
+    write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    stream(path, None, bounds, columns, GpsTimeType::Standard, write)
+}
+
+fn stream<E: From<CloudError>>(
+    path: &Path,
+    crs: Option<&str>,
+    bounds: &Bounds,
+    columns: &[(&str, ExtraType)],
+    times: GpsTimeType,
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut descriptors = Vec::new();
@@ -76,7 +115,9 @@ pub fn stream_points_laz<E: From<CloudError>>(
     let transforms = transforms_for(bounds, FINEST_M)
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
     write_whole(path, |partial| {
-        let header = export_header(false, transforms, extra_bytes, descriptors);
+        let mut header = export_header(false, transforms, extra_bytes, descriptors);
+        header.gps_time_type = times;
+        header.vlrs.extend(crs.and_then(crs_record));
         let mut sink = PointSink {
             path,
             columns,
@@ -102,11 +143,41 @@ impl PointSink<'_> {
     /// Appends points with the values of their extra dimensions.
     ///
     /// # Errors
-    /// A position is not finite or outside the box, a column is missing or has another type or length, or the file cannot
-    /// be written.
+    /// A position is not finite or outside the box, a column is missing or has another type or length, or the
+    /// file cannot be written.
     pub fn append(
         &mut self,
         positions: &[Point3<f64>],
+        columns: &[ExtraColumn<'_>],
+    ) -> Result<(), CloudError> {
+        self.append_records(positions, None, columns)
+    }
+
+    /// The same with the source and the time of every point.
+    ///
+    /// # Errors
+    /// As [`Self::append`], and sources or times of another length.
+    pub fn append_observed(
+        &mut self,
+        positions: &[Point3<f64>],
+        observed: Observed<'_>,
+        columns: &[ExtraColumn<'_>],
+    ) -> Result<(), CloudError> {
+        let (sources, times) = (observed.sources.len(), observed.times.len());
+        if sources != positions.len() || times != positions.len() {
+            let reason = format!(
+                "{sources} sources and {times} times for {} points",
+                positions.len()
+            );
+            return Err(CloudError::unwritable(self.path, reason));
+        }
+        self.append_records(positions, Some(observed), columns)
+    }
+
+    fn append_records(
+        &mut self,
+        positions: &[Point3<f64>],
+        observed: Option<Observed<'_>>,
         columns: &[ExtraColumn<'_>],
     ) -> Result<(), CloudError> {
         self.check(positions, columns)?;
@@ -117,7 +188,8 @@ impl PointSink<'_> {
                     position: *position,
                     intensity: 0,
                     color: None,
-                    source: 0,
+                    source: observed.map_or(0, |o| o.sources[i]),
+                    gps_time: observed.map_or(0.0, |o| o.times[i]),
                 };
                 record.append(&self.transforms, &mut out);
                 columns.iter().for_each(|c| c.append(i, &mut out));

@@ -10,12 +10,12 @@ use super::{CloudError, ReadSummary};
 
 /// Passes all points of a text file to `visit`, one point per line.
 ///
-/// Columns are separated by semicolons, else by commas, else by spaces or tabs, as the first point shows; with
-/// semicolons a comma may stand for the decimal point. Lines that begin with `#`, `//` or `%` are comments. A
-/// header, also one in a comment, names the columns (x, y, z, r or red, g or green, b or blue, intensity or i).
-/// Without one they are x, y, z and, where the first point has three integers from 0 to 255 there, colours;
-/// with seven columns an intensity comes before the colours. Colours are 8-bit. A line with nothing but a
-/// count is skipped before the first point, and anywhere in PTS files.
+/// Columns are separated by semicolons, else by commas, else by spaces or tabs, as the first point shows;
+/// with semicolons a comma may stand for the decimal point. Lines that begin with `#`, `//` or `%` are
+/// comments. A header, also one in a comment, names the columns (x, y, z, r or red, g or green, b or blue,
+/// intensity or i). Without one they are x, y, z and, where the first point has three integers from 0 to 255
+/// there, colours; with seven columns an intensity comes before the colours. Colours are 8-bit. A line with
+/// nothing but a count is skipped before the first point, and anywhere in PTS files.
 pub fn read<E: From<CloudError>>(
     path: &Path,
     chunk_points: usize,

@@ -1,4 +1,5 @@
-//! Features as GeoPackage geometry blobs: a header with the envelope, then ISO well-known binary, little-endian.
+//! Features as GeoPackage geometry blobs: a header with the envelope, then ISO well-known binary,
+//! little-endian.
 
 use super::Geometry;
 use nalgebra::Point3;
@@ -33,7 +34,8 @@ impl Geometry {
     }
 }
 
-/// A feature's blob and its envelope (min x, max x, min y, max y); `None` where it has too few finite vertices.
+/// A feature's blob and its envelope (min x, max x, min y, max y); `None` where it has too few finite
+/// vertices.
 pub(super) fn encode(kind: Geometry, srs: i32, vertices: &[Point3<f64>]) -> Option<(Vec<u8>, [f64; 4])> {
     let finite = vertices.iter().all(|p| p.iter().all(|v| v.is_finite()));
     if vertices.len() < kind.least() || !finite {

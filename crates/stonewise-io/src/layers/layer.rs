@@ -1,6 +1,6 @@
 //! What a layer holds.
 
-use super::Crs;
+use crate::crs::Crs;
 use crate::table::Table;
 use nalgebra::Point3;
 
@@ -19,7 +19,8 @@ pub struct Layer {
     pub crs: Option<Crs>,
     /// Attributes; floats, integers, booleans and text.
     pub attributes: Table,
-    /// Vertices of each feature; rings are closed on writing, the first vertex is not repeated. Empty: no geometry.
+    /// Vertices of each feature; rings are closed on writing, the first vertex is not repeated. Empty: no
+    /// geometry.
     pub vertices: Vec<Vec<Point3<f64>>>,
     /// Styles for QGIS; the first is the one that opens.
     pub styles: Vec<LayerStyle>,

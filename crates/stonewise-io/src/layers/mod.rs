@@ -1,7 +1,6 @@
-//! Layers of features for other programs: GeoPackage and GeoJSON for geographic information systems, VTK for ParaView.
-//! Only writing.
+//! Layers of features for other programs: GeoPackage and GeoJSON for geographic information systems, VTK for
+//! ParaView. Only writing.
 
-mod crs;
 mod geojson;
 mod geometry;
 mod geopackage;
@@ -9,7 +8,6 @@ mod layer;
 mod schema;
 mod vtk;
 
-pub use crs::Crs;
 pub use geojson::write_geojson;
 pub use geopackage::{LayerError, write_geopackage};
 pub use layer::{Geometry, Layer, LayerStyle};

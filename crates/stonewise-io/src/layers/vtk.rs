@@ -1,7 +1,7 @@
 //! VTK XML polygonal data (`.vtp`), for ParaView.
 //!
-//! Format: "VTK XML file formats", version 1.0, arrays inline as base64 of an unsigned 64-bit byte count and the data,
-//! little-endian, uncompressed.
+//! Format: "VTK XML file formats", version 1.0, arrays inline as base64 of an unsigned 64-bit byte count and
+//! the data, little-endian, uncompressed.
 
 use crate::atomic::write_atomically;
 use base64::Engine;
@@ -27,8 +27,8 @@ pub struct PolyData {
 /// Writes a `.vtp` file; values that are not known are NaN, which ParaView shows in a colour of its own.
 ///
 /// # Errors
-/// Columns differ in length, a polygon names a point that is not there, or the file cannot be written; an earlier file
-/// is kept then.
+/// Columns differ in length, a polygon names a point that is not there, or the file cannot be written; an
+/// earlier file is kept then.
 pub fn write_vtp(path: &Path, data: &PolyData) -> io::Result<()> {
     let points = data.points.len();
     let cells = if data.polygons.is_empty() {

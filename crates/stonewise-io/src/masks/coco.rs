@@ -15,6 +15,19 @@ pub struct CocoMasks {
     annotations: BTreeMap<u64, Vec<RawAnnotation>>,
 }
 
+/// A photo that a COCO file lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ListedPhoto<'a> {
+    /// Its name, folders included where the file has them.
+    pub file_name: &'a str,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Number of its masks.
+    pub masks: usize,
+}
+
 #[derive(Deserialize)]
 struct RawFile {
     images: Vec<RawImage>,
@@ -111,12 +124,22 @@ impl CocoMasks {
         })
     }
 
+    /// The photos that the file lists, in its order.
+    pub fn photos(&self) -> impl Iterator<Item = ListedPhoto<'_>> {
+        self.images.iter().map(|image| ListedPhoto {
+            file_name: &image.file_name,
+            width: image.width,
+            height: image.height,
+            masks: self.annotations.get(&image.id).map_or(0, Vec::len),
+        })
+    }
+
     /// The labels of a photo, see [`super::MaskSource::labels_for`].
     ///
-    /// An instance's label is its place among the photo's annotations, from 1 on. Where masks overlap, the one of smaller area is on
-    /// top (the later one if equal), so that a small stone inside the outline of a large one survives. The polygons of one
-    /// annotation are joined, as pycocotools does. Crowds and masks without a visible pixel are left out with a
-    /// warning.
+    /// An instance's label is its place among the photo's annotations, from 1 on. Where masks overlap, the
+    /// one of smaller area is on top (the later one if equal), so that a small stone inside the outline of a
+    /// large one survives. The polygons of one annotation are joined, as pycocotools does. Crowds and masks
+    /// without a visible pixel are left out with a warning.
     ///
     /// # Errors
     /// As [`super::MaskSource::labels_for`].

@@ -19,8 +19,8 @@ pub struct CocoPhoto<'a> {
 
 /// A COCO instances file with one category, `stone`, that grows photo by photo.
 ///
-/// Polygons run along pixel edges, so the file reads back to the same pixels; a mask with a hole, which COCO's polygons
-/// cannot hold, is written as compressed runs.
+/// Polygons run along pixel edges, so the file reads back to the same pixels; a mask with a hole, which
+/// COCO's polygons cannot hold, is written as compressed runs.
 #[derive(Clone, Debug, Default)]
 pub struct CocoFile {
     images: Vec<Value>,

@@ -92,6 +92,19 @@ pub enum MaskError {
         /// What it is.
         found: String,
     },
+    /// More pixels than the file can hold.
+    #[error(
+        "the header claims {}x{} pixels, and the file has {length} bytes: write the label image again: {}",
+        claimed.0, claimed.1, path.display()
+    )]
+    TooManyPixels {
+        /// File.
+        path: PathBuf,
+        /// Width and height that the header claims.
+        claimed: (u32, u32),
+        /// Bytes of the file.
+        length: u64,
+    },
     /// A label does not fit the format.
     #[error("label {label} does not fit a 16-bit PNG: write COCO json instead: {}", path.display())]
     LabelTooLarge {

@@ -12,6 +12,10 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{LabelImage, Raster};
 
+/// Bytes of pixels for each byte of a PNG, at most: deflate packs 258 bytes into two bits (RFC 1951, section
+/// 3.2.5).
+const MAX_PACKING: u64 = 1032;
+
 /// A folder of label images, each named after its photo: NAME.png, NAME_ids.png or NAME_mask.png.
 #[derive(Clone, Debug)]
 pub struct LabelFolder {
@@ -53,15 +57,16 @@ impl LabelFolder {
         let Some(path) = self.find(photo_name)? else {
             return Ok(None);
         };
-        let labels = read_label_png(path)?;
-        if (labels.width(), labels.height()) != (width, height) {
+        let decoder = label_decoder(path)?;
+        if decoder.dimensions() != (width, height) {
             return Err(MaskError::WrongSize {
                 path: path.clone(),
                 photo: photo_name.to_owned(),
-                found: (labels.width(), labels.height()),
+                found: decoder.dimensions(),
                 expected: (width, height),
             });
         }
+        let labels = decode_labels(decoder, path)?;
         let ids: BTreeSet<u32> = labels.data().iter().copied().filter(|&id| id != 0).collect();
         let mut warnings = Vec::new();
         if ids.len() == 1 && ids.contains(&255) {
@@ -116,10 +121,14 @@ impl LabelFolder {
 /// # Errors
 /// The file is missing, broken, or has colours, transparency or another depth.
 pub fn read_label_png(path: &Path) -> Result<LabelImage, MaskError> {
-    let file = File::open(path).map_err(|source| MaskError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    decode_labels(label_decoder(path)?, path)
+}
+
+type LabelDecoder = PngDecoder<BufReader<File>>;
+
+/// Reads the head of a label image.
+fn label_decoder(path: &Path) -> Result<LabelDecoder, MaskError> {
+    let file = File::open(path).map_err(|source| unreadable(path, source))?;
     let broken = |e| image_io::read_error(path, e);
     let decoder = PngDecoder::new(BufReader::new(file)).map_err(broken)?;
     let found = decoder.original_color_type();
@@ -129,7 +138,23 @@ pub fn read_label_png(path: &Path) -> Result<LabelImage, MaskError> {
             found: format!("{found:?}"),
         });
     }
+    Ok(decoder)
+}
+
+/// Decodes the pixels, unless the file cannot hold so many.
+fn decode_labels(decoder: LabelDecoder, path: &Path) -> Result<LabelImage, MaskError> {
     let (width, height) = decoder.dimensions();
+    let length = std::fs::metadata(path)
+        .map_err(|source| unreadable(path, source))?
+        .len();
+    if decoder.total_bytes() / MAX_PACKING > length {
+        return Err(MaskError::TooManyPixels {
+            path: path.to_owned(),
+            claimed: (width, height),
+            length,
+        });
+    }
+    let broken = |e| image_io::read_error(path, e);
     let values: Vec<u32> = match DynamicImage::from_decoder(decoder).map_err(broken)? {
         DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(u32::from).collect(),
         other => other
@@ -162,6 +187,13 @@ pub fn write_label_png(path: &Path, labels: &LabelImage) -> Result<(), MaskError
         PngEncoder::new(file).write_image(&bytes, labels.width(), labels.height(), ExtendedColorType::L16)
     })?;
     Ok(())
+}
+
+fn unreadable(path: &Path, source: std::io::Error) -> MaskError {
+    MaskError::Read {
+        path: path.to_owned(),
+        source,
+    }
 }
 
 fn is_png(path: &Path) -> bool {

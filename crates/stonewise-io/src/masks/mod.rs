@@ -6,7 +6,7 @@ mod error;
 mod label_png;
 mod valid_regions;
 
-pub use coco::CocoMasks;
+pub use coco::{CocoMasks, ListedPhoto};
 pub use coco_write::{CocoFile, CocoPhoto, write_coco};
 pub use error::MaskError;
 pub use label_png::{LabelFolder, read_label_png, write_label_png};
@@ -61,8 +61,9 @@ impl MaskSource {
 
     /// The labels of a photo of this size; `None` where the source has nothing about it.
     ///
-    /// `photo_name`: best with the folders it lies in, which tell apart photos of the same name; upper and lower case and a
-    /// missing extension do not matter. Of several fitting entries the one with more of the folders wins.
+    /// `photo_name`: best with the folders it lies in, which tell apart photos of the same name; upper and
+    /// lower case and a missing extension do not matter. Of several fitting entries the one with more of the
+    /// folders wins.
     ///
     /// # Errors
     /// The masks are broken or made for another image size, or two entries fit equally well.

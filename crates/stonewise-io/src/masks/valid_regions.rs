@@ -9,8 +9,9 @@ use stonewise_core::raster::{Raster, fill_polygon};
 
 /// For each photo, the regions inside which every stone has a mask; elsewhere stones without one are common.
 ///
-/// A JSON file with an object for each photo name: `width`, `height` and `valid`, a list of regions. A region has an `outer` polygon and
-/// `holes`, each polygon a flat list x, y, x, y, ... in pixels. Other keys are left alone.
+/// A JSON file with an object for each photo name: `width`, `height` and `valid`, a list of regions. A region
+/// has an `outer` polygon and `holes`, each polygon a flat list x, y, x, y, ... in pixels. Other keys are
+/// left alone.
 #[derive(Clone, Debug)]
 pub struct ValidRegions {
     path: PathBuf,
@@ -51,7 +52,8 @@ impl ValidRegions {
         })
     }
 
-    /// True where the masks of a photo of this size are not complete; `None` where the file does not name the photo.
+    /// True where the masks of a photo of this size are not complete; `None` where the file does not name the
+    /// photo.
     ///
     /// # Errors
     /// The regions were drawn in a photo of another size, or two entries fit the name equally well.

@@ -10,9 +10,10 @@ use crate::atomic::write_atomically;
 
 /// Writes a table as CSV: a header line, then one line per row, `\n` at each end.
 ///
-/// An empty cell stays empty; an empty string is written as `""`. Floats have the fewest digits that read back to
-/// the same value; booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break or
-/// spaces at an end (RFC 4180). Metadata is not written.
+/// An empty cell stays empty; an empty string is written as `""`. Floats have the fewest digits that read
+/// back to the same value; booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break
+/// or spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with
+/// =, +, - or @, gets an apostrophe in front. Metadata is not written.
 ///
 /// # Errors
 /// The file cannot be written; an earlier file is kept then.
@@ -73,6 +74,9 @@ fn is_plain(value: f64) -> bool {
 }
 
 fn write_text(out: &mut impl Write, text: &str) -> io::Result<()> {
+    let shielded = format!("'{text}");
+    let is_formula = text.trim_start().starts_with(['=', '+', '-', '@']);
+    let text = if is_formula { &shielded } else { text };
     let quoted = text.is_empty() || text.contains([',', '"', '\n', '\r']) || text.trim() != text;
     if quoted {
         write!(out, "\"{}\"", text.replace('"', "\"\""))
@@ -84,6 +88,19 @@ fn write_text(out: &mut impl Write, text: &str) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_text_begins_like_a_formula() {
+        let mut table = Table::new();
+        let names = ["=1+1", "+a", "-b.jpg", "@c", " =HYPERLINK(\"x\")", "a=b"];
+        table.push("photo", names.map(str::to_owned).to_vec()).unwrap();
+        table.push("number", vec![-1.5; 6]).unwrap();
+        let mut out = Vec::new();
+        write_rows(&mut out, &table).unwrap();
+        let expected = "photo,number\n'=1+1,-1.5\n'+a,-1.5\n'-b.jpg,-1.5\n'@c,-1.5\n\
+                        \"' =HYPERLINK(\"\"x\"\")\",-1.5\na=b,-1.5\n";
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
+    }
 
     #[test]
     fn cells_are_written_by_type() {

@@ -19,7 +19,8 @@ use super::{Column, Table, TableError};
 /// Reads all columns of a Parquet file.
 ///
 /// # Errors
-/// The file cannot be read, is no Parquet file, is damaged, or has a column of a type that a [`Table`] cannot hold.
+/// The file cannot be read, is no Parquet file, is damaged, or has a column of a type that a [`Table`] cannot
+/// hold.
 pub fn read_parquet(path: &Path) -> Result<Table, TableError> {
     guarded(path, || read_selected(path, None))
 }

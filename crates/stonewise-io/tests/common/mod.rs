@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-/// A file or folder of the sample surveys, which may lie beside the checkout; says so and gives `None` where it does not.
+/// A file or folder of the sample surveys, which may lie beside the checkout; says so and gives `None` where
+/// it does not.
 #[allow(clippy::print_stdout)] // a skipped test must say so
 pub fn survey(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))

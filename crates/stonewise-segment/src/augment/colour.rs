@@ -1,12 +1,13 @@
 //! Light, colours and the marks of cameras.
 
-use super::AugmentParams;
-use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageError};
+use super::params::AugmentParams;
+use crate::jpeg::through_jpeg;
+use image::ImageError;
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use stonewise_core::raster::{Raster, RgbImage};
+use stonewise_core::simulate::normal;
 
 /// Qualities of JPEG files, from and to.
 const JPEG_QUALITY: [f64; 2] = [35.0, 95.0];
@@ -44,12 +45,6 @@ pub fn recolour(image: &RgbImage, params: &AugmentParams, rng: &mut ChaCha8Rng) 
 
 fn between(rng: &mut ChaCha8Rng, [low, high]: [f64; 2]) -> f64 {
     low + (high - low) * rng.random::<f64>()
-}
-
-/// A standard normal number (Box & Muller 1958).
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    let (u, v): (f64, f64) = (rng.random(), rng.random());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (std::f64::consts::TAU * v).cos()
 }
 
 /// Brightness, contrast, and a linear map of colours; values from 0 to 1.
@@ -138,14 +133,6 @@ fn blur(pixels: &mut [[f64; 3]], [width, height]: [u32; 2], sigma_px: f64) {
 
 fn compress(image: &RgbImage, quality: u8) -> Result<RgbImage, ImageError> {
     let (width, height) = (image.width(), image.height());
-    let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, quality).encode(
-        image.data().as_flattened(),
-        width,
-        height,
-        ExtendedColorType::Rgb8,
-    )?;
-    let decoded = DynamicImage::from_decoder(JpegDecoder::new(std::io::Cursor::new(bytes))?)?.into_rgb8();
-    let pixels = decoded.pixels().map(|p| p.0).collect();
+    let pixels = through_jpeg(image.data(), [width, height], quality)?;
     Ok(Raster::from_vec(width, height, pixels).unwrap_or_else(|| image.clone()))
 }

@@ -1,6 +1,6 @@
 //! Which part of a photo a training image shows, and from where.
 
-use super::AugmentParams;
+use super::params::AugmentParams;
 use super::photo::Photo;
 use crate::Sample;
 use nalgebra::{Matrix3, Vector3};
@@ -27,8 +27,8 @@ impl CropView {
         )
     }
 
-    /// A square around a place, turned, mirrored and seen obliquely by chance, in which a stone of typical size has one of the sizes of
-    /// `params.stone_px`, small sizes as often as large ones.
+    /// A square around a place, turned, mirrored and seen obliquely by chance, in which a stone of typical
+    /// size has one of the sizes of `params.stone_px`, small sizes as often as large ones.
     pub fn random(
         photo: &Photo,
         centre: [f64; 2],
@@ -55,7 +55,8 @@ impl CropView {
         Self::of_corners(corners, side, size_px)
     }
 
-    /// The map of the crop's corners, clockwise from its first pixel, to these places. Source: Heckbert 1989, section 2.2.3.
+    /// The map of the crop's corners, clockwise from its first pixel, to these places. Source: Heckbert 1989,
+    /// section 2.2.3.
     fn of_corners([p0, p1, p2, p3]: [[f64; 2]; 4], side: f64, size_px: u32) -> Self {
         let difference = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
         let cross = |a: [f64; 2], b: [f64; 2]| a[0] * b[1] - a[1] * b[0];

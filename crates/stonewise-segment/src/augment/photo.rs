@@ -7,7 +7,8 @@ use stonewise_core::raster::{RgbImage, connected_components};
 /// Smaller images of a photo are made down to this length of the shorter side.
 const LEAST_SIDE_PX: u32 = 64;
 
-/// A labelled photo with its smaller images, each half the size of the one before. Memory: about nine bytes a pixel.
+/// A labelled photo with its smaller images, each half the size of the one before. Memory: about nine bytes a
+/// pixel.
 #[derive(Clone, Debug)]
 pub struct Photo {
     sample: Sample,
@@ -43,7 +44,8 @@ impl Photo {
         self.stone_px
     }
 
-    /// The image whose pixels are no larger than a crop's at this scale (crop pixels in a photo pixel), and at least half as large.
+    /// The image whose pixels are no larger than a crop's at this scale (crop pixels in a photo pixel), and
+    /// at least half as large.
     fn level(&self, scale: f64) -> &RgbImage {
         let halvings = (1.0 / scale).log2().floor().max(0.0) as usize;
         match halvings.min(self.smaller.len()) {
@@ -52,7 +54,8 @@ impl Photo {
         }
     }
 
-    /// The colour at a place of the photo, interpolated in the image for this scale; places outside have that of the border.
+    /// The colour at a place of the photo, interpolated in the image for this scale; places outside have that
+    /// of the border.
     pub fn colour(&self, at: [f64; 2], scale: f64) -> [u8; 3] {
         let image = self.level(scale);
         let size = [image.width(), image.height()].map(f64::from);

@@ -6,7 +6,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use stonewise_core::raster::{LabelImage, Raster, RgbImage};
 
-/// Blocks of 30 x 20 pixels, one stone each, with joints of 4 pixels; red and green are the number of the stone.
+/// Blocks of 30 x 20 pixels, one stone each, with joints of 4 pixels; red and green are the number of the
+/// stone.
 fn photo() -> Photo {
     let label = |x: u32, y: u32| {
         let is_joint = x % 30 < 4 || y % 20 < 4;

@@ -47,7 +47,8 @@ pub enum DatasetError {
 }
 
 impl Reference {
-    /// Opens masks (COCO json or a folder of label PNGs) and, where they are not complete everywhere, a file of valid regions.
+    /// Opens masks (COCO json or a folder of label PNGs) and, where they are not complete everywhere, a file
+    /// of valid regions.
     ///
     /// # Errors
     /// A file cannot be read.
@@ -58,7 +59,8 @@ impl Reference {
         })
     }
 
-    /// The stones of a photo of this size, and true where they are not complete; `None` for a photo without masks.
+    /// The stones of a photo of this size, and true where they are not complete; `None` for a photo without
+    /// masks.
     ///
     /// A photo that the file of valid regions does not name is complete nowhere.
     ///
@@ -85,7 +87,8 @@ impl Reference {
 }
 
 impl LabelledPhotos {
-    /// Finds the photos below a folder that have masks. `valid`: where the masks are complete; everywhere if absent.
+    /// Finds the photos below a folder that have masks. `valid`: where the masks are complete; everywhere if
+    /// absent.
     ///
     /// # Errors
     /// The folder or a file cannot be read, or no photo has masks.

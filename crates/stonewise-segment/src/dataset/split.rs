@@ -1,13 +1,14 @@
 //! Stones to learn from, stones to measure on.
 
 use crate::Sample;
-use crate::train::seed::mix;
+use crate::seed::mix;
 use std::collections::BTreeMap;
 
 /// Square blocks of a photo, some of which are kept for measuring.
 ///
-/// The split is one of blocks and not of photos, so that it works for a single photo too. A stone belongs to the blocks that hold most of it;
-/// training crops that show a block kept for measuring know nothing about it, so that no label is learnt and measured.
+/// The split is one of blocks and not of photos, so that it works for a single photo too. A stone belongs to
+/// the blocks that hold most of it; training crops that show a block kept for measuring carry no label of
+/// it, so that no label is learnt and measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
     block_px: u32,

@@ -5,10 +5,12 @@ use super::pairs::{FoundStone, PhotoPairs};
 /// Recall is sampled in steps of one hundredth.
 const RECALL_STEPS: usize = 100;
 
-/// Average precision over all photos where a stone is found from this IoU on; `None` without reference stones.
+/// Average precision over all photos where a stone is found from this IoU on; `None` without reference
+/// stones.
 ///
-/// Stones found are ranked by score (ties keep their order: photo by photo, by label); precision at a recall is the best at that recall or a
-/// higher one, averaged over recalls 0, 0.01, ... 1. Source: the evaluation code of COCO (Lin et al. 2014).
+/// Stones found are ranked by score (ties keep their order: photo by photo, by label); precision at a recall
+/// is the best at that recall or a higher one, averaged over recalls 0, 0.01, ... 1. Source: the evaluation
+/// code of COCO (Lin et al. 2014).
 pub fn average_precision(photos: &[PhotoPairs], least_iou: f64) -> Option<f64> {
     let references: usize = photos.iter().map(|p| p.references).sum();
     if references == 0 {

@@ -4,8 +4,8 @@ use crate::Segmentation;
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::raster::{LabelImage, Raster};
 
-/// Pairs of less overlap are none. From here on a mask fits one mask of the other image at most (two would have to share pixels),
-/// but for ties at exactly one half.
+/// Pairs of less overlap are none. From here on a mask fits one mask of the other image at most (two would
+/// have to share pixels), but for ties at exactly one half.
 const LEAST_IOU: f64 = 0.5;
 
 /// What became of the stones of one photo.
@@ -22,7 +22,8 @@ pub struct PhotoPairs {
 pub struct FoundStone {
     /// How sure the detector was.
     pub score: f32,
-    /// Intersection over union with the reference stone that it fits; `None` where there is none of at least one half.
+    /// Intersection over union with the reference stone that it fits; `None` where there is none of at least
+    /// one half.
     pub iou: Option<f64>,
     /// Nothing is known about it unless it fits a stone that counts.
     pub is_unknown: bool,
@@ -30,8 +31,8 @@ pub struct FoundStone {
 
 /// Pairs the stones found in a photo with reference stones, one to one, by descending overlap.
 ///
-/// `ignore`: where the reference is not complete. All three images have one size; what lies beyond the smallest is ignored.
-/// Cost: O(pixels log stones).
+/// `ignore`: where the reference is not complete. All three images have one size; what lies beyond the
+/// smallest is ignored. Cost: O(pixels log stones).
 pub fn pair_masks(found: &Segmentation, reference: &LabelImage, ignore: &Raster<bool>) -> PhotoPairs {
     let counts = Counts::of(&found.labels, reference, ignore);
     let mut pairs: Vec<(f64, u32, u32)> = counts

@@ -1,9 +1,11 @@
-//! Reference boxes (Ren et al. 2015, section 3.1), one set per level of the pyramid (Lin et al. 2017, section 4.1).
+//! Reference boxes (Ren et al. 2015, section 3.1), one set per level of the pyramid (Lin et al. 2017, section
+//! 4.1).
 
 use super::boxes::Bounds;
 use super::config::AnchorConfig;
 
-/// The boxes around one place, at the origin: all shapes of the first size ratio come together. Corners are whole pixels.
+/// The boxes around one place, at the origin: all shapes of the first size ratio come together. Corners are
+/// whole pixels.
 fn cell_anchors(sizes: &[f32], aspect_ratios: &[f32]) -> Vec<Bounds> {
     let mut anchors = Vec::with_capacity(sizes.len() * aspect_ratios.len());
     for &ratio in aspect_ratios {
@@ -18,8 +20,8 @@ fn cell_anchors(sizes: &[f32], aspect_ratios: &[f32]) -> Vec<Bounds> {
     anchors
 }
 
-/// All reference boxes of an image of `image` pixels (columns, rows) whose levels have `grids` cells (columns, rows):
-/// level by level, then row, column, shape.
+/// All reference boxes of an image of `image` pixels (columns, rows) whose levels have `grids` cells
+/// (columns, rows): level by level, then row, column, shape.
 pub fn anchors(config: &AnchorConfig, image: [usize; 2], grids: &[[usize; 2]]) -> Vec<Vec<Bounds>> {
     let levels = config.sizes.iter().zip(grids);
     let level = |(sizes, grid): (&Vec<f32>, &[usize; 2])| {

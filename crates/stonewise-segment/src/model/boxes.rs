@@ -42,8 +42,8 @@ pub fn is_large([left, top, right, bottom]: Bounds, min: f32) -> bool {
     right - left >= min && bottom - top >= min
 }
 
-/// Offsets that turn `reference` into `target` (Girshick et al. 2014, eqs. 6-9): shift of the centre in sizes of the
-/// reference, log of the growth; each times its weight.
+/// Offsets that turn `reference` into `target` (Girshick et al. 2014, eqs. 6-9): shift of the centre in sizes
+/// of the reference, log of the growth; each times its weight.
 pub fn encode(reference: Bounds, target: Bounds, weights: [f32; 4]) -> [f32; 4] {
     let ([x, y], [width, height]) = center_size(reference);
     let ([target_x, target_y], [target_width, target_height]) = center_size(target);

@@ -17,7 +17,8 @@ pub enum ResnetDepth {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Norm {
-    /// Batch normalisation with stored statistics that training leaves alone: for weights that come with statistics.
+    /// Batch normalisation with stored statistics that training leaves alone: for weights that come with
+    /// statistics.
     FrozenBatch {
         /// Added to the variance.
         epsilon: f64,
@@ -116,8 +117,8 @@ pub struct MaskRcnnConfig {
     pub backbone: BackboneConfig,
     /// Channels of the feature pyramid.
     pub fpn_channels: usize,
-    /// Groups of channels of a group normalisation of pyramid and convolutional heads, which training from scratch needs
-    /// (He et al. 2019); `None`: not normalised, as published.
+    /// Groups of channels of a group normalisation of pyramid and convolutional heads, which training from
+    /// scratch needs (He et al. 2019); `None`: not normalised, as published.
     #[serde(default)]
     pub head_groups: Option<usize>,
     /// Reference boxes.
@@ -138,13 +139,13 @@ pub struct MaskRcnnConfig {
     pub min_stone_pixels: usize,
 }
 
-/// A configuration that no network can have.
+/// An impossible configuration of the model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("model configuration: {0}")]
 pub struct ConfigError(String);
 
 impl MaskRcnnConfig {
-    /// The network of torchvision's `maskrcnn_resnet50_fpn` with its released weights: 91 classes of COCO.
+    /// The model of torchvision's `maskrcnn_resnet50_fpn` with its released weights: 91 classes of COCO.
     pub fn torchvision_r50() -> Self {
         Self {
             classes: 91,
@@ -197,7 +198,8 @@ impl MaskRcnnConfig {
         }
     }
 
-    /// A network that two CPU cores can train from scratch and a laptop can run; anchors for stones of 12 to 400 pixels.
+    /// A model that two CPU cores can train from scratch and a laptop can run; anchors for stones of 12 to
+    /// 400 pixels.
     pub fn light() -> Self {
         Self {
             classes: 2,
@@ -234,7 +236,7 @@ impl MaskRcnnConfig {
         }
     }
 
-    /// Refuses what no network can be built from.
+    /// Refuses configurations from which no model can be built.
     ///
     /// # Errors
     /// A number is out of range; the message names it.

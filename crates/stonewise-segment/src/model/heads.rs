@@ -80,7 +80,8 @@ impl<B: ModelBackend> RoiHeads<B> {
         }
     }
 
-    /// Class logits [regions, classes] and box offsets [regions, 4 classes] of regions [regions, channels, cells, cells].
+    /// Class logits [regions, classes] and box offsets [regions, 4 classes] of regions [regions, channels,
+    /// cells, cells].
     pub fn boxes(&self, regions: Tensor<B, 4>) -> (Tensor<B, 2>, Tensor<B, 2>) {
         let x = relu(self.box_head.fc6.forward(regions.flatten(1, 3)));
         let x = relu(self.box_head.fc7.forward(x));

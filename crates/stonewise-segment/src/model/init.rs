@@ -1,4 +1,4 @@
-//! First values of a network's parameters, the same for the same seed on every machine.
+//! First values of a model's parameters, the same for the same seed on every machine.
 
 use burn::module::{Param, ParamId};
 use burn::tensor::backend::Backend;
@@ -15,7 +15,7 @@ pub struct Init<'a, B: Backend> {
 }
 
 impl<'a, B: Backend> Init<'a, B> {
-    /// Starts a network of values drawn by chance, or of zeros where there is no seed.
+    /// Starts a model of values drawn by chance, or of zeros where there is no seed.
     pub fn new(seed: Option<u64>, device: &'a B::Device) -> Self {
         Self {
             rng: seed.map(ChaCha8Rng::seed_from_u64),

@@ -129,8 +129,8 @@ impl<B: ModelBackend> Linear<B> {
     }
 }
 
-/// Normalisation of channels, then a scale and a shift of each: over stored statistics where there are such, else over
-/// groups of channels of each image.
+/// Normalisation of channels, then a scale and a shift of each: over stored statistics where there are such,
+/// else over groups of channels of each image.
 #[derive(Module, Debug)]
 pub struct Norm<B: Backend> {
     pub weight: Param<Tensor<B, 1>>,

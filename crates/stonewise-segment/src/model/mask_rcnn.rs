@@ -1,4 +1,4 @@
-//! The whole network: photo in, stones out; labelled photos in, losses out.
+//! The whole model: a photo in, stones out; labelled photos in, losses out.
 
 use super::anchors::anchors;
 use super::boxes::{Bounds, HEAD_WEIGHTS, PROPOSAL_WEIGHTS, clip, decode, encode, is_large};
@@ -60,7 +60,7 @@ pub struct Instance {
     pub mask: Vec<f32>,
 }
 
-/// What the network sees in images: features at all scales and what the proposal network says about them.
+/// What the model sees in images: features at all scales and the scores and shifts of the proposal network.
 struct Sight<B: ModelBackend> {
     rows: FeatureRows<B>,
     scores: AnchorScores<B>,
@@ -68,7 +68,7 @@ struct Sight<B: ModelBackend> {
 }
 
 impl<B: ModelBackend> MaskRcnn<B> {
-    /// A network with random weights, the same for the same seed.
+    /// A model with random weights, the same for the same seed.
     ///
     /// # Errors
     /// The configuration makes no sense.
@@ -76,7 +76,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         Self::build(config, Some(seed), device)
     }
 
-    /// A network of zeros, to [load weights](super::load_weights) into.
+    /// A model of zeros, to [load weights](super::load_weights) into.
     ///
     /// # Errors
     /// The configuration makes no sense.
@@ -100,12 +100,12 @@ impl<B: ModelBackend> MaskRcnn<B> {
         })
     }
 
-    /// What the network looks like.
+    /// What the model looks like.
     pub fn config(&self) -> &MaskRcnnConfig {
         &self.config
     }
 
-    /// The same network, faster: stored statistics are moved into the convolutions. It cannot be saved under
+    /// The same model, faster: stored statistics are moved into the convolutions. It cannot be saved under
     /// torchvision's names.
     pub fn for_inference(mut self) -> Self {
         self.backbone.body.fold();
@@ -128,7 +128,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         self.instances(image).into_iter().map(detection).collect()
     }
 
-    /// The objects of an image, best score first, their masks still on the network's grid.
+    /// The objects of an image, best score first, their masks still on the model's grid.
     pub fn instances(&self, image: &RgbImage) -> Vec<Instance> {
         let device = &self.devices()[0];
         let seen = Seen::new(image, self.config.resize);
@@ -183,7 +183,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         }
     }
 
-    /// The objects in regions of one image, best first, without masks; bounds in pixels of the network.
+    /// The objects in regions of one image, best first, without masks; bounds in pixels of the model.
     fn classify(&self, rows: &FeatureRows<B>, regions: &[Bounds], seen: Seen) -> Vec<Instance> {
         if regions.is_empty() {
             return Vec::new();
@@ -397,14 +397,14 @@ impl<B: TrainBackend> MaskRcnn<B> {
     }
 }
 
-/// Finds stones with a trained network.
+/// Finds stones with a trained model.
 #[derive(Clone, Debug)]
 pub struct StoneDetector<B: ModelBackend> {
     model: MaskRcnn<B>,
 }
 
 impl<B: ModelBackend> StoneDetector<B> {
-    /// A detector that runs a network.
+    /// A detector that runs this model.
     pub fn new(model: MaskRcnn<B>) -> Self {
         Self {
             model: model.for_inference(),
@@ -414,7 +414,7 @@ impl<B: ModelBackend> StoneDetector<B> {
     /// Leaves out stones that score less, before their masks cost time.
     pub fn with_min_score(mut self, score: f32) -> Self {
         let threshold = &mut self.model.config.score_threshold;
-        // The network asks for more than its threshold; a stone that scores just this much stays.
+        // The model keeps scores above its threshold; a stone that scores just this much stays.
         *threshold = threshold.max(score.next_down());
         self
     }

@@ -13,11 +13,11 @@ pub enum Match {
     Between,
 }
 
-/// Matches candidates to stones by IoU: at least `positive` is the stone with the largest, below `negative` is
-/// background.
+/// Matches candidates to stones by IoU: at least `positive` is the stone with the largest, below `negative`
+/// is background.
 ///
-/// With `keep_best` the candidates that overlap a stone most, all of them where several tie, are positive whatever the
-/// overlap (Ren et al. 2015, section 3.1.2): no stone is without a candidate.
+/// With `keep_best` the candidates that overlap a stone most, all of them where several tie, are positive
+/// whatever the overlap (Ren et al. 2015, section 3.1.2): no stone is without a candidate.
 pub fn match_boxes(
     stones: &[Bounds],
     candidates: &[Bounds],

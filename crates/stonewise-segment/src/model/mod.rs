@@ -1,7 +1,8 @@
 //! Mask R-CNN (He et al. 2017) on a feature pyramid (Lin et al. 2017), generic over burn's backends.
 //!
-//! Boxes are left, top, right, bottom; pixel (x, y) covers [x, x+1) x [y, y+1). Tensors are batch, channel, row, column.
-//! What is small and full of decisions (anchors, matching, sampling, suppression) runs on plain vectors.
+//! Boxes are left, top, right, bottom; pixel (x, y) covers [x, x+1) x [y, y+1). Tensors are batch, channel,
+//! row, column. What is small and full of decisions (anchors, matching, sampling, suppression) runs on plain
+//! vectors.
 
 mod anchors;
 mod boxes;

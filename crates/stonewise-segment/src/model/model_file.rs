@@ -1,4 +1,4 @@
-//! A network whose file says what it looks like.
+//! Model files that state their configuration.
 
 use super::config::MaskRcnnConfig;
 use super::kernels::ModelBackend;
@@ -9,7 +9,7 @@ use safetensors::tensor::SafeTensors;
 use std::path::Path;
 use stonewise_io::atomic::write_atomically;
 
-/// Writes a network, whole or not at all.
+/// Writes a model, whole or not at all.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -25,10 +25,10 @@ pub fn save_model<B: ModelBackend>(
     })
 }
 
-/// Reads a network that [`save_model`] wrote.
+/// Reads a model that [`save_model`] wrote.
 ///
 /// # Errors
-/// The file cannot be read, or does not say what the network looks like.
+/// The file cannot be read, or does not state the configuration of its model.
 pub fn load_model<B: ModelBackend>(path: &Path, device: &Device<B>) -> Result<MaskRcnn<B>, WeightsError> {
     let bytes = std::fs::read(path).map_err(|source| WeightsError::File {
         path: path.to_owned(),
@@ -37,7 +37,7 @@ pub fn load_model<B: ModelBackend>(path: &Path, device: &Device<B>) -> Result<Ma
     model_from_bytes(&bytes, &path.display().to_string(), device)
 }
 
-/// A network from the bytes of its file; `name` stands for it in errors.
+/// A model from the bytes of its file; `name` stands for it in errors.
 ///
 /// # Errors
 /// As [`load_model`].

@@ -7,8 +7,9 @@ use stonewise_core::raster::Raster;
 /// Probability from which a pixel is part of a stone.
 const THRESHOLD: f32 = 0.5;
 
-/// The pixels of an image whose centres a mask of `cells` x `cells` probabilities, stretched over `bounds` and interpolated
-/// bilinearly between cell centres, calls inside. Beyond the outermost centres probabilities fall to 0 within a cell.
+/// The pixels of an image whose centres a mask of `cells` x `cells` probabilities, stretched over `bounds`
+/// and interpolated bilinearly between cell centres, calls inside. Beyond the outermost centres probabilities
+/// fall to 0 within a cell.
 pub fn paste_mask(mask: &[f32], cells: usize, bounds: Bounds, [width, height]: [u32; 2]) -> Patch {
     let [left, top, right, bottom] = clip(bounds, width as f32, height as f32);
     // Never without a pixel: a box between two pixels gets the one it lies in.

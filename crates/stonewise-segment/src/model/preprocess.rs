@@ -1,4 +1,4 @@
-//! From photos to what the network sees.
+//! From photos to the model's input.
 
 use super::config::{MaskRcnnConfig, Resize};
 use burn::tensor::backend::Backend;
@@ -6,15 +6,15 @@ use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use stonewise_core::raster::RgbImage;
 
-/// Sides of what the network sees are multiples of this: the stride of the coarsest features.
+/// Sides of the model's input are multiples of this: the stride of the coarsest features.
 const STRIDE: usize = 32;
 
-/// How large the network sees an image.
+/// Size of an image at the model's input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
     /// Columns and rows without padding.
     pub size: [usize; 2],
-    /// Network pixels per pixel, along columns and rows.
+    /// Model pixels per pixel, along columns and rows.
     pub scale: [f32; 2],
 }
 

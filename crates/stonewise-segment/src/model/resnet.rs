@@ -1,4 +1,5 @@
-//! Residual networks (He et al. 2016) of 18, 34 and 50 layers; strides sit at the 3 x 3 convolutions, as in torchvision.
+//! Residual networks (He et al. 2016) of 18, 34 and 50 layers; strides sit at the 3 x 3 convolutions, as in
+//! torchvision.
 
 use super::config::{BackboneConfig, ResnetDepth};
 use super::init::Init;

@@ -22,7 +22,8 @@ pub struct RoiAlign {
     pub cells: usize,
     /// Sampling points along a side of a cell.
     pub samples: usize,
-    /// The value of a feature lies at the centre of its cell; else at its corner, and regions are at least a feature wide.
+    /// The value of a feature lies at the centre of its cell; else at its corner, and regions are at least a
+    /// feature wide.
     pub half_pixel: bool,
 }
 
@@ -63,7 +64,8 @@ impl<B: ModelBackend> FeatureRows<B> {
         }
     }
 
-    /// Features [regions, channels, cells, cells] of regions (image, bounds), differentiable with regard to the features.
+    /// Features [regions, channels, cells, cells] of regions (image, bounds), differentiable with regard to
+    /// the features.
     pub fn cut(&self, regions: &[(usize, Bounds)], align: &RoiAlign) -> Tensor<B, 4> {
         let matrix = Arc::new(sampling_matrix(&self.shape, regions, align));
         let channels = self.rows.dims()[1];
@@ -81,8 +83,8 @@ fn level_of(bounds: Bounds) -> usize {
     level.clamp(0.0, (LEVELS - 1) as f32) as usize
 }
 
-/// The matrix that takes feature rows to cells: region by region, row, column. A cell is the mean of its sampling points,
-/// a point the bilinear mean of the four features around it.
+/// The matrix that takes feature rows to cells: region by region, row, column. A cell is the mean of its
+/// sampling points, a point the bilinear mean of the four features around it.
 fn sampling_matrix(shape: &PyramidShape, regions: &[(usize, Bounds)], align: &RoiAlign) -> SparseMatrix {
     let mut starts = vec![0usize];
     for [columns, rows] in &shape.grids {
@@ -110,8 +112,8 @@ fn sampling_matrix(shape: &PyramidShape, regions: &[(usize, Bounds)], align: &Ro
     matrix
 }
 
-/// The two features next to each sampling point along an axis and their weights, which are nothing for a point more than a
-/// feature outside; a cell's weights sum to one.
+/// The two features next to each sampling point along an axis and their weights, which are nothing for a
+/// point more than a feature outside; a cell's weights sum to one.
 fn samples_along(from: f32, to: f32, count: usize, align: &RoiAlign) -> Vec<[(usize, f32); 2]> {
     let offset = if align.half_pixel { 0.5 } else { 0.0 };
     let length = if align.half_pixel {

@@ -14,7 +14,7 @@ use burn::tensor::backend::Backend;
 /// Shorter sides make no proposal, pixels.
 const MIN_SIDE: f32 = 1e-3;
 
-/// The network that scores and shifts reference boxes.
+/// The part of the model that scores and shifts reference boxes.
 #[derive(Module, Debug)]
 pub struct Rpn<B: Backend> {
     head: Head<B>,
@@ -27,7 +27,7 @@ struct Head<B: Backend> {
     bbox_pred: Conv<B>,
 }
 
-/// What the network says about every reference box of a batch.
+/// Scores and shifts of every reference box of a batch.
 #[derive(Clone, Debug)]
 pub struct AnchorScores<B: Backend> {
     /// Logit of holding something: [batch, boxes].
@@ -75,8 +75,8 @@ impl<B: ModelBackend> Rpn<B> {
     }
 }
 
-/// The best boxes of one image, best first: of each level the best reference boxes, shifted, inside the image, without
-/// those that a better one of the same level covers.
+/// The best boxes of one image, best first: of each level the best reference boxes, shifted, inside the
+/// image, without those that a better one of the same level covers.
 ///
 /// `keep`: boxes of a level before suppression, of the image after it.
 pub fn proposals(

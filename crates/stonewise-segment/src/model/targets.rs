@@ -1,4 +1,4 @@
-//! What a labelled photo asks of the network.
+//! Training targets from a labelled photo.
 
 use super::boxes::{Bounds, area, clip};
 use super::preprocess::Seen;
@@ -11,12 +11,12 @@ const MAX_IGNORED: f32 = 0.5;
 /// Sampling points along a side of a mask's cell, at most.
 const MAX_POINTS: usize = 4;
 
-/// The stones of a photo, as the network sees it.
+/// The stones of a photo at the size at which the model looks at it.
 pub struct Targets<'a> {
     sample: &'a Sample,
     seen: Seen,
     labels: Vec<u32>,
-    /// Bounds of the stones, pixels of the network.
+    /// Bounds of the stones, pixels of the model.
     pub bounds: Vec<Bounds>,
     ignored: Option<Sums>,
 }

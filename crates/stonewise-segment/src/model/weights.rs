@@ -10,7 +10,7 @@ use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Key of the network's configuration in a file's metadata.
+/// Key of the model's configuration in a file's metadata.
 pub(super) const CONFIG_KEY: &str = "stonewise_model";
 
 /// How weights are stored.
@@ -42,8 +42,8 @@ pub enum WeightsError {
         /// What went wrong.
         source: SafeTensorError,
     },
-    /// The file does not say what the network looks like.
-    #[error("{name} does not say what its network looks like: {problem}")]
+    /// The file does not state the configuration of its model.
+    #[error("{name} does not state the configuration of its model: {problem}")]
     Config {
         /// The file or what stands for it.
         name: String,
@@ -52,7 +52,7 @@ pub enum WeightsError {
     },
     /// A parameter of the model is not in the file.
     #[error(
-        "{name} has no tensor \"{key}\", which the model needs; is it of another depth or of another network?"
+        "{name} has no tensor \"{key}\", which the model needs; is it of another depth or of another model?"
     )]
     Missing {
         /// The file or what stands for it.
@@ -86,7 +86,7 @@ pub enum WeightsError {
     },
     /// A tensor of the file belongs to no parameter of the model.
     #[error(
-        "{name} has a tensor \"{key}\" that the model does not know; is it of another depth or of another network?"
+        "{name} has a tensor \"{key}\" that the model does not have; is it of another depth or of another model?"
     )]
     Unknown {
         /// The file or what stands for it.
@@ -124,7 +124,8 @@ pub fn save_weights<B: ModelBackend>(
     })
 }
 
-/// Replaces all parameters of a model by those of a safetensors file in memory; `name` stands for it in errors.
+/// Replaces all parameters of a model by those of a safetensors file in memory; `name` stands for it in
+/// errors.
 ///
 /// # Errors
 /// As [`load_weights`].

@@ -1,9 +1,9 @@
 //! From light to a photo's bytes: blur, exposure, sensor noise, tone curve, sharpening, JPEG.
 
 use super::draw::{Rng, between, chance, log_between, normal, sometimes};
-use image::codecs::jpeg::{JpegDecoder, JpegEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageError};
+use crate::jpeg::through_jpeg;
 use rand::RngExt;
+use stonewise_core::raster::srgb_from_linear;
 
 /// Entries of the tone curve's table, over the square root of the light.
 const TONES: usize = 1024;
@@ -88,7 +88,7 @@ impl Camera {
             pixels
         };
         match self.jpeg_quality {
-            Some(quality) => compressed(&pixels, photo, quality).unwrap_or(pixels),
+            Some(quality) => through_jpeg(&pixels, photo, quality).unwrap_or(pixels),
             None => pixels,
         }
     }
@@ -129,7 +129,7 @@ impl Camera {
         let table: Vec<u8> = (0..TONES)
             .map(|i| {
                 let root = i as f32 / (TONES - 1) as f32;
-                let value = srgb(root * root);
+                let value = srgb_from_linear(root * root);
                 // A sigmoid about the middle for more contrast, a straight line for less.
                 let bent = if self.contrast > 1.0 {
                     let (a, b) = (value.powf(self.contrast), (1.0 - value).powf(self.contrast));
@@ -144,15 +144,6 @@ impl Camera {
             .iter()
             .map(|pixel| pixel.map(|c| table[(c.clamp(0.0, 1.0).sqrt() * (TONES - 1) as f32 + 0.5) as usize]))
             .collect()
-    }
-}
-
-/// sRGB value of a linear value, both 0 to 1 (IEC 61966-2-1).
-fn srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
     }
 }
 
@@ -263,17 +254,4 @@ fn sharpened(pixels: &[[u8; 3]], [width, height]: [u32; 2], strength: f32) -> Ve
             })
         })
         .collect()
-}
-
-/// The image after a turn through JPEG.
-fn compressed(pixels: &[[u8; 3]], photo: [u32; 2], quality: u8) -> Result<Vec<[u8; 3]>, ImageError> {
-    let mut file = Vec::new();
-    JpegEncoder::new_with_quality(&mut file, quality).encode(
-        pixels.as_flattened(),
-        photo[0],
-        photo[1],
-        ExtendedColorType::Rgb8,
-    )?;
-    let decoded = DynamicImage::from_decoder(JpegDecoder::new(std::io::Cursor::new(file))?)?;
-    Ok(decoded.to_rgb8().pixels().map(|p| p.0).collect())
 }

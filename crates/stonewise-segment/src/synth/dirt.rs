@@ -2,8 +2,8 @@
 
 use super::canvas::Canvas;
 use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep, sometimes};
-use super::material::linear;
 use super::noise::{Field, Grain};
+use stonewise_core::raster::linear_from_srgb;
 
 /// Cover above which a place does not show the stone any more.
 const HIDDEN: f32 = 0.6;
@@ -58,93 +58,153 @@ impl Dirt {
 
     /// Dirties everything but the sky; stones that moss or lichen hide become doubtful.
     pub(super) fn paint(&self, canvas: &mut Canvas, rng: &mut Rng) {
-        let size = canvas.photo_size();
-        let blotches = Field::isotropic(rng, Grain::Fractal, self.stains_px);
-        let streak_px = log_between(rng, 8.0, 50.0);
-        let streaks = Field::new(rng, Grain::Fractal, [18.0 * streak_px, streak_px], self.down);
-        let clumps = Field::sized(rng, Grain::Fractal, 40.0, 250.0);
-        let tufts = Field::isotropic(rng, Grain::Fractal, 9.0);
-        let spots = Field::isotropic(rng, Grain::Cells, self.lichen_px);
-        let bloom = Field::sized(rng, Grain::Fractal, 30.0, 200.0);
-        let green = [0.30, 0.34, 0.14].map(|c| linear(c) * (0.3 * normal(rng)).exp());
-        let crust = {
-            let base = [[0.78, 0.78, 0.74], [0.80, 0.62, 0.20], [0.28, 0.28, 0.27]];
-            let pick = (between(rng, 0.0, 3.0) as usize).min(2);
-            base[pick].map(linear)
-        };
-        let stain = [0.9, 0.8, 0.6].map(|c| c * (0.2 * normal(rng)).exp());
-        let bright = chance(rng, 0.3);
-        let side = between(rng, 0.0, std::f32::consts::TAU);
-        let joints = between(rng, 0.0, 1.2);
-        let mut covered = vec![[0u32; 2]; canvas.stones as usize + 1];
+        let coat = Coat::new(self, canvas.photo_size(), rng);
+        let mut covered = vec![Covered::default(); canvas.stones as usize + 1];
         for y in 0..canvas.height {
             for x in 0..canvas.width {
                 let i = y * canvas.width + x;
                 if canvas.sky[i] {
                     continue;
                 }
-                let [px, py] = canvas.photo(x, y);
-                let mut colour = canvas.albedo[i];
+                let place = canvas.photo(x, y);
+                let mut colour = coat.stained(canvas.albedo[i], place);
                 let mut cover = 0.0f32;
-                if self.stains > 0.0 {
-                    let amount = self.stains * smoothstep(-0.3, 1.2, blotches.at(px, py));
-                    let tone = if bright { 1.0 + amount } else { 1.0 - 0.8 * amount };
-                    colour = mix(scaled(colour, tone), product(colour, stain), 0.5 * amount);
-                }
-                if self.runs > 0.0 {
-                    let amount = self.runs * smoothstep(0.2, 0.2 + self.runs_softness, streaks.at(px, py));
-                    colour = scaled(colour, 1.0 - 0.8 * amount);
-                }
-                if self.soot > 0.0 {
-                    let along = (px / size[0] - 0.5) * side.cos() + (py / size[1] - 0.5) * side.sin();
-                    let amount = self.soot * smoothstep(-0.1, 0.6, along + 0.1 * clumps.at(px, py));
-                    colour = scaled(colour, 1.0 - 0.85 * amount);
-                }
-                if self.salt > 0.0 {
-                    let amount = self.salt * smoothstep(0.7, 2.0, bloom.at(px, py));
-                    colour = mix(colour, [0.75; 3], amount);
-                }
                 if self.lichen > 0.0 {
-                    let radius = 0.75
-                        * smoothstep(
-                            1.8 - 4.5 * self.lichen,
-                            3.0 - 4.0 * self.lichen,
-                            clumps.at(px, py),
-                        );
-                    let edge = spots.at(px, py) + 0.06 * tufts.at(px, py);
-                    let amount = smoothstep(radius, radius - 0.15, edge) * smoothstep(0.0, 0.1, radius);
-                    colour = mix(colour, crust, 0.85 * amount);
+                    let amount = coat.lichen(place);
+                    colour = mix(colour, coat.crust, 0.85 * amount);
                     cover = cover.max(0.8 * amount);
                 }
                 if self.moss > 0.0 {
-                    let tuft = tufts.at(px, py);
-                    let wet = joints * (1.0 - canvas.openness[i])
-                        + if canvas.label[i] == 0 { 0.3 * joints } else { 0.0 };
-                    let amount = smoothstep(
-                        1.5 - 2.6 * self.moss,
-                        2.2 - 2.6 * self.moss,
-                        clumps.at(px, py) + 0.35 * tuft + wet,
-                    );
-                    colour = mix(colour, scaled(green, (0.35 * tuft).exp()), 0.92 * amount);
+                    let is_joint = canvas.label[i] == 0;
+                    let (amount, tuft) = coat.moss(place, canvas.openness[i], is_joint);
+                    colour = mix(colour, scaled(coat.green, (0.35 * tuft).exp()), 0.92 * amount);
                     canvas.relief[i] += amount * (0.8 + 0.5 * tuft);
                     cover = cover.max(amount);
                 }
                 canvas.albedo[i] = colour.map(|c| c.clamp(0.003, 1.0));
                 let count = &mut covered[canvas.label[i] as usize];
-                count[0] += 1;
-                count[1] += u32::from(cover > HIDDEN);
+                count.all += 1;
+                count.hidden += u32::from(cover > HIDDEN);
             }
         }
         for _ in 0..self.marks {
             self.mark(canvas, rng);
         }
         for (label, doubtful) in canvas.label.iter_mut().zip(&mut canvas.doubtful) {
-            let [area, hidden] = covered[*label as usize];
-            if *label != 0 && hidden as f32 > MAX_HIDDEN_SHARE * area as f32 {
+            let Covered { all, hidden } = covered[*label as usize];
+            if *label != 0 && hidden as f32 > MAX_HIDDEN_SHARE * all as f32 {
                 *label = 0;
                 *doubtful = true;
             }
         }
+    }
+}
+
+/// Samples of the canvas that belong to a stone.
+#[derive(Clone, Copy, Default)]
+struct Covered {
+    all: u32,
+    /// Of these, under moss or lichen.
+    hidden: u32,
+}
+
+/// Dirt with what is drawn once for a photo.
+struct Coat<'a> {
+    dirt: &'a Dirt,
+    /// Width and height of the photo, pixels.
+    size: [f32; 2],
+    blotches: Field,
+    streaks: Field,
+    clumps: Field,
+    tufts: Field,
+    spots: Field,
+    bloom: Field,
+    green: [f32; 3],
+    crust: [f32; 3],
+    stain: [f32; 3],
+    /// Whether stains are brighter than the stones.
+    bright: bool,
+    /// Direction from which soot comes, radians.
+    side: f32,
+    /// How much moss prefers joints.
+    joints: f32,
+}
+
+impl<'a> Coat<'a> {
+    fn new(dirt: &'a Dirt, size: [f32; 2], rng: &mut Rng) -> Self {
+        let blotches = Field::isotropic(rng, Grain::Fractal, dirt.stains_px);
+        let streak_px = log_between(rng, 8.0, 50.0);
+        Self {
+            dirt,
+            size,
+            blotches,
+            streaks: Field::new(rng, Grain::Fractal, [18.0 * streak_px, streak_px], dirt.down),
+            clumps: Field::sized(rng, Grain::Fractal, 40.0, 250.0),
+            tufts: Field::isotropic(rng, Grain::Fractal, 9.0),
+            spots: Field::isotropic(rng, Grain::Cells, dirt.lichen_px),
+            bloom: Field::sized(rng, Grain::Fractal, 30.0, 200.0),
+            green: [0.30, 0.34, 0.14].map(|c| linear_from_srgb(c) * (0.3 * normal(rng)).exp()),
+            crust: {
+                let base = [[0.78, 0.78, 0.74], [0.80, 0.62, 0.20], [0.28, 0.28, 0.27]];
+                let pick = (between(rng, 0.0, 3.0) as usize).min(2);
+                base[pick].map(linear_from_srgb)
+            },
+            stain: [0.9, 0.8, 0.6].map(|c| c * (0.2 * normal(rng)).exp()),
+            bright: chance(rng, 0.3),
+            side: between(rng, 0.0, std::f32::consts::TAU),
+            joints: between(rng, 0.0, 1.2),
+        }
+    }
+
+    /// A colour under stains, runs, soot and salt.
+    #[inline]
+    fn stained(&self, mut colour: [f32; 3], [px, py]: [f32; 2]) -> [f32; 3] {
+        let dirt = self.dirt;
+        if dirt.stains > 0.0 {
+            let amount = dirt.stains * smoothstep(-0.3, 1.2, self.blotches.at(px, py));
+            let tone = if self.bright {
+                1.0 + amount
+            } else {
+                1.0 - 0.8 * amount
+            };
+            colour = mix(scaled(colour, tone), product(colour, self.stain), 0.5 * amount);
+        }
+        if dirt.runs > 0.0 {
+            let amount = dirt.runs * smoothstep(0.2, 0.2 + dirt.runs_softness, self.streaks.at(px, py));
+            colour = scaled(colour, 1.0 - 0.8 * amount);
+        }
+        if dirt.soot > 0.0 {
+            let along =
+                (px / self.size[0] - 0.5) * self.side.cos() + (py / self.size[1] - 0.5) * self.side.sin();
+            let amount = dirt.soot * smoothstep(-0.1, 0.6, along + 0.1 * self.clumps.at(px, py));
+            colour = scaled(colour, 1.0 - 0.85 * amount);
+        }
+        if dirt.salt > 0.0 {
+            let amount = dirt.salt * smoothstep(0.7, 2.0, self.bloom.at(px, py));
+            colour = mix(colour, [0.75; 3], amount);
+        }
+        colour
+    }
+
+    /// How much lichen covers a place, 0 to 1.
+    #[inline]
+    fn lichen(&self, [px, py]: [f32; 2]) -> f32 {
+        let share = self.dirt.lichen;
+        let clumps = self.clumps.at(px, py);
+        let radius = 0.75 * smoothstep(1.8 - 4.5 * share, 3.0 - 4.0 * share, clumps);
+        let edge = self.spots.at(px, py) + 0.06 * self.tufts.at(px, py);
+        smoothstep(radius, radius - 0.15, edge) * smoothstep(0.0, 0.1, radius)
+    }
+
+    /// How much moss covers a place, 0 to 1, and how high its tufts stand.
+    #[inline]
+    fn moss(&self, [px, py]: [f32; 2], openness: f32, is_joint: bool) -> (f32, f32) {
+        let share = self.dirt.moss;
+        let tuft = self.tufts.at(px, py);
+        let wet = self.joints * (1.0 - openness) + if is_joint { 0.3 * self.joints } else { 0.0 };
+        let grown = self.clumps.at(px, py) + 0.35 * tuft + wet;
+        let amount = smoothstep(1.5 - 2.6 * share, 2.2 - 2.6 * share, grown);
+        (amount, tuft)
     }
 }
 

@@ -10,9 +10,8 @@ const MIN_THICKNESS_PX: f32 = 2.6;
 /// Parts of a stone smaller than this share of it, cut off by something in front, are doubtful.
 const MIN_PART_SHARE: f32 = 0.1;
 
-/// Labels 1, 2, ... without gaps in reading order, and where the truth is doubtful: stones that are too small or thin to be seen
-/// through the blur, bits
-/// cut off from a stone, and what the canvas says.
+/// Labels 1, 2, ... without gaps in reading order, and where the truth is doubtful: stones that are too small
+/// or thin to be seen through the blur, bits cut off from a stone, and what the canvas says.
 pub(super) fn finish(canvas: &Canvas, blur_px: f32, width: u32, height: u32) -> (LabelImage, Raster<bool>) {
     let mut labels: LabelImage = Raster::filled(width, height, 0);
     let mut doubt = Raster::filled(width, height, false);

@@ -2,6 +2,7 @@
 
 use super::draw::{Rng, between, chance, log_between, mix, normal, scaled, smoothstep, sometimes};
 use super::noise::{Field, Grain};
+use stonewise_core::raster::linear_from_srgb;
 
 /// Colours of common building stones and bricks, sRGB 0 to 1, from which drawn colours depart.
 const COMMON_COLOURS: [[f32; 3]; 14] = [
@@ -214,17 +215,8 @@ pub(super) fn stone_colour(rng: &mut Rng) -> [f32; 3] {
     let brightness = (0.15 * normal(rng)).exp();
     base.map(|c| {
         let tinted = c * brightness * (0.035 * normal(rng)).exp();
-        linear(tinted.clamp(0.08, 0.95))
+        linear_from_srgb(tinted.clamp(0.08, 0.95))
     })
-}
-
-/// Linear value of an sRGB value, both 0 to 1 (IEC 61966-2-1).
-pub(super) fn linear(srgb: f32) -> f32 {
-    if srgb <= 0.04045 {
-        srgb / 12.92
-    } else {
-        ((srgb + 0.055) / 1.055).powf(2.4)
-    }
 }
 
 /// From 1 at 0 to 0 at 1 and beyond, level there.
@@ -330,7 +322,8 @@ impl Surface {
         }
     }
 
-    /// Albedo and height of a stone of a size, at a place `inside` pixels from its outline and `offset` from its centre.
+    /// Albedo and height of a stone of a size, at a place `inside` pixels from its outline and `offset` from
+    /// its centre.
     #[inline]
     pub(super) fn stone(
         &self,

@@ -1,24 +1,29 @@
 //! Rendered photos of masonry whose stones are known: what the built-in weights learn from.
 //!
-//! A photo is a wall seen by a camera: a bond laid out in wall coordinates ([`Bond`]), stones that depart from its cells
-//! ([`StoneShape`]), their substance and the mortar ([`Material`], [`Mortar`]), a viewpoint ([`Viewpoint`]), light
-//! ([`Light`]) and the camera's own marks ([`Camera`]). Nothing is taken from any photo. Every pixel of the canvas asks for
-//! the stone behind it, so the cost goes with the pixels and not with the size of the wall.
+//! A photo is a wall seen by a camera: a bond laid out in wall coordinates ([`Bond`]), stones that depart
+//! from its cells ([`StoneShape`]), their substance and the mortar ([`Material`], [`Mortar`]), a viewpoint
+//! ([`Viewpoint`]), light ([`Light`]) and the camera's own marks ([`Camera`]). Nothing is taken from any
+//! photo. The stone behind every sample of the canvas is looked up, so the cost goes with the pixels and not
+//! with the size of the wall.
 //!
 //! Lengths are pixels of the photo unless a field says otherwise; pixel (0, 0) covers `[0, 1) x [0, 1)`.
 
 mod backdrop;
+mod brush;
 mod building;
 mod camera;
 mod canvas;
+mod cell;
 mod dirt;
 mod draw;
 mod labels;
 mod layout;
 mod light;
+mod masonry;
 mod material;
 mod noise;
 mod object;
+mod rubble;
 mod scene;
 mod stone;
 mod view;
@@ -29,12 +34,13 @@ pub use camera::Camera;
 pub use dirt::Dirt;
 pub use layout::{Bond, BrickPattern, Courses};
 pub use light::{CastShadow, Light};
+pub use masonry::{Masonry, Ring};
 pub use material::{FaceRelief, Material, Mortar};
 pub use object::{Object, ObjectKind};
-pub use scene::{Content, Layer, Masonry, Region};
+pub use scene::{Content, Layer, Region};
 pub use stone::StoneShape;
 pub use view::Viewpoint;
-pub use wall::{Ring, Wall};
+pub use wall::Wall;
 
 use crate::Sample;
 use canvas::Canvas;
@@ -91,7 +97,8 @@ impl MasonryStyle {
     }
 }
 
-/// A photo of masonry drawn from a seed, `width` x `height` pixels (at least 1), with the visible face of every stone.
+/// A photo of masonry drawn from a seed, `width` x `height` pixels (at least 1), with the visible face of
+/// every stone.
 ///
 /// The same seed and size give the same bytes. Cost: 0.3 to 0.5 microseconds a pixel on one core.
 pub fn masonry_photo(seed: u64, width: u32, height: u32) -> Sample {

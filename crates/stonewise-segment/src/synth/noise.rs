@@ -1,4 +1,5 @@
-//! Procedural noise from periodic tables: a table is computed once, and a field is a random rotation, stretch and shift of it.
+//! Procedural noise from periodic tables: a table is computed once, and a field is a random rotation, stretch
+//! and shift of it.
 //!
 //! A look-up costs a few nanoseconds, where summing octaves at every pixel would cost most of a photo's time.
 
@@ -51,7 +52,8 @@ pub(super) struct Field {
 }
 
 impl Field {
-    /// A field whose coarsest features measure `wavelength` along and across a direction, turned by `angle` radians.
+    /// A field whose coarsest features measure `wavelength` along and across a direction, turned by `angle`
+    /// radians.
     pub(super) fn new(rng: &mut Rng, grain: Grain, wavelength: [f32; 2], angle: f32) -> Self {
         let (table, cells): (&'static [f32], usize) = match grain {
             Grain::Fractal => (&FRACTAL, FRACTAL_CELLS),

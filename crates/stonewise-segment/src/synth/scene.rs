@@ -4,9 +4,10 @@ use super::backdrop::{Backdrop, BackdropKind};
 use super::canvas::Canvas;
 use super::draw::{Rng, between, chance, log_between, normal, sometimes};
 use super::layout::Bond;
+use super::masonry::{Masonry, Ring};
 use super::noise::{Field, Grain};
 use super::view::{View, Viewpoint};
-use super::wall::{Ring, Wall};
+use super::wall::Wall;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Smallest and largest median size of a wall's stones, pixels; single stones are smaller and larger.
@@ -28,21 +29,6 @@ pub enum Content {
     Backdrop(Backdrop),
     /// A wall.
     Masonry(Box<Masonry>),
-}
-
-/// A wall as it is seen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Masonry {
-    /// The wall.
-    pub wall: Wall,
-    /// From where it is seen.
-    pub viewpoint: Viewpoint,
-    /// The sun's strength on this wall over that on a wall that faces the camera, 0.2 to 1.3.
-    pub facing: f32,
-    /// True where the wall ends along its stones, as a ruin does; else the border cuts through them.
-    pub whole_stones: bool,
-    /// Stones in a ring about a point of the photo instead of in a plane bond: an arch.
-    pub ring: Option<Ring>,
 }
 
 /// A part of a photo; positions in parts of its width and height.
@@ -136,20 +122,9 @@ impl Layer {
             Content::Backdrop(backdrop) => backdrop.paint(canvas, &mask, rng),
             Content::Masonry(masonry) => {
                 let view = View::new(&masonry.viewpoint, width, height);
-                masonry.wall.paint(canvas, &view, &mask, masonry, rng);
+                masonry.paint(canvas, &view, &mask, rng);
             }
         }
-    }
-}
-
-/// A wall that faces the sun as the camera does, cut by its borders.
-pub(super) fn masonry(wall: Wall, viewpoint: Viewpoint) -> Masonry {
-    Masonry {
-        wall,
-        viewpoint,
-        facing: 1.0,
-        whole_stones: false,
-        ring: None,
     }
 }
 
@@ -175,7 +150,7 @@ pub(super) fn random_layers(viewpoint: Viewpoint, width: u32, height: u32, rng: 
     let stone_px = wall.stone_px;
     match between(rng, 0.0, 1.0) {
         p if p < 0.05 => bare(rng),
-        p if p < 0.45 => vec![layer(Region::Everywhere, masonry(wall, viewpoint))],
+        p if p < 0.45 => vec![layer(Region::Everywhere, Masonry::plain(wall, viewpoint))],
         p if p < 0.70 => edged(wall, viewpoint, rng),
         p if p < 0.83 => cornered(wall, viewpoint, rng),
         p if p < 0.91 => arched(wall, viewpoint, shorter, rng),
@@ -197,14 +172,14 @@ fn edged(wall: Wall, viewpoint: Viewpoint, rng: &mut Rng) -> Vec<Layer> {
     if whole_stones {
         let content = Masonry {
             whole_stones,
-            ..masonry(wall, viewpoint)
+            ..Masonry::plain(wall, viewpoint)
         };
         return vec![
             backdrop(Region::Everywhere, Backdrop::random(rng)),
             layer(border(rng), content),
         ];
     }
-    let mut layers = vec![layer(Region::Everywhere, masonry(wall, viewpoint))];
+    let mut layers = vec![layer(Region::Everywhere, Masonry::plain(wall, viewpoint))];
     for _ in 0..1 + usize::from(chance(rng, 0.3)) {
         layers.push(backdrop(border(rng), Backdrop::random(rng)));
     }
@@ -229,10 +204,10 @@ fn cornered(wall: Wall, viewpoint: Viewpoint, rng: &mut Rng) -> Vec<Layer> {
     };
     let second = Masonry {
         facing: between(rng, 0.2, 1.3),
-        ..masonry(other, if chance(rng, 0.6) { turned } else { viewpoint })
+        ..Masonry::plain(other, if chance(rng, 0.6) { turned } else { viewpoint })
     };
     vec![
-        layer(Region::Everywhere, masonry(wall, viewpoint)),
+        layer(Region::Everywhere, Masonry::plain(wall, viewpoint)),
         layer(border(rng), second),
     ]
 }
@@ -255,14 +230,17 @@ fn arched(wall: Wall, viewpoint: Viewpoint, shorter: f32, rng: &mut Rng) -> Vec<
     voussoirs.mortar.width *= (wall.stone_px / depth_px).min(1.0);
     let inside = if chance(rng, 0.25) {
         let content = Wall::random(rng, STONE_PX[0], wall.stone_px.max(STONE_PX[0] + 1.0));
-        layer(Region::Arch { centre, radius_px }, masonry(content, viewpoint))
+        layer(
+            Region::Arch { centre, radius_px },
+            Masonry::plain(content, viewpoint),
+        )
     } else {
         backdrop(Region::Arch { centre, radius_px }, Backdrop::random(rng))
     };
     let behind = if chance(rng, 0.3) {
         backdrop(Region::Everywhere, Backdrop::random(rng))
     } else {
-        layer(Region::Everywhere, masonry(wall, viewpoint))
+        layer(Region::Everywhere, Masonry::plain(wall, viewpoint))
     };
     let ring = Masonry {
         whole_stones: true,
@@ -271,7 +249,7 @@ fn arched(wall: Wall, viewpoint: Viewpoint, shorter: f32, rng: &mut Rng) -> Vec<
             radius_px,
             depth_px,
         }),
-        ..masonry(voussoirs, viewpoint)
+        ..Masonry::plain(voussoirs, viewpoint)
     };
     vec![behind, inside, layer(Region::Everywhere, ring)]
 }
@@ -324,7 +302,7 @@ fn ruins(viewpoint: Viewpoint, stone_px: f32, rng: &mut Rng) -> Vec<Layer> {
         let content = Masonry {
             facing: between(rng, 0.2, 1.3),
             whole_stones: chance(rng, 0.6),
-            ..masonry(
+            ..Masonry::plain(
                 wall,
                 Viewpoint {
                     roll: viewpoint.roll,

@@ -1,7 +1,7 @@
 //! The shape of single stones: convex polygons with rounded corners, less what has broken off.
 
+use super::cell::Ring;
 use super::draw::{Rng, between, chance};
-use super::layout::Ring;
 
 /// How stones depart from their cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,7 +12,8 @@ pub struct StoneShape {
     pub chips: f32,
     /// Waviness of the outline, in parts of the stone's size, 0 to 0.05.
     pub ragged: f32,
-    /// Waviness shared by neighbours, so that joints wander at constant width, in parts of the stone's size, 0 to 0.1.
+    /// Waviness shared by neighbours, so that joints wander at constant width, in parts of the stone's size,
+    /// 0 to 0.1.
     pub wander: f32,
     /// Probability that a place is left without stone, 0 to 0.04.
     pub missing: f32,
@@ -99,7 +100,8 @@ impl Stone {
         })
     }
 
-    /// Distance of a point to the outline, positive inside; where it is at most `floor`, some number at most `floor`.
+    /// Distance of a point to the outline, positive inside; where it is at most `floor`, some number at most
+    /// `floor`.
     #[inline]
     pub(super) fn distance(&self, x: f32, y: f32, floor: f32) -> f32 {
         let mut distance = f32::INFINITY;
@@ -192,7 +194,8 @@ impl StoneIndex {
 
     /// The stone in which the point lies deepest, and its distance to the outline.
     ///
-    /// `guess` is the stone of a point nearby. Cells overlap by little, so a point deep in the guess lies in no other.
+    /// `guess` is the stone of a point nearby. Cells overlap by little, so a point deep in the guess lies in
+    /// no other.
     #[inline]
     pub(super) fn find(
         &self,

@@ -1,7 +1,7 @@
 //! Where the camera stands: the homography between wall and photo, and the lens.
 
+use super::cell::Extent;
 use super::draw::{Rng, between, chance, normal};
-use super::layout::Extent;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -53,8 +53,8 @@ impl Viewpoint {
     }
 }
 
-/// Maps pixels of a photo to places on the wall. One unit of the wall is one pixel in the middle of the photo, up to
-/// foreshortening.
+/// Maps pixels of a photo to places on the wall. One unit of the wall is one pixel in the middle of the
+/// photo, up to foreshortening.
 #[derive(Clone, Debug)]
 pub(super) struct View {
     wall_from_photo: Matrix3<f32>,
@@ -68,7 +68,8 @@ pub(super) struct View {
 }
 
 impl View {
-    /// The view of a photo of `width` x `height` pixels; obliqueness is reduced where the wall would shrink out of sight.
+    /// The view of a photo of `width` x `height` pixels; obliqueness is reduced where the wall would shrink
+    /// out of sight.
     pub(super) fn new(viewpoint: &Viewpoint, width: u32, height: u32) -> Self {
         let size = [width as f32, height as f32];
         let middle = [0.5 * size[0], 0.5 * size[1]];
@@ -101,7 +102,8 @@ impl View {
         view
     }
 
-    /// Sets the pinhole projection of a turned plane at the distance of the focal length, about the photo's middle.
+    /// Sets the pinhole projection of a turned plane at the distance of the focal length, about the photo's
+    /// middle.
     fn turn(&mut self, viewpoint: &Viewpoint, strength: f32) {
         let focal = viewpoint.focal * self.size[0].max(self.size[1]);
         let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), viewpoint.roll)
@@ -137,7 +139,8 @@ impl View {
         [p.x / p.z + self.middle[0], p.y / p.z + self.middle[1]]
     }
 
-    /// Pixels per unit of the wall at a pixel coordinate, the geometric mean over directions; 0 beyond the wall's horizon.
+    /// Pixels per unit of the wall at a pixel coordinate, the geometric mean over directions; 0 beyond the
+    /// wall's horizon.
     pub(super) fn scale(&self, x: f32, y: f32) -> f32 {
         let m = &self.wall_from_photo;
         let (dx, dy) = (x - self.middle[0], y - self.middle[1]);

@@ -4,8 +4,8 @@ use super::grid::Rect;
 use crate::{Detection, Patch};
 use stonewise_core::raster::Raster;
 
-/// A mask that reaches this close to the border of a tile inside the photo is taken to be cut, pixels of the tile: masks are uncertain by
-/// about as much.
+/// A mask that reaches this close to the border of a tile inside the photo is taken to be cut, pixels of the
+/// tile: masks are uncertain by about as much.
 const BORDER_PX: u32 = 2;
 
 /// What one tile says about one stone.

@@ -7,15 +7,17 @@ use super::overlap::{common_pixels, extent, intersects};
 const SAME_IOU: f64 = 0.5;
 /// A mask lies inside a larger one if this share of it does.
 const INSIDE_SHARE: f64 = 0.75;
-/// What lies inside a mask explains it, if score times area is at least this share of its own: the joints of a group belong to none of its
-/// stones.
+/// What lies inside a mask explains it, if score times area is at least this share of its own: the joints of
+/// a group belong to none of its stones.
 const GROUP_SHARE: f64 = 0.75;
 
-/// Of masks in descending order those that are neither found twice, nor a part of a stone, nor a group of stones.
+/// Of masks in descending order those that are neither found twice, nor a part of a stone, nor a group of
+/// stones.
 ///
-/// Masks inside others make a tree. From its leaves on, a mask stays if its score times its area is more than what the best choice of the masks inside
-/// it has; else these stay. So a fragment cannot displace its stone however good its score is, and a group cannot displace
-/// stones that fill it. Cost: pixels of overlapping pairs of masks.
+/// Masks inside others make a tree. From its leaves on, a mask stays if its score times its area is more than
+/// what the best choice of the masks inside it has; else these stay. So a fragment cannot displace its stone
+/// however good its score is, and a group cannot displace stones that fill it. Cost: pixels of overlapping
+/// pairs of masks.
 pub fn choose(candidates: Vec<Candidate>) -> Vec<Candidate> {
     let mut unique: Vec<Candidate> = Vec::new();
     for candidate in candidates {

@@ -8,14 +8,16 @@ use crate::{Patch, Segmentation};
 use std::collections::BTreeMap;
 use stonewise_core::raster::{LabelImage, Raster, connected_components};
 
-/// Two cut masks of neighbouring tiles are one stone if, where both tiles see, this share of the smaller lies in the larger.
+/// Two cut masks of neighbouring tiles are one stone if, where both tiles see, this share of the smaller lies
+/// in the larger.
 const SAME_STONE_SHARE: f64 = 0.5;
 
 /// Chooses among candidates and lays them on a photo from best to worst.
 ///
-/// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone, and come after all whole
-/// ones: only stones larger than the overlap at every scale are made of them. A cut mask of which the neighbouring tile knows nothing
-/// is dropped. Of the rest the higher score wins, then the finer scale.
+/// Masks that the border of a tile cuts are joined with what the neighbouring tile shows of the same stone,
+/// and come after all whole ones: only stones larger than the overlap at every scale are made of them. A cut
+/// mask that no neighbouring tile confirms is dropped. Of the rest the higher score wins, then the
+/// finer scale.
 pub fn merge(candidates: Vec<Candidate>, width: u32, height: u32, options: &TilingOptions) -> Segmentation {
     let (cut, whole): (Vec<_>, Vec<_>) = candidates.into_iter().partition(|c| c.is_cut);
     let mut all = choose(best_first(whole));
@@ -78,7 +80,8 @@ fn without_fragments(painted: &LabelImage, scores: &[f32], min_area_px: u32) -> 
     }
 }
 
-/// Cut masks of which neighbouring tiles show parts of one stone, joined; the others are left out. Cost: O(n^2) tests of rectangles.
+/// Cut masks of which neighbouring tiles show parts of one stone, joined; the others are left out. Cost:
+/// O(n^2) tests of rectangles.
 fn joined(cut: Vec<Candidate>) -> Vec<Candidate> {
     let mut group: Vec<usize> = (0..cut.len()).collect();
     for second in 0..cut.len() {
@@ -161,7 +164,8 @@ mod tests {
     use super::super::grid::Rect;
     use super::*;
 
-    /// A mask over `columns` of the photo's rows 10 to 30, cut by the border of a tile that begins at a column; tiles are 60 x 60 pixels.
+    /// A mask over `columns` of the photo's rows 10 to 30, cut by the border of a tile that begins at a
+    /// column; tiles are 60 x 60 pixels.
     fn cut(columns: std::ops::Range<u32>, tile_left: u32) -> Candidate {
         let (width, height) = (columns.end - columns.start, 20);
         Candidate {

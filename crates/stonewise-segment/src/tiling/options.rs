@@ -14,9 +14,10 @@ pub struct TilingOptions {
     pub overlap_px: u32,
     /// Sizes at which the photo is looked at, 1 = as it is; see [`Self::scales_for`].
     pub scales: Vec<f64>,
-    /// Pixels across (square root of the area) at which stones are found well. A size above 1 is looked at only where stones found at sizes up to 1 cover a
-    /// tenth of a tile and a quarter of them would be smaller than this even there; a size below the largest up to 1 only where the stones that would be larger than this even
-    /// there hold a quarter of the area found, or nothing was found.
+    /// Pixels across (square root of the area) at which stones are found well. A size above 1 is looked at
+    /// only where stones found at sizes up to 1 cover a tenth of a tile and a quarter of them would be
+    /// smaller than this even there; a size below the largest up to 1 only where the stones that would be
+    /// larger than this even there hold a quarter of the area found, or nothing was found.
     pub stone_px: f64,
     /// Masks with a lower score are dropped.
     pub min_score: f64,
@@ -50,8 +51,9 @@ impl TilingOptions {
         }
     }
 
-    /// The sizes at which a photo of `width` x `height` pixels is looked at. A smaller size is for stones that no tile of the larger sizes
-    /// shows whole, so it is left out where one tile of a larger size up to 1 shows the whole photo.
+    /// The sizes at which a photo of `width` x `height` pixels is looked at. A smaller size is for stones
+    /// that no tile of the larger sizes shows whole, so it is left out where one tile of a larger size up to
+    /// 1 shows the whole photo.
     pub fn scales_for(&self, width: u32, height: u32) -> Vec<f64> {
         let in_one_tile = |&scale: &f64| scaled(width.max(height), scale) <= self.tile_px;
         let is_needed = |scale: &f64| {
@@ -63,7 +65,8 @@ impl TilingOptions {
         self.scales.iter().copied().filter(is_needed).collect()
     }
 
-    /// Number of tiles of a photo of this size, all scales together, whether or not the enlarged ones turn out to be needed.
+    /// Number of tiles of a photo of this size, all scales together, whether or not the enlarged ones turn
+    /// out to be needed.
     pub fn tile_count(&self, width: u32, height: u32) -> u64 {
         let count = |scale: f64| {
             let tiles = |size| origins(scaled(size, scale), self.tile_px, self.overlap_px).len() as u64;

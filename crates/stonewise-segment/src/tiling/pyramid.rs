@@ -5,7 +5,8 @@ use super::options::scaled;
 use image::imageops::{FilterType, resize};
 use stonewise_core::raster::{Raster, RgbImage};
 
-/// The photo at a scale; smaller pixels are weighted means of those they cover. Costs a copy where the scale is not 1.
+/// The photo at a scale; smaller pixels are weighted means of those they cover. Costs a copy where the scale
+/// is not 1.
 pub fn at_scale(photo: &RgbImage, scale: f64) -> RgbImage {
     let (width, height) = (scaled(photo.width(), scale), scaled(photo.height(), scale));
     if (width, height) == (photo.width(), photo.height()) {

@@ -24,10 +24,11 @@ pub enum TilingError<E> {
 
 /// The stones of a photo of any size.
 ///
-/// The photo is looked at as it is first; where its stones are too small or too large for the detector, also enlarged or reduced
-/// ([`TilingOptions::stone_px`]).
-/// `progress` advances by one for every tile, [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, a
-/// tile a thread in the detector, and the masks found. The result does not depend on the number of threads if the detector's does not.
+/// The photo is looked at as it is first; where its stones are too small or too large for the detector, also
+/// enlarged or reduced ([`TilingOptions::stone_px`]). `progress` advances by one for every tile,
+/// [`TilingOptions::tile_count`] in all. Memory: the photo once more at each scale in turn, a tile a thread
+/// in the detector, and the masks found. The result does not depend on the number of threads if the
+/// detector's does not.
 ///
 /// # Errors
 /// The detector could not run, or the caller stopped it.
@@ -38,7 +39,8 @@ pub fn segment_photo<D: Detector>(
     progress: &dyn Progress,
 ) -> Result<Segmentation, TilingError<D::Error>> {
     let scales = options.scales_for(photo.width(), photo.height());
-    // The largest size that does not enlarge is looked at everywhere; what it shows says where others are needed.
+    // The largest size that does not enlarge is looked at everywhere; what it shows says where others are
+    // needed.
     let rank = |&i: &usize| (scales[i] > 1.0, -scales[i]);
     let mut order: Vec<usize> = (0..scales.len()).collect();
     order.sort_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(Ordering::Equal));
@@ -96,7 +98,8 @@ impl Size {
         )
     }
 
-    /// What the detector finds in some tiles, in their order. Tiles side by side take half of the time of threads in a layer.
+    /// What the detector finds in some tiles, in their order. Tiles side by side take half of the time of
+    /// threads in a layer.
     fn look<D: Detector>(
         &self,
         detector: &D,
@@ -158,7 +161,8 @@ impl Seen {
         self.0.iter().filter(is_inside)
     }
 
-    /// Whether a part of the photo shows a wall, a tenth of it stones, of which at least a quarter are less than `limit` across.
+    /// Whether a part of the photo shows a wall, a tenth of it stones, of which at least a quarter are less
+    /// than `limit` across.
     fn has_small(&self, part: &Rect, limit: f64) -> bool {
         let whole = self.inside(part).filter(|s| !s.is_cut);
         let (mut all, mut small, mut area) = (0, 0, 0.0);
@@ -171,7 +175,8 @@ impl Seen {
         is_wall && 4 * small >= all
     }
 
-    /// Whether stones of more than `limit` across, cut ones too, hold a quarter of the area found in a part of the photo; also where there is none.
+    /// Whether stones of more than `limit` across, cut ones too, hold a quarter of the area found in a part
+    /// of the photo; also where there is none.
     fn has_large(&self, part: &Rect, limit: f64) -> bool {
         let (mut all, mut large) = (0.0, 0.0);
         for stone in self.inside(part) {

@@ -49,7 +49,8 @@ fn coloured(labels: &LabelImage) -> RgbImage {
     Raster::from_vec(labels.width(), labels.height(), pixels).unwrap()
 }
 
-/// Finds every connected part of one colour, but for the specks of other colours that averaging makes along borders.
+/// Finds every connected part of one colour, but for the specks of other colours that averaging makes along
+/// borders.
 struct Oracle;
 
 /// Larger than any speck, smaller than any stone.

@@ -6,8 +6,13 @@ use burn::tensor::TensorData;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stonewise_io::atomic::write_atomically;
+
+/// Where a training keeps what it needs to go on.
+pub fn checkpoint_path(out: &Path) -> PathBuf {
+    out.join("checkpoint.safetensors")
+}
 
 /// Version of the file's layout.
 const FORMAT: u32 = 1;
@@ -39,7 +44,8 @@ struct State<C> {
 }
 
 impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
-    /// Writes the checkpoint, whole or not at all: safetensors of 32-bit floats, the rest as JSON in the metadata.
+    /// Writes the checkpoint, whole or not at all: safetensors of 32-bit floats, the rest as JSON in the
+    /// metadata.
     ///
     /// # Errors
     /// The file cannot be written.

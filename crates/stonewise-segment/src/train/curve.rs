@@ -13,7 +13,8 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Opens the curve of a training that has come to `steps`: rows of later steps, which will be done again, are removed.
+    /// Opens the curve of a training that has come to `steps`: rows of later steps, which will be done again,
+    /// are removed.
     ///
     /// # Errors
     /// The file cannot be read or written.
@@ -52,7 +53,8 @@ impl Curve {
     }
 }
 
-/// The columns of a curve by position, the step among them; rows that are not numbers throughout are left out.
+/// The columns of a curve by position, the step among them; rows that are not numbers throughout are left
+/// out.
 ///
 /// # Errors
 /// The file cannot be read.

@@ -42,9 +42,9 @@ pub enum TrainError {
     /// The weights could not be read or written.
     #[error(transparent)]
     Weights(#[from] crate::model::WeightsError),
-    /// The network cannot be built.
+    /// The detector cannot be built.
     #[error(transparent)]
-    Network(#[from] crate::model::ConfigError),
+    Model(#[from] crate::model::ConfigError),
     /// Images or parameters that cannot be used.
     #[error("{0}")]
     Data(String),

@@ -10,27 +10,22 @@ mod plot;
 mod rendered;
 mod run;
 mod schedule;
-pub(crate) mod seed;
+mod session;
 mod source;
 mod start;
 mod trainer;
 
+pub use checkpoint::checkpoint_path;
 pub use error::TrainError;
 pub use optimizer::AdamWParams;
 pub use params::{TrainConfig, TrainParams};
 pub use rendered::Rendered;
 pub use run::{Run, Stop, evaluate_samples, model_path};
 pub use schedule::{Elapsed, Schedule, Total};
+pub use session::Session;
 pub use source::SampleSource;
 pub use start::{Start, open_training};
 pub use trainer::{StepFigures, Trainer};
-
-use std::path::{Path, PathBuf};
-
-/// Where a training keeps what it needs to go on.
-pub fn checkpoint_path(out: &Path) -> PathBuf {
-    out.join("checkpoint.safetensors")
-}
 
 #[cfg(test)]
 mod tests;

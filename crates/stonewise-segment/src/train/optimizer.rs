@@ -37,8 +37,8 @@ impl Default for AdamWParams {
 
 /// Adam with decoupled weight decay.
 ///
-/// Its state is kept by the path of the parameter, so that it can be saved and taken up by another process. Source: Loshchilov & Hutter 2019,
-/// algorithm 2; clipping by the global norm: Pascanu et al. 2013.
+/// Its state is kept by the path of the parameter, so that it can be saved and taken up by another process.
+/// Source: Loshchilov & Hutter 2019, algorithm 2; clipping by the global norm: Pascanu et al. 2013.
 pub struct AdamW<B: Backend> {
     params: AdamWParams,
     steps: i32,
@@ -61,7 +61,8 @@ impl<B: Backend> AdamW<B> {
         }
     }
 
-    /// Takes a step against the gradients; returns the module and the length of the gradient before it was clipped.
+    /// Takes a step against the gradients; returns the module and the length of the gradient before it was
+    /// clipped.
     ///
     /// A gradient that is not finite leaves the module as it was.
     pub fn step<A, M>(&mut self, module: M, mut gradients: Gradients<B>, rate: f64) -> (M, f64)

@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 pub struct Gradients<B: Backend>(BTreeMap<String, Tensor<B, 1>>);
 
 impl<B: Backend> Gradients<B> {
-    /// The gradients of a module's parameters that a loss has left; parameters it does not depend on have none.
+    /// The gradients of a module's parameters that a loss has left; parameters it does not depend on have
+    /// none.
     pub fn of<A, M>(module: &M, gradients: &A::Gradients) -> Self
     where
         A: AutodiffBackend<InnerBackend = B>,

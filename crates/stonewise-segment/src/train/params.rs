@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Everything that decides a training; kept in its checkpoints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainConfig {
-    /// The network.
+    /// The detector.
     pub model: MaskRcnnConfig,
     /// How it is trained.
     pub training: TrainParams,
@@ -17,7 +17,7 @@ pub struct TrainConfig {
     pub total: Total,
 }
 
-/// How a network is trained.
+/// How a detector is trained.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainParams {
@@ -25,7 +25,7 @@ pub struct TrainParams {
     pub seed: u64,
     /// Edge of a training image, pixels.
     pub crop_px: u32,
-    /// Images that go through the network together.
+    /// Images that go through the detector together.
     pub batch: usize,
     /// Batches whose gradients make one step; they are computed side by side.
     pub accumulate: usize,
@@ -58,7 +58,8 @@ impl Default for TrainParams {
 }
 
 impl TrainParams {
-    /// For a network that has learnt before: a lower learning rate keeps what it knows, and fewer steps are enough.
+    /// For a detector that has learnt before: a lower learning rate keeps what it knows, and fewer steps are
+    /// enough.
     pub fn fine_tuning() -> Self {
         let from_scratch = Self::default();
         Self {

@@ -1,8 +1,8 @@
 //! Rendered photos as training images.
 
-use super::seed::mix;
 use super::source::SampleSource;
 use crate::Sample;
+use crate::seed::mix;
 use crate::synth::masonry_photo;
 
 /// Masonry photos without end, rendered when they are needed.

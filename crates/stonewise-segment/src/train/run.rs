@@ -1,6 +1,6 @@
 //! A training from start or checkpoint to its end.
 
-use super::checkpoint_path;
+use super::checkpoint::checkpoint_path;
 use super::curve::Curve;
 use super::error::TrainError;
 use super::plot::draw_curves;
@@ -39,7 +39,7 @@ pub struct Run<'a> {
     pub out: &'a Path,
     /// Ends this run after so many minutes.
     pub minutes: Option<f64>,
-    /// Threads that make images while the network learns.
+    /// Threads that make images while the detector learns.
     pub threads: usize,
     /// Whom to tell, and who may stop the run.
     pub progress: &'a dyn Progress,
@@ -49,8 +49,9 @@ impl Run<'_> {
     /// Trains until the total is reached, the time is up or the caller stops it; leaves in the folder
     ///
     /// - `checkpoint.safetensors`: everything needed to go on, written every few minutes and at the end,
-    /// - `model.safetensors`: the network, to be used,
-    /// - `loss.csv`: losses of every step, `validation.csv`: figures on the validation images, `curves.svg`: both as a picture.
+    /// - `model.safetensors`: the detector, to be used,
+    /// - `loss.csv`: losses of every step, `validation.csv`: figures on the validation images, `curves.svg`:
+    ///   both as a picture.
     ///
     /// # Errors
     /// The loss diverges, an image cannot be made, a file cannot be written.
@@ -122,13 +123,13 @@ impl Run<'_> {
 
     fn save<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<(), TrainError> {
         trainer.save(&checkpoint_path(self.out))?;
-        save_model(&trainer.network(), &model_path(self.out), Precision::Half)?;
+        save_model(&trainer.detector(), &model_path(self.out), Precision::Half)?;
         let [loss, validation, picture] = [LOSS, VALIDATION, "curves.svg"].map(|name| self.out.join(name));
         draw_curves(&loss, &validation, &picture)
     }
 
     fn evaluate<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<MaskScore, TrainError> {
-        let detector = StoneDetector::new(trainer.network());
+        let detector = StoneDetector::new(trainer.detector());
         evaluate_samples(&detector, self.validation).map_err(|e| TrainError::Data(e.to_string()))
     }
 }
@@ -150,7 +151,7 @@ pub fn evaluate_samples<D: Detector>(
     Ok(MaskScore::of(&pairs))
 }
 
-/// Where a training leaves its network.
+/// Where a training leaves its detector.
 pub fn model_path(out: &Path) -> PathBuf {
     out.join("model.safetensors")
 }

@@ -35,8 +35,8 @@ impl Total {
 
 /// A trapezoid: linear warm-up, a plateau, linear decay to zero.
 ///
-/// The plateau does not depend on the total, so a training that is continued under a larger total goes on as if the total had been
-/// known from the start. Source: Hägele et al. 2024, who find it as good as a cosine.
+/// The plateau does not depend on the total, so a training that is continued under a larger total goes on as
+/// if the total had been known from the start. Source: Hägele et al. 2024, who find it as good as a cosine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Schedule {

@@ -6,8 +6,8 @@ use std::thread::Scope;
 
 /// A supply of images without end, each told by its number.
 pub trait SampleSource: Sync {
-    /// The image of this number: the same whenever it is asked for, so that a training that was interrupted goes on as if it
-    /// had not been.
+    /// The image of this number: the same whenever it is asked for, so that a training that was interrupted
+    /// goes on as if it had not been.
     ///
     /// # Errors
     /// Why there is none.
@@ -27,7 +27,8 @@ pub struct Prefetch {
 }
 
 impl Prefetch {
-    /// Starts `threads` workers at image `first`; each keeps up to `ahead` images ready. They end when this is dropped.
+    /// Starts `threads` workers at image `first`; each keeps up to `ahead` images ready. They end when this
+    /// is dropped.
     pub fn start<'scope, 'env>(
         scope: &'scope Scope<'scope, 'env>,
         source: &'env dyn SampleSource,

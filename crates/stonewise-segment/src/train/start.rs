@@ -1,6 +1,6 @@
 //! The beginning of a training, or of another run of one.
 
-use super::checkpoint_path;
+use super::checkpoint::checkpoint_path;
 use super::error::TrainError;
 use super::params::{TrainConfig, TrainParams};
 use super::schedule::Total;
@@ -13,22 +13,24 @@ use std::path::Path;
 /// What a training starts from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
-    /// Random weights of a network that looks like this.
+    /// Random weights of a detector that looks like this.
     Nothing(Box<MaskRcnnConfig>),
-    /// A network that has learnt before.
+    /// A detector that has learnt before.
     Weights(Weights),
 }
 
-/// How long a training lasts that does not say it, minutes: enough to learn a wall from a few labelled photos on two CPU cores.
+/// How long a training lasts that does not say it, minutes: enough to learn a wall from a few labelled photos
+/// on two CPU cores.
 const DEFAULT_MINUTES: f64 = 30.0;
 
 /// Takes up the training in a folder, or starts one where there is none.
 ///
-/// A training goes on under the parameters that it was started with; `total`, where given, replaces how long it lasts in all. A new one
-/// without a total lasts for the `minutes` of its first run.
+/// A training goes on under the parameters that it was started with; `total`, where given, replaces how long
+/// it lasts in all. A new one without a total lasts for the `minutes` of its first run.
 ///
 /// # Errors
-/// The folder holds a training with other parameters, the weights cannot be read, or a parameter is impossible.
+/// The folder holds a training with other parameters, the weights cannot be read, or a parameter is
+/// impossible.
 pub fn open_training<B: TrainBackend>(
     out: &Path,
     start: &Start,

@@ -1,4 +1,4 @@
-//! A whole training of a tiny network: it learns, resumes to the bit, and stops when it diverges.
+//! A whole training of a tiny detector: it learns, resumes to the bit, and stops when it diverges.
 
 use super::*;
 use crate::Sample;

@@ -13,7 +13,7 @@ use burn::tensor::{Device, Tensor};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::path::Path;
 
-/// A network in training.
+/// A detector in training.
 pub struct Trainer<B: TrainBackend> {
     config: TrainConfig,
     elapsed: Elapsed,
@@ -47,7 +47,7 @@ impl StepFigures {
 type BatchResult<B> = (Vec<f64>, Gradients<B>);
 
 impl<B: TrainBackend> Trainer<B> {
-    /// Starts a training of a network that was made as `config.model` says.
+    /// Starts a training of a detector that was made as `config.model` says.
     ///
     /// # Errors
     /// No threads can be started.
@@ -64,7 +64,7 @@ impl<B: TrainBackend> Trainer<B> {
     /// Takes up a training where its checkpoint was written.
     ///
     /// # Errors
-    /// The file cannot be read, is no checkpoint, or was made by another version of the network.
+    /// The file cannot be read, is no checkpoint, or was made by another version of the detector.
     pub fn resume(path: &Path, device: &Device<B>) -> Result<Self, TrainError> {
         let checkpoint: Checkpoint<TrainConfig> = Checkpoint::read(path)?;
         let config = checkpoint.config;
@@ -101,7 +101,7 @@ impl<B: TrainBackend> Trainer<B> {
     /// Trains on the images of one step, `batch` at a time; the batches are computed side by side.
     ///
     /// # Errors
-    /// The loss or its gradient is not finite; the network is left as it was.
+    /// The loss or its gradient is not finite; the detector is left as it was.
     pub fn step(&mut self, images: &[Sample]) -> Result<StepFigures, TrainError> {
         let rate = self
             .config
@@ -141,7 +141,8 @@ impl<B: TrainBackend> Trainer<B> {
         Ok(figures)
     }
 
-    /// Losses and gradients of every batch of a step, each computed by threads of its own: one image is too little work to share.
+    /// Losses and gradients of every batch of a step, each computed by threads of its own: one image is too
+    /// little work to share.
     fn batches(&self, images: &[Sample]) -> Vec<BatchResult<B::InnerBackend>> {
         std::thread::scope(|scope| {
             let batches = images.chunks(self.config.training.batch.max(1)).enumerate();
@@ -188,15 +189,15 @@ impl<B: TrainBackend> Trainer<B> {
         &self.config
     }
 
-    /// The network as it is now, to be used.
-    pub fn network(&self) -> MaskRcnn<B::InnerBackend> {
+    /// The detector as it is now, to be used.
+    pub fn detector(&self) -> MaskRcnn<B::InnerBackend> {
         self.model.valid()
     }
 
     /// Seeds the draws of a batch: the same when a step is done again.
     fn batch_seed(&self, batch: usize) -> u64 {
         let number = self.elapsed.steps * self.config.training.accumulate as u64 + batch as u64;
-        super::seed::mix(self.config.training.seed, number)
+        crate::seed::mix(self.config.training.seed, number)
     }
 
     fn diverged(&self, what: &'static str, value: f64, rate: f64) -> TrainError {

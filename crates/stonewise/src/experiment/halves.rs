@@ -5,7 +5,7 @@ use crate::pipeline::{Key, StepStore};
 use crate::project::{Epoch, Project};
 use crate::split;
 use stonewise_core::progress::Progress;
-use stonewise_io::cameras::{find_photos, read_cameras};
+use stonewise_io::cameras::find_photos;
 
 /// The project of the two halves of an epoch, with the settings and the part of the whole; nothing moved between them.
 ///
@@ -21,13 +21,13 @@ pub(super) fn halves_of(
     for cloud in &epoch.clouds {
         digests.push(store.digest(cloud)?);
     }
-    let photos = find_photos(&epoch.images, &read_cameras(&epoch.cameras)?)?.paths;
+    let photos = find_photos(&epoch.images, &epoch.read_cameras()?)?.paths;
     let key = Key::new(
         "halves",
         &(seed, photos, &epoch.masks),
         &digests.iter().map(String::as_str).collect::<Vec<_>>(),
     );
-    let (dir, _) = store.step("halves", key, |dir| {
+    let (dir, _) = store.step("halves", key, &[], |dir| {
         split::split(project, epoch, seed, dir.path(), progress).map(|_| ())
     })?;
     let halves = Project::read(&dir.file("stonewise.toml"))?;

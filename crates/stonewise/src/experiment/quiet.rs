@@ -10,6 +10,10 @@ impl Progress for Quiet<'_> {
 
     fn advance(&self, _: u64) {}
 
+    fn note(&self, line: &str) {
+        self.0.note(line);
+    }
+
     fn is_cancelled(&self) -> bool {
         self.0.is_cancelled()
     }

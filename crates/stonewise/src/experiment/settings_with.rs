@@ -102,17 +102,17 @@ mod tests {
         let after = settings_with(
             &before,
             &[
-                ("matching.max_ratio", &ratio),
+                ("match.max_ratio", &ratio),
                 ("registration.gicp.buffer_m", &buffer),
                 ("registration.estimator", &estimator),
             ],
         )
         .unwrap();
-        assert_eq!(after.matching.max_ratio, 0.55);
+        assert_eq!(after.r#match.max_ratio, 0.55);
         assert_eq!(after.registration.gicp.buffer_m, 1.0);
         assert_eq!(after.registration.estimator, Estimator::Gicp);
         let mut back = after;
-        back.matching.max_ratio = before.matching.max_ratio;
+        back.r#match.max_ratio = before.r#match.max_ratio;
         back.registration.gicp.buffer_m = before.registration.gicp.buffer_m;
         back.registration.estimator = before.registration.estimator;
         assert_eq!(back, before);
@@ -126,18 +126,18 @@ mod tests {
                 .to_string()
         };
         assert!(fail("buffer_m", "1.0").contains("registration.gicp.buffer_m"));
-        assert!(fail("matching", "1.0").contains("no parameter"));
-        assert!(fail("matching.max_ratio", "\"much\"").contains("max_ratio"));
-        assert!(fail("matching.min_area_ratio", "1.5").contains("share"));
+        assert!(fail("match", "1.0").contains("no parameter"));
+        assert!(fail("match.max_ratio", "\"much\"").contains("max_ratio"));
+        assert!(fail("match.min_area_ratio", "1.5").contains("share"));
     }
 
     #[test]
     fn lines_read_back_as_tables() {
         let (a, b) = (value("0.4"), value("0.6"));
-        let lines = project_lines(&[("matching.max_ratio", &a), ("registration.gicp.buffer_m", &b)]);
+        let lines = project_lines(&[("match.max_ratio", &a), ("registration.gicp.buffer_m", &b)]);
         let read: Settings = toml::from_str(&lines).unwrap();
         assert_eq!(
-            (read.matching.max_ratio, read.registration.gicp.buffer_m),
+            (read.r#match.max_ratio, read.registration.gicp.buffer_m),
             (0.4, 0.6)
         );
     }

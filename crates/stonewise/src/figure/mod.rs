@@ -9,6 +9,7 @@ mod colour;
 mod colour_bar;
 mod page;
 mod plot;
+mod scale;
 mod text;
 
 pub(crate) use axes::Axes;
@@ -17,4 +18,5 @@ pub(crate) use colour::{GREY, PALETTE, Ramp, Rgb, diverging, sequential};
 pub(crate) use colour_bar::colour_bar;
 pub(crate) use page::{Page, jpeg_element, table};
 pub(crate) use plot::{Item, Plot};
+pub(crate) use scale::{Scale, colours};
 pub(crate) use text::{count, escape, mm, mm_or_dash, number, percent};

@@ -1,17 +1,18 @@
 //! Comparing clouds without stones: M3C2, C2C and C2M as commands of their own.
 
 use crate::error::{Error, Result};
-use crate::pipeline::compare::compare;
+use crate::output::OutputFolder;
 use crate::pipeline::context::Context;
-use crate::pipeline::tables::write_change;
-use crate::pipeline::tiled::{Tiled, tile_epoch};
+use crate::pipeline::outputs::crs::coordinate_system;
+use crate::pipeline::outputs::m3c2::write_m3c2;
+use crate::pipeline::steps::ingest::ingest;
+use crate::pipeline::steps::m3c2::m3c2;
 use crate::project::Project;
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
 use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_io::cameras::read_cameras;
 use stonewise_io::cloud::{ExtraColumn, read_mesh, write_points_laz};
 
 /// What to compare with what.
@@ -33,17 +34,18 @@ pub enum Comparison<'a> {
     },
 }
 
-/// Compares the first two epochs of a project in the folder `out`; neither photos nor masks are needed.
+/// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed.
 ///
 /// M3C2's normals point at the cameras of the first epoch where it has any, else upwards.
 pub fn compare_clouds(
     project: &Project,
     what: Comparison,
-    out: &Path,
+    folder: &OutputFolder,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let context = Context::new(project, out, progress)?;
-    let second = tile_epoch(&context, 2)?;
+    let context = Context::new(project, folder, progress)?;
+    let out = folder.path();
+    let second = ingest(&context, 2)?;
     match what {
         Comparison::M3c2 => {
             let views = views_of(project)?;
@@ -52,34 +54,27 @@ pub fn compare_clouds(
                 [] => OutwardReference::Direction(Vector3::z()),
                 centres => OutwardReference::Towards(centres),
             };
-            let change = compare(&context, [&tile_epoch(&context, 1)?, &second], 2, &outward)?;
-            write_change(out, "m3c2", &change)
+            let change = m3c2(&context, [&ingest(&context, 1)?, &second], 2, &outward)?;
+            write_m3c2(out, 1, coordinate_system(project)?.as_ref(), &change)
         }
         Comparison::C2c { max_m } => {
-            let first = tile_epoch(&context, 1)?;
+            let first = ingest(&context, 1)?;
             let distances =
                 Distances::collect(|sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink))?;
-            distances.write(&out.join("c2c.laz"), "c2c_distance")
+            distances.write(project, &out.join("c2c.laz"), "c2c_distance")
         }
-        Comparison::C2m { mesh, max_m } => distances_to_mesh(&second, mesh, max_m, out, progress),
+        Comparison::C2m { mesh, max_m } => {
+            let index = MeshIndex::new(read_mesh(mesh)?);
+            let distances =
+                Distances::collect(|sink| c2m_survey(&index, &second.tiles, max_m, progress, sink))?;
+            distances.write(project, &out.join("c2m.laz"), "c2m_distance")
+        }
     }
-}
-
-fn distances_to_mesh(
-    cloud: &Tiled,
-    mesh: &Path,
-    max_m: f64,
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<()> {
-    let index = MeshIndex::new(read_mesh(mesh)?);
-    let distances = Distances::collect(|sink| c2m_survey(&index, &cloud.tiles, max_m, progress, sink))?;
-    distances.write(&out.join("c2m.laz"), "c2m_distance")
 }
 
 fn views_of(project: &Project) -> Result<Vec<View>> {
     match project.epochs.first() {
-        Some(epoch) if !epoch.cameras.as_os_str().is_empty() => Ok(read_cameras(&epoch.cameras)?.views),
+        Some(epoch) if !epoch.cameras.as_os_str().is_empty() => Ok(epoch.read_cameras()?.views),
         _ => Ok(Vec::new()),
     }
 }
@@ -111,9 +106,11 @@ impl Distances {
         Ok(all)
     }
 
-    fn write(&self, path: &Path, name: &str) -> Result<()> {
+    fn write(&self, project: &Project, path: &Path, name: &str) -> Result<()> {
+        let crs = coordinate_system(project)?.map(|c| c.text());
         Ok(write_points_laz(
             path,
+            crs.as_deref(),
             &self.points,
             &[(name, ExtraColumn::F64(&self.distances))],
         )?)

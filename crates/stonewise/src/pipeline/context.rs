@@ -1,32 +1,20 @@
 //! What every step needs: where to work, whom to tell, how to resume.
 
-use crate::error::{Error, Result};
-use crate::files::{read_json, write_json};
-use crate::pipeline::step::{Keeps, Key, StepDir, StepStore};
+use crate::error::Result;
+use crate::files::{create_results_folder, read_json, write_json};
+use crate::output::OutputFolder;
+use crate::pipeline::clock::{Clock, peak_memory_bytes};
+use crate::pipeline::storage::step::{Keeps, Key, Origin, StepDir, StepStore};
 use crate::project::Project;
+use crate::results::names::WORK_DIR;
+use crate::results::records::StepTime;
 use crate::warnings::{Warning, Warnings};
-use serde::{Deserialize, Serialize};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 use stonewise_core::progress::Progress;
 
 /// Where a step notes its warnings.
 const WARNINGS: &str = "warnings.json";
-
-/// Wall time and memory of one step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StepTime {
-    /// Name of the step.
-    pub step: String,
-    /// Wall time, seconds; small where earlier results were taken.
-    pub seconds: f64,
-    /// Whether the results of an earlier run were taken.
-    pub resumed: bool,
-    /// Highest memory of the process so far, bytes; `None` where the system does not tell.
-    pub peak_memory_bytes: Option<u64>,
-}
 
 /// One run of a project in a folder.
 pub struct Context<'a> {
@@ -36,6 +24,8 @@ pub struct Context<'a> {
     pub out: PathBuf,
     /// Where steps keep their files.
     pub store: Arc<StepStore>,
+    /// The folder that results go to, claimed for this run; `None` within an experiment, which claims its own.
+    pub output: Option<&'a OutputFolder>,
     /// Whom to tell, and who may stop the run.
     pub progress: &'a dyn Progress,
     /// What went wrong without stopping the run.
@@ -45,9 +35,13 @@ pub struct Context<'a> {
 
 impl<'a> Context<'a> {
     /// Makes the folders of a run that keeps its steps beside its results.
-    pub fn new(project: &'a Project, out: &Path, progress: &'a dyn Progress) -> Result<Self> {
-        let store = StepStore::new(&out.join("work"), Keeps::Newest)?;
-        Self::with_store(project, out, Arc::new(store), progress)
+    pub fn new(project: &'a Project, output: &'a OutputFolder, progress: &'a dyn Progress) -> Result<Self> {
+        let store = StepStore::new(&output.path().join(WORK_DIR), Keeps::Newest)?;
+        let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
+        Ok(Self {
+            output: Some(output),
+            ..context
+        })
     }
 
     /// The same with the steps in a store that other runs may share.
@@ -57,13 +51,18 @@ impl<'a> Context<'a> {
         store: Arc<StepStore>,
         progress: &'a dyn Progress,
     ) -> Result<Self> {
-        fs::create_dir_all(out).map_err(Error::io("making the result folder", out))?;
+        create_results_folder(out)?;
+        let warnings = Warnings::default();
+        for note in &project.notes {
+            warnings.notice("project", project.path.to_string_lossy(), note);
+        }
         Ok(Self {
             project,
             out: out.to_path_buf(),
             store,
+            output: None,
             progress,
-            warnings: Warnings::default(),
+            warnings,
             times: Mutex::default(),
         })
     }
@@ -75,23 +74,37 @@ impl<'a> Context<'a> {
         key: Key,
         make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
     ) -> Result<StepDir> {
+        self.step_publishing(name, key, &[], make)
+    }
+
+    /// The same for a step that makes files outside its folder too.
+    pub fn step_publishing(
+        &self,
+        name: &str,
+        key: Key,
+        published: &[PathBuf],
+        make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
+    ) -> Result<StepDir> {
         self.progress.check()?;
-        let started = Instant::now();
-        let (dir, resumed) = self.store.step(name, key, |dir| {
+        let started = Clock::start();
+        let (dir, origin) = self.store.step(name, key, published, |dir| {
             let warnings = Warnings::default();
             make(dir, &warnings)?;
             write_json(&dir.file(WARNINGS), &warnings.sorted())
         })?;
+        if let Origin::MadeAgain(why) = &origin {
+            self.progress.note(&format!("step {name} was done again: {why}"));
+        }
         let warnings: Vec<Warning> = read_json(&dir.file(WARNINGS))?;
         warnings.into_iter().for_each(|w| self.warnings.push(w));
-        self.record(name, started, resumed);
+        self.record(name, started, origin == Origin::Found);
         Ok(dir)
     }
 
     /// Does a piece of work that keeps nothing between runs, and notes its time.
     pub fn timed<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.progress.check()?;
-        let started = Instant::now();
+        let started = Clock::start();
         let result = work()?;
         self.record(name, started, false);
         Ok(result)
@@ -107,10 +120,11 @@ impl<'a> Context<'a> {
         self.times.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn record(&self, step: &str, started: Instant, resumed: bool) {
+    fn record(&self, step: &str, started: Clock, resumed: bool) {
         let time = StepTime {
             step: step.to_owned(),
-            seconds: started.elapsed().as_secs_f64(),
+            seconds: started.wall_seconds(),
+            processor_seconds: started.processor_seconds(),
             resumed,
             peak_memory_bytes: peak_memory_bytes(),
         };
@@ -119,15 +133,4 @@ impl<'a> Context<'a> {
             .unwrap_or_else(PoisonError::into_inner)
             .push(time);
     }
-}
-
-/// Highest resident memory of this process, where Linux tells it.
-fn peak_memory_bytes() -> Option<u64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    line.split_whitespace()
-        .nth(1)?
-        .parse::<u64>()
-        .ok()
-        .map(|kib| kib * 1024)
 }

@@ -1,33 +1,22 @@
 //! The steps of the method, with their files, and the run that strings them together.
+//!
+//! `storage` keeps files between steps, `steps` are the steps, `outputs` writes what a user opens.
 
+mod clock;
 mod clouds_only;
-mod clouds_out;
-mod compare;
 mod context;
-mod crs;
-mod epoch_tiles;
-mod evidence;
-mod face_cloud;
-mod label;
-mod matching;
-mod network;
-mod pairs;
-mod photos;
-mod registration;
+mod doubts;
+mod look;
+mod outputs;
 mod run;
-mod run_record;
-mod score;
-mod series;
-mod spill;
-pub(crate) mod step;
-mod tables;
-mod tiled;
-mod tiles;
-mod windows;
+mod sources;
+mod steps;
+pub(crate) mod storage;
 
 pub use clouds_only::{Comparison, compare_clouds};
 pub(crate) use context::Context;
-pub(crate) use photos::segment;
 pub use run::{PairSummary, Summary, Until, run};
 pub(crate) use run::{first_stones, run_in};
-pub(crate) use step::{Keeps, Key, StepStore};
+pub use sources::SourceRule;
+pub(crate) use steps::segment::segment;
+pub(crate) use storage::step::{Keeps, Key, StepStore};

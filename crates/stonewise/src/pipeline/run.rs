@@ -1,27 +1,36 @@
 //! The method, from surveys to results.
 
 use crate::error::{Error, Result};
+use crate::export::write_layers;
 use crate::files::write_readable_json;
-use crate::pipeline::clouds_out::write_clouds;
-use crate::pipeline::compare::compare;
+use crate::output::OutputFolder;
 use crate::pipeline::context::Context;
-use crate::pipeline::evidence::write_evidence;
-use crate::pipeline::face_cloud::write_face_cloud;
-use crate::pipeline::label::{Labelled, label};
-use crate::pipeline::matching::find_partners;
-use crate::pipeline::photos::{Segmented, segment};
-use crate::pipeline::registration::register;
-use crate::pipeline::run_record::write_run_record;
-use crate::pipeline::score::evaluate;
-use crate::pipeline::series::write_series;
-use crate::pipeline::tables::{stone_rows, write_audit, write_change, write_stone_outlines};
-use crate::pipeline::tiled::{Tiled, tile_epoch};
+use crate::pipeline::doubts::note_doubts;
+use crate::pipeline::look::look;
+use crate::pipeline::outputs::audit::write_audit;
+use crate::pipeline::outputs::clouds::write_clouds;
+use crate::pipeline::outputs::crs::coordinate_system;
+use crate::pipeline::outputs::evidence::write_evidence;
+use crate::pipeline::outputs::face_cloud::write_face_cloud;
+use crate::pipeline::outputs::m3c2::write_m3c2;
+use crate::pipeline::outputs::outlines::write_stone_outlines;
+use crate::pipeline::outputs::run_record::write_run_record;
+use crate::pipeline::outputs::series::write_series;
+use crate::pipeline::outputs::stone_rows::stone_rows;
+use crate::pipeline::steps::evaluate::evaluate;
+use crate::pipeline::steps::ingest::{Ingested, ingest};
+use crate::pipeline::steps::label::{Labelled, label};
+use crate::pipeline::steps::m3c2::m3c2;
+use crate::pipeline::steps::r#match::r#match;
+use crate::pipeline::steps::register::{datum, register};
+use crate::pipeline::steps::segment::{Segmented, segment};
 use crate::project::Project;
-use crate::report::{StoneRow, read_outlines, write_layers, write_report, write_stones_named};
+use crate::report::write_report;
+use crate::results::names::PairFile;
+use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRecord};
+use crate::results::{Facade, StoneRow, facade_of, read_outlines, write_stones};
 use crate::warnings::Warning;
 use nalgebra::Point3;
-use serde_json::json;
-use std::path::Path;
 use stonewise_core::change::OutwardReference;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::evaluate::Evaluation;
@@ -60,6 +69,8 @@ pub struct Summary {
 pub struct PairSummary {
     /// One row for each stone of the first epoch; empty where the run did not go so far.
     pub rows: Vec<StoneRow>,
+    /// What is known about the registration of the epoch; `None` where the run did not go so far.
+    pub datum: Option<Datum>,
     /// Where the project knows the motion, and the run went so far.
     pub evaluation: Option<Evaluation>,
 }
@@ -69,24 +80,34 @@ impl Summary {
     pub fn skipped_inputs(&self) -> bool {
         self.warnings.iter().any(|w| w.skipped_input)
     }
+
+    /// Why the results as a whole cannot be relied on; none where they can, as far as the intervals say.
+    pub fn doubts(&self) -> impl Iterator<Item = &Warning> {
+        self.warnings.iter().filter(|w| w.doubt)
+    }
 }
 
 /// Runs a project as far as asked, in the folder `out`; takes over whatever an earlier run finished there.
 ///
-/// Errors: an input that cannot be used, epochs that do not overlap, a full disk, interruption. What is finished
-/// stays, and the same call goes on from there.
-pub fn run(project: &Project, out: &Path, until: Until, progress: &dyn Progress) -> Result<Summary> {
-    run_in(&Context::new(project, out, progress)?, until)
+/// Results of an earlier run lie aside until this one has finished. Errors: an input that cannot be used, epochs that do
+/// not overlap, a full disk, interruption. What is finished stays, and the same call goes on from there.
+pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn Progress) -> Result<Summary> {
+    out.begin_results(project)?;
+    let context = Context::new(project, out, progress)?;
+    look(&context, out.is_forced())?;
+    let summary = run_in(&context, until)?;
+    out.finish_results(until == Until::Reported)?;
+    Ok(summary)
 }
 
 /// The same in a context of the caller's.
 pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     let epochs = 1..=context.project.epochs.len();
-    let tiled = epochs
+    let ingested = epochs
         .clone()
-        .map(|n| tile_epoch(context, n))
+        .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
-    check_overlap(context, &tiled)?;
+    check_overlap(context, &ingested)?;
     let photos = epochs
         .clone()
         .map(|n| segment(context, n))
@@ -94,11 +115,11 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     if until == Until::Segmented {
         return Ok(summary(context, Vec::new()));
     }
-    let labelled = tiled
+    let labelled = ingested
         .into_iter()
         .zip(&photos)
         .zip(1..)
-        .map(|((tiled, photos), number)| label(context, number, tiled, photos))
+        .map(|((ingested, photos), number)| label(context, number, ingested, photos))
         .collect::<Result<Vec<_>>>()?;
     for number in epochs.clone() {
         write_audit(context, number, &photos[number - 1], &labelled[number - 1])?;
@@ -109,19 +130,21 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
             .try_for_each(|n| write_clouds(context, n, &labelled[n - 1], None))?;
         return Ok(summary(context, Vec::new()));
     }
+    write_stone_outlines(context, &labelled[0])?;
+    let outlines = read_outlines(&context.out)?;
+    let first = &labelled[0].stones;
+    let facade = facade_of(first.iter().map(|s| (s.id.0, s.centroid)), &outlines);
     let mut pairs = Vec::new();
     for number in epochs.clone().skip(1) {
-        pairs.push(measure(context, &photos, &labelled, number, until)?);
+        pairs.push(measure(context, &photos, &labelled, &facade, number, until)?);
     }
     if until == Until::Matched {
         return Ok(summary(context, pairs));
     }
-    write_stone_outlines(context, &labelled[0])?;
     if until < Until::Reported {
-        write_run_record(context, &photos, &labelled)?;
+        write_run_record(context, &photos, &labelled, &datums(&pairs))?;
         return Ok(summary(context, pairs));
     }
-    let outlines = read_outlines(&context.out)?;
     let rows: Vec<&[StoneRow]> = pairs.iter().map(|pair| pair.rows.as_slice()).collect();
     context.timed("evidence", || {
         write_evidence(context, &photos, &labelled, &outlines, &rows)
@@ -137,17 +160,17 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     if let Some(rows) = rows.first() {
         context.timed("face cloud", || write_face_cloud(context, &labelled[0], rows))?;
     }
-    write_series(context, &pairs)?;
-    write_run_record(context, &photos, &labelled)?;
-    context.timed("report", || Ok(write_report(&context.out)?))?;
-    context.timed("layers", || Ok(write_layers(&context.out)?))?;
+    write_series(context, &rows)?;
+    write_run_record(context, &photos, &labelled, &datums(&pairs))?;
+    context.timed("report", || write_report(&context.out))?;
+    context.timed("layers", || write_layers(&context.out))?;
     Ok(summary(context, pairs))
 }
 
 /// Stones of the first epoch, before any known motion is asked for.
 pub(crate) fn first_stones(context: &Context) -> Result<Vec<Stone>> {
-    let tiled = tile_epoch(context, 1)?;
-    Ok(label(context, 1, tiled, &segment(context, 1)?)?.stones)
+    let ingested = ingest(context, 1)?;
+    Ok(label(context, 1, ingested, &segment(context, 1)?)?.stones)
 }
 
 /// Matches, measures and compares one later epoch against the first, and writes its tables.
@@ -155,67 +178,79 @@ fn measure(
     context: &Context,
     photos: &[Segmented],
     labelled: &[Labelled],
+    facade: &Facade,
     number: usize,
     until: Until,
 ) -> Result<PairSummary> {
     let (first, second) = (&labelled[0], &labelled[number - 1]);
-    let matched = find_partners(context, first, second, number)?;
+    let matched = r#match(context, first, second, number)?;
     if matched.pairs().is_empty() {
         return Err(Error::NoMatch {
             epochs: [0, number - 1].map(|e| context.project.epochs[e].name.clone()),
             stones: [first.stones.len(), second.stones.len()],
         });
     }
-    let named = |stem: &str| {
-        if number == 2 {
-            stem.to_owned()
-        } else {
-            format!("{stem}_{}", number - 1)
-        }
-    };
-    write_readable_json(
-        &context.out.join(format!("{}.json", named("matches"))),
-        &matched.report,
-    )?;
+    let pair = number - 1;
+    let file = |file: PairFile| context.out.join(file.name(pair));
+    write_readable_json(&file(PairFile::Matches), &matched.report)?;
     if until == Until::Matched {
         return Ok(PairSummary::default());
     }
     let registered = register(context, first, second, &matched, number)?;
-    let rows = stone_rows(context, first, second, &matched, &registered);
-    write_stones_named(&context.out, &named("stones"), &rows)?;
-    write_readable_json(
-        &context.out.join(format!("{}.json", named("registration"))),
-        &json!(registered.summary),
-    )?;
+    let datum = datum(context.project, number, &registered, &first.stones);
+    if datum.state == DatumState::Unknown {
+        let epoch = &context.project.epochs[number - 1].name;
+        context.warnings.notice("register", epoch, &datum.note);
+    }
+    let rows = stone_rows([first, second], &matched, &registered, &datum, facade);
+    note_doubts(context, number, &registered, &rows);
+    write_stones(&context.out, pair, &rows)?;
+    let record = RegistrationRecord {
+        estimator: registered.estimator,
+        datum: datum.clone(),
+        observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
+    };
+    write_readable_json(&file(PairFile::Registration), &record)?;
     let change = if until > Until::Registered {
         let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
         let outward = OutwardReference::Towards(&centres);
-        let change = compare(context, [&first.tiled, &second.tiled], number, &outward)?;
+        let change = m3c2(context, [&first.ingested, &second.ingested], number, &outward)?;
+        let crs = coordinate_system(context.project)?;
         context.timed("write m3c2", || {
-            write_change(&context.out, &named("m3c2"), &change)
+            write_m3c2(&context.out, pair, crs.as_ref(), &change)
         })?;
         Some(change)
     } else {
         None
     };
-    let evaluation = evaluate(context, &first.stones, &rows, change.as_ref(), number);
+    let evaluation = evaluate(context, &first.stones, &rows, &datum, change.as_ref(), number);
     if let Some(evaluation) = &evaluation {
-        write_readable_json(
-            &context.out.join(format!("{}.json", named("evaluation"))),
-            evaluation,
-        )?;
+        write_readable_json(&file(PairFile::Evaluation), evaluation)?;
     }
-    Ok(PairSummary { rows, evaluation })
+    Ok(PairSummary {
+        rows,
+        datum: Some(datum),
+        evaluation,
+    })
+}
+
+/// What is known about the registration of each later epoch.
+fn datums(pairs: &[PairSummary]) -> Vec<DatumState> {
+    pairs
+        .iter()
+        .filter_map(|p| p.datum.as_ref())
+        .map(|d| d.state)
+        .collect()
 }
 
 /// Epochs whose clouds lie apart cannot be compared.
-fn check_overlap(context: &Context, tiled: &[Tiled]) -> Result<()> {
-    let bounds = |t: &Tiled| {
+fn check_overlap(context: &Context, ingested: &[Ingested]) -> Result<()> {
+    let bounds = |t: &Ingested| {
         (0..t.tiles.tile_count())
             .map(|i| t.tiles.bounds(i))
             .reduce(|a, b| a.union(&b))
     };
-    let boxes: Vec<Bounds> = tiled.iter().filter_map(bounds).collect();
+    let boxes: Vec<Bounds> = ingested.iter().filter_map(bounds).collect();
     for (number, bounds) in boxes.iter().enumerate().skip(1) {
         if !boxes[0].intersects(bounds) {
             let names = [0, number].map(|e| &context.project.epochs[e].name);

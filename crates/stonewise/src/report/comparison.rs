@@ -1,7 +1,6 @@
 //! Stones against the M3C2 core points on them.
 
-use super::statistics::Sorted;
-use super::{ResultSet, StoneRow};
+use crate::results::{ResultSet, Sorted, StoneRow};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 

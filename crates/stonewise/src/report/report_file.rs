@@ -1,27 +1,29 @@
 //! The report file.
 
-use super::page::{page, page_name};
-use super::{ReportError, ResultSet};
+use super::page::page;
+use crate::error::Error;
+use crate::results::ResultSet;
+use crate::results::names::{PairFile, REPORT_DIR};
 use std::path::{Path, PathBuf};
 use stonewise_io::atomic::write_atomically;
 
 /// Makes `report/index.html` from the result files in `dir` alone and returns its path.
 ///
 /// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of the third
-/// against the first is `report/epoch_3.html`, and so on; each links to the others. The same results give the same
+/// against the first is `report/index_2.html`, and so on; each links to the others. The same results give the same
 /// bytes.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or the report cannot be written.
-pub fn write_report(dir: &Path) -> Result<PathBuf, ReportError> {
+pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
     let results = ResultSet::read(dir)?;
-    let folder = dir.join("report");
-    std::fs::create_dir_all(&folder).map_err(ReportError::io("making the folder", &folder))?;
+    let folder = dir.join(REPORT_DIR);
+    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))?;
     let write = |results: &ResultSet| {
-        let path = folder.join(page_name(results.pair));
+        let path = folder.join(PairFile::ReportPage.name(results.pair));
         let page = page(results)?;
         write_atomically(&path, |partial| std::fs::write(partial, page))
-            .map_err(ReportError::io("writing the report", &path))?;
+            .map_err(Error::io("writing the report", &path))?;
         Ok(path)
     };
     for pair in 2..=results.pairs {
@@ -33,16 +35,22 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, ReportError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::testing::{outlines, rows};
-    use crate::report::{StoneRow, write_outlines, write_stones, write_stones_named};
+    use crate::files::write_json;
+    use crate::results::names::RUN;
+    use crate::results::records::{Datum, RegistrationRecord, RunRecord, StepTime};
+    use crate::results::testing::{folder, outlines, registration_record, rows, run_record};
+    use crate::results::{Status, StoneRow, write_outlines, write_stones};
+    use crate::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
 
     /// Result files with these rows and this run.json, and the report made of them.
-    fn report(rows: &[StoneRow], run: &str) -> String {
+    fn report(rows: &[StoneRow], run: Option<&RunRecord>) -> String {
         let folder = tempfile::tempdir().unwrap();
-        write_stones(folder.path(), rows).unwrap();
+        write_stones(folder.path(), 1, rows).unwrap();
         write_outlines(folder.path(), &outlines()).unwrap();
-        std::fs::write(folder.path().join("run.json"), run).unwrap();
+        if let Some(run) = run {
+            write_json(&folder.path().join(RUN), run).unwrap();
+        }
         let points = "x,y,z,nx,ny,nz,m3c2_distance,m3c2_uncertainty\n100,200.4,50.25,1,0,0,0.004,0.001\n";
         std::fs::write(folder.path().join("m3c2.csv"), points).unwrap();
         let evaluation = Evaluation::new("a <known> motion", &EvaluationParams::default());
@@ -54,8 +62,7 @@ mod tests {
         std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
         let decisions = "event,photo,instance\nmerged_instance,<script>.jpg,4\nmerged_instance,b.jpg,5\n";
         std::fs::write(folder.path().join("audit_epoch1.csv"), decisions).unwrap();
-        std::fs::write(folder.path().join("registration.json"), r#"{"converged": false, "stable_areas": {"shift": [0.0012, 0, -0.003], "points": [1200, 1300],
-                "covariance": [1e-6,0,0,0,0,0, 0,4e-6,0,0,0,0, 0,0,1e-6,0,0,0, 0,0,0,1,0,0, 0,0,0,0,1,0, 0,0,0,0,0,1]}}"#).unwrap();
+        write_json(&folder.path().join("registration.json"), &registration_record()).unwrap();
         let path = write_report(folder.path()).unwrap();
         let html = std::fs::read_to_string(&path).unwrap();
         assert_eq!(
@@ -96,10 +103,7 @@ mod tests {
 
     #[test]
     fn it_says_what_moved_and_shows_it() {
-        let html = report(
-            &rows(),
-            r#"{"project": "Test wall", "epochs": [{"name": "A"}, {"name": "B"}]}"#,
-        );
+        let html = report(&rows(), Some(&run_record("Test wall", &["A", "B"])));
         check_nesting(&html);
         for id in [
             "summary",
@@ -124,9 +128,8 @@ mod tests {
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
         assert!(html.contains("before it settled"));
-        assert!(
-            html.contains("the stable areas outside the wall seem to have moved by 3.2 mm (\u{b1} 2.4 mm)")
-        );
+        assert!(html.contains("Datum: the stable areas show a registration error of 3.2 mm."));
+        assert!(html.contains("finished <b>2026-04-30 12:00 UTC</b>") && html.contains("temperature_c 9.5"));
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         let html = written(&html);
@@ -138,15 +141,27 @@ mod tests {
 
     #[test]
     fn it_needs_no_network_and_names_from_files_are_harmless() {
-        let run = r#"{"project": {"name": "</title><script>alert(1)</script>"}, "<b>": ["\" onload=\"x"],
-            "steps": [{"step": "<i>", "seconds": 1.23456789}, {"step": "label"}],
-            "warnings": [{"step": "label", "subject": "<script>.jpg", "message": "'&'", "skipped_input": true}]}"#;
-        let html = report(&rows(), run);
+        let mut run = run_record("</title><script>alert(1)</script>", &["\" onload=\"x", "<b>"]);
+        run.steps = vec![StepTime {
+            step: "<i>".to_owned(),
+            seconds: 1.234_567_89,
+            processor_seconds: Some(2.5),
+            resumed: false,
+            peak_memory_bytes: None,
+        }];
+        run.warnings = vec![Warning {
+            step: "label".to_owned(),
+            subject: "<script>.jpg".to_owned(),
+            message: "'&'".to_owned(),
+            skipped_input: true,
+            doubt: false,
+        }];
+        let html = report(&rows(), Some(&run));
         check_nesting(&html);
         assert!(
             !html.contains("<script>alert") && !html.contains("<script>.jpg") && !html.contains("<known>")
         );
-        assert!(html.contains("<td>&lt;i&gt;</td><td class=\"n\">1.2</td>"));
+        assert!(html.contains("<td>&lt;i&gt;</td><td class=\"n\">1.2</td><td class=\"n\">2.5</td>"));
         assert!(html.contains("&lt;script&gt;.jpg") && html.contains("left out"));
         assert_eq!(
             html.matches("</script").count(),
@@ -164,12 +179,12 @@ mod tests {
     fn a_run_without_matches_or_without_stones_has_a_report() {
         let mut unmatched = rows();
         for row in &mut unmatched {
-            (row.motion, row.status) = (None, crate::report::Status::UnmatchedUnseen);
+            (row.motion, row.status) = (None, Status::UnmatchedUnseen);
         }
-        let html = report(&unmatched, "{}");
+        let html = report(&unmatched, None);
         check_nesting(&html);
         assert!(html.contains("No stone was measured.") && html.contains("class=\"hatch\""));
-        check_nesting(&report(&[], "null"));
+        check_nesting(&report(&[], None));
     }
 
     #[test]
@@ -179,7 +194,7 @@ mod tests {
         odd[1].motion.as_mut().unwrap().face.x = f64::NAN;
         odd[4].motion.as_mut().unwrap().detection_limit_m = f64::INFINITY;
         odd[5].area_m2 = 0.0;
-        let html = written(&report(&odd, "{}"));
+        let html = written(&report(&odd, None));
         check_nesting(&html);
         for word in ["NaN", "inf"] {
             let at = html.find(word).unwrap_or(0);
@@ -190,15 +205,30 @@ mod tests {
     #[test]
     fn every_later_epoch_has_its_report_and_links_to_the_others() {
         let folder = tempfile::tempdir().unwrap();
-        write_stones(folder.path(), &rows()).unwrap();
-        write_stones_named(folder.path(), "stones_2", &rows()[..20]).unwrap();
-        let run = r#"{"epochs": [{"name": "A"}, {"name": "B"}, {"name": "<C>"}]}"#;
-        std::fs::write(folder.path().join("run.json"), run).unwrap();
+        write_stones(folder.path(), 1, &rows()).unwrap();
+        write_stones(folder.path(), 2, &rows()[..20]).unwrap();
+        write_json(&folder.path().join(RUN), &run_record("Wall", &["A", "B", "<C>"])).unwrap();
         write_report(folder.path()).unwrap();
         let page = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
-        assert!(page("index.html").contains("of 24 stones") && page("epoch_3.html").contains("of 20 stones"));
-        assert!(page("index.html").contains("<a href=\"epoch_3.html\">A \u{2192} &lt;C&gt;</a>"));
-        assert!(page("epoch_3.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
+        assert!(page("index.html").contains("of 24 stones") && page("index_2.html").contains("of 20 stones"));
+        assert!(page("index.html").contains("<a href=\"index_2.html\">A \u{2192} &lt;C&gt;</a>"));
+        assert!(page("index_2.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
+    }
+
+    #[test]
+    fn an_unknown_datum_is_the_first_thing_said() {
+        let folder = folder(&rows());
+        let unknown = Datum::unknown(&nalgebra::Point3::origin(), "unknown".to_owned());
+        let registration = RegistrationRecord {
+            datum: unknown,
+            observers: None,
+            ..registration_record()
+        };
+        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        let first = html.split("<ul class=\"findings\"><li>").nth(1).unwrap();
+        assert!(first.starts_with("<b>The registration error of the epochs is unknown</b>"));
+        assert!(html.contains("against the common motion of the wall"));
     }
 
     #[test]

@@ -1,8 +1,7 @@
 //! The facts that the report states in words.
 
-use super::statistics::Sorted;
-use super::{ResultSet, RowMotion, Status, StoneRow};
 use crate::figure::number;
+use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m};
 use nalgebra::Point2;
 
 /// Share of stones at rest that the 95 % test calls significant.
@@ -17,7 +16,7 @@ pub(crate) struct Summary<'a> {
     pub measured: Vec<(&'a StoneRow, &'a RowMotion)>,
     /// Those that moved significantly, largest motion first.
     pub significant: Vec<(&'a StoneRow, &'a RowMotion)>,
-    /// Those that move unlike their neighbours, largest relative motion first.
+    /// Loose ones, largest relative motion first.
     pub loose: Vec<(&'a StoneRow, &'a RowMotion)>,
     /// Detection limits, metres.
     pub limits: Sorted,
@@ -32,11 +31,7 @@ pub(crate) struct Summary<'a> {
 
 impl<'a> Summary<'a> {
     pub(crate) fn new(results: &'a ResultSet) -> Self {
-        let measured: Vec<_> = results
-            .stones
-            .iter()
-            .filter_map(|s| s.motion.as_ref().map(|m| (s, m)))
-            .collect();
+        let measured = results.measured();
         let pick = |keep: fn(&RowMotion) -> bool, size: fn(&RowMotion) -> f64| {
             let mut all: Vec<_> = measured.iter().copied().filter(|(_, m)| keep(m)).collect();
             all.sort_by(|a, b| {
@@ -90,6 +85,11 @@ impl<'a> Summary<'a> {
     /// Millimetres for tables.
     pub(crate) fn mm(&self, metres: f64) -> String {
         number(metres * 1e3, self.decimals())
+    }
+
+    /// End of the colour scale that the components share, metres.
+    pub(crate) fn component_limit_m(&self) -> f64 {
+        component_limit_m(self.measured.iter().map(|(_, m)| *m))
     }
 
     /// Number of stones without a motion.

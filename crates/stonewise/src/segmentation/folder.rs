@@ -3,7 +3,8 @@
 use super::overlay::outlined;
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json, write_readable_json};
-use crate::pipeline::step::{Key, StepDir, path_digest};
+use crate::kept::Kept;
+use crate::pipeline::storage::step::{Key, StepDir, path_digest};
 use crate::warnings::{Warning, Warnings};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,12 +13,10 @@ use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
 use stonewise_io::image_io::{image_size, photos_in, read_rgb, write_jpeg};
 use stonewise_io::masks::{CocoFile, CocoPhoto, InstanceInfo, read_label_png, write_label_png};
-use stonewise_segment::backend::{Compute, device};
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::evaluation::{MaskScore, PhotoPairs, pair_masks};
-use stonewise_segment::model::StoneDetector;
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
-use stonewise_segment::{Segmentation, Weights, open_model};
+use stonewise_segment::{Segmentation, StoneFinder, Weights};
 
 const STEP: &str = "segment";
 /// Quality of the overlays.
@@ -30,7 +29,7 @@ pub struct FolderJob<'a> {
     pub photos: &'a Path,
     /// Where results go; made if need be.
     pub out: &'a Path,
-    /// The network.
+    /// The detector.
     pub weights: &'a Weights,
     /// How photos are cut into tiles.
     pub tiling: &'a TilingOptions,
@@ -73,7 +72,10 @@ pub struct PhotoScore {
 /// What is kept of a photo that is done, besides its label image.
 #[derive(Serialize, Deserialize)]
 struct Done {
+    /// Of the photo.
     digest: String,
+    /// Its label image, as it was left.
+    labels: Kept,
     scores: BTreeMap<u32, f32>,
 }
 
@@ -84,19 +86,18 @@ struct Done {
 /// - `masks.json`: all masks as a COCO instances file,
 /// - `evaluation.json`: figures, where there is a reference.
 ///
-/// Masks belong to the pixels as the photo stores them. Photos that an interrupted call finished are taken over if photo, network
-/// and parameters are the same.
+/// Masks belong to the pixels as the photo stores them. Photos that an interrupted call finished are taken
+/// over if photo, detector and parameters are the same.
 ///
 /// # Errors
-/// There is no photo, the network cannot be read, a file cannot be written, or the caller stopped it. A photo that cannot be read is a
-/// warning.
+/// There is no photo, the detector cannot be read, a file cannot be written, or the caller stopped it. A
+/// photo that cannot be read is a warning.
 pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<FolderSummary> {
     let (root, photos) = photos_of(job.photos)?;
-    let network = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
-    let key = Key::new(STEP, job.tiling, &[&network]);
+    let detector = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
+    let key = Key::new(STEP, job.tiling, &[&detector]);
     let step = StepDir::open(job.out.join("work").join(STEP), key)?;
-    let detector = StoneDetector::new(open_model::<Compute>(job.weights, &device())?)
-        .with_min_score(job.tiling.min_score as f32);
+    let detector = StoneFinder::open(job.weights, job.tiling.min_score as f32)?;
     let warnings = Warnings::default();
     let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
     progress.begin("stones", photos.iter().map(tiles).sum());
@@ -122,9 +123,11 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
                 let segmented = segment_photo(&detector, &image, job.tiling, progress)?;
                 let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
                 write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
-                write_label_png(&label_path(job, name)?, &segmented.labels)?;
+                let labels = label_path(job, name)?;
+                write_label_png(&labels, &segmented.labels)?;
                 let done = Done {
                     digest: path_digest(photo)?,
+                    labels: Kept::of(&labels, name.to_path_buf())?,
                     scores: segmented.scores.clone(),
                 };
                 write_json(&file_in(step.path(), name, "json")?, &done)?;
@@ -176,11 +179,11 @@ fn photos_of(path: &Path) -> Result<(PathBuf, Vec<PathBuf>)> {
 /// The result of an earlier call for the same photo.
 fn taken_over(job: &FolderJob, step: &StepDir, photo: &Path, name: &Path) -> Result<Option<Segmentation>> {
     let (stamp, labels) = (file_in(step.path(), name, "json")?, label_path(job, name)?);
-    if !stamp.exists() || !labels.exists() {
+    // A damaged note of what is done is none.
+    let Ok(done) = read_json::<Done>(&stamp) else {
         return Ok(None);
-    }
-    let done: Done = read_json(&stamp)?;
-    if done.digest != path_digest(photo)? {
+    };
+    if done.digest != path_digest(photo)? || done.labels.differs(&labels).is_some() {
         return Ok(None);
     }
     Ok(Some(Segmentation {

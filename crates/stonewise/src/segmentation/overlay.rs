@@ -35,7 +35,8 @@ pub fn outlined(photo: &RgbImage, labels: &LabelImage) -> RgbImage {
                 || differs(Some(x), y.checked_sub(reach))
                 || differs(Some(x), Some(y + reach));
             if is_border && let Some(pixel) = picture.get_mut(x, y) {
-                // Neighbours tend to have consecutive numbers; a step that shares no factor with the colours tells them apart.
+                // Neighbours tend to have consecutive numbers; a step that shares no factor with the colours
+                // tells them apart.
                 *pixel = COLOURS[(label as usize * 3) % COLOURS.len()];
             }
         }

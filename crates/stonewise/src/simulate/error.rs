@@ -38,7 +38,7 @@ pub enum SimulateError {
     },
     /// What is finished cannot be noted.
     #[error(transparent)]
-    Unfinished(#[from] Box<crate::Error>),
+    Unfinished(Box<dyn std::error::Error + Send + Sync>),
     /// Parameters cannot be written as TOML.
     #[error("cannot write parameters: {0}")]
     Toml(#[from] toml::ser::Error),

@@ -1,9 +1,12 @@
 //! Simulated surveys as files, which enter through the same door as real ones.
 
+mod clouds;
 mod error;
 mod params;
+mod photo_masks;
 mod photos;
 mod project_file;
+mod survey;
 mod truth;
 mod unfinished;
 mod write;

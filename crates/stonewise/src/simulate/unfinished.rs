@@ -2,21 +2,21 @@
 
 use crate::files::{read_json, write_json};
 use crate::pipeline::Key;
-use crate::pipeline::step::StepDir;
+use crate::pipeline::storage::step::StepDir;
 use crate::simulate::{SimulateError, SurveyParams};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 
-/// A folder beside the survey that says which of its files are whole, and what else must be known about them. It is there
-/// only while the survey is being made.
+/// A folder beside the survey that says which of its files are whole, and what else must be known about them.
+/// It is there only while the survey is being made.
 pub(super) struct Unfinished(StepDir);
 
 impl Unfinished {
     /// Takes up an interrupted simulation of the same parameters by the same program, or begins a new one.
     pub fn open(survey: &Path, params: &SurveyParams) -> Result<Self, SimulateError> {
         let key = Key::new("survey", params, &[]);
-        let step = StepDir::open(survey.join("unfinished"), key).map_err(Box::new)?;
+        let step = StepDir::open(survey.join("unfinished"), key).map_err(unfinished)?;
         Ok(Self(step))
     }
 
@@ -27,7 +27,7 @@ impl Unfinished {
 
     /// Notes that the files of a part are whole.
     pub fn write(&self, part: &str, known: &impl Serialize) -> Result<(), SimulateError> {
-        Ok(write_json(&self.0.file(part), known).map_err(Box::new)?)
+        write_json(&self.0.file(part), known).map_err(unfinished)
     }
 
     /// Nothing is left to be done.
@@ -35,4 +35,8 @@ impl Unfinished {
         let path = self.0.path().to_path_buf();
         fs::remove_dir_all(&path).map_err(|source| SimulateError::Write { path, source })
     }
+}
+
+fn unfinished(error: impl std::error::Error + Send + Sync + 'static) -> SimulateError {
+    SimulateError::Unfinished(Box::new(error))
 }

@@ -2,6 +2,7 @@
 
 use super::params::GicpParams;
 use crate::cloud::{Cloud, GridIndex};
+use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
@@ -20,9 +21,9 @@ pub struct GicpBlock {
     pub(super) spacing_m: f64,
 }
 
-/// Points whose distance to their neighbour tells the spacing.
+/// Points whose distance to their neighbour gives the spacing: its median is then known to some percent.
 const SPACING_SAMPLE: usize = 500;
-/// Neighbours are sought no further than this, metres.
+/// Neighbours are sought no farther than this, metres: no survey of stones has its points that far apart.
 const FAR_M: f64 = 1.0;
 
 impl GicpBlock {
@@ -67,10 +68,7 @@ fn spacing(points: &[Point3<f64>]) -> f64 {
         .step_by(stride)
         .filter_map(|p| index.nearest_k(p, 2, FAR_M).get(1).map(|n| n.1.sqrt()))
         .collect();
-    nearest.sort_by(f64::total_cmp);
-    nearest
-        .get(nearest.len() / 2)
-        .map_or(FAR_M, |d| (2.0 * d).max(1e-4))
+    upper_median(&mut nearest).map_or(FAR_M, |d| (2.0 * d).max(1e-4))
 }
 
 /// Normal of the plane through the neighbours of a point.

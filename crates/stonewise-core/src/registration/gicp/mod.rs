@@ -1,12 +1,13 @@
 //! One stone at a time with its surroundings, by plane-to-plane ICP: the estimator of the paper.
 //!
-//! Generalized ICP (Segal, Haehnel & Thrun 2009): every point stands for a small piece of plane, and the rigid motion
-//! is sought that brings the pieces of the first epoch onto their nearest neighbours in the second. The points of a
-//! stone alone are few, so all points within a buffer around them take part; the motion is then the motion of
-//! the whole window, and whatever stands still in it, or moves otherwise, drags the answer.
+//! Generalized ICP (Segal, Haehnel & Thrun 2009): every point stands for a small piece of plane, and the
+//! rigid motion is sought that brings the pieces of the first epoch onto their nearest neighbours in the
+//! second. The points of a stone alone are few, so all points within a buffer around them take part; the
+//! motion is then the motion of the whole window, and whatever stands still in it, or moves otherwise, drags
+//! the answer.
 //!
-//! Work on a survey goes block by block: [`GicpBlock::new`] prepares a region of each epoch once, [`align`] measures
-//! the stones inside, [`relate_to_neighbours`] compares all stones in the end.
+//! Work on a survey goes block by block: [`GicpBlock::new`] prepares a region of each epoch once, [`align`]
+//! measures the stones inside, [`relate_to_neighbours`] compares all stones in the end.
 
 mod align;
 mod block;
@@ -14,6 +15,7 @@ mod neighbours;
 mod pairing;
 mod params;
 mod uncertainty;
+mod window;
 
 pub use align::{GicpStone, align};
 pub use block::GicpBlock;

@@ -2,6 +2,7 @@
 
 use super::params::GicpParams;
 use crate::cloud::GridIndex;
+use crate::statistics::median;
 use crate::stone::{PairResult, StoneMotion};
 use nalgebra::{Matrix3, Point3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -9,15 +10,15 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Variance of a normal variable over its squared median absolute deviation.
 const MAD_TO_VARIANCE: f64 = 1.4826 * 1.4826;
-/// A neighbour lies within this distance, metres.
+/// A neighbour lies within this distance, metres: farther stones move by another part of the wall.
 const FAR_M: f64 = 5.0;
 
 /// Fills in `relative`, `relative_covariance`, `own_motion_p` and `loose` of every measured stone.
 ///
-/// `centroids`: first epoch, world, one per result. The motion that a stone should have is the median, axis by axis, of
-/// its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k times theirs), with the
-/// spread the neighbours really have. Loose are the stones whose difference is significant with the false discovery
-/// rate controlled (Benjamini & Hochberg 1995).
+/// `centroids`: first epoch, world, one per result. The motion that a stone should have is the median, axis
+/// by axis, of its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k
+/// times theirs), with the spread the neighbours really have. Loose are the stones whose difference is
+/// significant with the false discovery rate controlled (Benjamini & Hochberg 1995).
 pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>], params: &GicpParams) {
     let measured: Vec<usize> = (0..results.len())
         .filter(|&i| results[i].motion.is_ok())
@@ -58,12 +59,12 @@ fn relative(own: &StoneMotion, others: &[&StoneMotion]) -> (Vector3<f64>, Matrix
         return (Vector3::zeros(), own_covariance);
     }
     let k = others.len() as f64;
-    let expected = Vector3::from_fn(|axis, _| median(others.iter().map(|o| o.displacement[axis]).collect()));
+    let expected = Vector3::from_fn(|axis, _| middle(others.iter().map(|o| o.displacement[axis])));
     let spread = Vector3::from_fn(|axis, _| {
         let deviations = others
             .iter()
             .map(|o| (o.displacement[axis] - expected[axis]).abs());
-        MAD_TO_VARIANCE * median(deviations.collect()).powi(2)
+        MAD_TO_VARIANCE * middle(deviations).powi(2)
     });
     let mean: Matrix3<f64> = others
         .iter()
@@ -74,14 +75,8 @@ fn relative(own: &StoneMotion, others: &[&StoneMotion]) -> (Vector3<f64>, Matrix
     (own.displacement - expected, own_covariance + of_median)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    match values.len() {
-        0 => 0.0,
-        n if n % 2 == 1 => values[half],
-        _ => 0.5 * (values[half - 1] + values[half]),
-    }
+fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    median(&mut values.collect::<Vec<f64>>()).unwrap_or(0.0)
 }
 
 /// Probability of so large a difference by chance.

@@ -17,22 +17,24 @@ pub enum GicpStart {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GicpParams {
-    /// Points within this distance of any point of the stone take part, metres. 0.6 as in the paper; 0 leaves the
-    /// stone's own points.
+    /// Points within this distance of any point of the stone take part, metres. 0.6 as in the paper; 0 leaves
+    /// the stone's own points.
     pub buffer_m: f64,
     /// Where the iteration starts. `identity` as in the paper.
     pub start: GicpStart,
-    /// Points further apart do not correspond, metres. 0.1 is twice the largest motion of the paper's experiment.
+    /// Points further apart do not correspond, metres. 0.1 is twice the largest motion of the paper's
+    /// experiment.
     pub max_distance_m: f64,
-    /// Neighbours to which the plane of a point is fitted, itself included. 20 as in Segal, Haehnel & Thrun (2009).
+    /// Neighbours to which the plane of a point is fitted, itself included. 20 as in Segal, Haehnel & Thrun
+    /// (2009).
     pub plane_neighbours: usize,
-    /// All points within this radius are used for the plane too, metres; noisy clouds need more than their nearest
-    /// points. 0: the nearest alone, as in the source.
+    /// All points within this radius are used for the plane too, metres; noisy clouds need more than their
+    /// nearest points. 0: the nearest alone, as in the source.
     pub plane_radius_m: f64,
     /// Variance across a plane relative to the variance along it. 1e-3 as in Segal, Haehnel & Thrun (2009).
     pub plane_epsilon: f64,
-    /// A step below this, together with `tolerance_rad`, ends the iteration, metres. 1e-6: the millimetre that is
-    /// common elsewhere biases the answer by half a millimetre.
+    /// A step below this, together with `tolerance_rad`, ends the iteration, metres. 1e-6: the millimetre
+    /// that is common elsewhere biases the answer by half a millimetre.
     pub tolerance_m: f64,
     /// A rotation below this ends the iteration, radians. 1e-7 is a tenth of `tolerance_m` on a metre.
     pub tolerance_rad: f64,
@@ -43,14 +45,15 @@ pub struct GicpParams {
     pub min_points: usize,
     /// Share of the window's points that must find a partner. 0.3: below it the epochs show different things.
     pub min_overlap: f64,
-    /// Smallest observability (see [`super::align`]) at which a motion is reported. 0.01: relief with a slope of 1 % of
-    /// the whole window, after the slope that noise feigns is taken off.
+    /// Smallest observability (see [`super::align`]) at which a motion is reported. 0.01: relief with a slope
+    /// of 1 % of the whole window, after the slope that noise feigns is taken off.
     pub min_observability: f64,
     /// Cell within which residuals may be correlated, metres. 0.05: twice the usual support of a plane.
     pub correlation_cell_m: f64,
     /// Nearest stones that a stone is compared with. 8: one ring around it.
     pub neighbours: usize,
-    /// Share of false discoveries that is accepted among the stones called loose. 0.05 as everywhere in the project.
+    /// Share of false discoveries that is accepted among the stones called loose. 0.05 as everywhere in the
+    /// project.
     pub false_discovery_rate: f64,
 }
 

@@ -268,6 +268,7 @@ fn one_stone_among_still_ones_is_loose() {
                 own_motion_p: 1.0,
                 relative_covariance: Matrix3::zeros(),
                 loose: false,
+                p_loose: None,
                 observability: 1.0,
                 rmse_m: 0.0,
             }),

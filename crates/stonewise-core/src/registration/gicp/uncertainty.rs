@@ -1,16 +1,18 @@
 //! How far an alignment can be trusted.
 //!
-//! At the solution the weighted residuals balance. How fast that balance changes with the motion is the information G
-//! of the pairs; how much it scatters by chance is B. The covariance is then G^-1 B G^-1. Two things make that honest:
-//! - Normals of noisy points lean, and lean like relief. Partners' normals differ by twice the variance of that lean,
-//!   which tells its size; G is formed without it, and without the weight along the planes, which pulls a point to its
-//!   neighbour however the surface moves.
-//! - Residuals of points next to each other are alike: they share partners, and unevenness of the ground. B is
-//!   the sum over single points, scaled by what the sums over small cells have more.
+//! At the solution the weighted residuals balance. How fast that balance changes with the motion is the
+//! information G of the pairs; how much it scatters by chance is B. The covariance is then G^-1 B G^-1. Two
+//! things make that honest:
+//! - Normals of noisy points lean, and lean like relief. Partners' normals differ by twice the variance of
+//!   that lean, which tells its size; G is formed without it, and without the weight along the planes, which
+//!   pulls a point to its neighbour however the surface moves.
+//! - Residuals of points next to each other are alike: they share partners, and unevenness of the ground. B
+//!   is the sum over single points, scaled by what the sums over small cells have more.
 
-use super::align::{Motion, Pair, WindowPoint, for_each_pair};
 use super::block::GicpBlock;
 use super::params::GicpParams;
+use super::window::{Motion, Pair, WindowPoint, for_each_pair};
+use crate::statistics::upper_median;
 use crate::stone::MotionFailure;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use std::collections::BTreeMap;
@@ -25,7 +27,8 @@ pub(super) struct Uncertainty {
 /// Median over mean of a chi-square variable of two degrees of freedom.
 const MEDIAN_OF_CHI2_2: f64 = std::f64::consts::LN_2;
 
-/// Uncertainty of the final motion of a window; `Unobservable` where the relief does not hold it in a direction.
+/// Uncertainty of the final motion of a window; `Unobservable` where the relief does not hold it in a
+/// direction.
 pub(super) fn uncertainty(
     window: &mut [WindowPoint],
     second: &GicpBlock,
@@ -83,15 +86,10 @@ fn mean_normal(pair: &Pair) -> Vector3<f64> {
 
 /// Variance, per direction, of the lean that noise gives to the mean of two partners' normals.
 ///
-/// Half the sum of two errors varies as half their difference does. The median leaves out edges, where partners'
-/// normals differ because the surface bends.
+/// Half the sum of two errors varies as half their difference does. The median leaves out edges, where
+/// partners' normals differ because the surface bends.
 fn feigned_slope_variance(leans: &mut [f64]) -> f64 {
-    if leans.is_empty() {
-        return 0.0;
-    }
-    let middle = leans.len() / 2;
-    let (_, median, _) = leans.select_nth_unstable_by(middle, f64::total_cmp);
-    *median / (2.0 * MEDIAN_OF_CHI2_2) / 4.0
+    upper_median(leans).map_or(0.0, |median| median / (2.0 * MEDIAN_OF_CHI2_2) / 4.0)
 }
 
 /// The part of a pair's weight that the shape of the surface answers for.

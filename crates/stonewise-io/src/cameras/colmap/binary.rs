@@ -37,7 +37,8 @@ pub fn read_cameras(path: &Path) -> Result<BTreeMap<u32, RawCamera>, CameraError
     Ok(cameras)
 }
 
-/// images.bin: count u64; each: id u32, rotation 4 f64, translation 3 f64, camera u32, name ending in 0, points.
+/// images.bin: count u64; each: id u32, rotation 4 f64, translation 3 f64, camera u32, name ending in 0,
+/// points.
 pub fn read_images(path: &Path) -> Result<Vec<RawImage>, CameraError> {
     let mut bytes = Bytes::open(path)?;
     let count = bytes.u64()?;

@@ -36,21 +36,33 @@ struct RawImage {
     place: String,
 }
 
+/// Whether a folder holds a COLMAP model, in itself or in its `sparse/0`, `sparse` or `0`.
+pub fn is_camera_folder(folder: &Path) -> bool {
+    model_files(folder).is_some()
+}
+
 /// Reads the model in a folder, or in its `sparse/0`, `sparse` or `0`.
 pub fn read_folder(folder: &Path) -> Result<CameraFile, CameraError> {
+    match model_files(folder) {
+        Some((cameras, images)) => read_pair(&cameras, &images),
+        None => Err(CameraError::UnknownFormat {
+            path: PathBuf::from(folder),
+        }),
+    }
+}
+
+fn model_files(folder: &Path) -> Option<(PathBuf, PathBuf)> {
     for inner in ["", "sparse/0", "sparse", "0"] {
         for extension in ["bin", "txt"] {
             let base = folder.join(inner);
             let cameras = base.join("cameras").with_extension(extension);
             let images = base.join("images").with_extension(extension);
             if cameras.is_file() && images.is_file() {
-                return read_pair(&cameras, &images);
+                return Some((cameras, images));
             }
         }
     }
-    Err(CameraError::UnknownFormat {
-        path: PathBuf::from(folder),
-    })
+    None
 }
 
 fn read_pair(cameras: &Path, images: &Path) -> Result<CameraFile, CameraError> {

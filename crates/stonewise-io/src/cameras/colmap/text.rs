@@ -35,7 +35,8 @@ pub fn read_cameras(path: &Path) -> Result<BTreeMap<u32, RawCamera>, CameraError
     Ok(cameras)
 }
 
-/// images.txt: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, each followed by a line of image points, which may be empty.
+/// images.txt: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, each followed by a line of image points, which
+/// may be empty.
 pub fn read_images(path: &Path) -> Result<Vec<RawImage>, CameraError> {
     let text = read_text(path)?;
     let mut images = Vec::new();

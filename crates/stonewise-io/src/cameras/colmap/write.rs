@@ -11,8 +11,8 @@ use stonewise_core::geometry::{Camera, Distortion, View};
 /// One camera per distinct interior orientation, in the simplest model that holds it exactly.
 ///
 /// # Errors
-/// A file cannot be written, or a camera has skew, an eighth-order radial term (Metashape's b2, k4) or a fisheye with
-/// tangential terms, which COLMAP's models do not hold.
+/// A file cannot be written, or a camera has skew, an eighth-order radial term (Metashape's b2, k4) or a
+/// fisheye with tangential terms, which COLMAP's models do not hold.
 pub fn write_colmap(folder: &Path, views: &[View]) -> Result<(), CameraError> {
     let mut cameras: Vec<&Camera> = Vec::new();
     let mut camera_lines = String::from("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n");

@@ -1,5 +1,6 @@
 //! Reading of chunks, components and cameras.
 
+use super::super::map_frame::{MapFrame, Placing};
 use super::super::xml::{Element, parse};
 use super::super::{CameraError, CameraFile, malformed, read_text};
 use super::frame::{Frames, Similarity};
@@ -9,8 +10,8 @@ use std::path::Path;
 use stonewise_core::geometry::{Camera, View};
 use stonewise_core::id::ImageId;
 
-/// Reads the first enabled chunk that has aligned cameras.
-pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
+/// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
+pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     let text = read_text(path)?;
     let root = parse(&text, path)?;
     let chunks: Vec<&Element> = match root.name.as_str() {
@@ -35,7 +36,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
                 format!("chunk {label} was not read, only {used_label}, the first with aligned cameras");
             file.warnings.push(warning);
         } else {
-            let file = read_chunk(chunk, path)?;
+            let file = read_chunk(chunk, path, map)?;
             if file.views.is_empty() {
                 fallback.skipped.extend(file.skipped);
             } else {
@@ -53,7 +54,7 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
     })
 }
 
-fn read_chunk(chunk: &Element, path: &Path) -> Result<CameraFile, CameraError> {
+fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     let mut file = CameraFile {
         crs: chunk
             .child("reference")
@@ -96,12 +97,28 @@ fn read_chunk(chunk: &Element, path: &Path) -> Result<CameraFile, CameraError> {
         let warning = "rolling shutter compensation is not applied: points may fall some pixels beside their photo place";
         file.warnings.push(warning.to_owned());
     }
-    if let Some(crs) = &file.crs
-        && !file.views.is_empty()
-    {
-        check_crs(crs, path)?;
+    if file.crs.is_some() && !file.views.is_empty() {
+        place(&mut file, path, map)?;
     }
     Ok(file)
+}
+
+/// Brings the cameras of a chunk to the clouds: Metashape stores the poses of all but local chunks
+/// earth-centred.
+fn place(file: &mut CameraFile, path: &Path, map: &MapFrame) -> Result<(), CameraError> {
+    let crs = file.crs.clone().unwrap_or_default();
+    let unsupported = |reason| CameraError::UnsupportedCrs {
+        path: path.to_owned(),
+        crs: crs.split('"').nth(1).unwrap_or(&crs).to_owned(),
+        reason,
+    };
+    if let Placing::Mapped(placing) = map.placing(&crs).map_err(unsupported)? {
+        for view in &mut file.views {
+            placing.place(view).map_err(unsupported)?;
+        }
+        file.crs = map.crs.clone().or_else(|| file.crs.take());
+    }
+    Ok(())
 }
 
 /// Cameras in file order, those in groups included.
@@ -147,24 +164,6 @@ fn find_sensor<'a>(
         .child("sensors")
         .and_then(|list| list.children.iter().find(|s| s.attribute("id") == Some(id)))
         .ok_or_else(|| malformed(path, camera.place(), format!("sensor_id {id:?} names no sensor")))
-}
-
-/// Accepts Cartesian frames; Metashape stores the poses of all others geocentrically.
-fn check_crs(crs: &str, path: &Path) -> Result<(), CameraError> {
-    let keyword = crs.split('[').next().unwrap_or_default().trim().to_uppercase();
-    let name = crs.split('"').nth(1).unwrap_or(crs);
-    match keyword.as_str() {
-        "LOCAL_CS" | "ENGCRS" | "ENGINEERINGCRS" | "GEOCCS" | "GEODCRS" if !is_ellipsoidal(crs) => Ok(()),
-        _ => Err(CameraError::UnsupportedCrs {
-            path: path.to_owned(),
-            crs: format!("{keyword} {name}").trim().to_owned(),
-        }),
-    }
-}
-
-/// Whether a WKT 2 geodetic system has latitudes and longitudes.
-fn is_ellipsoidal(crs: &str) -> bool {
-    crs.to_lowercase().contains("cs[ellipsoidal")
 }
 
 fn is_disabled(element: &Element) -> bool {

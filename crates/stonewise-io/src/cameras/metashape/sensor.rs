@@ -8,8 +8,9 @@ use stonewise_core::geometry::{Camera, Distortion};
 
 /// The camera of a `<sensor>`: its adjusted calibration, else the initial one, else the nominal focal length.
 ///
-/// With r the radius of (x, y) = (X/Z, Y/Z): x' = x (1 + k1 r^2 + .. + k4 r^8) + p1 (r^2 + 2 x^2) + 2 p2 x y, and y' likewise;
-/// u = w/2 + cx + x' f + x' b1 + y' b2, v = h/2 + cy + y' f. Metashape's p1 is OpenCV's p2 and the other way round.
+/// With r the radius of (x, y) = (X/Z, Y/Z): x' = x (1 + k1 r^2 + .. + k4 r^8) + p1 (r^2 + 2 x^2) + 2 p2 x y,
+/// and y' likewise; u = w/2 + cx + x' f + x' b1 + y' b2, v = h/2 + cy + y' f. Metashape's p1 is OpenCV's p2
+/// and the other way round.
 pub fn camera(sensor: &Element, photo: &str, path: &Path) -> Result<Camera, CameraError> {
     let of_class = |class: Option<&'static str>| {
         sensor

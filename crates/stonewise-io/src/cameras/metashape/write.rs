@@ -8,8 +8,8 @@ use stonewise_core::geometry::{Camera, Distortion, View};
 
 /// Writes views as a chunk in local coordinates whose frame is the world, one sensor per distinct camera.
 ///
-/// `crs`: WKT of a Cartesian system; without one, Metashape's local coordinates in metres. Numbers carry 17 significant digits,
-/// so that poses come back as they were.
+/// `crs`: WKT of a Cartesian system; without one, Metashape's local coordinates in metres. Numbers carry 17
+/// significant digits, so that poses come back as they were.
 ///
 /// # Errors
 /// The file cannot be written, or a camera has denominator terms, which Metashape does not know.

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use las::{Builder, PointData, Vlr};
 
-use super::extra_bytes::{self, ExistingDimension};
 use super::read::{LasSource, fill_chunk};
 use super::{Layout, LazWriter};
+use crate::cloud::extra_bytes::{self, ExistingDimension};
 use crate::cloud::label::{Fill, LabelColumns, PointLabel};
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
 

@@ -4,7 +4,7 @@ use las::{Builder, Transform, Vector, point::Format};
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
-use super::extra_bytes::description_record;
+use crate::cloud::extra_bytes::description_record;
 
 /// Steps of coordinates that are tried, metres: decimal, so that coordinates print short.
 const SCALES_M: [f64; 8] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
@@ -50,28 +50,19 @@ pub fn export_header(
     builder
 }
 
-/// The record that holds a coordinate system as WKT.
-pub fn wkt_record(text: &str) -> las::Vlr {
-    let mut data = text.as_bytes().to_vec();
-    data.push(0);
-    las::Vlr {
-        user_id: "LASF_Projection".to_owned(),
-        record_id: 2112,
-        description: "WKT Information".to_owned(),
-        data,
-    }
-}
-
 /// The standard part of a point record.
 pub struct Export {
     pub position: Point3<f64>,
     pub intensity: u16,
     pub color: Option<[u16; 3]>,
     pub source: u16,
+    /// Seconds, of the kind that the header states.
+    pub gps_time: f64,
 }
 
 impl Export {
-    /// Appends the record in point format 7, or 6 without colour; the position must lie in the transform's box.
+    /// Appends the record in point format 7, or 6 without colour; the position must lie in the transform's
+    /// box.
     pub fn append(&self, transforms: &Vector<Transform>, out: &mut Vec<u8>) {
         let axes = [&transforms.x, &transforms.y, &transforms.z];
         for (value, axis) in self.position.iter().zip(axes) {
@@ -82,7 +73,7 @@ impl Export {
         // First of one return; no flags; class, user data and scan angle zero.
         out.extend([0x11, 0, 0, 0, 0, 0]);
         out.extend(self.source.to_le_bytes());
-        out.extend(0f64.to_le_bytes());
+        out.extend(self.gps_time.to_le_bytes());
         for channel in self.color.into_iter().flatten() {
             out.extend(channel.to_le_bytes());
         }

@@ -1,16 +1,20 @@
 //! LAS, LAZ and COPC.
 
+mod chunks;
+mod compression;
 mod copy;
+mod crs_record;
+mod envelope;
 mod export;
-mod extra_bytes;
+mod las_error;
 mod layout;
 mod read;
+mod stream;
 mod writer;
 
 pub(super) use copy::copy_labelled;
-pub(super) use export::{Export, export_header, transforms_for, wkt_record};
-pub use extra_bytes::ExtraType;
-pub(super) use extra_bytes::{DESCRIPTOR_BYTES, describe};
+pub(super) use crs_record::crs_record;
+pub(super) use export::{Export, export_header, transforms_for};
 pub(super) use layout::Layout;
 pub(super) use read::read;
 pub(super) use writer::LazWriter;

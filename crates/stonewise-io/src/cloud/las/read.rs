@@ -1,17 +1,19 @@
 //! Streaming LAS points.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use las::{LazParallelism, PointData, PointDataBuilder, Reader, ReaderOptions};
 use nalgebra::Point3;
 
 use super::Layout;
-use super::layout::las_error;
+use super::las_error::las_error;
+use super::stream::LasStream;
 use crate::cloud::chunk::Visit;
 use crate::cloud::guard::guarded;
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
+
+/// Bytes of records that are unpacked at a time, at most; a record has 65,535 at most.
+const MAX_STEP_BYTES: u64 = 1 << 27;
 
 /// Points of a LAS file, some at a time, as raw records.
 pub struct LasSource {
@@ -25,16 +27,16 @@ pub struct LasSource {
 impl LasSource {
     pub fn open(path: &Path) -> Result<Self, CloudError> {
         let layout = Layout::open(path)?;
-        let open = |parallelism| {
-            guarded(path, || {
-                let file = File::open(path).map_err(|e| CloudError::read(path, e))?;
-                let options = ReaderOptions::default().with_laz_parallelism(parallelism);
-                let file = BufReader::with_capacity(1 << 20, file);
-                Reader::with_options(file, options).map_err(|e| las_error(path, e))
-            })
+        let parallelism = if layout.one_thread {
+            LazParallelism::No
+        } else {
+            LazParallelism::Yes
         };
-        // Files without chunks, as old writers make them, can only be read by one thread.
-        let reader = open(LazParallelism::Yes).or_else(|_| open(LazParallelism::No))?;
+        let reader = guarded(path, || {
+            let stream = LasStream::open(path, layout.corrections).map_err(|e| CloudError::read(path, e))?;
+            let options = ReaderOptions::default().with_laz_parallelism(parallelism);
+            Reader::with_options(stream, options).map_err(|e| las_error(path, e))
+        })?;
         Ok(Self {
             path: path.to_owned(),
             data: PointDataBuilder::new().for_header(reader.header()).build(),
@@ -47,7 +49,9 @@ impl LasSource {
     /// The next records, at most `count`, with the index of the first; `None` at the end.
     pub fn next(&mut self, count: usize) -> Result<Option<(u64, &PointData)>, CloudError> {
         let total = self.layout.header.number_of_points();
-        let wanted = (total - self.next_index).min(count.max(1) as u64);
+        let record = u64::from(self.layout.header.point_format().len()).max(1);
+        let most = (count.max(1) as u64).min(MAX_STEP_BYTES / record);
+        let wanted = (total - self.next_index).min(most);
         if wanted == 0 {
             return Ok(None);
         }
@@ -82,6 +86,10 @@ pub fn fill_chunk(chunk: &mut PointChunk, first_index: u64, data: &PointData) ->
         .rgb()
         .map(|rgb| rgb.map(|(r, g, b)| [r, g, b]).collect::<Vec<_>>());
     chunk.colors = colors.map(|all| chunk.indices.iter().map(|i| all[kept(i)]).collect());
+    let sources: Vec<u16> = data.point_source_id().collect();
+    chunk.sources = Some(chunk.indices.iter().map(|i| sources[kept(i)]).collect());
+    let times = data.gps_time().map(|times| times.collect::<Vec<f64>>());
+    chunk.times_s = times.map(|all| chunk.indices.iter().map(|i| all[kept(i)]).collect());
     data.len() as u64 - chunk.len() as u64
 }
 
@@ -97,9 +105,7 @@ pub fn read<E: From<CloudError>>(
     while let Some((first, data)) = source.next(chunk_points)? {
         summary.records += data.len() as u64;
         summary.skipped += fill_chunk(&mut chunk, first, data);
-        if !chunk.is_empty() {
-            visit(&chunk)?;
-        }
+        visit(&chunk)?;
     }
     Ok(summary)
 }

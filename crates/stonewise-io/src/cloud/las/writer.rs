@@ -7,9 +7,13 @@ use std::path::{Path, PathBuf};
 use las::{Builder, Header, PointDataBuilder, raw};
 use laz::ParLasZipCompressor;
 
-use super::layout::las_error;
+use super::crs_record::is_wkt;
+use super::las_error::las_error;
 use crate::cloud::CloudError;
 use crate::cloud::guard::guarded_write;
+
+/// Bit of the header that says where the coordinate system is (LAS 1.4 R15, table 4).
+const WKT_BIT: u16 = 16;
 
 /// A LAZ file that is being written, compressed by all threads.
 ///
@@ -80,6 +84,7 @@ fn write_end(file: &mut BufWriter<File>, header: Header) -> las::Result<()> {
         record.clone().into_raw(true)?.write_to(&mut *file)?;
     }
     let extended = header.point_format().is_extended;
+    let names_keys = header.has_crs_vlrs() && !header.all_vlrs().any(is_wkt);
     let las::Bounds { min, max } = header.bounds();
     let bounds = match header.number_of_points() {
         0 => ([0.0; 3], [0.0; 3]),
@@ -94,6 +99,10 @@ fn write_end(file: &mut BufWriter<File>, header: Header) -> las::Result<()> {
         // LAS 1.4: the counts of earlier versions are zero with point formats 6 and later.
         raw.number_of_point_records = 0;
         raw.number_of_points_by_return = [0; 5];
+    }
+    if names_keys {
+        // The crate says that every file of the extended point formats names its system as WKT.
+        raw.global_encoding &= !WKT_BIT;
     }
     // The crate widens the box by up to a step.
     [raw.min_x, raw.min_y, raw.min_z] = bounds.0;

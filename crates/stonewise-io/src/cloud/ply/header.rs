@@ -1,5 +1,7 @@
 //! The header: which elements with which properties follow.
 
+use std::path::Path;
+
 use crate::cloud::CloudError;
 use crate::cloud::lines::Lines;
 
@@ -70,6 +72,20 @@ pub struct Element {
     pub properties: Vec<Property>,
 }
 
+impl Element {
+    /// Bytes that one of them takes at least; in text a digit and the end of the line.
+    fn least_bytes(&self, encoding: Encoding) -> u64 {
+        let least = |property: &Property| match property.kind {
+            Kind::One(scalar) | Kind::List { count: scalar, .. } => scalar.size() as u64,
+        };
+        let bytes: u64 = self.properties.iter().map(least).sum();
+        match encoding {
+            Encoding::Text if bytes > 0 => 2,
+            _ => bytes,
+        }
+    }
+}
+
 #[derive(Debug)]
 pub struct Header {
     pub encoding: Encoding,
@@ -108,6 +124,29 @@ impl Header {
             }
         }
         Err(lines.error("the header has no end_header"))
+    }
+
+    /// Checks that the first `needed` elements have room in the `bytes` after the header, before any of them
+    /// is read.
+    pub fn check_room(&self, needed: usize, bytes: u64, path: &Path) -> Result<(), CloudError> {
+        // The last line of a text may have no end.
+        let mut left = bytes.saturating_add(u64::from(self.encoding == Encoding::Text));
+        for element in self.elements.iter().take(needed).filter(|e| e.count > 0) {
+            let (name, count) = (&element.name, element.count);
+            let least = element.least_bytes(self.encoding);
+            if least == 0 {
+                let reason = format!("the header claims {count} elements {name} that have no properties");
+                return Err(CloudError::malformed(path, reason));
+            }
+            let room = left / least;
+            if room < count {
+                let reason =
+                    format!("it has room for {room} of the {count} elements {name} that its header claims");
+                return Err(CloudError::truncated(path, reason));
+            }
+            left -= count * least;
+        }
+        Ok(())
     }
 }
 

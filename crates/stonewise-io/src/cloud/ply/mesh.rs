@@ -26,6 +26,7 @@ pub fn read_mesh(path: &Path) -> Result<TriangleMesh, CloudError> {
             "the ply header has no element face with a list vertex_indices: give a mesh, not a cloud";
         return Err(CloudError::malformed(path, reason));
     }
+    header.check_room(header.elements.len(), lines.bytes_left()?, path)?;
     let mut values = Values::after_header(lines, header.encoding);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     let (mut row, mut corners) = (Vec::new(), Vec::new());

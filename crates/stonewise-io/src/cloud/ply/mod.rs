@@ -5,4 +5,4 @@ mod mesh;
 mod read;
 
 pub use mesh::read_mesh;
-pub(super) use read::read;
+pub(super) use read::{read, vertex_count};

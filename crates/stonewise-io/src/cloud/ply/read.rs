@@ -26,15 +26,20 @@ pub fn read<E: From<CloudError>>(
     let columns = Columns::find(vertex).ok_or_else(|| {
         CloudError::malformed(path, "the vertices of the ply header have no numbers x, y and z")
     })?;
+    header.check_room(vertices + 1, lines.bytes_left()?, path)?;
     let mut values = Values::after_header(lines, header.encoding);
     let mut row = Vec::new();
-    for element in before {
-        for _ in 0..element.count {
-            values.next(path, element, &mut row)?;
-        }
-    }
     let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
     let mut chunker = Chunker::new(chunk_points, has_color, has_intensity, visit);
+    for element in before {
+        for index in 0..element.count {
+            if !values.next(path, element, &mut row)? {
+                let reason = format!("it holds {index} of {} elements {}", element.count, element.name);
+                return Err(CloudError::truncated(path, reason).into());
+            }
+            chunker.pass()?;
+        }
+    }
     for index in 0..vertex.count {
         if !values.next(path, vertex, &mut row)? {
             let reason = format!("it holds {index} of {} vertices", vertex.count);
@@ -43,6 +48,13 @@ pub fn read<E: From<CloudError>>(
         chunker.push(columns.record(&row))?;
     }
     chunker.finish()
+}
+
+/// Number of vertices that the header claims.
+pub fn vertex_count(path: &Path) -> Result<u64, CloudError> {
+    let header = Header::read(&mut Lines::open(path)?)?;
+    let vertices = header.elements.iter().find(|e| e.name == "vertex");
+    Ok(vertices.map_or(0, |e| e.count))
 }
 
 /// Places of what is wanted among the properties of a vertex.
@@ -119,7 +131,8 @@ impl Values {
         }
     }
 
-    /// Reads one value per property into `row` (the length, where it is a list); false at the end of the file.
+    /// Reads one value per property into `row` (the length, where it is a list); false at the end of the
+    /// file.
     fn next(&mut self, path: &Path, element: &Element, row: &mut Vec<f64>) -> Result<bool, CloudError> {
         self.next_with_items(path, element, row, &mut |_, _| {})
     }

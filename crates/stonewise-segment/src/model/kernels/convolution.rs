@@ -54,8 +54,8 @@ impl Geometry {
         self.size == 1 && self.stride == 1
     }
 
-    /// Output places along an axis of `outputs` at which tap `tap` lies inside an input of `inputs`, and the input place of
-    /// the first.
+    /// Output places along an axis of `outputs` at which tap `tap` lies inside an input of `inputs`, and the
+    /// input place of the first.
     fn inside(&self, tap: usize, outputs: usize, inputs: usize) -> (Range<usize>, usize) {
         let padding = self.size / 2;
         let first = padding.saturating_sub(tap).div_ceil(self.stride);
@@ -72,7 +72,8 @@ impl Geometry {
 
 /// The convolution of a batch.
 ///
-/// Patches of a few output rows at a time become the columns of a matrix that the weights are multiplied with.
+/// Patches of a few output rows at a time become the columns of a matrix that the weights are multiplied
+/// with.
 pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geometry) -> Vec<f32> {
     let pixels = geometry.output_pixels();
     let [rows, columns] = geometry.output_size();
@@ -114,7 +115,7 @@ pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geome
 
 /// Derivatives with regard to image and weight, where wanted, from that with regard to the result.
 ///
-/// Each thread takes some of the inputs, of which nobody else needs the patches.
+/// Each thread takes some of the inputs, whose patches no other thread needs.
 pub fn backward(
     x: &[f32],
     weight: &[f32],
@@ -122,86 +123,139 @@ pub fn backward(
     geometry: &Geometry,
     [wants_x, wants_weight]: [bool; 2],
 ) -> [Vec<f32>; 2] {
-    let pixels = geometry.output_pixels();
-    let taps = geometry.taps();
     let plane = geometry.rows * geometry.columns;
-    let depth = geometry.inputs * taps;
-    let inputs_at_once = (8 * BLOCK / (taps * pixels).max(1))
+    let depth = geometry.inputs * geometry.taps();
+    let zeros = |wanted: bool, count: usize| vec![0.0f32; if wanted { count } else { 0 }];
+    let mut x_grad = zeros(wants_x, geometry.batch * geometry.inputs * plane);
+    let mut weight_grad = zeros(wants_weight, geometry.outputs * depth);
+    let weight_matrix =
+        wants_weight.then(|| MatMut::from_row_major_slice_mut(&mut weight_grad, geometry.outputs, depth));
+    let layer = Layer {
+        x,
+        weight: MatRef::from_row_major_slice(weight, geometry.outputs, depth),
+        grad,
+        geometry,
+    };
+    shares(&mut x_grad, weight_matrix, geometry)
+        .into_par_iter()
+        .for_each_init(
+            || (Vec::new(), Vec::new()),
+            |(patches, spread), mut share| {
+                for image in 0..geometry.batch {
+                    layer.add_weight_grad(image, &mut share, patches);
+                    layer.set_x_grad(image, &mut share, spread);
+                }
+            },
+        );
+    [x_grad, weight_grad]
+}
+
+/// Some of the inputs with their parts of the derivatives.
+struct Share<'a> {
+    /// The first of the inputs, and how many.
+    start: usize,
+    inputs: usize,
+    /// Derivative with regard to the inputs, image by image; empty where it is not wanted.
+    x: Vec<&'a mut [f32]>,
+    /// Derivative with regard to their weights.
+    weight: Option<MatMut<'a, f32>>,
+}
+
+/// Divides the derivatives by inputs.
+fn shares<'a>(
+    x_grad: &'a mut [f32],
+    weight_grad: Option<MatMut<'a, f32>>,
+    geometry: &Geometry,
+) -> Vec<Share<'a>> {
+    let plane = geometry.rows * geometry.columns;
+    let at_once = (8 * BLOCK / (geometry.taps() * geometry.output_pixels()).max(1))
         .min(geometry.inputs.div_ceil(8))
         .max(1);
-    let weight = MatRef::from_row_major_slice(weight, geometry.outputs, depth);
-    let mut x_grad = vec![
-        0.0f32;
-        if wants_x {
-            geometry.batch * geometry.inputs * plane
-        } else {
-            0
-        }
-    ];
-    let mut weight_grad = vec![0.0f32; if wants_weight { geometry.outputs * depth } else { 0 }];
-
-    let starts: Vec<usize> = (0..geometry.inputs).step_by(inputs_at_once).collect();
-    let mut x_blocks: Vec<Vec<&mut [f32]>> = starts.iter().map(|_| Vec::new()).collect();
-    for image in x_grad.chunks_mut((geometry.inputs * plane).max(1)) {
-        let blocks = image.chunks_mut((inputs_at_once * plane).max(1));
-        blocks
-            .zip(&mut x_blocks)
-            .for_each(|(part, block)| block.push(part));
-    }
-    let mut weight_blocks: Vec<Option<MatMut<f32>>> = Vec::new();
-    let mut rest =
-        wants_weight.then(|| MatMut::from_row_major_slice_mut(&mut weight_grad, geometry.outputs, depth));
-    for start in &starts {
-        let width = inputs_at_once.min(geometry.inputs - start) * taps;
-        let (block, after) = rest.map(|rest| rest.split_at_col_mut(width)).unzip();
-        weight_blocks.push(block);
+    let mut rest = weight_grad;
+    let mut shares: Vec<Share> = Vec::new();
+    for start in (0..geometry.inputs).step_by(at_once) {
+        let inputs = at_once.min(geometry.inputs - start);
+        let (weight, after) = rest
+            .map(|rest| rest.split_at_col_mut(inputs * geometry.taps()))
+            .unzip();
         rest = after;
+        shares.push(Share {
+            start,
+            inputs,
+            x: Vec::new(),
+            weight,
+        });
+    }
+    for image in x_grad.chunks_mut((geometry.inputs * plane).max(1)) {
+        let parts = image.chunks_mut((at_once * plane).max(1));
+        parts
+            .zip(&mut shares)
+            .for_each(|(part, share)| share.x.push(part));
+    }
+    shares
+}
+
+/// What the derivatives of a convolution are computed from.
+struct Layer<'a> {
+    x: &'a [f32],
+    weight: MatRef<'a, f32>,
+    grad: &'a [f32],
+    geometry: &'a Geometry,
+}
+
+impl Layer<'_> {
+    /// Derivative with regard to the result of one image: output channel x pixel.
+    fn image_grad(&self, image: usize) -> MatRef<'_, f32> {
+        let (outputs, pixels) = (self.geometry.outputs, self.geometry.output_pixels());
+        let grad = &self.grad[image * outputs * pixels..][..outputs * pixels];
+        MatRef::from_row_major_slice(grad, outputs, pixels)
     }
 
-    let blocks = starts.into_par_iter().zip(x_blocks).zip(weight_blocks);
-    let buffers = || (Vec::new(), Vec::new());
-    blocks.for_each_init(
-        buffers,
-        |(patches, spread), ((start, mut x_block), mut weight_block)| {
-            let inputs = inputs_at_once.min(geometry.inputs - start);
-            let weight = weight.subcols(start * taps, inputs * taps);
-            for image in 0..geometry.batch {
-                let grad = &grad[image * geometry.outputs * pixels..][..geometry.outputs * pixels];
-                let grad = MatRef::from_row_major_slice(grad, geometry.outputs, pixels);
-                let x = &x[(image * geometry.inputs + start) * plane..][..inputs * plane];
-                if let Some(weight_block) = &mut weight_block {
-                    let seen = if geometry.is_pointwise() {
-                        MatRef::from_row_major_slice(x, inputs, pixels)
-                    } else {
-                        gather(x, geometry, 0..geometry.output_size()[0], patches);
-                        MatRef::from_row_major_slice(patches.as_slice(), inputs * taps, pixels)
-                    };
-                    matmul(
-                        weight_block.as_mut(),
-                        Accum::Add,
-                        grad,
-                        seen.transpose(),
-                        1.0,
-                        Par::Seq,
-                    );
-                }
-                let Some(x_block) = x_block.get_mut(image) else {
-                    continue;
-                };
-                if geometry.is_pointwise() {
-                    let target = MatMut::from_row_major_slice_mut(x_block, inputs, pixels);
-                    matmul(target, Accum::Replace, weight.transpose(), grad, 1.0, Par::Seq);
-                } else {
-                    spread.resize(inputs * taps * pixels, 0.0);
-                    let target =
-                        MatMut::from_row_major_slice_mut(spread.as_mut_slice(), inputs * taps, pixels);
-                    matmul(target, Accum::Replace, weight.transpose(), grad, 1.0, Par::Seq);
-                    scatter(spread, geometry, x_block);
-                }
-            }
-        },
-    );
-    [x_grad, weight_grad]
+    fn add_weight_grad(&self, image: usize, share: &mut Share, patches: &mut Vec<f32>) {
+        let Some(weight_grad) = &mut share.weight else {
+            return;
+        };
+        let (geometry, inputs) = (self.geometry, share.inputs);
+        let (plane, pixels) = (geometry.rows * geometry.columns, geometry.output_pixels());
+        let x = &self.x[(image * geometry.inputs + share.start) * plane..][..inputs * plane];
+        let seen = if geometry.is_pointwise() {
+            MatRef::from_row_major_slice(x, inputs, pixels)
+        } else {
+            gather(x, geometry, 0..geometry.output_size()[0], patches);
+            MatRef::from_row_major_slice(patches.as_slice(), inputs * geometry.taps(), pixels)
+        };
+        let grad = self.image_grad(image);
+        matmul(
+            weight_grad.as_mut(),
+            Accum::Add,
+            grad,
+            seen.transpose(),
+            1.0,
+            Par::Seq,
+        );
+    }
+
+    fn set_x_grad(&self, image: usize, share: &mut Share, spread: &mut Vec<f32>) {
+        let Some(x_grad) = share.x.get_mut(image) else {
+            return;
+        };
+        let (geometry, pixels) = (self.geometry, self.geometry.output_pixels());
+        let depth = share.inputs * geometry.taps();
+        let weight = self
+            .weight
+            .subcols(share.start * geometry.taps(), depth)
+            .transpose();
+        let grad = self.image_grad(image);
+        if geometry.is_pointwise() {
+            let target = MatMut::from_row_major_slice_mut(x_grad, share.inputs, pixels);
+            matmul(target, Accum::Replace, weight, grad, 1.0, Par::Seq);
+        } else {
+            spread.resize(depth * pixels, 0.0);
+            let target = MatMut::from_row_major_slice_mut(spread.as_mut_slice(), depth, pixels);
+            matmul(target, Accum::Replace, weight, grad, 1.0, Par::Seq);
+            scatter(spread, geometry, x_grad);
+        }
+    }
 }
 
 /// Sum of every output channel over images and pixels.

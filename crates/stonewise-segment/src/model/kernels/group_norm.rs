@@ -12,7 +12,8 @@ pub struct Moments {
     inverse_std: f32,
 }
 
-/// Normalised values, times the scale of their channel plus its shift, and the moments of the groups, image by image.
+/// Normalised values, times the scale of their channel plus its shift, and the moments of the groups, image
+/// by image.
 pub fn forward(
     x: &[f32],
     (scale, shift): (&[f32], &[f32]),

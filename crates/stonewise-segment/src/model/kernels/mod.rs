@@ -22,8 +22,8 @@ pub trait ModelBackend: Backend {
     /// The product of a sparse matrix, rows x columns, and a dense one, columns x channels.
     fn sparse_product(matrix: &Arc<SparseMatrix>, dense: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// Convolution of [batch, in, rows, columns] with [out, in, size, size], odd size, padded by half of it with zeros, plus
-    /// a bias for each output.
+    /// Convolution of [batch, in, rows, columns] with [out, in, size, size], odd size, padded by half of it
+    /// with zeros, plus a bias for each output.
     fn convolve(
         x: FloatTensor<Self>,
         weight: FloatTensor<Self>,
@@ -41,7 +41,8 @@ pub trait ModelBackend: Backend {
         ))
     }
 
-    /// Group normalisation (Wu & He 2018) of [batch, channels, rows, columns], then a scale and a shift of each channel.
+    /// Group normalisation (Wu & He 2018) of [batch, channels, rows, columns], then a scale and a shift of
+    /// each channel.
     fn group_norm(
         x: FloatTensor<Self>,
         scale: FloatTensor<Self>,

@@ -2,7 +2,7 @@
 
 use super::Case;
 use crate::figure::{Axis, GREY, Item, PALETTE, Plot, Ramp};
-use crate::report::{ResultSet, StoneRow};
+use crate::results::{ResultSet, StoneRow};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 

@@ -14,7 +14,7 @@ use crate::experiment::quiet::Quiet;
 use crate::part::Part;
 use crate::pipeline::{Context, Keeps, StepStore, Until, first_stones, run_in};
 use crate::project::{Epoch, Estimator, Project, Settings};
-use crate::report::ResultSet;
+use crate::results::ResultSet;
 use crate::truth::outcome;
 use nalgebra::{Point3, Vector3};
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ impl Method {
     fn settings(self, settings: &Settings) -> Settings {
         let mut settings = settings.clone();
         if self == Self::Paper {
-            settings.matching = MatchParams::paper();
+            settings.r#match = MatchParams::paper();
             settings.registration.estimator = Estimator::Gicp;
         }
         settings
@@ -211,10 +211,10 @@ fn score_region(
         .stones
         .iter()
         .filter(|row| near(&row.centroid))
-        .map(|row| outcome(row, normal(row.stone_id)))
+        .map(|row| outcome(row, normal(row.stone_id), results.datum()))
         .collect();
     let truth = |p: &Point3<f64>| motion.field.displacement_at(p);
-    let stones = score_stones(&outcomes, truth, &settings.evaluation);
+    let stones = score_stones(&outcomes, truth, &settings.evaluate);
     let points = results.distances.iter().filter(|p| near(&p.position));
     let field = ChangeField {
         points: points
@@ -229,7 +229,7 @@ fn score_region(
             .collect(),
     };
     let face = |p: &ChangePoint| results.facade.frame_at(&p.position).out;
-    [stones, score_change(&field, truth, face, &settings.evaluation)]
+    [stones, score_change(&field, truth, face, &settings.evaluate)]
 }
 
 /// A name as a folder: letters, digits, dashes.

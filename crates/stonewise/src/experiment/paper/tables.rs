@@ -145,9 +145,8 @@ impl PaperTables {
 fn parameters(cases: &[Case]) -> Vec<Vec<String>> {
     let value = |method: Method, path: &[&str]| {
         let case = cases.iter().find(|c| c.method == method)?;
-        let found = path
-            .iter()
-            .try_fold(&case.results.run["parameters"], |v, name| v.get(name))?;
+        let parameters = serde_json::to_value(&case.results.run.as_ref()?.parameters).ok()?;
+        let found = path.iter().try_fold(&parameters, |v, name| v.get(name))?;
         Some(found.as_str().map_or_else(|| found.to_string(), str::to_owned))
     };
     let row = |name: &str, paper: &str, path: &[&str], factor: f64| {
@@ -164,16 +163,11 @@ fn parameters(cases: &[Case]) -> Vec<Vec<String>> {
         ]
     };
     let mut rows = vec![
-        row(
-            "Ratio threshold, centroids",
-            "0.4",
-            &["matching", "max_ratio"],
-            1.0,
-        ),
+        row("Ratio threshold, centroids", "0.4", &["match", "max_ratio"], 1.0),
         row(
             "Ratio threshold, surface",
             "0.95",
-            &["matching", "min_area_ratio"],
+            &["match", "min_area_ratio"],
             1.0,
         ),
         row(
@@ -184,7 +178,7 @@ fn parameters(cases: &[Case]) -> Vec<Vec<String>> {
         ),
         row("Buffer [cm]", "60", &["registration", "gicp", "buffer_m"], 100.0),
     ];
-    if value(Method::Ours, &["registration", "estimator"]).as_deref() == Some("network")
+    if value(Method::Ours, &["registration", "estimator"]).as_deref() == Some("adjustment")
         && let Some(ours) = rows[3].last_mut()
     {
         "none: neighbours share".clone_into(ours);

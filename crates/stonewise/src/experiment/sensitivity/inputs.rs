@@ -33,7 +33,7 @@ pub(super) fn inputs(
 ) -> Result<Inputs> {
     let params = changed(base, variant.change);
     let key = Key::new("survey", &params, &[]);
-    let (survey, _) = store.step("survey", key, |dir| {
+    let (survey, _) = store.step("survey", key, &[], |dir| {
         write_survey(&dir.file("survey"), &params, progress)?;
         Ok(())
     })?;
@@ -55,7 +55,7 @@ pub(super) fn inputs(
         }
         Change::Pose(_) | Change::Photos(_) => {
             let key = Key::new("cameras", &variant.change, &[survey.key().as_str()]);
-            let (dir, _) = store.step("cameras", key, |dir| {
+            let (dir, _) = store.step("cameras", key, &[], |dir| {
                 (1..=2).try_for_each(|number| {
                     let exact = folder.join(format!("truth/cameras_epoch{number}/cameras_metashape.xml"));
                     let delivered = folder.join(format!("epoch{number}/cameras_metashape.xml"));
@@ -122,13 +122,13 @@ fn spoilt_masks(
     store: &StepStore,
 ) -> Result<([PathBuf; 2], f64)> {
     let key = Key::new("masks", &error, &[survey]);
-    let (dir, _) = store.step("masks", key, |dir| {
+    let (dir, _) = store.step("masks", key, &[], |dir| {
         let mut ious = Vec::new();
         for (number, epoch) in (1u64..).zip(&project.epochs) {
             let folder = dir.file(number.to_string());
             fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
             let source = MaskSource::open(epoch.masks.as_deref().unwrap_or(&folder))?;
-            let views = read_cameras(&epoch.cameras)?.views;
+            let views = epoch.read_cameras()?.views;
             for (photo, view) in (0u64..).zip(&views) {
                 let name = format!("{}.jpg", view.name);
                 let (width, height) = (view.camera.width, view.camera.height);

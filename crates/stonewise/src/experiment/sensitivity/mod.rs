@@ -120,14 +120,14 @@ fn measure(
         for method in methods {
             let mut project: Project = project.clone();
             if *method == "paper" {
-                project.settings.matching = MatchParams::paper();
+                project.settings.r#match = MatchParams::paper();
                 project.settings.registration.estimator = Estimator::Gicp;
             }
             let folder = out.join(format!("{}-{method}", scanner.to_lowercase()));
             let context = Context::with_store(&project, &folder, Arc::clone(store), &quiet)?;
             let score = match run_in(&context, Until::Registered) {
                 Ok(_) => {
-                    let params = &project.settings.evaluation;
+                    let params = &project.settings.evaluate;
                     evaluate_truth(&folder, &inputs.truth, params)?.external
                 }
                 Err(Error::NoMatch { .. } | Error::Survey(_) | Error::Registration(_)) => None,

@@ -79,7 +79,7 @@ fn range(text: &str) -> Option<Vec<toml::Value>> {
 
 /// The grid that is tried where none is given: the paper's three parameters, with values on both sides of its choice.
 ///
-/// The buffer belongs to plane-to-plane ICP; the network has the border instead that it leaves out of every stone.
+/// The buffer belongs to plane-to-plane ICP; the adjustment has the border instead that it leaves out of every stone.
 pub fn default_grid(settings: &Settings) -> Vec<Dimension> {
     let dimension = |key: &str, values: &[f64]| Dimension {
         key: key.to_owned(),
@@ -87,11 +87,11 @@ pub fn default_grid(settings: &Settings) -> Vec<Dimension> {
     };
     let last = match settings.registration.estimator {
         Estimator::Gicp => dimension("registration.gicp.buffer_m", &[0.0, 0.15, 0.3, 0.6, 0.9]),
-        Estimator::Network => dimension("registration.border_noises", &[0.0, 1.5, 3.0, 5.0]),
+        Estimator::Adjustment => dimension("registration.border_noises", &[0.0, 1.5, 3.0, 5.0]),
     };
     vec![
-        dimension("matching.max_ratio", &[0.3, 0.4, 0.5, 0.6]),
-        dimension("matching.min_area_ratio", &[0.5, 0.7, 0.8, 0.9, 0.95]),
+        dimension("match.max_ratio", &[0.3, 0.4, 0.5, 0.6]),
+        dimension("match.min_area_ratio", &[0.5, 0.7, 0.8, 0.9, 0.95]),
         last,
     ]
 }
@@ -118,10 +118,10 @@ mod tests {
 
     #[test]
     fn lists_and_ranges_are_read() {
-        let list: Dimension = "registration.estimator=gicp, network".parse().unwrap();
+        let list: Dimension = "registration.estimator=gicp, adjustment".parse().unwrap();
         assert_eq!(
             list.values,
-            ["gicp", "network"].map(|v| toml::Value::String(v.into()))
+            ["gicp", "adjustment"].map(|v| toml::Value::String(v.into()))
         );
         let mixed: Dimension = "a.b=1,0.5,true".parse().unwrap();
         assert_eq!(

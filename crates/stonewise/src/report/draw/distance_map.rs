@@ -1,9 +1,8 @@
 //! The unrolled wall with M3C2 distances.
 
-use super::colour_bar::Scale;
 use super::stone_map::MapLayout;
-use crate::report::ResultSet;
-use crate::report::statistics::Sorted;
+use crate::figure::Scale;
+use crate::results::{ResultSet, Sorted};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 

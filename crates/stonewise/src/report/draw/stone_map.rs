@@ -1,9 +1,7 @@
 //! The unrolled wall with its stones coloured by a quantity.
 
-use super::colour_bar::Scale;
-use crate::figure::{Axes, Axis, escape, mm, nice_above};
-use crate::report::statistics::Sorted;
-use crate::report::{ResultSet, StoneRow};
+use crate::figure::{Axes, Axis, Scale, escape, mm, nice_above};
+use crate::results::{ResultSet, Sorted, StoneRow};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;

@@ -2,76 +2,61 @@
 
 use super::html::{details, section, table};
 use crate::figure::{count, escape, number};
-use crate::report::ResultSet;
+use crate::results::ResultSet;
+use crate::results::records::StepTime;
+use crate::warnings::Warning;
+use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 
 /// Rows of a list of decisions at most.
 const MAX_DECISIONS: usize = 150;
 
 /// Decisions about masks, the adjustment, and everything in run.json, warnings first.
 pub(super) fn audit(results: &ResultSet) -> String {
-    let mut more = String::new();
-    if results.registration.is_object() {
-        more.push_str(&details(
-            "Adjustment of the motions (registration.json)",
-            &tree(&results.registration),
-        ));
-    }
-    let run = &results.run;
-    let Value::Object(entries) = run else {
-        let counts = decision_counts(&results.decisions);
-        more.push_str(&decision_lists(&results.decisions));
-        let body = format!("<p>There is no run.json beside the results.</p>{counts}{more}");
-        return section("audit", "Audit", &body);
+    let mut out = match &results.run {
+        Some(run) => warnings(&run.warnings),
+        None => "<p>There is no run.json beside the results.</p>".to_owned(),
     };
-    let mut out = warnings(
-        run.get("warnings")
-            .and_then(Value::as_array)
-            .map_or(&[], Vec::as_slice),
-    );
     out.push_str(&decision_counts(&results.decisions));
-    for (key, value) in entries.iter().filter(|(k, _)| *k != "warnings") {
-        match value {
-            Value::Null => {}
-            Value::Array(items) if key == "steps" => {
-                out.push_str(&details("Steps, times and memory", &steps(items)))
-            }
-            Value::Object(_) | Value::Array(_) => out.push_str(&details(&words(key), &tree(value))),
-            _ => {
-                let _ = write!(
-                    out,
-                    "<p class=\"fact\"><span>{}</span> {}</p>",
-                    escape(&words(key)),
-                    scalar(value)
-                );
-            }
+    if let Some(run) = &results.run {
+        out.push_str(&details("Steps, times and memory", &steps(&run.steps)));
+        out.push_str(&details("Epochs", &tree_of(&run.epochs)));
+        out.push_str(&details("Parameters", &tree_of(&run.parameters)));
+        if let Some(part) = &run.part {
+            out.push_str(&details("Part of the survey", &tree_of(part)));
         }
     }
-    out.push_str(&more);
+    if let Some(registration) = &results.registration {
+        out.push_str(&details(
+            "Adjustment of the motions (registration.json)",
+            &tree_of(registration),
+        ));
+    }
     out.push_str(&decision_lists(&results.decisions));
     section("audit", "Audit", &out)
 }
 
 /// What was done, how long it took, and the highest memory up to its end.
-fn steps(items: &[Value]) -> String {
-    let number = |item: &Value, key: &str, unit: f64| {
-        item.get(key)
-            .and_then(Value::as_f64)
-            .map_or("\u{2013}".into(), |v| self::number(v / unit, 1))
-    };
-    let row = |item: &Value| {
-        let resumed = item.get("resumed").and_then(Value::as_bool) == Some(true);
+fn steps(steps: &[StepTime]) -> String {
+    let or_dash = |v: Option<f64>| v.map_or("\u{2013}".into(), |v| number(v, 1));
+    let row = |step: &StepTime| {
         vec![
-            escape(item.get("step").and_then(Value::as_str).unwrap_or("")),
-            number(item, "seconds", 1.0),
-            number(item, "peak_memory_bytes", 1e6),
-            if resumed { "taken from an earlier run" } else { "" }.into(),
+            escape(&step.step),
+            number(step.seconds, 1),
+            or_dash(step.processor_seconds),
+            or_dash(step.peak_memory_bytes.map(|b| b as f64 / 1e6)),
+            if step.resumed {
+                "taken from an earlier run"
+            } else {
+                ""
+            }
+            .into(),
         ]
     };
-    let rows: Vec<Vec<String>> = items.iter().map(row).collect();
-    table(&["step", "seconds", "highest memory MB", ""], &rows, 1)
+    let rows: Vec<Vec<String>> = steps.iter().map(row).collect();
+    let head = ["step", "seconds", "processor seconds", "highest memory MB", ""];
+    table(&head, &rows, 1)
 }
 
 /// How many mask instances were merged, split, dropped, by epoch.
@@ -142,33 +127,31 @@ fn decision_list(rows: &[Vec<String>], number: usize) -> String {
     )
 }
 
-fn warnings(warnings: &[Value]) -> String {
+fn warnings(warnings: &[Warning]) -> String {
     if warnings.is_empty() {
         return "<p>No warnings.</p>".into();
     }
-    let text = |w: &Value, key: &str| escape(w.get(key).and_then(Value::as_str).unwrap_or(""));
-    let skipped = |w: &Value| w.get("skipped_input").and_then(Value::as_bool) == Some(true);
-    let row = |w: &Value| {
-        let message = if w.is_string() {
-            scalar(w)
-        } else {
-            text(w, "message")
-        };
+    let row = |w: &Warning| {
         vec![
-            text(w, "step"),
-            text(w, "subject"),
-            message,
-            if skipped(w) { "<b>left out</b>" } else { "" }.into(),
+            escape(&w.step),
+            escape(&w.subject),
+            escape(&w.message),
+            if w.skipped_input { "<b>left out</b>" } else { "" }.into(),
         ]
     };
     let rows: Vec<Vec<String>> = warnings.iter().map(row).collect();
-    let left_out = warnings.iter().filter(|w| skipped(w)).count();
+    let left_out = warnings.iter().filter(|w| w.skipped_input).count();
     format!(
         "<h3>Warnings ({}; inputs left out: {})</h3>{}",
         count(warnings.len()),
         count(left_out),
         table(&["step", "about", "what happened", "input"], &rows, 4)
     )
+}
+
+/// A record as nested lists, see [`tree`].
+fn tree_of(record: &impl Serialize) -> String {
+    serde_json::to_value(record).map_or_else(|_| String::new(), |value| tree(&value))
 }
 
 /// A document as nested lists; arrays of plain values on one line, arrays of plain objects as a table.

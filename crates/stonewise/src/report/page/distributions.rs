@@ -1,13 +1,12 @@
 //! Histograms, in-plane scatter, stones against M3C2, and the datum check.
 
 use super::html::{figure, section, table};
-use crate::figure::{count, mm, mm_or_dash};
-use crate::report::ResultSet;
+use crate::figure::{count, escape, mm, mm_or_dash};
 use crate::report::comparison::Comparison;
-use crate::report::datum::Datum;
 use crate::report::draw::{Series, histogram, scatter};
-use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
+use crate::results::records::DatumState;
+use crate::results::{ResultSet, Sorted};
 
 const NAMES: [&str; 3] = ["along the wall", "up the face", "out of the wall"];
 
@@ -152,7 +151,7 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
          error of that registration; only stable points outside the wall can tell. Stones that did not move significantly should \
          scatter around zero.</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
          deviation of normally distributed values. {} stones in all, {} not significant.</p>",
-        registration(&Datum::of(&results.run, &results.registration)),
+        registration(results),
         table(&head, &rows, 1),
         count(facts.measured.len()),
         count(still.len())
@@ -161,30 +160,29 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
 }
 
 /// What is known about the registration, in words.
-fn registration(datum: &Datum) -> String {
-    match datum {
-        Datum::Unknown => "<b>The error of the registration is not known.</b> The project names no stable areas \
-            (<code>[[registration.stable]]</code>) and states no error (<code>epoch_error_m</code>), so no uncertainty in this report \
-            holds it: intervals and limits are right for motions of stones against each other, and too short for motions against \
-            the ground."
+fn registration(results: &ResultSet) -> String {
+    let estimated = results.datum().filter(|d| d.is_estimated());
+    let observers = results.registration.as_ref().and_then(|r| r.observers.as_ref());
+    if let (Some(datum), Some(observers)) = (estimated, observers) {
+        let axes = ["x", "y", "z"].into_iter().enumerate();
+        let part = |(k, axis): (usize, &str)| {
+            let sd = datum.covariance_6x6.map_or(0.0, |c| c[k][k].max(0.0).sqrt());
+            format!("{axis} {} \u{b1} {} mm", mm(observers.error[k]), mm(sd))
+        };
+        return format!(
+            "Datum: {}. Error of the later epoch in the middle of the wall: {} (one standard deviation, world axes; {} plane cells in stable \
+             areas, sources compared on {} stones).",
+            escape(&datum.note),
+            axes.map(part).collect::<Vec<_>>().join(", "),
+            count(observers.stable_cells),
+            observers.compared_stones.map(count).join(" and ")
+        );
+    }
+    match results.datum() {
+        Some(datum) if datum.state != DatumState::Unknown => format!("Datum: {}.", escape(&datum.note)),
+        _ => "<b>The registration error of the epochs is unknown.</b> The project names no stable areas \
+            (<code>[[registration.stable]]</code>) that show it and states no error (<code>epoch_error_m</code>): intervals, limits and \
+            significance hold for motions against the common rigid motion of the measured stones, not against the ground."
             .into(),
-        Datum::Stated(error) => format!(
-            "The project states a registration error of {} mm per axis and epoch; every uncertainty holds it.",
-            mm(*error)
-        ),
-        Datum::StableAreas { shift_m, sigma_m, points } => {
-            let parts: Vec<String> = ["x", "y", "z"]
-                .into_iter()
-                .zip(shift_m.iter().zip(sigma_m))
-                .map(|(axis, (shift, sigma))| format!("{axis} {} \u{b1} {} mm", mm(*shift), mm(*sigma)))
-                .collect();
-            let counts: Vec<String> = points.iter().map(|n| count(*n)).collect();
-            format!(
-                "<b>Stable areas</b> ({} points) seem to have moved by {} (one standard deviation, world axes). That is an error of \
-                 the registration: it is counted in every uncertainty, and not taken out of the displacements.",
-                counts.join(" and "),
-                parts.join(", ")
-            )
-        }
     }
 }

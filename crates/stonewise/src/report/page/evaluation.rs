@@ -3,7 +3,7 @@
 use super::html::{details, section, table};
 use crate::figure::{count, escape, number};
 use std::fmt::Write;
-use stonewise_core::evaluate::{Directions, ErrorStatistics, Evaluation, MotionScore};
+use stonewise_core::evaluate::{Coverage, Directions, ErrorStatistics, Evaluation, MotionScore};
 
 /// The paper's table, the full statistics, and what they mean.
 pub(super) fn evaluation(evaluation: &Evaluation) -> String {
@@ -85,10 +85,16 @@ fn rmse_table(methods: &[(&str, &MotionScore)]) -> String {
 
 fn statistics(name: &str, score: &MotionScore) -> String {
     let share = |v: Option<f64>| v.map_or("–".into(), |v| format!("{}\u{a0}%", number(100.0 * v, 1)));
+    // Without a datum intervals are claimed for motions against the common one only.
+    let calibration = score
+        .calibration
+        .as_ref()
+        .or(score.calibration_without_datum.as_ref());
+    let covered = |of: fn(&Coverage) -> Option<f64>| share(calibration.and_then(|c| of(&c.coverage_95)));
     let coverage = |i: usize| match i {
-        0 => share(score.calibration.coverage_95.along),
-        1 => share(score.calibration.coverage_95.up),
-        4 => share(score.calibration.coverage_95.out),
+        0 => covered(|c| c.along),
+        1 => covered(|c| c.up),
+        4 => covered(|c| c.out),
         _ => String::new(),
     };
     let head = [
@@ -141,7 +147,7 @@ fn statistics(name: &str, score: &MotionScore) -> String {
         count(s.detectable),
         share(s.detectable_hit_rate)
     );
-    if let Some(chi) = score.calibration.chi_square_median {
+    if let Some(chi) = calibration.and_then(|c| c.chi_square_median) {
         let _ = write!(
             out,
             " Median of e\u{2032}C<sup>\u{2212}1</sup>e: {} (2.37 is right).",

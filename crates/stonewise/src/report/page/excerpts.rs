@@ -1,7 +1,7 @@
 //! Excerpts of the survey, packed for the page: crops, sections, thinned clouds, cameras.
 
 use super::block::Block;
-use crate::report::{Cut, ResultSet, SectionPoint, ThinPoint};
+use crate::results::{Cut, ResultSet, SectionPoint, ThinPoint};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use nalgebra::{Point3, Vector3};

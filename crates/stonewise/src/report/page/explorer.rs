@@ -6,17 +6,16 @@
 use super::block::Block;
 use super::excerpts;
 use super::{epoch_names, known_translation_mm};
-use crate::figure::nice_above;
+use crate::error::Error;
+use crate::figure::{colours, nice_above};
 use crate::report::comparison::Comparison;
-use crate::report::datum::Datum;
-use crate::report::draw::{colours, component_limit_m};
-use crate::report::joints::Joint;
-use crate::report::statistics::Sorted;
 use crate::report::summary::Summary;
-use crate::report::{ReportError, ResultSet, RowMotion, Status, StoneRow};
+use crate::results::records::DatumState;
+use crate::results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
 use nalgebra::{Point2, Point3, Vector3};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
+use std::path::Path;
 use stonewise_core::geometry::FaceFrame;
 
 /// The program; `web/README.md` says how it is built from its sources.
@@ -38,7 +37,7 @@ pub(super) fn data(
     facts: &Summary,
     compared: &Comparison,
     joints: &[Joint],
-) -> Result<String, ReportError> {
+) -> Result<String, Error> {
     let mut blocks = vec![
         ("stones", stones(results, compared)),
         ("joints", joint_block(joints, &origin(results))),
@@ -50,7 +49,7 @@ pub(super) fn data(
     for (name, block) in blocks {
         let (columns, text) = block
             .finish()
-            .map_err(ReportError::io("packing the report's data", "report"))?;
+            .map_err(Error::io("packing the report's data", Path::new("report")))?;
         lists.insert(name.to_owned(), columns);
         let _ = writeln!(
             texts,
@@ -71,8 +70,11 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         nice_above(values.quantile(0.98).unwrap_or(0.0) * 1e3)
     };
     let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
-    let component = component_limit_m(facts) * 1e3;
-    let names = epoch_names(&results.run, results.pair);
+    let component = facts.component_limit_m() * 1e3;
+    let names = results
+        .run
+        .as_ref()
+        .and_then(|run| epoch_names(run, results.pair));
     let [diverging, sequential] = colours();
     json!({
         "epochs": names.unwrap_or_else(|| [1, results.pair + 1].map(|n| format!("epoch {n}"))),
@@ -87,7 +89,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
             "opening": nice_above(Sorted::new(openings).quantile(0.98).unwrap_or(0.0) * 1e3),
         },
         "decimals": facts.decimals(),
-        "registrationKnown": Datum::of(&results.run, &results.registration) != Datum::Unknown,
+        "registrationKnown": results.datum().is_some_and(|d| d.state != DatumState::Unknown),
         "truth": known_translation_mm(results),
         "blocks": blocks,
         "cameras": excerpts::cameras(results, &origin(results)),
@@ -208,7 +210,7 @@ fn joint_block(joints: &[Joint], origin: &Point3<f64>) -> Block {
         }
     }
     block.i16("width", TENTH_MM, joints.iter().map(|j| j.width_m));
-    let of = |pick: fn(&crate::report::JointMotion) -> f64| {
+    let of = |pick: fn(&JointMotion) -> f64| {
         joints
             .iter()
             .map(move |j| j.motion.as_ref().map_or(f64::NAN, pick))

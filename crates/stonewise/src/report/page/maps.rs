@@ -2,22 +2,20 @@
 
 use super::explorer::PLACE;
 use super::html::{figure, section};
-use crate::figure::mm;
-use crate::report::draw::{
-    MapLayout, MapPicture, Scale, component_limit_m, distance_map, joint_map, nice_scale_m, stone_map,
-};
+use crate::figure::{Scale, mm};
+use crate::report::draw::{MapLayout, MapPicture, distance_map, joint_map, stone_map};
 use crate::report::summary::Summary;
-use crate::report::{Joint, ResultSet, StoneRow};
+use crate::results::{Joint, ResultSet, StoneRow, nice_scale_m};
 
 /// What the marks in the maps mean.
 const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>significant at 95 %</span>\
     <span><i class=\"key pale\"></i>below the detection limit (faded)</span>\
-    <span><i class=\"key hatched\"></i>not measured</span><span><i class=\"key ring\"></i>moves unlike its neighbours</span></p>";
+    <span><i class=\"key hatched\"></i>not measured</span><span><i class=\"key ring\"></i>loose</span></p>";
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
 pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> String {
     let layout = MapLayout::new(results);
-    let shared = Scale::Diverging(component_limit_m(facts));
+    let shared = Scale::Diverging(facts.component_limit_m());
     let beyond = facts
         .components
         .iter()

@@ -3,6 +3,7 @@
 mod audit;
 mod block;
 mod distributions;
+mod doubts;
 mod evaluation;
 mod excerpts;
 mod explorer;
@@ -13,11 +14,12 @@ mod overview;
 mod survey;
 
 use super::comparison::compare;
-use super::joints::joints;
 use super::summary::Summary;
-use super::{ReportError, ResultSet};
+use crate::error::Error;
 use crate::figure::escape;
-use serde_json::Value;
+use crate::results::names::PairFile;
+use crate::results::records::RunRecord;
+use crate::results::{ResultSet, joints};
 
 #[cfg(test)]
 pub(super) use explorer::{SCRIPT, STYLE};
@@ -36,15 +38,6 @@ const SECTIONS: [(&str, &str); 8] = [
     ("audit", "Audit"),
 ];
 
-/// File of the report on one pair of epochs.
-pub(super) fn page_name(pair: usize) -> String {
-    if pair == 1 {
-        "index.html".into()
-    } else {
-        format!("epoch_{}.html", pair + 1)
-    }
-}
-
 /// The whole report as one HTML document. The same results give the same bytes.
 ///
 /// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be fetched: markup
@@ -52,7 +45,7 @@ pub(super) fn page_name(pair: usize) -> String {
 ///
 /// # Errors
 /// None in practice: compressing in memory does not fail.
-pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
+pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
     let facts = Summary::new(results);
     let (compared, joints) = (compare(results), joints(results));
     let mut body = String::new();
@@ -75,7 +68,7 @@ pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     }
     body.push_str(&method::method());
     body.push_str(&audit::audit(results));
-    let title = title(&results.run);
+    let title = title(results);
     let present = SECTIONS
         .iter()
         .filter(|(id, _)| body.contains(&format!("<section id=\"{id}\">")));
@@ -92,8 +85,9 @@ pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
          <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n\
-         <header><p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
+         <header>{}<p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
          <main>\n{body}</main>\n{data}",
+        doubts::doubts(results.run.as_ref().map_or(&[], |run| run.warnings.as_slice())),
         cover(results)
     );
     // Of all that the page holds, so that no input can guess it.
@@ -110,45 +104,37 @@ pub(super) fn page(results: &ResultSet) -> Result<String, ReportError> {
     ))
 }
 
-fn title(run: &Value) -> String {
-    let project = run.get("project");
-    let name = project.and_then(|p| p.as_str().or_else(|| p.get("name").and_then(Value::as_str)));
+/// Name of the structure.
+fn title(results: &ResultSet) -> String {
+    let name = results.run.as_ref().map(|run| run.project.name.as_str());
     escape(name.filter(|n| !n.is_empty()).unwrap_or("Survey"))
 }
 
 /// Names of the first and of the compared epoch, as far as run.json has them.
-fn epoch_names(run: &Value, pair: usize) -> Option<[String; 2]> {
-    let name = |i: usize| {
-        let epoch = run.get("epochs")?.get(i)?;
-        epoch
-            .as_str()
-            .or_else(|| epoch.get("name")?.as_str())
-            .map(str::to_owned)
-    };
+fn epoch_names(run: &RunRecord, pair: usize) -> Option<[String; 2]> {
+    let name = |epoch: usize| Some(run.epochs.get(epoch)?.name.clone());
     Some([name(0)?, name(pair)?])
 }
 
 /// The same as one line of HTML.
-fn epochs(run: &Value, pair: usize) -> Option<String> {
+fn epochs(run: &RunRecord, pair: usize) -> Option<String> {
     epoch_names(run, pair).map(|[first, second]| format!("{} \u{2192} {}", escape(&first), escape(&second)))
 }
 
 /// Epochs, version and time of the run, and the way to the reports on other epochs.
 fn cover(results: &ResultSet) -> String {
-    let run = &results.run;
-    let mut facts: Vec<String> = epochs(run, results.pair)
-        .map(|e| format!("Epochs <b>{e}</b>"))
-        .into_iter()
-        .collect();
-    for (key, word) in [("finished_at", "finished"), ("version", "stonewise")] {
-        if let Some(text) = run.get(key).and_then(Value::as_str) {
-            facts.push(format!("{word} <b>{}</b>", escape(text)));
-        }
+    let run = results.run.as_ref();
+    let line = |pair: usize| run.and_then(|run| epochs(run, pair));
+    let mut facts: Vec<String> = Vec::new();
+    facts.extend(line(results.pair).map(|e| format!("Epochs <b>{e}</b>")));
+    if let Some(run) = run {
+        facts.push(format!("finished <b>{}</b>", run.finished_at.minute()));
+        facts.push(format!("stonewise <b>{}</b>", escape(&run.version)));
     }
     let others = (1..=results.pairs).filter(|p| *p != results.pair);
     facts.extend(others.map(|pair| {
-        let name = epochs(run, pair).unwrap_or_else(|| format!("epoch {}", pair + 1));
-        format!("<a href=\"{}\">{name}</a>", page_name(pair))
+        let name = line(pair).unwrap_or_else(|| format!("epoch {}", pair + 1));
+        format!("<a href=\"{}\">{name}</a>", PairFile::ReportPage.name(pair))
     }));
     let line = if facts.is_empty() {
         String::new()
@@ -160,17 +146,8 @@ fn cover(results: &ResultSet) -> String {
 
 /// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.
 fn known_translation_mm(results: &ResultSet) -> Option<[f64; 2]> {
-    let motion = results.run.get("epochs")?.get(results.pair)?.get("motion")?;
-    if motion.get("kind")?.as_str()? != "translation" {
-        return None;
-    }
-    let d: Vec<f64> = motion
-        .get("d")?
-        .as_array()?
-        .iter()
-        .filter_map(Value::as_f64)
-        .collect();
-    let d = (d.len() == 3).then(|| nalgebra::Vector3::from_column_slice(&d))?;
+    let epoch = results.run.as_ref()?.epochs.get(results.pair)?;
+    let d = epoch.motion.as_ref()?.common_displacement()?;
     let stone = results.stones.get(results.stones.len() / 2)?;
     let frame = results.facade.frame_at(&stone.centroid);
     Some([d.dot(&frame.along) * 1e3, d.dot(&frame.up) * 1e3])

@@ -3,12 +3,10 @@
 use super::html::{details, section, table};
 use super::maps::motion_map;
 use crate::figure::{count, escape, mm, mm_or_dash, number, percent};
-use crate::report::datum::Datum;
-use crate::report::statistics::Sorted;
 use crate::report::summary::{FALSE_ALARMS, Summary};
-use crate::report::{ResultSet, RowMotion, Status, StoneRow};
+use crate::results::records::{Datum, DatumState};
+use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
 use nalgebra::Point2;
-use serde_json::Value;
 use std::fmt::Write;
 
 /// Rows of a table of single stones at most; the full list is in stones.csv.
@@ -16,10 +14,10 @@ const MAX_ROWS: usize = 25;
 
 /// What moved, how many, where, how sure.
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
-    let datum = Datum::of(&results.run, &results.registration);
-    let mut out = tiles(facts, &datum);
+    let datum = results.datum();
+    let mut out = tiles(facts, datum);
     out.push_str("<div class=\"statement\"><ul class=\"findings\">");
-    for sentence in sentences(results, facts, &datum) {
+    for sentence in sentences(results, facts, datum) {
         let _ = write!(out, "<li>{sentence}</li>");
     }
     out.push_str("</ul>");
@@ -30,7 +28,7 @@ pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     section("summary", "Summary", &out)
 }
 
-fn tiles(facts: &Summary, datum: &Datum) -> String {
+fn tiles(facts: &Summary, datum: Option<&Datum>) -> String {
     let tile =
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
     let share = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.stones));
@@ -46,12 +44,13 @@ fn tiles(facts: &Summary, datum: &Datum) -> String {
             of_measured(facts.significant.len()),
             "of these moved significantly"
         ),
-        tile(count(facts.loose.len()), "move unlike their neighbours"),
+        tile(count(facts.loose.len()), "loose: move unlike their neighbours"),
         tile(
             format!("{} <small>mm</small>", mm_or_dash(facts.limits.median())),
-            match datum {
-                Datum::Unknown => "typical detection limit (95 %, median), registration error not included",
-                _ => "typical detection limit (95 %, median), registration error included",
+            if is_known(datum) {
+                "typical detection limit (95 %, median), registration error included"
+            } else {
+                "typical detection limit (95 %, median) against the common motion of the wall"
             }
         ),
         tile(
@@ -61,7 +60,7 @@ fn tiles(facts: &Summary, datum: &Datum) -> String {
     )
 }
 
-fn sentences(results: &ResultSet, facts: &Summary, datum: &Datum) -> Vec<String> {
+fn sentences(results: &ResultSet, facts: &Summary, datum: Option<&Datum>) -> Vec<String> {
     if facts.measured.is_empty() {
         let lost = facts
             .by_status
@@ -70,10 +69,12 @@ fn sentences(results: &ResultSet, facts: &Summary, datum: &Datum) -> Vec<String>
         let reasons = lost.collect::<Vec<_>>().join("; ");
         return vec![format!("<b>No stone was measured.</b> {reasons}")];
     }
-    let mut out = vec![significance(facts), registration(datum)];
+    let mut out = vec![significance(facts)];
+    // What all numbers refer to comes first where it is not the ground.
+    out.insert(usize::from(is_known(datum)), registration(datum));
     let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
     out.push(format!(
-        "Common to all measured stones (median): <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
+        "Median of all measured stones: <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
          the wall."
     ));
     if facts.motion_is_proven() {
@@ -90,17 +91,21 @@ fn sentences(results: &ResultSet, facts: &Summary, datum: &Datum) -> Vec<String>
             number(place.y, 2)
         ));
     }
-    if results.registration.get("converged").and_then(Value::as_bool) == Some(false) {
+    if results
+        .registration
+        .as_ref()
+        .is_some_and(|r| !r.estimator.converged())
+    {
         out.push(
             "<b>The joint adjustment reached its limit of iterations before it settled</b>; see the audit."
                 .into(),
         );
     }
     out.push(match facts.loose.len() {
-        0 => "No stone moves unlike its neighbours beyond what the noise explains.".into(),
-        1 => "<b>One stone</b> moves unlike its neighbours; it is listed below.".into(),
+        0 => "No stone is loose: none moves unlike its neighbours beyond what the noise explains.".into(),
+        1 => "<b>One stone is loose</b>: it moves unlike its neighbours; it is listed below.".into(),
         n => format!(
-            "<b>{} stones</b> move unlike their neighbours; they are listed below.",
+            "<b>{} stones are loose</b>: they move unlike their neighbours; they are listed below.",
             count(n)
         ),
     });
@@ -140,28 +145,20 @@ fn places(facts: &Summary) -> Vec<String> {
     out
 }
 
-/// What a motion that all stones share may be, and whether the uncertainties know.
-fn registration(datum: &Datum) -> String {
-    match datum {
-        Datum::Unknown => "<b>The error of the registration of the epochs is not known to this report</b> and is in no limit or interval: \
-            they hold for stones against each other. A shift, tilt or drift common to many stones may be an error of the registration; \
-            only stable areas outside the wall can tell (see the datum check)."
-            .into(),
-        Datum::Stated(error) => format!(
-            "Datum: the project states a registration error of {} mm per axis and epoch; limits and intervals hold it.",
-            mm(*error)
-        ),
-        Datum::StableAreas { shift_m, sigma_m, .. } => format!(
-            "Datum: the stable areas outside the wall seem to have moved by {} mm (\u{b1} {} mm), an error of the registration; limits \
-             and intervals hold it.",
-            mm(norm(shift_m)),
-            mm(norm(sigma_m))
-        ),
-    }
+/// Whether the error of the registration of the epochs is known.
+fn is_known(datum: Option<&Datum>) -> bool {
+    datum.is_some_and(|d| d.state != DatumState::Unknown)
 }
 
-fn norm(v: &[f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
+/// What is known about the registration of the epochs.
+fn registration(datum: Option<&Datum>) -> String {
+    match datum {
+        Some(datum) if is_known(Some(datum)) => format!("Datum: {}.", escape(&datum.note)),
+        _ => "<b>The registration error of the epochs is unknown</b>: limits, intervals and significance hold for motions against the \
+            common rigid motion of the measured stones. A motion of the wall as a whole cannot be told from an error of the \
+            registration; stable areas outside the wall would show it."
+            .into(),
+    }
 }
 
 /// How many stones have no motion, and why.
@@ -221,7 +218,7 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
         out.push_str(&stone_rows(results, facts, &facts.significant));
     }
     if !facts.loose.is_empty() {
-        out.push_str("<h3>Stones that move unlike their neighbours</h3>");
+        out.push_str("<h3>Loose stones</h3>");
         out.push_str(&stone_rows(results, facts, &facts.loose));
     }
     out.push_str(&stretches(results, facts));
@@ -247,7 +244,7 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
         "d out mm",
         "norm mm",
         "LoD95 mm",
-        "unlike neighbours mm",
+        "against neighbours mm",
         "rotation mrad",
         "loose",
     ];

@@ -2,51 +2,47 @@
 
 use super::html::{details, table};
 use crate::figure::{count, escape, number};
-use crate::report::ResultSet;
+use crate::results::ResultSet;
+use crate::results::records::{EpochRecord, InputRecord};
 use serde_json::Value;
 use std::fmt::Write;
-use std::path::Path;
+use stonewise_core::evaluate::MotionField;
 
-/// A table of the epochs, folded on the screen and open on the printed cover; empty where run.json has none.
+/// A table of the epochs, folded on the screen and open on the printed cover; empty without run.json.
 pub(super) fn survey(results: &ResultSet) -> String {
-    let Some(epochs) = results.run.get("epochs").and_then(Value::as_array) else {
+    let Some(run) = &results.run else {
         return String::new();
     };
-    let compared = [0, results.pair];
-    let chosen: Vec<&Value> = compared.iter().filter_map(|e| epochs.get(*e)).collect();
-    let whole = |epoch: &Value, key: &str| {
-        let value = epoch.get(key).and_then(Value::as_u64);
-        value.map_or("\u{2013}".into(), |v| {
-            count(usize::try_from(v).unwrap_or(usize::MAX))
-        })
-    };
-    let row = |what: &str, cell: &dyn Fn(&Value) -> String| {
+    let chosen: Vec<&EpochRecord> = [0, results.pair]
+        .into_iter()
+        .filter_map(|epoch| run.epochs.get(epoch))
+        .collect();
+    let row = |what: &str, cell: &dyn Fn(&EpochRecord) -> String| {
         let mut row = vec![what.to_owned()];
         row.extend(chosen.iter().map(|e| cell(e)));
         row
     };
+    let dash = || "\u{2013}".to_owned();
     let rows = vec![
-        row("point clouds", &|e| files(e.get("clouds"))),
-        row("points", &|e| whole(e, "points")),
-        row("camera file", &|e| files(e.get("cameras"))),
-        row("photos used", &|e| whole(e, "photos")),
-        row("masks", &|e| files(e.get("masks"))),
-        row("stones found", &|e| whole(e, "stones")),
-        row("known motion put in", &known_motion),
+        row("date", &|e| e.date.as_deref().map_or_else(dash, escape)),
+        row("conditions", &conditions),
+        row("point clouds", &|e| files(&e.clouds)),
+        row("points", &|e| {
+            count(usize::try_from(e.points).unwrap_or(usize::MAX))
+        }),
+        row("camera file", &|e| file(&e.cameras)),
+        row("photos used", &|e| count(e.photos)),
+        row("masks", &|e| e.masks.as_ref().map_or_else(dash, file)),
+        row("stones found", &|e| count(e.stones)),
+        row("known motion put in", &|e| {
+            e.motion.as_ref().map_or("none".into(), known_motion)
+        }),
     ];
-    let heads: Vec<String> = chosen
-        .iter()
-        .map(|e| e.get("name").and_then(Value::as_str).unwrap_or("").to_owned())
-        .collect();
     let mut head = vec!["epoch"];
-    head.extend(heads.iter().map(String::as_str));
+    head.extend(chosen.iter().map(|e| e.name.as_str()));
     let columns = head.len();
-    let crs = results
-        .run
-        .get("crs")
-        .and_then(|c| c.get("name"))
-        .and_then(Value::as_str);
-    let frame = crs.map_or("the survey's own local frame, metres".into(), escape);
+    let local = || "the survey's own local frame, metres".to_owned();
+    let frame = run.crs.as_ref().map_or_else(local, |crs| escape(&crs.name));
     details(
         "Survey data",
         &format!(
@@ -56,27 +52,26 @@ pub(super) fn survey(results: &ResultSet) -> String {
     )
 }
 
-/// Names and sizes of one input or a list of them.
-fn files(value: Option<&Value>) -> String {
-    let one = |input: &Value| {
-        let path = input.get("path").and_then(Value::as_str)?;
-        let name = Path::new(path)
-            .file_name()
-            .map_or(path.into(), |n| n.to_string_lossy());
-        let size = input.get("bytes").and_then(Value::as_u64);
-        let size = size.map_or(String::new(), |b| format!(" ({})", bytes(b)));
-        Some(format!("{}{size}", escape(&name)))
-    };
-    let list: Vec<String> = match value {
-        Some(Value::Array(items)) => items.iter().filter_map(one).collect(),
-        Some(item) => one(item).into_iter().collect(),
-        None => Vec::new(),
-    };
+/// Conditions by name.
+fn conditions(epoch: &EpochRecord) -> String {
+    let one = |(name, value): (&String, &f64)| format!("{} {value}", escape(name));
+    let list: Vec<String> = epoch.conditions.iter().map(one).collect();
     if list.is_empty() {
         "\u{2013}".into()
     } else {
         list.join("<br>")
     }
+}
+
+/// Names and sizes of inputs.
+fn files(inputs: &[InputRecord]) -> String {
+    inputs.iter().map(file).collect::<Vec<_>>().join("<br>")
+}
+
+/// Name and size of an input.
+fn file(input: &InputRecord) -> String {
+    let name = input.path.file_name().unwrap_or(input.path.as_os_str());
+    format!("{} ({})", escape(&name.to_string_lossy()), bytes(input.bytes))
 }
 
 /// A size of a file in the unit that suits it.
@@ -90,9 +85,9 @@ fn bytes(value: u64) -> String {
 }
 
 /// Kind of the motion and its numbers, metres.
-fn known_motion(epoch: &Value) -> String {
-    let Some(Value::Object(parts)) = epoch.get("motion") else {
-        return "none".into();
+fn known_motion(motion: &MotionField) -> String {
+    let Ok(Value::Object(parts)) = serde_json::to_value(motion) else {
+        return String::new();
     };
     let kind = parts.get("kind").and_then(Value::as_str).unwrap_or("motion");
     let mut text = escape(kind);

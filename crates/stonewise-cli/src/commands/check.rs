@@ -1,0 +1,49 @@
+//! `check`.
+
+use crate::args::CheckArgs;
+use crate::commands::Outcome;
+use crate::printer::Printer;
+use anyhow::{Result, bail};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use stonewise::Project;
+use stonewise::check::{Verdict, check as look_at};
+
+/// Ends the title of every page that this command writes.
+const TITLE_END: &str = "a look at the survey</title>";
+
+/// Looks at a survey; the table goes to stdout.
+pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let project = Project::read(&args.project)?;
+    let page = page_path(args, force)?;
+    let report = look_at(&project, &args.out, printer)?;
+    printer.finish();
+    write!(std::io::stdout(), "{}", report.text())?;
+    match report.write_page(&page, &project) {
+        Ok(()) => printer.log(&format!("pictures: {}", page.display())),
+        Err(error) => printer.log(&format!(
+            "note: no page with pictures ({error}); --page puts it elsewhere"
+        )),
+    }
+    Ok(match report.verdict() {
+        Verdict::Fine | Verdict::Note => Outcome::Done,
+        Verdict::Doubt | Verdict::Wrong => Outcome::InDoubt,
+    })
+}
+
+/// Where the page goes; a file that is there must be an earlier page.
+fn page_path(args: &CheckArgs, force: bool) -> Result<PathBuf> {
+    let beside = args.project.with_extension("check.html");
+    let page = args.page.clone().unwrap_or(beside);
+    if page.exists() && !force && !is_ours(&page) {
+        bail!(
+            "{} is there and is no page of this command: give another --page",
+            page.display()
+        );
+    }
+    Ok(page)
+}
+
+fn is_ours(page: &Path) -> bool {
+    std::fs::read_to_string(page).is_ok_and(|text| text.contains(TITLE_END))
+}

@@ -1,0 +1,233 @@
+//! `check`, and what a run makes of surveys that cannot be right.
+#![allow(clippy::unwrap_used)] // a test that cannot go on must stop
+
+mod support;
+
+use nalgebra::Point3;
+use std::fs;
+use std::path::Path;
+use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
+use stonewise_io::image_io::{read_rgb, write_jpeg};
+use support::{copy_of, outcome, run, sharp_survey, stonewise};
+
+/// Runs `check`; exit code, table, log.
+fn check(survey: &Path) -> (i32, String, String) {
+    let mut command = stonewise();
+    command
+        .arg("check")
+        .arg(survey.join("stonewise.toml"))
+        .arg("--out")
+        .arg(survey.join("out"));
+    let output = command.output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (table, log) = (text(&output.stdout), text(&output.stderr));
+    assert!(!log.contains("panicked"), "{log}");
+    (output.status.code().unwrap(), table, log)
+}
+
+fn points(cloud: &Path) -> Vec<Point3<f64>> {
+    let mut points = Vec::new();
+    read_cloud(cloud, 100_000, |chunk| {
+        points.extend_from_slice(&chunk.positions);
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    points
+}
+
+/// Replaces a cloud by the same points somewhere else.
+fn map_cloud(cloud: &Path, to: impl Fn(&Point3<f64>) -> Point3<f64>) {
+    let moved: Vec<Point3<f64>> = points(cloud).iter().map(to).collect();
+    fs::remove_file(cloud).unwrap();
+    write_points_laz(cloud, None, &moved, &[]).unwrap();
+}
+
+/// Writes a cloud again with a coordinate system in its header.
+fn name_system(cloud: &Path, epsg: u32) {
+    let points = points(cloud);
+    let bounds = stonewise_core::geometry::Bounds::of(points.iter().copied()).unwrap();
+    let wkt = format!(
+        "PROJCS[\"system {epsg}\",GEOGCS[\"ETRS89\",DATUM[\"x\",SPHEROID[\"GRS 1980\",6378137,298.257222101]],PRIMEM[\"Greenwich\",0],\
+         UNIT[\"degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"],UNIT[\"metre\",1],AUTHORITY[\"EPSG\",\"{epsg}\"]]"
+    );
+    fs::remove_file(cloud).unwrap();
+    write_coloured_laz::<CloudError>(cloud, &bounds, &[], Some(&wkt), |out| {
+        points.iter().try_for_each(|p| out.push(*p, [128; 3], &[]))
+    })
+    .unwrap();
+}
+
+fn first_photo(survey: &Path) -> std::path::PathBuf {
+    let mut photos: Vec<_> = fs::read_dir(survey.join("epoch2/images"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    photos.sort();
+    photos.swap_remove(0)
+}
+
+/// What is wrong; how the survey is spoilt; a word of the table; whether a run stops.
+type Case = (&'static str, fn(&Path), &'static str, bool);
+
+const CLOUD_2: &str = "epoch2/cloud_tls.laz";
+
+const CASES: [Case; 8] = [
+    (
+        "feet",
+        |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
+        "is in feet: export its coordinates in metres",
+        true,
+    ),
+    (
+        "two coordinate systems",
+        |dir| {
+            name_system(&dir.join("epoch1/cloud_tls.laz"), 25832);
+            name_system(&dir.join(CLOUD_2), 25833);
+        },
+        "EPSG:25832 (epoch 1), EPSG:25833 (epoch 2): transform them to one",
+        true,
+    ),
+    (
+        "a cloud elsewhere",
+        |dir| {
+            map_cloud(&dir.join(CLOUD_2), |p| {
+                p + nalgebra::Vector3::new(100.0, 0.0, 0.0)
+            })
+        },
+        "do not overlap",
+        true,
+    ),
+    (
+        "the same cloud twice",
+        |dir| {
+            let path = dir.join("stonewise.toml");
+            let text = fs::read_to_string(&path).unwrap();
+            fs::write(path, text.replace(CLOUD_2, "epoch1/cloud_tls.laz")).unwrap();
+        },
+        "like epoch",
+        false,
+    ),
+    (
+        "an empty photo",
+        |dir| fs::write(first_photo(dir), "").unwrap(),
+        "cannot be read or are cut off",
+        false,
+    ),
+    (
+        "a photo that is none",
+        |dir| fs::write(first_photo(dir), "this is no photo").unwrap(),
+        "cannot be read or are cut off",
+        false,
+    ),
+    (
+        "a photo that is cut off",
+        |dir| {
+            let photo = first_photo(dir);
+            let bytes = fs::read(&photo).unwrap();
+            fs::write(photo, &bytes[..bytes.len() / 2]).unwrap();
+        },
+        "cannot be read or are cut off",
+        false,
+    ),
+    (
+        "a photo of another size",
+        |dir| {
+            let photo = first_photo(dir);
+            let whole = read_rgb(&photo).unwrap();
+            let half = stonewise_core::raster::Raster::from_vec(
+                whole.width(),
+                whole.height() / 2,
+                whole.data()[..(whole.width() * (whole.height() / 2)) as usize].to_vec(),
+            );
+            fs::remove_file(&photo).unwrap();
+            write_jpeg(&photo, &half.unwrap(), 90).unwrap();
+        },
+        "its camera 1200x900 px",
+        false,
+    ),
+];
+
+#[test]
+fn a_sound_survey_passes() {
+    let survey = copy_of(sharp_survey());
+    let (code, table, log) = check(survey.path());
+    assert_eq!(code, 0, "{table}{log}");
+    for line in [
+        "point spacing",
+        "overlap",
+        "photos",
+        "cameras against cloud",
+        "disk",
+        "memory",
+        "time",
+    ] {
+        assert!(table.contains(line), "{line}: {table}");
+    }
+    let page = fs::read_to_string(survey.path().join("stonewise.check.html")).unwrap();
+    assert_eq!(
+        page.matches("data:image/jpeg").count(),
+        2,
+        "a picture for each epoch"
+    );
+    // The page is replaced, but nothing else of that name.
+    assert_eq!(check(survey.path()).0, 0);
+    fs::write(survey.path().join("stonewise.check.html"), "mine").unwrap();
+    let (code, _, log) = check(survey.path());
+    assert!(code == 1 && log.contains("no page of this command"), "{log}");
+}
+
+#[test]
+fn broken_surveys_are_named_and_a_run_stops_where_they_cannot_be_right() {
+    for (what, spoil, word, stops) in CASES {
+        let survey = copy_of(sharp_survey());
+        spoil(survey.path());
+        let (code, table, log) = check(survey.path());
+        println!("--- {what}\n{table}");
+        assert_eq!(code, 3, "{what}: {table}{log}");
+        assert!(table.contains(word), "{what}: {table}{log}");
+        if stops {
+            let out = survey.path().join("out");
+            let (code, log) = run(survey.path(), &out, &[]);
+            assert!(
+                code == 1 && log.contains("cannot be right") && log.contains(word),
+                "{what}: {code} {log}"
+            );
+            assert!(!out.join("stones.csv").exists());
+        }
+    }
+}
+
+#[test]
+fn a_doubtful_survey_runs_with_exit_code_3_and_says_so_first() {
+    let survey = copy_of(sharp_survey());
+    fs::write(first_photo(survey.path()), "").unwrap();
+    let out = survey.path().join("out");
+    let (code, log) = run(survey.path(), &out, &["--quiet"]);
+    assert_eq!(code, 3, "{log}");
+    let report = fs::read_to_string(out.join("report/index.html")).unwrap();
+    let (doubt, title) = (report.find("must not be relied on"), report.find("<h1>"));
+    assert!(doubt.unwrap() < title.unwrap(), "the doubt is not the first line");
+}
+
+#[test]
+fn clouds_far_off_their_photos_end_in_exit_code_3_even_by_force() {
+    let survey = copy_of(sharp_survey());
+    map_cloud(&survey.path().join(CLOUD_2), |p| {
+        p + nalgebra::Vector3::new(0.0, 0.12, 0.0)
+    });
+    let out = survey.path().join("out");
+    let (code, log) = run(survey.path(), &out, &["--force"]);
+    assert!([1, 3].contains(&code), "{log}");
+    if code == 3 {
+        assert!(log.contains("DOUBT: "), "{log}");
+    }
+}
+
+#[test]
+fn wrong_projects_are_wrong_usage() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("stonewise.toml"), "[project]\n").unwrap();
+    let mut command = stonewise();
+    let (code, log) = outcome(command.arg("check").arg(dir.path().join("stonewise.toml")));
+    assert_eq!(code, 2, "{log}");
+}

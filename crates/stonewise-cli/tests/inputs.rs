@@ -1,0 +1,192 @@
+//! What the command says about files: `info`, and project files with the usual slips.
+#![allow(clippy::unwrap_used)] // a test that cannot go on must stop
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn stonewise() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_stonewise"))
+}
+
+fn testdata(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata")
+        .join(name)
+}
+
+/// Exit code, standard output and standard error of `info`.
+fn info(paths: &[PathBuf]) -> (i32, String, String) {
+    let output = stonewise().arg("info").args(paths).output().unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    (
+        output.status.code().unwrap(),
+        text(output.stdout),
+        text(output.stderr),
+    )
+}
+
+#[test]
+fn info_goes_on_after_a_bad_file_and_names_what_is_wrong_with_it() {
+    let bad = [
+        "layer_sizes.laz",
+        "claim.png",
+        "ply_huge_element_at_eof.ply",
+        "laz_2e60.laz",
+        "bomb.xml",
+    ];
+    let mut paths: Vec<PathBuf> = bad.iter().map(|name| testdata("hostile").join(name)).collect();
+    paths.push(testdata("clouds/little.ply"));
+    let (code, out, log) = info(&paths);
+    assert_eq!(code, 1);
+    assert!(out.contains("little.ply") && out.contains("Ply,"), "{out}");
+    for name in bad {
+        let about: Vec<&str> = log.lines().filter(|line| line.contains(name)).collect();
+        assert_eq!(about.len(), 1, "{name}: {log}");
+        assert!(!about[0].contains("not a camera file"), "{log}");
+    }
+    assert!(log.contains("5 of 6 cannot be used"), "{log}");
+    assert_eq!(log.lines().count(), 6, "{log}");
+}
+
+#[test]
+fn info_tells_what_pictures_and_masks_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["photos", "labels"] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    let photo = stonewise_core::raster::Raster::filled(64, 48, [1u8, 2, 3]);
+    let labels = stonewise_core::raster::Raster::from_vec(64, 48, (0..64 * 48).map(|i| i % 3).collect());
+    let jpeg = folder.path().join("photos/one.jpg");
+    stonewise_io::image_io::write_jpeg(&jpeg, &photo, 90).unwrap();
+    fs::write(folder.path().join("photos/two.jpg"), "no picture").unwrap();
+    let png = folder.path().join("labels/one.png");
+    stonewise_io::masks::write_label_png(&png, &labels.unwrap()).unwrap();
+    let masks = folder.path().join("masks.json");
+    fs::write(
+        &masks,
+        "{\"images\": [], \"annotations\": [], \"categories\": []}",
+    )
+    .unwrap();
+    let (code, out, log) = info(&[
+        folder.path().join("photos"),
+        folder.path().join("labels"),
+        jpeg,
+        png,
+        masks,
+    ]);
+    assert_eq!((code, log.as_str()), (0, ""));
+    for expected in [
+        "  1 photos of 64 x 48 px\n",
+        "  not usable: cannot read the image",
+        "  1 label images of 64 x 48 px\n",
+        "  photo, 64 x 48 px\n",
+        "  label image, 64 x 48 px, 2 instances\n",
+        "  masks (COCO) of ",
+    ] {
+        assert!(out.contains(expected), "{expected} is not in\n{out}");
+    }
+    let (code, _, log) = info(&[testdata("hostile/../crs")]);
+    assert_eq!(code, 1);
+    assert!(
+        log.contains("neither photos, label images nor a COLMAP model"),
+        "{log}"
+    );
+}
+
+#[test]
+fn info_does_not_repeat_a_false_box() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.las");
+    let mut bytes = fs::read(testdata("clouds/las12_format3.las")).unwrap();
+    // The highest and the lowest z of the header, a thousand times too large.
+    for place in [211, 219] {
+        let z = f64::from_le_bytes(bytes[place..place + 8].try_into().unwrap());
+        bytes[place..place + 8].copy_from_slice(&(z * 1000.0 + 1.0).to_le_bytes());
+    }
+    let (_, sound, _) = info(&[testdata("clouds/las12_format3.las")]);
+    fs::write(&path, &bytes).unwrap();
+    let (code, out, _) = info(&[path]);
+    assert_eq!(code, 0);
+    let extent = |text: &str| text.lines().find(|l| l.starts_with("  from")).map(str::to_owned);
+    assert_eq!(extent(&out), extent(&sound));
+    assert!(out.contains("  its header is wrong: it says from"), "{out}");
+    assert!(!sound.contains("wrong"), "{sound}");
+}
+
+#[test]
+fn usual_slips_in_project_files_are_wrong_usage_with_the_fix() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stonewise.toml");
+    let whole = |clouds: &str| {
+        let rest = "images = \".\"\ncameras = \".\"\n";
+        let epoch = |name: &str, clouds: &str| format!("[[epochs]]\nname = \"{name}\"\n{clouds}\n{rest}");
+        format!(
+            "[project]\nname = \"a\"\n{}{}",
+            epoch("b", clouds),
+            epoch("c", "clouds = [\".\"]")
+        )
+    };
+    let slashes = "use / or single quotes in paths";
+    for (clouds, expected) in [
+        ("clouds = \"a.laz\"", "write it as a list: clouds = [\"a.laz\"]"),
+        ("clouds = [\"C:\\epoch2\"]", slashes),
+        ("clouds = [\"C:\\wall.laz\"]", slashes),
+        ("clouds = [\"C:\\new.laz\"]", slashes),
+    ] {
+        fs::write(&path, whole(clouds)).unwrap();
+        // The folder stands for the project file in it.
+        for given in [folder.path(), &path] {
+            let output = stonewise()
+                .arg("run")
+                .arg(given)
+                .args(["--out", "unused"])
+                .output()
+                .unwrap();
+            let log = String::from_utf8(output.stderr).unwrap();
+            assert_eq!(output.status.code(), Some(2), "{log}");
+            assert!(
+                log.contains(expected) && log.contains("stonewise.toml:5: "),
+                "{clouds}: {log}"
+            );
+        }
+    }
+    let text = whole("clouds = [\".\"]").replacen("[[epochs]]", "crs = \"EPSG:1\"\n[[epochs]]", 1);
+    fs::write(&path, text).unwrap();
+    let output = stonewise()
+        .arg("run")
+        .arg(&path)
+        .args(["--out", "unused"])
+        .output()
+        .unwrap();
+    let log = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        log.contains(":3: crs: EPSG:1 is not among the systems known by their number"),
+        "{log}"
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_that_never_ends_is_ended_by_a_signal() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("endless.xyz");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    assert!(made.success());
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_stonewise"))
+        .arg("info")
+        .arg(&pipe)
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let signal = std::process::Command::new("kill")
+        .arg(child.id().to_string())
+        .status();
+    assert!(signal.unwrap().success());
+    let ended = (0..100).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        child.try_wait().unwrap().is_some()
+    });
+    let _ = child.kill();
+    assert!(ended);
+}

@@ -1,0 +1,138 @@
+//! A small simulated survey and runs of the command on it.
+#![allow(dead_code)] // each test program uses a part
+
+use assert_cmd::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use tempfile::TempDir;
+
+/// A wall of a few dozen stones, small enough to be run many times.
+const SURVEY: &str = r#"
+name = "Test wall"
+[scene]
+seed = 3
+[scene.wall]
+width_m = 1.6
+height_m = 1.0
+seed = 3
+[scene.tls]
+spacing_m = 0.008
+[photos]
+columns = 2
+rows = 1
+width = 800
+height = 600
+focal_px = 1100.0
+distance_m = 5.0
+"#;
+
+/// A wall whose photos and points are fine enough to compare its edges in both.
+const SHARP: &str = r#"
+name = "Sharp wall"
+[scene]
+seed = 5
+[scene.wall]
+width_m = 2.4
+height_m = 1.6
+seed = 5
+[scene.tls]
+spacing_m = 0.004
+[photos]
+columns = 2
+rows = 1
+width = 1200
+height = 900
+focal_px = 1700.0
+distance_m = 5.0
+"#;
+
+pub fn stonewise() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_stonewise"))
+}
+
+/// The survey, made once for all tests of a program.
+pub fn survey() -> &'static Path {
+    static DIR: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    &DIR.get_or_init(|| simulated(SURVEY)).1
+}
+
+/// The finer survey, made once for all tests of a program.
+pub fn sharp_survey() -> &'static Path {
+    static DIR: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    &DIR.get_or_init(|| simulated(SHARP)).1
+}
+
+fn simulated(params: &str) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("params.toml");
+    fs::write(&file, params).unwrap();
+    let survey = dir.path().join("survey");
+    stonewise()
+        .args(["simulate", "--quiet", "--params"])
+        .arg(&file)
+        .arg("--out")
+        .arg(&survey)
+        .assert()
+        .success();
+    (dir, survey)
+}
+
+/// A copy of a survey that a test may spoil.
+pub fn copy_of(survey: &Path) -> TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    copy_tree(survey, dir.path());
+    dir
+}
+
+pub fn copy_tree(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy_tree(&entry.path(), &target);
+        } else {
+            fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+/// Runs a command; exit code and stderr.
+pub fn outcome(command: &mut Command) -> (i32, String) {
+    let output = command.output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!text.contains("panicked"), "{text}");
+    (output.status.code().unwrap(), text)
+}
+
+/// Runs `run` on a survey; exit code and stderr.
+pub fn run(survey: &Path, out: &Path, extra: &[&str]) -> (i32, String) {
+    let mut command = stonewise();
+    command
+        .arg("run")
+        .arg(survey.join("stonewise.toml"))
+        .arg("--out")
+        .arg(out);
+    outcome(command.args(extra))
+}
+
+/// Every file below a folder with its bytes, ascending by name; `but`: names at its top that are left out.
+pub fn contents(folder: &Path, but: &[&str]) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut files = Vec::new();
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(dir) = open.pop() {
+        for path in fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
+            let below = path.strip_prefix(folder).unwrap().to_path_buf();
+            if but.iter().any(|b| below == Path::new(b)) {
+                continue;
+            }
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                files.push((below, fs::read(&path).unwrap()));
+            }
+        }
+    }
+    files.sort();
+    files
+}

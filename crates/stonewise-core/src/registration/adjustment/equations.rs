@@ -1,0 +1,89 @@
+//! The normal equations of all stones: what every type of observation hands over, added up.
+
+use super::candidate::CandidateMotion;
+use super::observation::NormalEquations;
+use super::observation::surface::Equations;
+use super::state::Adjustment;
+use crate::geometry::Bounds;
+use crate::statistics::upper_median;
+
+/// A stone's normal equations about the common translation.
+pub(crate) struct StoneEquations {
+    /// Moving with the field.
+    pub with_field: NormalEquations,
+    /// Moving on its own, where that is followed.
+    pub on_own: Option<NormalEquations>,
+}
+
+impl Adjustment {
+    /// Equations of all stones, with correlation between points accounted for.
+    pub fn equations(&self) -> Vec<StoneEquations> {
+        let error_m = self.components.error_m;
+        let of_stone = |(i, with_field): (usize, NormalEquations)| {
+            let own = self.stones[i].on_own.as_ref();
+            StoneEquations {
+                with_field,
+                on_own: own.map(|c| self.compared(i, self.observed(i, c, error_m))),
+            }
+        };
+        let with_field = self.equations_with_field(error_m);
+        with_field.into_iter().enumerate().map(of_stone).collect()
+    }
+
+    /// Those of stones that move with the field, for an error of their motions in the face.
+    pub fn equations_with_field(&self, error_m: f64) -> Vec<NormalEquations> {
+        let stones = self.stones.iter().enumerate();
+        stones
+            .map(|(i, s)| self.observed(i, &s.with_field, error_m))
+            .collect()
+    }
+
+    /// The sum over all types of observation of a stone at one of its motions.
+    fn observed(&self, i: usize, candidate: &CandidateMotion, error_m: f64) -> NormalEquations {
+        let stone = &self.stones[i];
+        let mut sum = NormalEquations::nothing();
+        if stone.info.usable {
+            let inflation = self.surface.inflation(stone.surface());
+            let origin = self.common_in(i);
+            sum += self
+                .surface
+                .normal_equations(&candidate.surface, &origin, inflation, error_m);
+        }
+        sum
+    }
+
+    /// The equations of a stone on its own, with the likelihood that it has against the field's motion on the
+    /// same points.
+    fn compared(&self, i: usize, mut equations: NormalEquations) -> NormalEquations {
+        let stone = &self.stones[i];
+        let own = stone.on_own.as_ref().and_then(|c| c.surface.equations());
+        if let (Some(with_field), Some(own)) = (stone.with_field.surface.equations(), own) {
+            let on_its_own_points = 0.5 * (with_field.deviance - own.deviance);
+            let inflation = self.surface.inflation_of_all(stone.surface());
+            equations.constant += (stone.ratio.log_ratio - on_its_own_points) / inflation;
+        }
+        equations
+    }
+
+    /// Variances of errors that all points of a stone share, beyond what its own cells show: translation,
+    /// rotation, bending. `octaves` of length, from the size of a stone up: one against its neighbours,
+    /// [`Self::octaves`] against another epoch.
+    pub fn shared_variances(&self, octaves: f64) -> [f64; 9] {
+        let stones = self.stones.iter();
+        let known: Vec<&Equations> = stones.filter_map(|s| s.with_field.surface.equations()).collect();
+        self.surface
+            .shared_variances(&known, octaves, self.params.systematic_share)
+    }
+
+    /// Octaves of length between a stone and the wall, at least one.
+    pub fn octaves(&self) -> f64 {
+        let places = self.graph.nodes.iter().map(|n| n.centroid);
+        let extent_m = Bounds::of(places).map_or(0.0, |b| (b.max - b.min).norm());
+        let mut lengths: Vec<f64> = self.graph.edges.iter().map(|e| e.length_m).collect();
+        let step_m = upper_median(&mut lengths).unwrap_or(extent_m);
+        (extent_m / step_m.max(SHORTEST_STEP_M)).log2().max(0.0) + 1.0
+    }
+}
+
+/// Guards the ratio where all stones share a place, metres.
+const SHORTEST_STEP_M: f64 = 1e-3;

@@ -1,0 +1,226 @@
+//! Estimation of the variance components by marginal likelihood.
+
+use super::eliminate::eliminate_own_motions;
+use super::field_vector::stone_from_field;
+use super::prior::prior;
+use super::problem::FieldProblem;
+use super::solve::assemble;
+use super::variance_components::{BOUNDS, COUNT, VarianceComponents};
+use rayon::prelude::*;
+
+/// Most steps. The search starts from the last estimate, and six steps of at most [`LARGEST_STEP`] cross the
+/// whole range of the bounds (six decades would be eight); the next call goes on.
+const STEPS: usize = 6;
+/// Distance of the values through which a parabola is laid in each logarithm: a factor of 1.5, over which
+/// deviances of 100 stones change by more than rounding and are still nearly quadratic.
+const WIDTH: f64 = 0.4;
+/// Largest change of a logarithm in one step: a factor of 4.5, beyond which a parabola of width [`WIDTH`]
+/// says nothing.
+const LARGEST_STEP: f64 = 1.5;
+/// Curvature below which the deviance counts as flat and a full step downhill is taken.
+const FLAT: f64 = 1e-3;
+/// Shares of the step that are tried: the components are correlated, so the full step may overshoot.
+const STEP_SHARES: [f64; 4] = [1.0, 0.5, 0.2, 0.05];
+/// The search ends when a step gains less deviance than this: a hundredth of a standard error.
+const LEAST_GAIN: f64 = 0.02;
+/// Deviance of components for which the equations cannot be factored: worse than all others, and finite so
+/// that differences stay so.
+const UNSOLVABLE: f64 = f64::MAX / 1e6;
+
+/// Variance components under which the stones' normal equations are most likely, field integrated out.
+///
+/// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 21
+/// factorisations.
+pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents {
+    let value = |log: &[f64; COUNT]| {
+        let components = VarianceComponents::from_log(*log);
+        deviance(problem, &components).map_or(UNSOLVABLE, |d| d + components.penalty())
+    };
+    let mut log = clamp(problem.components.to_log());
+    for _ in 0..STEPS {
+        let mut probes = vec![log];
+        for k in 0..COUNT {
+            for sign in [-1.0, 1.0] {
+                let mut l = log;
+                l[k] += sign * WIDTH;
+                probes.push(clamp(l));
+            }
+        }
+        let values: Vec<f64> = probes.par_iter().map(value).collect();
+        let step = newton_step(&values);
+        let candidates = STEP_SHARES.map(|share| clamp(std::array::from_fn(|k| log[k] + share * step[k])));
+        let trial: Vec<f64> = candidates.par_iter().map(value).collect();
+        let best = (0..trial.len())
+            .min_by(|&a, &b| trial[a].total_cmp(&trial[b]))
+            .unwrap_or(0);
+        if trial[best] > values[0] - LEAST_GAIN {
+            break;
+        }
+        log = candidates[best];
+    }
+    VarianceComponents::from_log(log)
+}
+
+/// `values`: here, then below and above in each logarithm.
+fn newton_step(values: &[f64]) -> [f64; COUNT] {
+    std::array::from_fn(|k| {
+        let (below, above) = (values[1 + 2 * k], values[2 + 2 * k]);
+        let curvature = below + above - 2.0 * values[0];
+        let slope = 0.5 * (below - above);
+        if curvature > FLAT {
+            (WIDTH * slope / curvature).clamp(-LARGEST_STEP, LARGEST_STEP)
+        } else {
+            LARGEST_STEP * slope.clamp(-1.0, 1.0)
+        }
+    })
+}
+
+fn clamp(log: [f64; COUNT]) -> [f64; COUNT] {
+    std::array::from_fn(|k| log[k].clamp(BOUNDS[k][0].ln(), BOUNDS[k][1].ln()))
+}
+
+/// Minus twice the log marginal likelihood of the normal equations, up to a constant, under other components
+/// than the problem's.
+///
+/// The equations are those of the observations alone: the error in the face is among what is estimated.
+pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) -> Option<f64> {
+    let prior = prior(problem.graph, components, &problem.ties);
+    let prior_log_det = problem.graph.pattern.factor(&prior)?.log_det();
+    let own = [
+        components.own_variances(),
+        problem.loose.own_variances(components),
+    ];
+    let own = own.map(|own| components.with_error(own));
+    let normal = assemble(problem, prior, eliminate_own_motions(problem, &own))?;
+    let (mut quadratic, mut evidence) = (0.0, 0.0);
+    for ((state, stone), node) in normal
+        .state
+        .iter()
+        .zip(&normal.eliminated)
+        .zip(&problem.graph.nodes)
+    {
+        quadratic += (stone_from_field(&node.face_from_world) * state).dot(&stone.vector);
+        evidence += stone.log_evidence;
+    }
+    Some(normal.factor.log_det() - prior_log_det - quadratic - 2.0 * evidence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linalg::BlockMatrix;
+    use crate::registration::adjustment::field::testing::SmallWall;
+    use crate::registration::adjustment::observation::NormalEquations;
+    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+    use nalgebra::{DMatrix, DVector};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn dense(matrix: &BlockMatrix<9>, problem: &FieldProblem) -> DMatrix<f64> {
+        let n = matrix.diagonal.len();
+        let mut whole = DMatrix::zeros(9 * n, 9 * n);
+        for (i, d) in matrix.diagonal.iter().enumerate() {
+            whole.view_mut((9 * i, 9 * i), (9, 9)).copy_from(d);
+        }
+        for (block, edge) in matrix.edges.iter().zip(&problem.graph.edges) {
+            let (low, high) = (9 * edge.low, 9 * edge.high);
+            whole.view_mut((high, low), (9, 9)).copy_from(block);
+            whole.view_mut((low, high), (9, 9)).copy_from(&block.transpose());
+        }
+        whole
+    }
+
+    /// All stones' frames on the diagonal.
+    fn frames(problem: &FieldProblem) -> DMatrix<f64> {
+        let n = problem.stones.len();
+        let mut all = DMatrix::zeros(9 * n, 9 * n);
+        for (i, node) in problem.graph.nodes.iter().enumerate() {
+            let a = stone_from_field(&node.face_from_world);
+            all.view_mut((9 * i, 9 * i), (9, 9)).copy_from(&a);
+        }
+        all
+    }
+
+    #[test]
+    fn the_deviance_is_that_of_a_multivariate_normal_variable() {
+        let wall = SmallWall::new(4, 3, 11);
+        let problem = wall.problem(1.0);
+        let (n, a) = (problem.stones.len(), frames(&problem));
+        let start = VarianceComponents::start();
+        let other = VarianceComponents {
+            drift: [2e-3, 2e-2],
+            own_m: 1e-3,
+            error_m: 2e-4,
+            ..start
+        };
+        // Observed motions scatter about zero with the covariance of field, own motion, error and noise.
+        let by_definition = |components: &VarianceComponents| {
+            let field = dense(&prior(problem.graph, components, &problem.ties), &problem);
+            let own = components.with_error(components.own_variances());
+            let mut covariance = &a * field.try_inverse().unwrap() * a.transpose();
+            let mut observed = DVector::zeros(9 * n);
+            for (i, stone) in problem.stones.iter().enumerate() {
+                let noise = stone.equations.information.try_inverse().unwrap();
+                let mut block = covariance.view_mut((9 * i, 9 * i), (9, 9));
+                block += noise + Matrix9::from_diagonal(&Vector9::from(own));
+                observed
+                    .rows_mut(9 * i, 9)
+                    .copy_from(&(noise * stone.equations.vector));
+            }
+            let factor = covariance.cholesky().unwrap();
+            let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            log_det + observed.dot(&factor.solve(&observed))
+        };
+        let difference = deviance(&problem, &other).unwrap() - deviance(&problem, &start).unwrap();
+        let expected = by_definition(&other) - by_definition(&start);
+        assert!(
+            (difference - expected).abs() < 1e-5 * expected.abs(),
+            "{difference} {expected}"
+        );
+    }
+
+    #[test]
+    fn components_from_which_a_survey_was_drawn_are_found() {
+        let mut rng = ChaCha8Rng::seed_from_u64(8);
+        let mut gauss = || (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+        let truth = VarianceComponents {
+            drift: [1.6e-2, 3e-2],
+            own_m: 2e-3,
+            ..VarianceComponents::start()
+        };
+        let mut wall = SmallWall::new(14, 10, 1);
+        let problem = wall.problem(1.0);
+        let field = dense(&prior(problem.graph, &truth, &problem.ties), &problem);
+        let root = field.cholesky().unwrap();
+        let white = DVector::from_fn(9 * 140, |_, _| gauss());
+        let drawn = frames(&problem) * root.l().transpose().solve_upper_triangular(&white).unwrap();
+        let own = truth.with_error(truth.own_variances());
+        let weights = Vector9::from([1e8, 1e8, 1e8, 1e7, 1e7, 1e7, 1e4, 1e4, 1e4]);
+        let equations: Vec<NormalEquations> = (0..140)
+            .map(|i| {
+                let moved = Vector9::from_fn(|k, _| {
+                    drawn[9 * i + k] + gauss() * own[k].sqrt() + gauss() / weights[k].sqrt()
+                });
+                NormalEquations {
+                    information: Matrix9::from_diagonal(&weights),
+                    vector: weights.component_mul(&moved),
+                    constant: 0.0,
+                }
+            })
+            .collect();
+        wall.equations = equations;
+        let mut problem = wall.problem(1.0);
+        // As in the adjustment: some calls, each from where the last ended.
+        for _ in 0..3 {
+            problem.components = estimate_components(&problem);
+        }
+        let found = problem.components;
+        let ratios = [
+            found.drift[0] / truth.drift[0],
+            found.drift[1] / truth.drift[1],
+            found.own_m / truth.own_m,
+            found.own_rad / truth.own_rad,
+        ];
+        assert!(ratios.iter().all(|r| r.ln().abs() < 0.4), "{ratios:?}");
+    }
+}

@@ -1,0 +1,79 @@
+//! The field's unknowns at a stone.
+
+use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+use nalgebra::{Matrix3, Vector3};
+
+/// The field of motion at a stone, world axes: displacement, and its derivatives along the face.
+///
+/// The order of the unknowns: displacement (m), gradient along the face, gradient up the face (metre per
+/// metre).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FieldVector(Vector9);
+
+impl FieldVector {
+    /// Of the stone's centroid, metres.
+    pub fn displacement(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(0).into_owned()
+    }
+
+    /// Change of the displacement per metre along the face.
+    pub fn gradient_along(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(3).into_owned()
+    }
+
+    /// Change of the displacement per metre up the face.
+    pub fn gradient_up(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(6).into_owned()
+    }
+
+    /// All nine unknowns in order.
+    pub fn unknowns(&self) -> &Vector9 {
+        &self.0
+    }
+}
+
+impl From<Vector9> for FieldVector {
+    fn from(unknowns: Vector9) -> Self {
+        Self(unknowns)
+    }
+}
+
+/// Takes field unknowns to the motion, in its frame, of a stone that moves with the field.
+///
+/// Rotation about along and up is the tilt of the face, rotation about out half the curl of the motion in it
+/// (small angles); a field with constant gradients does not bend the stone. `frame` takes world axes to
+/// (along, up, out).
+pub(crate) fn stone_from_field(frame: &Matrix3<f64>) -> Matrix9 {
+    let mut a = Matrix9::zeros();
+    a.fixed_view_mut::<3, 3>(0, 0).copy_from(frame);
+    for c in 0..3 {
+        a[(3, 6 + c)] = frame[(2, c)];
+        a[(4, 3 + c)] = -frame[(2, c)];
+        a[(5, 3 + c)] = 0.5 * frame[(1, c)];
+        a[(5, 6 + c)] = -0.5 * frame[(0, c)];
+    }
+    a
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::FaceFrame;
+    use crate::registration::adjustment::stone_vector::StoneVector;
+
+    #[test]
+    fn a_field_that_turns_the_wall_turns_its_stones() {
+        let frame = FaceFrame::from_normal(&Vector3::new(0.8, 0.5, 0.1).normalize()).face_from_world();
+        let turn = Vector3::new(2e-3, -3e-3, 5e-3);
+        let shift = Vector3::new(0.01, 0.02, -0.03);
+        let [along, up] = [0, 1].map(|k| frame.row(k).transpose());
+        let mut field = Vector9::zeros();
+        field.fixed_rows_mut::<3>(0).copy_from(&shift);
+        field.fixed_rows_mut::<3>(3).copy_from(&turn.cross(&along));
+        field.fixed_rows_mut::<3>(6).copy_from(&turn.cross(&up));
+        let stone = StoneVector::from(stone_from_field(&frame) * field);
+        assert!((stone.translation() - frame * shift).norm() < 1e-15);
+        assert!((stone.rotation() - frame * turn).norm() < 1e-15);
+        assert_eq!(stone.bending(), Vector3::zeros());
+    }
+}

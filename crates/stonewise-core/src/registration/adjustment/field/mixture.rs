@@ -1,0 +1,78 @@
+//! The probability of each stone to move with the field.
+
+use super::posterior::posterior;
+use super::problem::FieldProblem;
+use super::solve::Field;
+use crate::registration::adjustment::observation::NormalEquations;
+use rayon::prelude::*;
+
+/// Probability of each stone to move with the field, given all others.
+///
+/// `on_own`: equations at the stone's own optimum, where that is followed; a loose stone's likelihood is
+/// taken there. `shared`: variances of errors that look like a stone's own motion.
+pub(crate) fn probabilities_with_field(
+    problem: &FieldProblem,
+    on_own: &[Option<&NormalEquations>],
+    field: &Field,
+    shared: &[f64; 9],
+) -> Vec<f64> {
+    let [with_field, loose]: [[f64; 9]; 2] = problem
+        .own_variances()
+        .map(|own| std::array::from_fn(|k| own[k] + shared[k]));
+    let share = problem.loose.share;
+    (0..problem.stones.len())
+        .into_par_iter()
+        .map(|i| {
+            let prediction = &field.from_others[i];
+            let equations = problem.stones[i].equations;
+            let tied = posterior(equations, prediction, &with_field).log_evidence + (1.0 - share).ln();
+            let at_optimum = on_own[i].unwrap_or(equations);
+            let free = posterior(at_optimum, prediction, &loose).log_evidence + share.ln();
+            1.0 / (1.0 + (free - tied).exp())
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::adjustment::field::solve::solve;
+    use crate::registration::adjustment::field::testing::{LOOSE, SmallWall};
+    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn the_probability_is_bayes_rule_between_two_gaussians() {
+        let mut wall = SmallWall::new(5, 4, 1);
+        let weights = Vector9::from([1e7, 1e7, 1e7, 1e5, 1e5, 1e5, 1e2, 1e2, 1e2]);
+        for (k, equations) in wall.equations.iter_mut().enumerate() {
+            let own = if k == 7 {
+                Vector3::new(0.0, 0.0, 0.006)
+            } else {
+                Vector3::zeros()
+            };
+            equations.information = Matrix9::from_diagonal(&weights);
+            equations.vector = equations.information * StoneVector::from_translation(own).unknowns();
+        }
+        let problem = wall.problem(1.0);
+        let field = solve(&problem).unwrap();
+        let found = probabilities_with_field(&problem, &[None; 20], &field, &[0.0; 9]);
+        for (i, (p, prediction)) in found.iter().zip(&field.from_others).enumerate() {
+            let density = |own: [f64; 9]| {
+                let mut covariance = Matrix9::from_diagonal(&(Vector9::from(own) + weights.map(|w| 1.0 / w)));
+                let mut part = covariance.fixed_view_mut::<6, 6>(0, 0);
+                part += prediction.covariance;
+                let mut apart = problem.stones[i].equations.vector.component_div(&weights);
+                let mut rows = apart.fixed_rows_mut::<6>(0);
+                rows -= prediction.mean;
+                let factor = covariance.cholesky().unwrap();
+                let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+                -0.5 * (apart.dot(&factor.solve(&apart)) + log_det)
+            };
+            let [tied, loose] = problem.own_variances().map(density);
+            let odds = (loose - tied).exp() * LOOSE.share / (1.0 - LOOSE.share);
+            assert!((p - 1.0 / (1.0 + odds)).abs() < 1e-6, "{i}: {p} {odds}");
+        }
+        assert!(found[7] < 0.05 && found[0] > 0.9, "{found:?}");
+    }
+}

@@ -1,0 +1,32 @@
+//! The smooth field of motion over the wall: its prior, its solution and its variance components.
+
+mod component_estimate;
+mod cracks;
+mod eliminate;
+mod field_vector;
+mod graph;
+mod jump;
+mod loose_prior;
+mod mixture;
+mod posterior;
+mod prior;
+mod problem;
+mod solve;
+mod subgraph;
+#[cfg(test)]
+mod testing;
+mod ties;
+mod variance_components;
+
+pub(crate) use component_estimate::estimate_components;
+pub(crate) use cracks::{Crack, find_crack};
+pub(crate) use graph::{Edge, Graph, Place};
+pub(crate) use loose_prior::LoosePrior;
+pub(crate) use mixture::probabilities_with_field;
+pub(crate) use posterior::{Posterior, posterior};
+pub(crate) use prior::Tie;
+pub(crate) use problem::{FieldProblem, FieldStone};
+pub(crate) use solve::{Field, solve};
+pub(crate) use subgraph::Subgraph;
+pub(crate) use ties::reweight_ties;
+pub use variance_components::VarianceComponents;

@@ -1,0 +1,141 @@
+//! The variance components of the adjustment.
+
+use serde::{Deserialize, Serialize};
+
+/// How unlike neighbouring stones may move: standard deviations, estimated from the survey itself.
+///
+/// "In" are the two directions in the face, "out" the one across it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VarianceComponents {
+    /// Growth of the motion's gradient with distance, per square root metre: in the face, out of it.
+    pub drift: [f64; 2],
+    /// The motion's gradient itself, metre per metre: in the face, out of it.
+    pub strain: [f64; 2],
+    /// A stone's own translation beside the common field, across the face, metres.
+    pub own_m: f64,
+    /// Error of a stone's motion in the face that no number of its points averages away, metres: relief finer
+    /// than the points lie, mixed pixels, the mix of stations. Locked stones cannot slide, so what they seem
+    /// to do in the face beside the field is this.
+    pub error_m: f64,
+    /// A stone's own rotation beside that of the field, radians.
+    pub own_rad: f64,
+    /// Bending of a stone's face, 1/m.
+    pub bending_per_m: f64,
+}
+
+/// Minus twice the log of the probability, one in a hundred, with which a component exceeds its rare size.
+const RATE: f64 = 2.0 * 4.6;
+/// Own motion or error of stones that one survey in a hundred exceeds, metres: locked masonry moves with its
+/// surroundings.
+const RARE_M: f64 = 5e-4;
+/// The same for rotations, radians: half a millimetre at the edge of a stone of 20 cm.
+const RARE_RAD: f64 = 5e-3;
+
+/// Number of components.
+pub(crate) const COUNT: usize = 8;
+
+impl VarianceComponents {
+    /// A moderate start, neighbours about a millimetre apart: from a stiff one, fields that bend end as loose
+    /// stones.
+    pub(crate) fn start() -> Self {
+        Self {
+            drift: [5e-3, 1e-2],
+            strain: [3e-3, 1e-2],
+            own_m: 5e-4,
+            error_m: 5e-4,
+            own_rad: 2e-3,
+            bending_per_m: 0.01,
+        }
+    }
+
+    pub(crate) fn to_log(self) -> [f64; COUNT] {
+        [
+            self.drift[0],
+            self.drift[1],
+            self.strain[0],
+            self.strain[1],
+            self.error_m,
+            self.own_m,
+            self.own_rad,
+            self.bending_per_m,
+        ]
+        .map(f64::ln)
+    }
+
+    pub(crate) fn from_log(log: [f64; COUNT]) -> Self {
+        let v = log.map(f64::exp);
+        Self {
+            drift: [v[0], v[1]],
+            strain: [v[2], v[3]],
+            error_m: v[4],
+            own_m: v[5],
+            own_rad: v[6],
+            bending_per_m: v[7],
+        }
+    }
+
+    /// Minus twice the log prior: exponential laws, so that stones have neither motions nor errors of their
+    /// own unless the survey shows them (penalised complexity, Simpson et al. 2017).
+    pub(crate) fn penalty(&self) -> f64 {
+        RATE * ((self.error_m + self.own_m) / RARE_M + self.own_rad / RARE_RAD)
+    }
+
+    /// Variances of a stone's own (translation, rotation, bending) in its frame.
+    pub(crate) fn own_variances(&self) -> [f64; 9] {
+        let (i, o, r, b) = (NONE_M, self.own_m, self.own_rad, self.bending_per_m);
+        [i, i, o, r, r, r, b, b, b].map(|s| s * s)
+    }
+
+    /// Such variances with the error in the face.
+    pub(crate) fn with_error(&self, mut variances: [f64; 9]) -> [f64; 9] {
+        for v in &mut variances[..2] {
+            *v += self.error_m * self.error_m;
+        }
+        variances
+    }
+}
+
+/// As good as no motion, metres: a hundredth of the best accuracy of a stone.
+const NONE_M: f64 = 2e-6;
+
+/// Bounds of the logarithms: below, a component is as good as absent; above, neighbours say nothing.
+pub(crate) const BOUNDS: [[f64; 2]; COUNT] = [
+    [1e-5, 0.3],
+    [1e-5, 0.3],
+    [1e-5, 0.05],
+    [1e-5, 0.1],
+    [NONE_M, 6e-3],
+    [NONE_M, 6e-3],
+    [1e-5, 1.5e-2],
+    [1e-4, 0.5],
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn logarithms_go_there_and_back_and_lie_within_their_bounds() {
+        let start = VarianceComponents::start();
+        let log = start.to_log();
+        let back = VarianceComponents::from_log(log).to_log();
+        for k in 0..COUNT {
+            assert!((back[k] - log[k]).abs() < 1e-12);
+            assert!(log[k] > BOUNDS[k][0].ln() && log[k] < BOUNDS[k][1].ln(), "{k}");
+        }
+    }
+
+    #[test]
+    fn the_error_in_the_face_counts_there_only() {
+        let components = VarianceComponents {
+            error_m: 3e-4,
+            ..VarianceComponents::start()
+        };
+        let own = components.own_variances();
+        let with_error = components.with_error(own);
+        for k in 0..9 {
+            let added = if k < 2 { 9e-8 } else { 0.0 };
+            assert!((with_error[k] - own[k] - added).abs() < 1e-18);
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Whether a stone moved with the field or on its own.
+
+mod likelihood_ratio;
+mod probing;
+
+pub(crate) use likelihood_ratio::{LikelihoodRatio, LikelihoodRatioTest, Placed};
+pub(crate) use probing::Probe;

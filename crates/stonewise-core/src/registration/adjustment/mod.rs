@@ -1,0 +1,28 @@
+//! The joint adjustment of all stones.
+//!
+//! [`adjust`] reads as the method. What the stones' points say comes from `observation`, the motion that
+//! neighbours share from `field`, and whether a stone moved with it or on its own from `hypothesis`; `state`
+//! is what changes between iterations.
+
+mod adjust;
+mod breaks;
+mod candidate;
+mod equations;
+mod error;
+mod evaluate;
+mod field;
+mod hypothesis;
+pub(crate) mod observation;
+mod outcome;
+mod params;
+mod significance;
+mod solution;
+mod state;
+mod step;
+pub(crate) mod stone_vector;
+mod survey;
+
+pub use adjust::adjust;
+pub use error::AdjustError;
+pub use field::VarianceComponents;
+pub use params::{AdjustmentParams, AdjustmentReport, Break};

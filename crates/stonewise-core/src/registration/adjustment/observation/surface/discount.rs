@@ -1,0 +1,140 @@
+//! Less weight for what a stone's slopes say than for what its heights say.
+//!
+//! A motion across the face is seen by every point; a motion in it only where the face is steep, at rims and
+//! edges, where points err more: mixed pixels, the beam's footprint, relief finer than the cells of the
+//! surface. [`super::correlation`] measures by how much.
+
+use crate::registration::adjustment::observation::normal_equations::NormalEquations;
+use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
+
+/// Unknowns in the face: two translations and the rotation about the normal.
+const INSIDE: [usize; 3] = [0, 1, 5];
+/// The others.
+const ACROSS: [usize; 6] = [2, 3, 4, 6, 7, 8];
+/// Relative ridge on every unknown: keeps those that no point determines solvable; far below any information
+/// that counts, as blocks are scaled to a unit diagonal and double precision has 16 digits.
+const RIDGE: f64 = 1e-12;
+
+/// The equations with the variances of the motion in the face times `factor`, at least 1, and those of the
+/// translation in it larger by `error_m` squared; its optimum, and what is known of the other unknowns once
+/// that motion is given, stay.
+///
+/// With A, B, D the blocks of the information (in the face, both, across), S = A - B D^-1 B' is what is known
+/// of the motion in the face alone; the log likelihood is its quadratic form plus one that depends on the
+/// others given it. S becomes (factor S^-1 + E)^-1, E the covariance of the error.
+pub(crate) fn discounted(mut equations: NormalEquations, factor: f64, error_m: f64) -> NormalEquations {
+    let a = Matrix3::from_fn(|r, c| equations.information[(INSIDE[r], INSIDE[c])]);
+    let b = Matrix3x6::from_fn(|r, c| equations.information[(INSIDE[r], ACROSS[c])]);
+    let d = Matrix6::from_fn(|r, c| equations.information[(ACROSS[r], ACROSS[c])]);
+    let of_inside = Vector3::from_fn(|r, _| equations.vector[INSIDE[r]]);
+    let of_across = Vector6::from_fn(|r, _| equations.vector[ACROSS[r]]);
+    let Some(inverse) = inverted(d) else {
+        return equations;
+    };
+    let known = a - b * inverse * b.transpose();
+    let pull = of_inside - b * inverse * of_across;
+    let Some(optimum) = inverted(known).map(|i| i * pull) else {
+        return equations;
+    };
+    let scaled = known / factor.max(1.0);
+    let error = Matrix3::from_diagonal(&Vector3::new(error_m, error_m, 0.0));
+    // (S^-1 + E)^-1 = S - S e (I + e S e)^-1 e S with E = e e, which holds for a singular S too.
+    let Some(inner) = (Matrix3::identity() + error * scaled * error).try_inverse() else {
+        return equations;
+    };
+    let left = scaled - scaled * error * inner * error * scaled;
+    let taken = known - 0.5 * (left + left.transpose());
+    let pull_taken = taken * optimum;
+    for r in 0..3 {
+        equations.vector[INSIDE[r]] -= pull_taken[r];
+        for c in 0..3 {
+            equations.information[(INSIDE[r], INSIDE[c])] -= taken[(r, c)];
+        }
+    }
+    equations.constant += 0.5 * pull_taken.dot(&optimum);
+    equations
+}
+
+/// Inverse of a positive semi-definite matrix whose rows have different units.
+fn inverted<const N: usize>(matrix: nalgebra::SMatrix<f64, N, N>) -> Option<nalgebra::SMatrix<f64, N, N>>
+where
+    nalgebra::Const<N>: nalgebra::DimSub<nalgebra::U1>,
+{
+    let scale =
+        nalgebra::SVector::<f64, N>::from_fn(|r, _| matrix[(r, r)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scaled = nalgebra::SMatrix::<f64, N, N>::from_fn(|r, c| {
+        matrix[(r, c)] * scale[r] * scale[c] + if r == c { RIDGE } else { 0.0 }
+    });
+    let inverse = scaled.cholesky()?.inverse();
+    Some(nalgebra::SMatrix::from_fn(|r, c| {
+        inverse[(r, c)] * scale[r] * scale[c]
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn term(columns: usize) -> NormalEquations {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut information = Matrix9::zeros();
+        for _ in 0..columns {
+            let row = Vector9::from_fn(|k, _| rng.random_range(-1.0..1.0) * if k < 3 { 1e3 } else { 50.0 });
+            information += row * row.transpose();
+        }
+        let optimum = Vector9::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        NormalEquations {
+            vector: information * optimum,
+            information,
+            constant: 3.0,
+        }
+    }
+
+    #[test]
+    fn variances_in_the_face_grow_and_the_rest_stays() {
+        let (before, factor) = (term(30), 1.7);
+        let after = discounted(before.clone(), factor, 0.0);
+        let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
+        for &i in &INSIDE {
+            for &j in &INSIDE {
+                assert!((d[(i, j)] / c[(i, j)] - factor).abs() < 1e-6);
+            }
+        }
+        let optimum = c * before.vector;
+        assert!((d * after.vector - optimum).norm() < 1e-6);
+        let peak = |t: &NormalEquations| t.constant + 0.5 * optimum.dot(&t.vector);
+        assert!((peak(&after) - peak(&before)).abs() < 1e-6 * peak(&before).abs());
+        let given = |t: &NormalEquations| Matrix6::from_fn(|r, c| t.information[(ACROSS[r], ACROSS[c])]);
+        assert_eq!(given(&after), given(&before));
+    }
+
+    #[test]
+    fn an_error_in_the_face_adds_to_the_variances_of_the_translation_there() {
+        let (before, error_m) = (term(30), 2e-4);
+        let after = discounted(before.clone(), 1.0, error_m);
+        let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
+        for &i in &INSIDE {
+            for &j in &INSIDE {
+                let added = if i == j && i < 2 { error_m * error_m } else { 0.0 };
+                assert!((d[(i, j)] - c[(i, j)] - added).abs() < 1e-6 * d[(i, i)].max(d[(j, j)]));
+            }
+        }
+        assert!((d * after.vector - c * before.vector).norm() < 1e-6);
+    }
+
+    #[test]
+    fn what_no_point_determines_stays_undetermined() {
+        let before = term(4);
+        let after = discounted(before.clone(), 2.0, 1e-3);
+        let eigen = before.information.symmetric_eigen();
+        for k in 0..9 {
+            let direction = eigen.eigenvectors.column(k);
+            if eigen.eigenvalues[k] < 1e-6 {
+                assert!((after.information * direction).norm() < 1e-3);
+            }
+        }
+    }
+}

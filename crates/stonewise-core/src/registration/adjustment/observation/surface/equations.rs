@@ -1,0 +1,266 @@
+//! The normal equations of one stone's motion, from its own points of both epochs.
+//!
+//! Stone frame: origin at the epoch-1 centroid, axes (along, up, out) of the wall around it.
+
+use super::cells::{COMPARE_CELLS, CellSums};
+use super::inverse_motion::InverseMotion;
+use super::layout::Layout;
+use super::local_pair::LocalPair;
+use super::patch_fit::PatchFit;
+use super::patch_grid::{PatchGrid, WeightedPoint};
+use super::patches::{PatchPoints, pool_into_patches};
+use super::robust::{robust_fit, steepness};
+use super::slope_scatter::SlopeScatter;
+use super::surface_noise::SurfaceNoise;
+use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+
+/// The normal equations of a stone's points at one of its motions, and figures of how well both epochs agree
+/// there.
+#[derive(Clone, Debug)]
+pub(crate) struct Equations {
+    /// Information matrix.
+    pub information: Matrix9,
+    /// Gradient of half the squared residuals; the step solves `information * step = -gradient`.
+    pub gradient: Vector9,
+    /// Minus twice the log likelihood of the points, one per point taken off; points outside count nothing.
+    pub deviance: f64,
+    /// Share of the small cells of the smaller face that hold points of both epochs.
+    pub overlap: f64,
+    /// Per small cell seen by both: squared difference of the mean residuals over its expected variance.
+    pub differences: Vec<f64>,
+    /// The same for quarters of the patches.
+    pub coarse_differences: Vec<f64>,
+    /// Expected variances behind `coarse_differences`, m^2.
+    pub coarse_variances: Vec<f64>,
+    /// Scatter of the motions along u and v that the cells' slopes give.
+    pub slopes: [SlopeScatter; 2],
+    /// Root mean square of the second epoch's residuals, metres.
+    pub rms_m: f64,
+    /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
+    pub scatter: [(f64, f64); 2],
+}
+
+impl Equations {
+    /// Of no points; `overlap` as in the struct.
+    pub(super) fn zeros(overlap: f64) -> Self {
+        Self {
+            information: Matrix9::zeros(),
+            gradient: Vector9::zeros(),
+            deviance: 0.0,
+            overlap,
+            differences: Vec::new(),
+            coarse_differences: Vec::new(),
+            coarse_variances: Vec::new(),
+            slopes: [SlopeScatter::default(); 2],
+            rms_m: 0.0,
+            scatter: [(0.0, 0.0); 2],
+        }
+    }
+}
+
+/// Weight of the points of an epoch that a cell needs: the mean of fewer is not yet normal.
+const CELL_POINTS: f64 = 3.0;
+/// The same, times the square of the slope: a cell of ten points with slopes of 1 %. Less shows no motion in
+/// the face.
+const LEAST_SLOPE: f64 = 1e-3;
+
+/// Normal equations at `motion`, of the points in the stone's window where that moved by `window`. Cost:
+/// points, plus coefficients times patch width squared.
+pub(crate) fn equations(
+    pair: &LocalPair,
+    motion: &StoneVector,
+    window: &StoneVector,
+    noise: &SurfaceNoise,
+    layout: &Layout,
+) -> Equations {
+    let motion = InverseMotion::new(motion);
+    let patches = pool_into_patches(pair, &motion, &InverseMotion::new(window), layout);
+    let mut sum = Equations::zeros(patches.overlap);
+    for patch in &patches.list {
+        add_patch(patch, &motion, noise, layout, &mut sum);
+    }
+    if sum.scatter[1].1 > 0.0 {
+        sum.rms_m = noise.sigma_m[1] * (sum.scatter[1].0 / sum.scatter[1].1).sqrt();
+    }
+    sum
+}
+
+/// [`Equations::deviance`] alone, at `motion`, of all of these points.
+pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNoise, layout: &Layout) -> f64 {
+    let motion = InverseMotion::new(motion);
+    let of_patch = |patch: &PatchPoints| {
+        let mut epochs = patch.epochs.clone();
+        robust_fit(patch.grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
+            let of_points = |(observations, sigma): (&Vec<WeightedPoint>, f64)| -> f64 {
+                fit.squares(observations, sigma).map(|square| square - 1.0).sum()
+            };
+            fit.surface_deviance(noise) + epochs.iter().zip(noise.sigma_m).map(of_points).sum::<f64>()
+        })
+    };
+    pool_into_patches(pair, &motion, &motion, layout)
+        .list
+        .iter()
+        .map(of_patch)
+        .sum()
+}
+
+/// Adds what a patch says to the equations.
+fn add_patch(
+    patch: &PatchPoints,
+    motion: &InverseMotion,
+    noise: &SurfaceNoise,
+    layout: &Layout,
+    sum: &mut Equations,
+) {
+    let mut epochs = patch.epochs.clone();
+    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
+        return;
+    };
+    let mut coupling = vec![[0.0; 9]; patch.grid.coefficient_count()];
+    let mut cells = PatchCells::new(&patch.grid, layout.cell_m);
+    let inverse = fit.factor.inverse();
+    for (epoch, points) in epochs.iter().enumerate() {
+        let sigma = noise.sigma_m[epoch];
+        for o in points {
+            let [u, v, z] = o.position;
+            let [h, hu, hv] = fit.surface(u, v);
+            let r = z - h;
+            cells.add(epoch, o, r, [hu, hv]);
+            sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
+            sum.scatter[epoch].1 += 1.0;
+            sum.deviance += o.weight * r * r / (sigma * sigma);
+            let w = o.weight / (sigma * sigma);
+            let row = motion.jacobian(&o.position, [hu, hv]);
+            let j = Vector9::from(row);
+            // The surface follows each point a little, most at the edge of the points, and takes the slope
+            // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
+            // the determinant makes good.
+            let bias = motion.jacobian(&o.position, fit.slope_covariance(u, v, &inverse));
+            let level = motion.jacobian(&o.position, [0.0; 2]);
+            let bias = Vector9::from(bias) - Vector9::from(level);
+            // What matters is the motion of one epoch against the other: half a step of each. Where the
+            // surface cannot follow the stone, at joints, both epochs' residuals are alike, and that drops
+            // out.
+            sum.gradient += (j * r - bias) * (w * [-0.5, 0.5][epoch]);
+            if epoch == 1 {
+                fit.scatter(u, v, w, &row, &mut coupling);
+                sum.information.syger(w, &j, &j, 1.0);
+            }
+        }
+    }
+    sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
+    take_off_surface(&fit, coupling, &mut sum.information);
+    cells.finish(noise, sum);
+}
+
+/// The surface is unknown: what it absorbs is taken off the information (Schur complement).
+fn take_off_surface(fit: &PatchFit, mut coupling: Vec<[f64; 9]>, information: &mut Matrix9) {
+    fit.factor.forward(&mut coupling);
+    for row in &coupling {
+        let c = Vector9::from(*row);
+        information.syger(-1.0, &c, &c, 1.0);
+    }
+    information.fill_upper_triangle_with_lower_triangle();
+}
+
+/// The cells of a patch in which the epochs are compared.
+struct PatchCells {
+    small: CellSums,
+    slopes: [CellSums; 2],
+    /// Quarters of the patch.
+    coarse: CellSums,
+}
+
+impl PatchCells {
+    fn new(grid: &PatchGrid, cell_m: f64) -> Self {
+        let cells = |side_m: f64| CellSums::new(grid.low(), grid.high(), side_m);
+        let longest = (0..2).map(|a| grid.high()[a] - grid.low()[a]).fold(0.0, f64::max);
+        let small = COMPARE_CELLS * cell_m;
+        Self {
+            small: cells(small),
+            slopes: [cells(small), cells(small)],
+            coarse: cells(0.5 * longest),
+        }
+    }
+
+    fn add(&mut self, epoch: usize, point: &WeightedPoint, residual: f64, slopes: [f64; 2]) {
+        let (at, weight) = (&point.position, steepness(slopes));
+        self.small.add(epoch, at, weight * residual, weight);
+        self.coarse.add(epoch, at, weight * residual, weight);
+        for (cells, slope) in self.slopes.iter_mut().zip(slopes) {
+            let w = point.weight * slope;
+            cells.add(epoch, at, w * residual, w * slope);
+        }
+    }
+
+    fn finish(&self, noise: &SurfaceNoise, sum: &mut Equations) {
+        for (difference, variance) in self.small.differences(&noise.sigma_m, CELL_POINTS) {
+            sum.differences.push(difference * difference / variance);
+        }
+        for (difference, variance) in self.coarse.differences(&noise.sigma_m, CELL_POINTS) {
+            sum.coarse_differences.push(difference * difference / variance);
+            sum.coarse_variances.push(variance);
+        }
+        for (scatter, cells) in sum.slopes.iter_mut().zip(&self.slopes) {
+            for (motion, variance) in cells.differences(&noise.sigma_m, LEAST_SLOPE) {
+                scatter.add(motion, 1.0 / variance);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const NOISE: SurfaceNoise = SurfaceNoise {
+        sigma_m: [0.004, 0.005],
+        tau_m: 0.01,
+    };
+    const LAYOUT: Layout = Layout {
+        cell_m: 0.02,
+        patch_cells: 24,
+        outlier_sigmas: 1e9,
+    };
+
+    /// Two scans of a bumpy face; the second shows another part of it, `beside` metres farther along.
+    fn scans(beside: f64) -> LocalPair {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        let mut scan = |sigma: f64, from: f64| {
+            (0..400)
+                .map(|_| {
+                    let (u, v) = (from + rng.random_range(-0.1..0.1), rng.random_range(-0.08..0.08));
+                    let noise = sigma * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                    [u, v, 0.002 * (40.0 * u).sin() + 0.001 * (55.0 * v).cos() + noise]
+                })
+                .collect::<Vec<_>>()
+        };
+        let (first, second) = (scan(NOISE.sigma_m[0], 0.0), scan(NOISE.sigma_m[1], beside));
+        LocalPair::of_points(first, second)
+    }
+
+    #[test]
+    fn the_gradient_is_that_of_the_marginal_likelihood() {
+        for beside in [0.0, 0.02] {
+            let pair = scans(beside);
+            let at = |x: &StoneVector| equations(&pair, x, x, &NOISE, &LAYOUT);
+            let here = at(&StoneVector::zeros());
+            for k in 0..6 {
+                let step = 1e-3 * here.information[(k, k)].sqrt().recip();
+                let moved = |by: f64| {
+                    let mut x = Vector9::zeros();
+                    x[k] = by * step;
+                    at(&x.into()).deviance
+                };
+                let slope = (moved(1.0) - moved(-1.0)) / (4.0 * step);
+                let scale = here.information[(k, k)].sqrt();
+                // The rotation in the face is seen by steep points most, whose weights are held.
+                let allowed = if k == 5 { 0.35 } else { 0.12 };
+                let difference = (slope - here.gradient[k]).abs() / scale;
+                assert!(difference < allowed, "{beside} {k}: {difference}");
+            }
+        }
+    }
+}

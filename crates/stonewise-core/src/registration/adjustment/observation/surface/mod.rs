@@ -1,0 +1,31 @@
+//! The stones' own points, as observations of a surface that both epochs share.
+
+mod cells;
+mod correlation;
+mod discount;
+pub(crate) mod equations;
+mod inverse_motion;
+mod layout;
+mod linearisation;
+mod local_pair;
+mod model;
+mod noise_estimate;
+mod patch_fit;
+mod patch_grid;
+mod patches;
+mod robust;
+mod slope_scatter;
+mod surface_noise;
+#[cfg(test)]
+mod testing;
+
+pub(crate) use correlation::Correlation;
+pub(crate) use equations::{Equations, deviance};
+pub(crate) use layout::Layout;
+pub(crate) use linearisation::Linearisation;
+pub(crate) use local_pair::LocalPair;
+pub(crate) use model::{StoneSurface, SurfaceModel};
+pub(crate) use noise_estimate::estimate_noise;
+pub(crate) use surface_noise::SurfaceNoise;
+#[cfg(test)]
+pub(crate) use testing::without_points;

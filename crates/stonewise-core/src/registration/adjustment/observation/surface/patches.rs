@@ -1,0 +1,117 @@
+//! The face of a stone cut into patches, each with the points of both epochs.
+
+use super::cells::{COMPARE_CELLS, CellSums};
+use super::inverse_motion::InverseMotion;
+use super::layout::Layout;
+use super::local_pair::LocalPair;
+use super::patch_grid::{PatchGrid, WeightedPoint};
+
+/// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be
+/// told.
+const PATCH_POINTS: usize = 12;
+/// Width by which a face is widened, in cells: points that noise moved beyond the first epoch's outline still
+/// count.
+const MARGIN_CELLS: f64 = 2.0;
+/// Shortest side of a patch, in cells: a cubic spline's four coefficients.
+const LEAST_CELLS: usize = 4;
+
+/// A piece of the face with the points of both epochs.
+pub(crate) struct PatchPoints {
+    pub grid: PatchGrid,
+    pub epochs: [Vec<WeightedPoint>; 2],
+}
+
+pub(crate) struct Patches {
+    pub list: Vec<PatchPoints>,
+    pub overlap: f64,
+}
+
+/// Cuts the face of the first epoch into patches and pools the points of both epochs in each.
+pub(crate) fn pool_into_patches(
+    pair: &LocalPair,
+    motion: &InverseMotion,
+    window: &InverseMotion,
+    layout: &Layout,
+) -> Patches {
+    let Some(cuts) = Cuts::new(&pair.first, layout) else {
+        return Patches {
+            list: Vec::new(),
+            overlap: 0.0,
+        };
+    };
+    let mut epochs = vec![[Vec::new(), Vec::new()]; cuts.count[0] * cuts.count[1]];
+    let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
+    let moved = pair.second_moved_back(motion, window).map(|p| (1, p));
+    for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
+        compare.count(epoch, &p);
+        if let Some(patch) = cuts.patch_at(&p) {
+            epochs[patch][epoch].push(WeightedPoint {
+                position: p,
+                weight: 1.0,
+            });
+        }
+    }
+    let list = epochs
+        .into_iter()
+        .enumerate()
+        .filter(|(_, e)| e.iter().all(|o| o.len() >= PATCH_POINTS))
+        .map(|(patch, epochs)| PatchPoints {
+            grid: cuts.grid(patch, layout.cell_m),
+            epochs,
+        })
+        .collect();
+    Patches {
+        list,
+        overlap: compare.overlap(),
+    }
+}
+
+/// How a face is cut into patches of equal size.
+struct Cuts {
+    low: [f64; 2],
+    high: [f64; 2],
+    count: [usize; 2],
+    /// Sides of a patch, metres.
+    step: [f64; 2],
+}
+
+impl Cuts {
+    /// `None` without points.
+    fn new(face: &[[f64; 3]], layout: &Layout) -> Option<Self> {
+        let margin = MARGIN_CELLS * layout.cell_m;
+        let mut low = [f64::INFINITY; 2];
+        let mut high = [f64::NEG_INFINITY; 2];
+        for p in face {
+            for a in 0..2 {
+                low[a] = low[a].min(p[a] - margin);
+                high[a] = high[a].max(p[a] + margin);
+            }
+        }
+        let side = layout.patch_cells.max(LEAST_CELLS) as f64 * layout.cell_m;
+        let count = [0, 1].map(|a| ((high[a] - low[a]) / side).ceil().max(1.0) as usize);
+        (!face.is_empty()).then(|| Self {
+            low,
+            high,
+            count,
+            step: [0, 1].map(|a| (high[a] - low[a]) / count[a] as f64),
+        })
+    }
+
+    fn patch_at(&self, p: &[f64; 3]) -> Option<usize> {
+        let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.step[a]).floor());
+        let is_inside = (0..2).all(|a| at[a] >= 0.0 && at[a] < self.count[a] as f64);
+        is_inside.then(|| at[1] as usize * self.count[0] + at[0] as usize)
+    }
+
+    fn grid(&self, patch: usize, cell_m: f64) -> PatchGrid {
+        let corner = [
+            self.low[0] + (patch % self.count[0]) as f64 * self.step[0],
+            self.low[1] + (patch / self.count[0]) as f64 * self.step[1],
+        ];
+        PatchGrid::new(
+            corner,
+            [corner[0] + self.step[0], corner[1] + self.step[1]],
+            cell_m,
+        )
+    }
+}

@@ -1,0 +1,10 @@
+//! The noise model of a stone's points.
+
+/// Noise of the points and roughness of the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SurfaceNoise {
+    /// Standard deviation of a point along the normal, per epoch, metres.
+    pub sigma_m: [f64; 2],
+    /// Standard deviation of a second difference of the coefficients, metres.
+    pub tau_m: f64,
+}

@@ -1,0 +1,277 @@
+//! From the adjusted stones to one row per pair, with tests and uncertainties.
+
+use super::breaks::find_breaks;
+use super::observation::NormalEquations;
+use super::observation::surface::Equations;
+use super::params::AdjustmentReport;
+use super::significance::{Tested, test_stones};
+use super::solution::Solution;
+use super::state::Adjustment;
+use super::stone_vector::Matrix9;
+use crate::geometry::Rigid3;
+use crate::stone::{MotionFailure, PairResult, StoneMotion};
+use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
+
+/// A cell whose epochs differ by this many times the expected variance shows two surfaces (1 in 400 by
+/// chance).
+const BAD_CELL: f64 = 9.0;
+/// A face of which this share shows two surfaces is not the same stone twice.
+const BAD_SHARE: f64 = 0.25;
+/// At least so many cells: one alone may be that of a neighbour which did not move along.
+const BAD_CELLS: usize = 2;
+/// The same share where the stone is probably loose: at its own optimum, remaining disagreement means a wrong
+/// mask.
+const BAD_SHARE_LOOSE: f64 = 0.2;
+/// Information that keeps rotations and bendings solvable which no point determines; far below any that
+/// counts.
+const RIDGE: f64 = 1e-9;
+
+/// Results of the last iteration; `None`: there was none.
+pub(crate) fn report(
+    adjustment: &Adjustment,
+    last: Option<&Solution>,
+    iterations: usize,
+    converged: bool,
+) -> AdjustmentReport {
+    let tested = last.map_or_else(Vec::new, |solution| test_stones(adjustment, solution));
+    let results = last.map_or_else(Vec::new, |solution| results(adjustment, solution, &tested));
+    let breaks = last.map_or_else(Vec::new, |solution| {
+        find_breaks(adjustment, solution, |i| tested[i].is_loose)
+    });
+    let moved: Vec<Vector3<f64>> = results
+        .iter()
+        .filter_map(|r| r.motion.as_ref().ok().filter(|m| !m.loose))
+        .map(|m| m.displacement)
+        .collect();
+    let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
+    AdjustmentReport {
+        loose: results.iter().filter(is_loose).count(),
+        results,
+        sigma_m: adjustment.surface.noise.sigma_m,
+        roughness_m: adjustment.surface.noise.tau_m,
+        cell_m: adjustment.surface.layout.cell_m,
+        correlation_factor: adjustment.surface.correlation.factor(),
+        components: adjustment.components,
+        common_motion: moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64,
+        common_covariance: last.map_or_else(Matrix3::zeros, |s| common_covariance(adjustment, s)),
+        iterations,
+        converged,
+        breaks,
+    }
+}
+
+/// Covariance of the mean motion: of the field's mean, and of the mean of the stones' own motions and shared
+/// errors.
+fn common_covariance(adjustment: &Adjustment, solution: &Solution) -> Matrix3<f64> {
+    let shared = adjustment.shared_variances(adjustment.octaves());
+    let own = adjustment.components.own_variances();
+    let variance: f64 = (0..3).map(|k| own[k] + shared[k]).fold(0.0, f64::max);
+    let stones = adjustment.stones.len().max(1) as f64;
+    solution.field.mean_covariance + Matrix3::identity() * (variance / stones)
+}
+
+fn results(adjustment: &Adjustment, solution: &Solution, tested: &[Tested]) -> Vec<PairResult> {
+    let shared = adjustment.shared_variances(adjustment.octaves());
+    let stones = adjustment.stones.iter().zip(tested).enumerate();
+    stones
+        .map(|(i, (stone, tested))| PairResult {
+            first: stone.info.first,
+            second: stone.info.second,
+            motion: match failure(adjustment, i) {
+                Some(failure) => Err(failure),
+                None => observable(
+                    motion(adjustment, i, solution, *tested, &shared),
+                    adjustment.params.max_sd_m,
+                ),
+            },
+        })
+        .collect()
+}
+
+/// Refuses a motion whose weakest direction neither the stone nor its neighbours show.
+fn observable(motion: StoneMotion, max_sd_m: f64) -> Result<StoneMotion, MotionFailure> {
+    let eigen = motion
+        .covariance
+        .fixed_view::<3, 3>(0, 0)
+        .into_owned()
+        .symmetric_eigen();
+    let worst = eigen.eigenvalues.imax();
+    if eigen.eigenvalues[worst] > max_sd_m * max_sd_m {
+        let direction = eigen.eigenvectors.column(worst).into_owned();
+        return Err(MotionFailure::Unobservable { direction });
+    }
+    Ok(motion)
+}
+
+/// Why a stone has no motion.
+fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
+    let (stone, params) = (&adjustment.stones[i], &adjustment.params);
+    if !stone.info.usable {
+        let [first, second] = stone.info.counts;
+        return Some(MotionFailure::TooFewPoints {
+            first,
+            second,
+            needed: params.min_points,
+        });
+    }
+    let Some(e) = stone.more_probable().surface.equations() else {
+        return Some(MotionFailure::NotConverged);
+    };
+    let share = match stone.is_probably_loose() {
+        true => BAD_SHARE_LOOSE,
+        false => BAD_SHARE,
+    };
+    let disagrees = shows_two_surfaces(e, adjustment.surface.correlation.factor(), share);
+    (e.overlap < params.min_overlap || disagrees).then_some(MotionFailure::Disagreement)
+}
+
+/// Whether more than a share of a stone's cells shows two surfaces; `inflation`: factor on the expected
+/// variances.
+fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool {
+    let cells = equations.differences.len() as f64;
+    let limit = BAD_CELL * inflation;
+    let bad = equations.differences.iter().filter(|d| **d > limit).count();
+    bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
+}
+
+/// `shared`: variances of errors that all points of a stone share.
+fn motion(
+    adjustment: &Adjustment,
+    i: usize,
+    solution: &Solution,
+    tested: Tested,
+    shared: &[f64; 9],
+) -> StoneMotion {
+    let node = &adjustment.graph.nodes[i];
+    let world = node.face_from_world.transpose();
+    let estimate = adjustment.estimate(i, solution);
+    let x = estimate.mean + adjustment.common_in(i);
+    let displacement = world * x.translation();
+    let rotation = world * x.rotation();
+    let turned = UnitQuaternion::from_scaled_axis(rotation);
+    let arm = node.centroid.coords;
+    let mut local = estimate.covariance;
+    for (k, variance) in shared.iter().enumerate() {
+        local[(k, k)] += variance;
+    }
+    let covariance = in_world(&local, &world);
+    let prediction = &solution.field.from_others[i];
+    let common = adjustment.common_in(i).translation();
+    let expected = world * (prediction.mean.fixed_rows::<3>(0) + common);
+    let spread = world * prediction.covariance.fixed_view::<3, 3>(0, 0) * world.transpose();
+    let equations = adjustment.stones[i].more_probable().surface.equations();
+    StoneMotion {
+        second_from_first: Rigid3::from_parts(Translation3::from(arm + displacement - turned * arm), turned),
+        displacement,
+        rotation,
+        covariance,
+        relative: displacement - expected,
+        relative_covariance: covariance.fixed_view::<3, 3>(0, 0) + spread,
+        own_motion_p: tested.p_value,
+        loose: tested.is_loose,
+        p_loose: Some(1.0 - adjustment.stones[i].p_with_field),
+        observability: observability(&solution.equations[i].with_field),
+        rmse_m: equations.map_or(f64::NAN, |e| e.rms_m),
+    }
+}
+
+/// Covariance of (displacement, rotation) in world axes from that of a stone's unknowns.
+fn in_world(local: &Matrix9, world: &Matrix3<f64>) -> Matrix6<f64> {
+    let mut covariance = Matrix6::zeros();
+    for (r, c) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
+        let block = world * local.fixed_view::<3, 3>(r, c) * world.transpose();
+        covariance.fixed_view_mut::<3, 3>(r, c).copy_from(&block);
+    }
+    covariance
+}
+
+/// Square root of the smallest over the largest eigenvalue of the displacement's information, rotation and
+/// bending free.
+fn observability(equations: &NormalEquations) -> f64 {
+    let h = &equations.information;
+    let rest = h.fixed_view::<6, 6>(3, 3).into_owned() + Matrix6::identity() * RIDGE;
+    let Some(factor) = rest.cholesky() else { return 0.0 };
+    let cross = h.fixed_view::<6, 3>(3, 0).into_owned();
+    let own = h.fixed_view::<3, 3>(0, 0) - cross.transpose() * factor.solve(&cross);
+    let values = own.symmetric_eigenvalues();
+    if values.max() > 0.0 {
+        (values.min().max(0.0) / values.max()).sqrt()
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::adjustment::observation::surface::without_points;
+    use crate::registration::adjustment::stone_vector::Vector9;
+    use nalgebra::Rotation3;
+
+    #[test]
+    fn observability_is_that_of_the_inverse_covariance_of_the_displacement() {
+        let m = Matrix9::from_fn(|r, c| ((r * 5 + c * 11) % 7) as f64 - 3.0);
+        let information = m * m.transpose() + Matrix9::identity();
+        let equations = NormalEquations {
+            information,
+            vector: Vector9::zeros(),
+            constant: 0.0,
+        };
+        let covariance = information
+            .try_inverse()
+            .unwrap()
+            .fixed_view::<3, 3>(0, 0)
+            .into_owned();
+        let values = covariance.symmetric_eigenvalues();
+        let expected = (values.min() / values.max()).sqrt();
+        assert!((observability(&equations) - expected).abs() < 1e-6);
+        assert_eq!(observability(&NormalEquations::nothing()), 0.0);
+    }
+
+    #[test]
+    fn a_share_of_bad_cells_shows_two_surfaces_and_one_cell_does_not() {
+        let with = |bad: usize, good: usize| Equations {
+            differences: [vec![40.0; bad], vec![1.0; good]].concat(),
+            ..without_points()
+        };
+        assert!(shows_two_surfaces(&with(6, 14), 1.0, BAD_SHARE));
+        assert!(!shows_two_surfaces(&with(5, 15), 1.0, BAD_SHARE));
+        assert!(shows_two_surfaces(&with(5, 15), 1.0, BAD_SHARE_LOOSE));
+        assert!(!shows_two_surfaces(&with(6, 14), 5.0, BAD_SHARE));
+        assert!(!shows_two_surfaces(&with(1, 2), 1.0, BAD_SHARE));
+    }
+
+    #[test]
+    fn covariances_turn_with_their_axes_and_bending_drops_out() {
+        let turn = Rotation3::from_euler_angles(0.3, -0.2, 0.9).into_inner();
+        let m = Matrix9::from_fn(|r, c| ((r * 3 + c * 7) % 5) as f64);
+        let local = m * m.transpose();
+        let mut lever = nalgebra::SMatrix::<f64, 6, 9>::zeros();
+        lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn);
+        lever.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+        let expected = lever * local * lever.transpose();
+        assert!((in_world(&local, &turn) - expected).norm() < 1e-9 * expected.norm());
+    }
+
+    #[test]
+    fn a_motion_is_refused_along_its_weakest_direction() {
+        let motion = |sd: f64| StoneMotion {
+            second_from_first: Rigid3::identity(),
+            displacement: Vector3::zeros(),
+            rotation: Vector3::zeros(),
+            covariance: Matrix6::from_diagonal(&nalgebra::Vector6::new(1e-6, sd * sd, 1e-6, 1.0, 1.0, 1.0)),
+            relative: Vector3::zeros(),
+            relative_covariance: Matrix3::zeros(),
+            own_motion_p: 1.0,
+            loose: false,
+            p_loose: None,
+            observability: 1.0,
+            rmse_m: 0.0,
+        };
+        assert!(observable(motion(0.019), 0.02).is_ok());
+        let Err(MotionFailure::Unobservable { direction }) = observable(motion(0.021), 0.02) else {
+            panic!("a motion known to 21 mm was reported")
+        };
+        assert!(direction.y.abs() > 0.999);
+    }
+}

@@ -1,0 +1,136 @@
+//! Which stones are loose.
+
+use super::field::posterior;
+use super::solution::Solution;
+use super::state::Adjustment;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Factor by which the bending's variance is raised in the test for loose stones: a bent face is not a loose
+/// stone, so bending is left free.
+const BENDING_SLACK: f64 = 100.0;
+
+/// A stone tested against its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Tested {
+    /// Probability of so large a departure where the stone moves with its neighbours; 1 where its points say
+    /// nothing.
+    pub p_value: f64,
+    pub is_loose: bool,
+}
+
+/// Tests each stone against its neighbours, with the false discovery rate controlled.
+///
+/// Significance alone is not enough: scans show departures of tenths of a millimetre that come from how
+/// stations overlap. A stone is loose if it also moved as loose stones do more probably than as its
+/// neighbours.
+pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<Tested> {
+    let rate = adjustment.params.false_discovery_rate;
+    let p_values = p_values(adjustment, solution);
+    let followed: Vec<Option<f64>> = adjustment
+        .stones
+        .iter()
+        .map(|s| s.on_own.as_ref().map(|_| s.p_with_field))
+        .collect();
+    let mut loose = within_error_rate(&followed, rate);
+    for i in discoveries(&p_values, rate) {
+        loose[i] |= adjustment.stones[i].is_probably_loose();
+    }
+    p_values
+        .iter()
+        .zip(loose)
+        .map(|(p, is_loose)| Tested {
+            p_value: p.unwrap_or(1.0),
+            is_loose,
+        })
+        .collect()
+}
+
+/// Probability of so large a departure from what the neighbours predict. `None` where a stone's points say
+/// nothing.
+fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
+    let mut own = adjustment.components.own_variances();
+    own[6..].iter_mut().for_each(|v| *v *= BENDING_SLACK);
+    for (v, shared) in own.iter_mut().zip(adjustment.shared_variances(1.0)) {
+        *v += shared;
+    }
+    let stones = adjustment.stones.iter().zip(&solution.equations);
+    stones
+        .zip(&solution.field.from_others)
+        .map(|((stone, equations), prediction)| {
+            let (misfit, freedom) = posterior(&equations.with_field, prediction, &own).misfit;
+            let law = ChiSquared::new(freedom as f64).ok()?;
+            (freedom > 0 && stone.info.usable).then(|| law.sf(misfit))
+        })
+        .collect()
+}
+
+/// Tests that are significant when the share of false ones among them is to be at most `rate` (Benjamini &
+/// Hochberg 1995).
+fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
+    let mut sorted: Vec<(f64, usize)> = p_values
+        .iter()
+        .enumerate()
+        .filter_map(|(i, p)| Some(((*p)?, i)))
+        .collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let tests = sorted.len() as f64;
+    let last = sorted
+        .iter()
+        .enumerate()
+        .rposition(|(k, p)| p.0 <= rate * (k + 1) as f64 / tests);
+    sorted.truncate(last.map_or(0, |k| k + 1));
+    sorted.into_iter().map(|(_, i)| i).collect()
+}
+
+/// As many stones, in the order of their probability of an error, as keep the mean of that probability within
+/// `rate` (Newton et al. 2004). `None`: not a candidate.
+fn within_error_rate(p_error: &[Option<f64>], rate: f64) -> Vec<bool> {
+    let mut candidates: Vec<(f64, usize)> = p_error
+        .iter()
+        .enumerate()
+        .filter_map(|(i, p)| Some(((*p)?, i)))
+        .collect();
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut chosen = vec![false; p_error.len()];
+    let mut errors = 0.0;
+    for (k, &(p, i)) in candidates.iter().enumerate() {
+        errors += p;
+        if errors > rate * (k + 1) as f64 {
+            break;
+        }
+        chosen[i] = true;
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn discoveries_follow_the_published_example() {
+        // Benjamini & Hochberg 1995, section 3: fifteen ordered p values, of which the first four are
+        // rejected at 5 %.
+        let published = [
+            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719,
+            0.6528, 0.7590, 1.0,
+        ];
+        let mut p_values: Vec<Option<f64>> = published.into_iter().rev().map(Some).collect();
+        p_values.insert(3, None);
+        let mut found = discoveries(&p_values, 0.05);
+        found.sort_unstable();
+        assert_eq!(found, [12, 13, 14, 15]);
+        assert!(discoveries(&[None, Some(0.2)], 0.05).is_empty());
+    }
+
+    #[test]
+    fn the_mean_probability_of_an_error_stays_within_the_rate() {
+        let p_error = [Some(0.2), None, Some(0.01), Some(0.06), Some(0.01), Some(0.9)];
+        // 0.01, 0.01 and 0.06 have a mean of 0.027, with 0.2 it is 0.07.
+        assert_eq!(
+            within_error_rate(&p_error, 0.05),
+            [false, false, true, true, true, false]
+        );
+        assert_eq!(within_error_rate(&[Some(0.06)], 0.05), [false]);
+    }
+}

@@ -1,0 +1,115 @@
+//! Solution of the field, and what follows from it: weights of stones and ties, variance components, cracks.
+
+use super::equations::StoneEquations;
+use super::field::{
+    Field, FieldProblem, FieldStone, estimate_components, find_crack, posterior, probabilities_with_field,
+    reweight_ties, solve,
+};
+use super::observation::NormalEquations;
+use super::state::Adjustment;
+
+/// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
+/// is expensive.
+const REWEIGHTINGS: usize = 4;
+/// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what loose
+/// stones are expected to move) has observations too weak to tell it from its neighbours: they took off a
+/// quarter of the variance at most.
+const UNCERTAIN_SHARE: f64 = 0.85;
+
+/// The last iteration's equations and the field that solves them.
+pub(crate) struct Solution {
+    /// One per stone.
+    pub equations: Vec<StoneEquations>,
+    pub field: Field,
+}
+
+impl Adjustment {
+    /// Estimates the variance components from the stones' equations; from parts of large walls.
+    pub fn estimate_components(&mut self) {
+        let equations = self.equations_with_field(0.0);
+        let problem = self.problem(equations.iter());
+        self.components = match &self.subgraph {
+            None => estimate_components(&problem),
+            Some(part) => estimate_components(&part.restrict(&problem)),
+        };
+    }
+
+    /// Solves for the field with the present weights. `None` where the equations cannot be factored.
+    pub fn solve(&self, equations: &[StoneEquations]) -> Option<Field> {
+        solve(&self.problem(equations.iter().map(|e| &e.with_field)))
+    }
+
+    /// Solves for the field; probabilities of stones and weights of ties follow from it, and it is solved
+    /// again.
+    pub fn solve_and_reweight(&mut self, equations: &[StoneEquations]) -> Option<Field> {
+        let mut field = self.solve(equations)?;
+        let rounds = if self.subgraph.is_some() { 1 } else { REWEIGHTINGS };
+        for _ in 0..rounds {
+            self.reweight_stones(equations, &field);
+            reweight_ties(
+                &self.graph,
+                &field,
+                self.params.tie_freedom,
+                &mut self.components,
+                &mut self.ties,
+            );
+            field = self.solve(equations)?;
+        }
+        Some(field)
+    }
+
+    /// Parts the wall along its most significant crack; whether there is one.
+    pub fn add_crack(&mut self, solution: &Solution) -> bool {
+        let problem = self.problem(solution.equations.iter().map(|e| &e.with_field));
+        let Some(crack) = find_crack(&problem, &solution.field) else {
+            return false;
+        };
+        for (tie, edge) in self.ties.iter_mut().zip(&self.graph.edges) {
+            tie.is_parted |= crack.side[edge.low] != crack.side[edge.high];
+        }
+        self.cracks.push(crack);
+        true
+    }
+
+    fn problem<'a>(&'a self, equations: impl Iterator<Item = &'a NormalEquations>) -> FieldProblem<'a> {
+        let stones = equations.zip(&self.stones);
+        FieldProblem {
+            graph: &self.graph,
+            stones: stones
+                .map(|(equations, stone)| FieldStone {
+                    equations,
+                    p_with_field: stone.p_with_field,
+                })
+                .collect(),
+            ties: self.ties.clone(),
+            components: self.components,
+            loose: self.loose,
+        }
+    }
+
+    fn reweight_stones(&mut self, equations: &[StoneEquations], field: &Field) {
+        let problem = self.problem(equations.iter().map(|e| &e.with_field));
+        let on_own: Vec<Option<&NormalEquations>> = equations.iter().map(|e| e.on_own.as_ref()).collect();
+        let probabilities = probabilities_with_field(&problem, &on_own, field, &self.shared_variances(1.0));
+        for (stone, p) in self.stones.iter_mut().zip(probabilities) {
+            stone.p_with_field = p;
+        }
+        self.return_to_field(equations, field);
+    }
+
+    /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
+    /// (few noisy points have optima far away), and those of which one half contradicts it.
+    fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
+        let own = self.loose.own_variances(&self.components);
+        for ((stone, equations), prediction) in self.stones.iter_mut().zip(equations).zip(&field.from_others)
+        {
+            let at_optimum = equations.on_own.as_ref().unwrap_or(&equations.with_field);
+            let loose = posterior(at_optimum, prediction, &own);
+            let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+            let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
+            if largest_m > UNCERTAIN_SHARE * self.loose.move_m || stone.ratio.is_contradicted {
+                stone.p_with_field = 1.0;
+            }
+        }
+    }
+}

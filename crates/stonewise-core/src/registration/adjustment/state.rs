@@ -1,0 +1,126 @@
+//! The state of the adjustment between iterations.
+
+use super::candidate::CandidateMotion;
+use super::field::{Crack, Graph, LoosePrior, Place, Subgraph, Tie, VarianceComponents};
+use super::hypothesis::LikelihoodRatio;
+use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
+use super::params::AdjustmentParams;
+use super::stone_vector::StoneVector;
+use super::survey::{StoneInfo, Survey};
+use crate::registration::points::PairPoints;
+use crate::statistics::component_median;
+use nalgebra::Vector3;
+use std::ops::Range;
+
+/// All stones, the field that ties them, and the models under which they are observed.
+pub(crate) struct Adjustment {
+    /// In the order of the source; one per node of the graph.
+    pub stones: Vec<StoneState>,
+    pub graph: Graph,
+    /// The part of a large wall on which the variance components are estimated.
+    pub subgraph: Option<Subgraph>,
+    /// One per edge of the graph.
+    pub ties: Vec<Tie>,
+    pub components: VarianceComponents,
+    pub loose: LoosePrior,
+    pub cracks: Vec<Crack>,
+    /// Common translation about which the field is solved, world.
+    pub common: Vector3<f64>,
+    pub surface: SurfaceModel,
+    /// Pairs kept in memory for the noise estimate, with their index.
+    pub sample: Vec<(usize, PairPoints)>,
+    /// The stones of each batch.
+    pub batches: Vec<Range<usize>>,
+    pub params: AdjustmentParams,
+}
+
+/// A stone between iterations.
+pub(crate) struct StoneState {
+    pub info: StoneInfo,
+    /// Moving with the field.
+    pub with_field: CandidateMotion,
+    /// Moving on its own, where that is followed.
+    pub on_own: Option<CandidateMotion>,
+    /// What the stone's points say between the two.
+    pub ratio: LikelihoodRatio,
+    /// Probability that the stone moves with the field.
+    pub p_with_field: f64,
+    /// Effective degrees of freedom: how many unknowns the stone's own points determine.
+    pub effective_freedom: f64,
+}
+
+impl Adjustment {
+    /// Every stone moves as its neighbours' centroids did, with the field; ties are whole. `None` where
+    /// memory does not suffice.
+    pub fn new(survey: Survey, params: &AdjustmentParams) -> Option<Self> {
+        let places: Vec<Place> = survey.stones.iter().map(|s| s.place.clone()).collect();
+        let graph = Graph::new(&places, params.neighbours_per_side)?;
+        let start = survey.smoothed_shifts(&graph);
+        let layout = Layout {
+            cell_m: (params.cell_spacings * survey.spacing_m).max(params.min_cell_m),
+            patch_cells: params.patch_cells,
+            outlier_sigmas: params.outlier_sigmas,
+        };
+        let stones = survey.stones.into_iter().zip(&graph.nodes).zip(&start);
+        Some(Self {
+            stones: stones
+                .map(|((info, node), shift)| StoneState::new(info, node.face_from_world * shift))
+                .collect(),
+            subgraph: Subgraph::new(&graph),
+            ties: vec![Tie::WHOLE; graph.edges.len()],
+            components: VarianceComponents::start(),
+            loose: LoosePrior {
+                share: params.loose_share,
+                move_m: params.loose_move_m,
+                turn_rad: params.loose_turn_rad,
+            },
+            cracks: Vec::new(),
+            common: component_median(&start),
+            surface: SurfaceModel::start(layout),
+            sample: survey.sample,
+            batches: survey.batches,
+            params: params.clone(),
+            graph,
+        })
+    }
+
+    /// The common translation in a stone's frame.
+    pub fn common_in(&self, i: usize) -> StoneVector {
+        StoneVector::from_translation(self.graph.nodes[i].face_from_world * self.common)
+    }
+}
+
+impl StoneState {
+    fn new(info: StoneInfo, translation: Vector3<f64>) -> Self {
+        Self {
+            info,
+            with_field: CandidateMotion::new(StoneVector::from_translation(translation)),
+            on_own: None,
+            ratio: LikelihoodRatio::default(),
+            p_with_field: 1.0,
+            effective_freedom: 0.0,
+        }
+    }
+
+    /// Its linearised surface.
+    pub fn surface(&self) -> StoneSurface<'_> {
+        StoneSurface {
+            with_field: &self.with_field.surface,
+            on_own: self.on_own.as_ref().map(|c| &c.surface),
+            effective_freedom: self.effective_freedom,
+        }
+    }
+
+    /// The motion that the stone more probably made: its own or the field's.
+    pub fn more_probable(&self) -> &CandidateMotion {
+        match &self.on_own {
+            Some(own) if self.is_probably_loose() => own,
+            _ => &self.with_field,
+        }
+    }
+
+    /// Whether it moved more probably on its own than with the field.
+    pub fn is_probably_loose(&self) -> bool {
+        self.p_with_field < 0.5
+    }
+}

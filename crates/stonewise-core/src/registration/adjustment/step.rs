@@ -1,0 +1,125 @@
+//! Stones move to their posterior means.
+
+use super::candidate::CandidateMotion;
+use super::equations::StoneEquations;
+use super::field::{Field, Posterior, posterior};
+use super::solution::Solution;
+use super::state::Adjustment;
+use super::stone_vector::{Matrix9, StoneVector};
+
+/// One stone in so many may still swing between two optima of its own when the adjustment has settled.
+const RESTLESS: usize = 50;
+/// A stone's own optimum is followed once its points make it so many times more probably loose than it was
+/// without them.
+const SUSPECT: f64 = 1.5;
+/// A step within this share of its standard deviation no longer matters.
+const SETTLED: f64 = 0.01;
+
+/// A stone's motion with its looseness averaged out.
+pub(crate) struct Estimate {
+    /// In the stone's frame, about the common translation.
+    pub mean: StoneVector,
+    pub covariance: Matrix9,
+}
+
+impl Adjustment {
+    /// Moves every stone to its posterior mean; whether the adjustment has settled.
+    pub fn step(&mut self, solution: &Solution) -> bool {
+        // What counts as an error might be the start of a motion: the equations follow it, so that a loose
+        // stone shows itself.
+        let followed = self.equations_with_field(0.0);
+        let own = self.components.with_error(self.components.own_variances());
+        let mut restless = 0;
+        for (i, equations) in followed.iter().enumerate() {
+            let tied = posterior(equations, &solution.field.from_others[i], &own);
+            let p = self.stones[i].p_with_field;
+            self.stones[i].effective_freedom = tied.effective_freedom;
+            let origin = self.common_in(i);
+            let limits = StepLimits::of(self);
+            restless += usize::from(limits.follow(&mut self.stones[i].with_field, &tied, &origin, p));
+            restless += usize::from(self.step_on_own(i, &solution.equations[i], &solution.field));
+        }
+        restless * RESTLESS <= self.stones.len()
+    }
+
+    /// Moves a stone on its own, or begins to where that has become likely; whether it still moved.
+    fn step_on_own(&mut self, i: usize, equations: &StoneEquations, field: &Field) -> bool {
+        let wide = self.loose.own_variances(&self.components);
+        let prediction = &field.from_others[i];
+        let origin = self.common_in(i);
+        let limits = StepLimits::of(self);
+        let stone = &mut self.stones[i];
+        let p_loose = 1.0 - stone.p_with_field;
+        if let (Some(own), Some(equations)) = (&mut stone.on_own, &equations.on_own) {
+            return limits.follow(own, &posterior(equations, prediction, &wide), &origin, p_loose);
+        }
+        let is_suspect = p_loose > SUSPECT * self.loose.share;
+        if is_suspect {
+            let start = posterior(&equations.with_field, prediction, &wide).mean + origin;
+            let mut own = CandidateMotion::new(stone.with_field.motion);
+            own.move_to(&start, limits.max_step_m);
+            stone.on_own = Some(own);
+        }
+        is_suspect
+    }
+
+    /// A stone's motion about the common translation, looseness averaged out.
+    pub fn estimate(&self, i: usize, solution: &Solution) -> Estimate {
+        let p = self.stones[i].p_with_field;
+        let equations = &solution.equations[i];
+        let prediction = &solution.field.from_others[i];
+        let mut tied = posterior(
+            &equations.with_field,
+            prediction,
+            &self.components.own_variances(),
+        );
+        // What counts as an error might be a motion after all.
+        for k in 0..2 {
+            tied.covariance[(k, k)] += self.components.error_m * self.components.error_m;
+        }
+        let Some(own) = &equations.on_own else {
+            return Estimate {
+                mean: tied.mean,
+                covariance: tied.covariance,
+            };
+        };
+        let loose = posterior(own, prediction, &self.loose.own_variances(&self.components));
+        let apart = (tied.mean - loose.mean).unknowns().to_owned();
+        Estimate {
+            mean: tied.mean.scaled(p) + loose.mean.scaled(1.0 - p),
+            covariance: tied.covariance * p
+                + loose.covariance * (1.0 - p)
+                + apart * apart.transpose() * (p * (1.0 - p)),
+        }
+    }
+}
+
+/// How far a stone steps, and what step still counts.
+#[derive(Clone, Copy)]
+struct StepLimits {
+    max_step_m: f64,
+    tolerance_m: f64,
+}
+
+impl StepLimits {
+    fn of(adjustment: &Adjustment) -> Self {
+        Self {
+            max_step_m: adjustment.params.max_step_m,
+            tolerance_m: adjustment.params.tolerance_m,
+        }
+    }
+
+    /// Moves a candidate to its posterior mean; whether that step still counts. A candidate of little
+    /// probability `p` moves the stone's estimate by that share only.
+    fn follow(
+        self,
+        candidate: &mut CandidateMotion,
+        posterior: &Posterior,
+        origin: &StoneVector,
+        p: f64,
+    ) -> bool {
+        let step = candidate.move_to(&(posterior.mean + *origin), self.max_step_m);
+        let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
+        p * step > self.tolerance_m.max(SETTLED * sd)
+    }
+}

@@ -1,0 +1,94 @@
+//! A stone's unknowns: its motion in its own frame.
+
+use nalgebra::{SMatrix, SVector, Vector3};
+use std::ops::{Add, Sub};
+
+/// Nine unknowns without names: what normal equations multiply.
+pub(crate) type Vector9 = SVector<f64, 9>;
+/// A matrix over nine unknowns.
+pub(crate) type Matrix9 = SMatrix<f64, 9, 9>;
+
+/// Motion of a stone in its frame, whose axes are (along, up, out) of the wall around it.
+///
+/// The order of the unknowns: translation of the centroid (m), rotation vector (rad), bending (1/m: second
+/// derivatives uu, uv, vv of an out-of-plane distortion; masonry does not bend, but a motion field prescribed
+/// for a survey may).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StoneVector(Vector9);
+
+impl StoneVector {
+    /// No motion.
+    pub fn zeros() -> Self {
+        Self(Vector9::zeros())
+    }
+
+    /// A motion without rotation and bending.
+    pub fn from_translation(translation: Vector3<f64>) -> Self {
+        let mut all = Vector9::zeros();
+        all.fixed_rows_mut::<3>(0).copy_from(&translation);
+        Self(all)
+    }
+
+    /// Of the centroid: along, up, out, metres.
+    pub fn translation(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(0).into_owned()
+    }
+
+    /// Rotation vector about (along, up, out), radians.
+    pub fn rotation(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(3).into_owned()
+    }
+
+    /// Second derivatives uu, uv, vv of the face's distortion, 1/m.
+    pub fn bending(&self) -> Vector3<f64> {
+        self.0.fixed_rows::<3>(6).into_owned()
+    }
+
+    /// All nine unknowns in order.
+    pub fn unknowns(&self) -> &Vector9 {
+        &self.0
+    }
+
+    /// The same direction, `factor` times as far.
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self(self.0 * factor)
+    }
+}
+
+impl From<Vector9> for StoneVector {
+    fn from(unknowns: Vector9) -> Self {
+        Self(unknowns)
+    }
+}
+
+impl Add for StoneVector {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self(self.0 + other.0)
+    }
+}
+
+impl Sub for StoneVector {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Self(self.0 - other.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_where_their_names_say() {
+        let all = StoneVector::from(Vector9::from_fn(|k, _| k as f64));
+        assert_eq!(all.translation(), Vector3::new(0.0, 1.0, 2.0));
+        assert_eq!(all.rotation(), Vector3::new(3.0, 4.0, 5.0));
+        assert_eq!(all.bending(), Vector3::new(6.0, 7.0, 8.0));
+        let moved = all + StoneVector::from_translation(Vector3::new(1.0, 1.0, 1.0)).scaled(-2.0);
+        assert_eq!((moved - all).translation(), Vector3::new(-2.0, -2.0, -2.0));
+        assert_eq!(moved.rotation(), all.rotation());
+    }
+}

@@ -1,0 +1,213 @@
+//! One pass over all pairs: places, point spacing, first guesses, and a sample for the noise estimate.
+
+use super::error::AdjustError;
+use super::field::{Graph, Place};
+use super::params::AdjustmentParams;
+use crate::geometry::FaceFrame;
+use crate::id::StoneId;
+use crate::registration::points::{PairPoints, PairSource};
+use crate::statistics::{component_median, upper_median};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::ops::Range;
+
+/// A pair without its points.
+pub(crate) struct StoneInfo {
+    pub first: StoneId,
+    pub second: StoneId,
+    pub place: Place,
+    /// Difference of the centroids, world, metres.
+    pub shift: Vector3<f64>,
+    pub counts: [usize; 2],
+    pub usable: bool,
+}
+
+/// All pairs without their points.
+pub(crate) struct Survey {
+    pub stones: Vec<StoneInfo>,
+    /// The stones of each batch.
+    pub batches: Vec<Range<usize>>,
+    /// Median point spacing of the sparser epoch, metres.
+    pub spacing_m: f64,
+    /// Pairs kept in memory for the noise estimate, with their index.
+    pub sample: Vec<(usize, PairPoints)>,
+}
+
+/// Pairs kept for the noise estimate: each has a patch or more, and 64 patches determine the noise to a
+/// percent.
+const SAMPLE: usize = 48;
+/// Stones whose centroid shifts are smoothed into a first guess: a ring of neighbours, so that one wrong mask
+/// does not matter.
+const SMOOTHED: usize = 12;
+/// Cells in which a face's area is counted, metres: some dozens on a stone, each with some points of a sparse
+/// drone cloud.
+const AREA_CELL_M: f64 = 0.02;
+/// Points below which a stone shows no spacing.
+const SPACING_POINTS: usize = 10;
+/// Point spacing of a survey none of whose stones shows one, metres.
+const USUAL_SPACING_M: f64 = 0.005;
+
+/// Reads every batch once.
+pub(crate) fn survey<S: PairSource>(
+    source: &S,
+    params: &AdjustmentParams,
+) -> Result<Survey, AdjustError<S::Error>> {
+    let mut stones = Vec::new();
+    let mut batches = Vec::new();
+    let mut spacings = Vec::new();
+    let mut sample: Vec<(usize, PairPoints)> = Vec::new();
+    let mut stride = 1;
+    for batch in 0..source.batch_count() {
+        let pairs = source.load(batch).map_err(AdjustError::Source)?;
+        batches.push(stones.len()..stones.len() + pairs.len());
+        spacings.extend(pairs.par_iter().filter_map(spacing).collect::<Vec<f64>>());
+        for pair in pairs {
+            let index = stones.len();
+            let info = StoneInfo::new(&pair, params);
+            if info.usable && index % stride == 0 {
+                sample.push((index, pair));
+            }
+            stones.push(info);
+            if sample.len() > 2 * SAMPLE {
+                stride *= 2;
+                sample.retain(|(i, _)| i % stride == 0);
+            }
+        }
+    }
+    let keep = sample.len().div_ceil(SAMPLE).max(1);
+    let sample = sample.into_iter().step_by(keep).collect();
+    let spacing_m = upper_median(&mut spacings).unwrap_or(USUAL_SPACING_M);
+    Ok(Survey {
+        stones,
+        batches,
+        spacing_m,
+        sample,
+    })
+}
+
+impl StoneInfo {
+    fn new(pair: &PairPoints, params: &AdjustmentParams) -> Self {
+        let counts = [pair.points_first.len(), pair.points_second.len()];
+        Self {
+            first: pair.first,
+            second: pair.second,
+            place: Place::from(pair),
+            shift: pair.centroid_second - pair.centroid,
+            counts,
+            usable: counts.iter().all(|&n| n >= params.min_points),
+        }
+    }
+}
+
+impl Survey {
+    /// Centroid shifts, each the median of the stone's and its nearest neighbours' along the graph.
+    pub fn smoothed_shifts(&self, graph: &Graph) -> Vec<Vector3<f64>> {
+        let next = graph.neighbours();
+        (0..self.stones.len())
+            .into_par_iter()
+            .map(|i| {
+                let mut reached = BTreeSet::from([i]);
+                for _ in 0..2 {
+                    reached.extend(reached.clone().iter().flat_map(|&j| next[j].iter().copied()));
+                }
+                let centre = self.stones[i].place.centroid;
+                let mut nearest: Vec<usize> = reached.into_iter().collect();
+                nearest.sort_by(|&a, &b| {
+                    let d = |k: usize| (self.stones[k].place.centroid - centre).norm_squared();
+                    d(a).total_cmp(&d(b)).then(a.cmp(&b))
+                });
+                nearest.truncate(SMOOTHED);
+                component_median(&nearest.iter().map(|&j| self.stones[j].shift).collect::<Vec<_>>())
+            })
+            .collect()
+    }
+}
+
+/// Mean point spacing of the sparser epoch.
+fn spacing(pair: &PairPoints) -> Option<f64> {
+    let sparse = if pair.points_first.len() < pair.points_second.len() {
+        &pair.points_first
+    } else {
+        &pair.points_second
+    };
+    let frame = FaceFrame::from_normal(&pair.normal);
+    let cells: BTreeSet<(i64, i64)> = (0..sparse.len())
+        .map(|i| {
+            let p = sparse.local(i).coords;
+            (
+                (p.dot(&frame.along) / AREA_CELL_M).floor() as i64,
+                (p.dot(&frame.up) / AREA_CELL_M).floor() as i64,
+            )
+        })
+        .collect();
+    (sparse.len() >= SPACING_POINTS).then(|| AREA_CELL_M * (cells.len() as f64 / sparse.len() as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Cloud;
+    use crate::registration::points::MemoryPairs;
+    use nalgebra::Point3;
+
+    /// A stone of 20 x 20 cm at column `k` with a point every `spacing_m`, which moved by `shift`.
+    fn pair(k: u32, spacing_m: f64, shift: Vector3<f64>) -> PairPoints {
+        let centroid = Point3::new(0.0, 0.25 * f64::from(k % 20), 0.25 * f64::from(k / 20));
+        let side = (0.2 / spacing_m) as i32;
+        let at = |i: i32| (f64::from(i) + 0.5) * spacing_m - 0.1;
+        let points: Vec<Point3<f64>> = (0..side * side)
+            .map(|i| centroid + Vector3::new(0.0, at(i % side), at(i / side)))
+            .collect();
+        let cloud = || Cloud::from_world(centroid, points.iter().copied());
+        PairPoints {
+            first: StoneId(k + 1),
+            second: StoneId(k + 1),
+            centroid,
+            centroid_second: centroid + shift,
+            normal: Vector3::x(),
+            points_first: cloud(),
+            points_second: cloud(),
+            nearby_second: Cloud::new(centroid, Vec::new()),
+            window: None,
+        }
+    }
+
+    #[test]
+    fn one_pass_finds_spacing_batches_and_a_sample_from_everywhere() {
+        let pairs: Vec<PairPoints> = (0..400).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
+        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default()).unwrap();
+        assert_eq!(found.stones.len(), 400);
+        assert!(found.stones.iter().all(|s| s.usable && s.counts == [400, 400]));
+        assert!((found.spacing_m / 0.01 - 1.0).abs() < 0.15, "{}", found.spacing_m);
+        let covered: Vec<usize> = found.batches.iter().cloned().flatten().collect();
+        assert_eq!(covered, (0..400).collect::<Vec<_>>());
+        let kept: Vec<usize> = found.sample.iter().map(|s| s.0).collect();
+        assert!((SAMPLE / 2..=SAMPLE).contains(&kept.len()), "{}", kept.len());
+        assert!(kept.windows(2).all(|k| k[1] - k[0] == kept[1] - kept[0]) && kept[kept.len() - 1] > 380);
+    }
+
+    #[test]
+    fn stones_with_few_points_are_kept_but_not_used() {
+        let mut pairs: Vec<PairPoints> = (0..12).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
+        pairs[4] = pair(4, 0.05, Vector3::zeros());
+        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default()).unwrap();
+        let usable: Vec<bool> = found.stones.iter().map(|s| s.usable).collect();
+        assert_eq!(usable.iter().filter(|u| !**u).count(), 1);
+        assert!(!usable[4] && !found.sample.iter().any(|s| s.0 == 4));
+    }
+
+    #[test]
+    fn one_wrong_centroid_does_not_move_the_first_guess() {
+        let shift = Vector3::new(0.001, 0.02, -0.01);
+        let wrong = Vector3::new(0.0, 0.3, 0.1);
+        let pairs = (0..60).map(|k| pair(k, 0.02, if k == 27 { wrong } else { shift }));
+        let found = survey(&MemoryPairs::new(pairs.collect()), &AdjustmentParams::default()).unwrap();
+        let places: Vec<Place> = found.stones.iter().map(|s| s.place.clone()).collect();
+        let smoothed = found.smoothed_shifts(&Graph::new(&places, 2).unwrap());
+        assert!(
+            smoothed.iter().all(|s| (s - shift).norm() < 1e-12),
+            "{smoothed:?}"
+        );
+    }
+}

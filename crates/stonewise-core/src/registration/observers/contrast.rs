@@ -1,0 +1,303 @@
+//! Differences between the sources of one epoch, from the points of single stones.
+
+use super::observation::Observation;
+use super::sight::{SeenStone, Sight, Source, SourcePoints};
+use crate::cloud::Cloud;
+use crate::geometry::FaceFrame;
+use crate::id::StoneId;
+use crate::registration::adjustment::observation::surface::{
+    Equations, Layout, LocalPair, SurfaceNoise, equations::equations, estimate_noise,
+};
+use crate::registration::adjustment::stone_vector::StoneVector;
+use crate::registration::points::PairPoints;
+use crate::statistics::upper_median;
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Parameters of the comparison of an epoch's sources.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ContrastParams {
+    /// Points that a source needs on a stone.
+    pub min_points: usize,
+    /// Most points of a source on a stone that are used; more cost time and change nothing that matters here.
+    pub max_points: usize,
+    /// Most stones whose sources are compared, evenly chosen; the variances of a wall need no more.
+    pub max_stones: usize,
+    /// Cell of the stones' surface grid in median point spacings of one source.
+    pub cell_spacings: f64,
+    /// Smallest cell, metres: finer than a scanner's footprint shows nothing.
+    pub min_cell_m: f64,
+    /// Longest side of a piece of a face, cells.
+    pub patch_cells: usize,
+    /// Residuals beyond this many sigmas lose weight.
+    pub outlier_sigmas: f64,
+}
+
+impl Default for ContrastParams {
+    fn default() -> Self {
+        Self {
+            min_points: 40,
+            max_points: 4000,
+            max_stones: 400,
+            cell_spacings: 2.0,
+            min_cell_m: 0.003,
+            patch_cells: 24,
+            outlier_sigmas: 3.5,
+        }
+    }
+}
+
+/// Pairs of points whose noise is estimated.
+const NOISE_SAMPLE: usize = 32;
+/// Rounds in which the sources' common differences are found and removed before the stones are compared.
+const ALIGNMENTS: usize = 3;
+/// Standard deviation that stands for "not seen", metres: keeps a flat stone's covariance finite.
+const UNSEEN_M: f64 = 0.1;
+/// Cells in which a face's area is counted, metres.
+const AREA_CELL_M: f64 = 0.02;
+
+/// What the sources of epoch `epoch` show of the stones, relative to the source that shows most of each.
+pub(super) fn contrasts(
+    sources: &[Source],
+    stones: &[SeenStone],
+    epoch: usize,
+    params: &ContrastParams,
+) -> Vec<Observation> {
+    let seen: Vec<Comparison> = stones
+        .iter()
+        .filter_map(|stone| Comparison::new(sources, stone, epoch, params))
+        .collect();
+    if seen.is_empty() {
+        return Vec::new();
+    }
+    let mut spacings: Vec<f64> = seen.iter().map(|c| c.spacing_m).collect();
+    let spacing_m = upper_median(&mut spacings).unwrap_or(0.0);
+    let layout = Layout {
+        cell_m: (params.cell_spacings * spacing_m).max(params.min_cell_m),
+        patch_cells: params.patch_cells,
+        outlier_sigmas: params.outlier_sigmas,
+    };
+    let mut noise = SurfaceNoise {
+        sigma_m: [0.003; 2],
+        tau_m: 0.001,
+    };
+    let mut shifts: BTreeMap<(usize, usize), Vector3<f64>> = BTreeMap::new();
+    for _ in 0..ALIGNMENTS {
+        noise = common_noise(&seen, &shifts, &noise, &layout);
+        shifts = common_shifts(&seen, &shifts, &noise, &layout);
+    }
+    seen.par_iter()
+        .map(|comparison| comparison.observe(&shifts, &noise, &layout))
+        .collect()
+}
+
+/// A stone with the sources of one epoch that show enough of it; the first shows most.
+struct Comparison {
+    sights: Vec<(Sight, u64)>,
+    pairs: Vec<LocalPair>,
+    spacing_m: f64,
+    face_from_world: Matrix3<f64>,
+}
+
+impl Comparison {
+    /// `None` where fewer than two sources show enough.
+    fn new(sources: &[Source], stone: &SeenStone, epoch: usize, params: &ContrastParams) -> Option<Self> {
+        let mut seen: Vec<&SourcePoints> = stone
+            .sights
+            .iter()
+            .filter(|s| sources[s.source].epoch == epoch && s.points.len() >= params.min_points)
+            .collect();
+        seen.sort_by_key(|s| (std::cmp::Reverse(s.points.len()), s.source));
+        let (reference, others) = seen.split_first().filter(|(_, others)| !others.is_empty())?;
+        let frame = FaceFrame::from_normal(&stone.normal).face_from_world();
+        let pair = |other: &&SourcePoints| {
+            let pair = PairPoints {
+                first: StoneId(1),
+                second: StoneId(1),
+                centroid: stone.centroid,
+                centroid_second: stone.centroid,
+                normal: stone.normal,
+                points_first: thinned(&reference.points, params.max_points),
+                points_second: thinned(&other.points, params.max_points),
+                nearby_second: Cloud::new(stone.centroid, Vec::new()),
+                window: None,
+            };
+            LocalPair::new(&pair, &frame)
+        };
+        let sight = |s: &&SourcePoints| {
+            let sight = Sight {
+                source: s.source,
+                time_s: s.time_s,
+                place: stone.centroid,
+            };
+            (sight, s.points.len().min(params.max_points) as u64)
+        };
+        Some(Self {
+            pairs: others.iter().map(pair).collect(),
+            spacing_m: spacing(&thinned(&reference.points, params.max_points), &stone.normal),
+            sights: seen.iter().map(sight).collect(),
+            face_from_world: frame,
+        })
+    }
+
+    fn shift(&self, k: usize, shifts: &BTreeMap<(usize, usize), Vector3<f64>>) -> Vector3<f64> {
+        let (reference, other) = (self.sights[0].0.source, self.sights[k + 1].0.source);
+        shifts.get(&(reference, other)).copied().unwrap_or_default()
+    }
+
+    /// Equations of the displacement of source k + 1 against the first, at `shift` (world).
+    fn equations(
+        &self,
+        k: usize,
+        shift: &Vector3<f64>,
+        noise: &SurfaceNoise,
+        layout: &Layout,
+    ) -> Translation {
+        let x = self.motion(shift);
+        let e = equations(&self.pairs[k], &x, &x, noise, layout);
+        Translation::new(&e, shift, &self.face_from_world)
+    }
+
+    fn motion(&self, shift: &Vector3<f64>) -> StoneVector {
+        StoneVector::from_translation(self.face_from_world * shift)
+    }
+
+    fn observe(
+        &self,
+        shifts: &BTreeMap<(usize, usize), Vector3<f64>>,
+        noise: &SurfaceNoise,
+        layout: &Layout,
+    ) -> Observation {
+        let count = self.pairs.len();
+        let mut values = DVector::zeros(3 * count);
+        let mut covariance = DMatrix::zeros(3 * count, 3 * count);
+        let mut of_reference = Matrix3::zeros();
+        let points = |k: usize| self.sights[k].1 as f64;
+        for k in 0..count {
+            let shift = self.shift(k, shifts);
+            let (value, spread) = self.equations(k, &shift, noise, layout).solved();
+            values.fixed_rows_mut::<3>(3 * k).copy_from(&value);
+            // The noise of a difference is that of both sources, each by its number of points.
+            let share = points(0) / (points(0) + points(k + 1));
+            let mut block = covariance.fixed_view_mut::<3, 3>(3 * k, 3 * k);
+            block += spread * share;
+            of_reference += spread * ((1.0 - share) / count as f64);
+        }
+        for r in 0..count {
+            for c in 0..count {
+                let mut block = covariance.fixed_view_mut::<3, 3>(3 * r, 3 * c);
+                block += of_reference;
+            }
+        }
+        Observation {
+            sights: self.sights.iter().map(|s| s.0).collect(),
+            directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
+            values,
+            covariance,
+            face_from_world: self.face_from_world,
+            weight: 1.0,
+        }
+    }
+}
+
+/// Normal equations of a translation, world frame, about none.
+#[derive(Clone, Copy, Default)]
+struct Translation {
+    information: Matrix3<f64>,
+    vector: Vector3<f64>,
+}
+
+impl Translation {
+    /// A source's rotation within one stone is negligible, and so is the stone's bending.
+    fn new(e: &Equations, at: &Vector3<f64>, face_from_world: &Matrix3<f64>) -> Self {
+        let world = face_from_world.transpose();
+        let information = world * e.information.fixed_view::<3, 3>(0, 0) * face_from_world;
+        Self {
+            information,
+            vector: information * at - world * e.gradient.fixed_rows::<3>(0),
+        }
+    }
+
+    fn solved(&self) -> (Vector3<f64>, Matrix3<f64>) {
+        let held = self.information + Matrix3::identity() / (UNSEEN_M * UNSEEN_M);
+        match held.cholesky() {
+            Some(factor) => (factor.solve(&self.vector), factor.inverse()),
+            None => (Vector3::zeros(), Matrix3::identity() * UNSEEN_M * UNSEEN_M),
+        }
+    }
+}
+
+/// The mean displacement of every source against every reference, each found from all stones together.
+fn common_shifts(
+    seen: &[Comparison],
+    shifts: &BTreeMap<(usize, usize), Vector3<f64>>,
+    noise: &SurfaceNoise,
+    layout: &Layout,
+) -> BTreeMap<(usize, usize), Vector3<f64>> {
+    let found: Vec<Vec<((usize, usize), Translation)>> = seen
+        .par_iter()
+        .map(|c| {
+            let of_pair = |k: usize| {
+                let key = (c.sights[0].0.source, c.sights[k + 1].0.source);
+                (key, c.equations(k, &c.shift(k, shifts), noise, layout))
+            };
+            (0..c.pairs.len()).map(of_pair).collect()
+        })
+        .collect();
+    let mut sums: BTreeMap<(usize, usize), Translation> = BTreeMap::new();
+    for (key, term) in found.into_iter().flatten() {
+        // The same two sources the other way round say the same with the other sign.
+        let (key, sign) = if key.0 < key.1 {
+            (key, 1.0)
+        } else {
+            ((key.1, key.0), -1.0)
+        };
+        let sum = sums.entry(key).or_default();
+        sum.information += term.information;
+        sum.vector += term.vector * sign;
+    }
+    sums.into_iter()
+        .flat_map(|((a, b), sum)| {
+            let shift = sum.solved().0;
+            [((a, b), shift), ((b, a), -shift)]
+        })
+        .collect()
+}
+
+fn common_noise(
+    seen: &[Comparison],
+    shifts: &BTreeMap<(usize, usize), Vector3<f64>>,
+    start: &SurfaceNoise,
+    layout: &Layout,
+) -> SurfaceNoise {
+    let stride = seen.len().div_ceil(NOISE_SAMPLE).max(1);
+    let sample: Vec<(&LocalPair, StoneVector)> = seen
+        .iter()
+        .step_by(stride)
+        .map(|c| (&c.pairs[0], c.motion(&c.shift(0, shifts))))
+        .collect();
+    estimate_noise(&sample, start, layout)
+}
+
+/// Every so many points, so that no more than `most` remain.
+fn thinned(cloud: &Cloud, most: usize) -> Cloud {
+    let step = cloud.len().div_ceil(most.max(1)).max(1);
+    Cloud::new(
+        cloud.origin(),
+        cloud.offsets().iter().copied().step_by(step).collect(),
+    )
+}
+
+/// Mean distance of neighbouring points, seen along the normal.
+fn spacing(cloud: &Cloud, normal: &Vector3<f64>) -> f64 {
+    let frame = FaceFrame::from_normal(normal);
+    let cell = |p: Point3<f64>| {
+        let at = |axis: &Vector3<f64>| (p.coords.dot(axis) / AREA_CELL_M).floor() as i64;
+        (at(&frame.along), at(&frame.up))
+    };
+    let cells: BTreeSet<(i64, i64)> = (0..cloud.len()).map(|i| cell(cloud.local(i))).collect();
+    AREA_CELL_M * (cells.len() as f64 / cloud.len().max(1) as f64).sqrt()
+}

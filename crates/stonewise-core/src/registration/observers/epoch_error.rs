@@ -1,0 +1,464 @@
+//! The error of a later epoch against the reference, at every stone.
+
+use super::component_estimate::estimate;
+use super::components::{ObserverComponents, SensorClass};
+use super::contrast::{ContrastParams, contrasts};
+use super::model::{Prior, Problem, Row, Solution, Unknowns};
+use super::observation::Observation;
+use super::sight::{SeenStone, Sight, Source};
+use super::stable::{StableParams, StablePoints, stable_observations};
+use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::BTreeMap;
+
+/// Parameters of [`epoch_errors`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EpochErrorParams {
+    /// Comparison of the sources of an epoch.
+    pub contrasts: ContrastParams,
+    /// Planes in stable areas.
+    pub stable: StableParams,
+    /// Error that all sources of an epoch share, 1 sigma per axis, metres; absent: by the class of the sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared_error_m: Option<f64>,
+}
+
+/// Where the knowledge of the epochs' common frame comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Datum {
+    /// Areas that did not move.
+    Stable,
+    /// Differences between the sources of each epoch.
+    Sources,
+    /// Nothing shows it.
+    Unknown,
+}
+
+/// Error of the later epoch minus that of the reference at a place, world, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorAt {
+    /// Its expectation; a measured displacement less this is the motion.
+    pub mean: Vector3<f64>,
+    /// Its covariance, m^2, scaled so that 1.96 standard deviations hold 95 %.
+    pub covariance: Matrix3<f64>,
+}
+
+/// What was found about a source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SourceError {
+    /// Name of the source.
+    pub name: String,
+    /// 0 for the reference epoch, 1 for the later one.
+    pub epoch: usize,
+    /// Error in the middle of what it sees against the mean of its epoch's sources, world, metres.
+    pub against_epoch: Vector3<f64>,
+    /// Standard deviation of that per axis, metres.
+    pub sd: Vector3<f64>,
+}
+
+/// The rigid motion that lies closest to the later epoch's error at the stones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RigidError {
+    /// Middle of the stones, world, metres.
+    pub centre: Point3<f64>,
+    /// Shift of the centre and rotation vector about it, m, rad.
+    pub error: Vector6<f64>,
+    /// Covariance of that, m^2, m rad, rad^2.
+    pub covariance: Matrix6<f64>,
+}
+
+/// Result of [`epoch_errors`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpochErrors {
+    /// What the error was found from.
+    pub datum: Datum,
+    /// Class of the sensor.
+    pub class: SensorClass,
+    /// Error that all sources of an epoch are assumed to share, per axis, metres.
+    pub shared_error_m: f64,
+    /// Variances of the sources' errors; `None` where no epoch has sources to compare.
+    pub components: Option<ObserverComponents>,
+    /// Twice the log likelihood that errors of the sources gain over none.
+    pub significance: f64,
+    /// Comparisons of sources per epoch, and cells of stable areas.
+    pub observations: [usize; 3],
+    /// Per source, in their order.
+    pub sources: Vec<SourceError>,
+    /// The rigid part of the error over all stones.
+    pub rigid: RigidError,
+    /// Error at each stone, in their order.
+    pub at: Vec<ErrorAt>,
+}
+
+/// What is measured and stated about two epochs.
+pub struct EpochPair<'a> {
+    /// Sources of both epochs.
+    pub sources: &'a [Source],
+    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the other half.
+    pub same_as: &'a [usize],
+    /// The stones.
+    pub stones: &'a [SeenStone],
+    /// Points in stable areas.
+    pub stable: &'a [StablePoints],
+    /// Noise of single points along the normal, metres.
+    pub sigma_m: f64,
+}
+
+/// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one degree of freedom,
+/// half of whose weight is at zero (Self & Liang 1987).
+const SIGNIFICANT: f64 = 2.71;
+/// An observation whose squared residual per difference exceeds this loses weight.
+const MISFIT: f64 = 9.0;
+/// Factors on the sources' errors over which their uncertainty is averaged, logarithms.
+const FACTORS: [f64; 9] = [-1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2];
+/// Most stones by which the rigid part of the error is found.
+const RIGID_STONES: usize = 500;
+/// Prior of a source's error where nothing but stable areas shows it, metres.
+const OPEN_M: f64 = 0.03;
+
+/// The error of the later epoch against the reference at every stone.
+///
+/// Cost: three evaluations of the compared stones' points; then dense algebra over the unknowns of the sources.
+pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
+    let class = SensorClass::of_noise(pair.sigma_m);
+    let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());
+    let is_one_survey = pair.same_as.iter().enumerate().any(|(s, &same)| s != same);
+    let whole_m = if is_one_survey {
+        0.0
+    } else {
+        2f64.sqrt() * shared_error_m
+    };
+    let mut within: [Vec<Observation>; 2] =
+        [0, 1].map(|e| contrasts(pair.sources, pair.stones, e, &params.contrasts));
+    let mut stable: Vec<Observation> = stable_observations(pair.stable, pair.sigma_m, &params.stable)
+        .into_iter()
+        .map(|(_, o)| o)
+        .collect();
+    let unknowns = Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &stable));
+    let (components, significance) = estimated(&unknowns, &mut within, class);
+    let counts = [within[0].len(), within[1].len(), stable.len()];
+    let overlaps = within.iter().all(|w| !w.is_empty());
+    let datum = if stable.len() >= params.stable.min_cells {
+        Datum::Stable
+    } else if overlaps && significance > SIGNIFICANT {
+        Datum::Sources
+    } else {
+        Datum::Unknown
+    };
+    if datum != Datum::Stable {
+        stable.clear();
+    }
+    let assumed = match overlaps && significance > SIGNIFICANT {
+        true => components,
+        false => opened(components),
+    };
+    let mut all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
+    let found = Averaged::new(&unknowns, &all, &assumed, whole_m, class);
+    // Planes that do not fit the rest moved, or are none.
+    let weights = found.weights(&unknowns, &all, &assumed);
+    let reweighted: Vec<Observation> = all
+        .iter()
+        .zip(&weights)
+        .map(|(o, w)| Observation {
+            weight: *w,
+            ..(*o).clone()
+        })
+        .collect();
+    all = reweighted.iter().collect();
+    let found = Averaged::new(&unknowns, &all, &assumed, whole_m, class);
+    EpochErrors {
+        datum,
+        class,
+        shared_error_m,
+        components: overlaps.then_some(components),
+        significance,
+        observations: counts,
+        sources: found.sources(pair, &unknowns),
+        rigid: found.rigid(pair, &unknowns),
+        at: found.at_stones(pair, &unknowns),
+    }
+}
+
+/// All sights, by which the blocks of the unknowns are laid out.
+fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
+    let of_stone = |stone: &super::sight::SeenStone| {
+        let centroid = stone.centroid;
+        stone
+            .sights
+            .iter()
+            .map(|s| Sight {
+                source: s.source,
+                time_s: s.time_s,
+                place: centroid,
+            })
+            .collect::<Vec<_>>()
+    };
+    let stones = pair.stones.iter().flat_map(of_stone);
+    stones
+        .chain(stable.iter().flat_map(|o| o.sights.clone()))
+        .collect()
+}
+
+/// The components, and twice what they gain in log likelihood over sources without errors; disturbed stones lose weight on the way.
+fn estimated(
+    unknowns: &Unknowns,
+    within: &mut [Vec<Observation>; 2],
+    class: SensorClass,
+) -> (ObserverComponents, f64) {
+    let expected = ObserverComponents::expected(class);
+    if within.iter().all(Vec::is_empty) {
+        return (expected, 0.0);
+    }
+    let mut components = expected;
+    for round in 0..2 {
+        let all: Vec<&Observation> = within.iter().flatten().collect();
+        let problem = Problem::new(unknowns, &all);
+        components = estimate(&problem, class);
+        let prior = Prior::new(&components, 0.0);
+        if round == 0
+            && let Some(solution) = problem.solve(&prior, &components)
+        {
+            let weights: Vec<f64> = problem
+                .misfits(&solution.mean, &components)
+                .iter()
+                .map(|m| weight(*m))
+                .collect();
+            within
+                .iter_mut()
+                .flatten()
+                .zip(weights)
+                .for_each(|(o, w)| o.weight = w);
+        }
+    }
+    let all: Vec<&Observation> = within.iter().flatten().collect();
+    let problem = Problem::new(unknowns, &all);
+    let deviance = |c: &ObserverComponents| problem.deviance(&Prior::new(c, 0.0), c);
+    let gain = deviance(&components.scaled(1e-3))
+        .zip(deviance(&components))
+        .map_or(0.0, |(without, with)| without - with);
+    (components, gain)
+}
+
+/// Share of its weight that an observation keeps.
+fn weight(misfit: f64) -> f64 {
+    if misfit > MISFIT { MISFIT / misfit } else { 1.0 }
+}
+
+/// Components of sources whose errors only stable areas show.
+fn opened(components: ObserverComponents) -> ObserverComponents {
+    ObserverComponents {
+        translation_m: OPEN_M,
+        rotation_m: OPEN_M,
+        ..components
+    }
+}
+
+/// Solutions for several sizes of the sources' errors, with their posterior weights.
+struct Averaged {
+    solutions: Vec<(f64, Solution)>,
+}
+
+impl Averaged {
+    fn new(
+        unknowns: &Unknowns,
+        observations: &[&Observation],
+        components: &ObserverComponents,
+        whole_m: f64,
+        class: SensorClass,
+    ) -> Self {
+        let problem = Problem::new(unknowns, observations);
+        let solved: Vec<(f64, Solution)> = FACTORS
+            .par_iter()
+            .filter_map(|log| {
+                let scaled = components.scaled(log.exp());
+                let solution = problem.solve(&Prior::new(&scaled, whole_m), &scaled)?;
+                Some((solution.deviance + scaled.penalty(class), solution))
+            })
+            .collect();
+        let best = solved.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
+        let weights: Vec<f64> = solved.iter().map(|s| (-0.5 * (s.0 - best)).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        let solutions = solved.into_iter().zip(weights);
+        Self {
+            solutions: solutions.map(|((_, s), w)| (w / sum, s)).collect(),
+        }
+    }
+
+    fn weights(
+        &self,
+        unknowns: &Unknowns,
+        observations: &[&Observation],
+        components: &ObserverComponents,
+    ) -> Vec<f64> {
+        let problem = Problem::new(unknowns, observations);
+        let best = self.solutions.iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        match best {
+            Some((_, solution)) => problem
+                .misfits(&solution.mean, components)
+                .into_iter()
+                .map(weight)
+                .collect(),
+            None => vec![1.0; observations.len()],
+        }
+    }
+
+    /// A linear function of the unknowns: mean, and covariance that holds 95 % within 1.96 standard deviations.
+    fn function(&self, row: &Row) -> ErrorAt {
+        let parts: Vec<(f64, Vector3<f64>, Matrix3<f64>)> = self
+            .solutions
+            .iter()
+            .map(|(w, s)| {
+                let (mean, covariance) = applied(row, s);
+                (*w, mean, covariance)
+            })
+            .collect();
+        let mean: Vector3<f64> = parts.iter().map(|(w, m, _)| m * *w).sum();
+        let covariance: Matrix3<f64> = parts
+            .iter()
+            .map(|(w, m, c)| (c + (m - mean) * (m - mean).transpose()) * *w)
+            .sum();
+        let variances: Vec<(f64, f64)> = parts.iter().map(|(w, _, c)| (*w, c.trace() / 3.0)).collect();
+        ErrorAt {
+            mean,
+            covariance: covariance * tail_factor(&variances),
+        }
+    }
+
+    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<ErrorAt> {
+        pair.stones
+            .par_iter()
+            .map(|stone| self.function(&difference_row(stone, pair.sources, unknowns)))
+            .collect()
+    }
+
+    /// The rigid motion closest to the error at the stones, which is linear in the unknowns.
+    fn rigid(&self, pair: &EpochPair, unknowns: &Unknowns) -> RigidError {
+        let stride = pair.stones.len().div_ceil(RIGID_STONES).max(1);
+        let stones: Vec<&SeenStone> = pair.stones.iter().step_by(stride).collect();
+        let count = stones.len().max(1) as f64;
+        let centre = Point3::from(stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / count);
+        let lever = |stone: &SeenStone| {
+            let mut j = SMatrix::<f64, 3, 6>::zeros();
+            j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
+            let turn = -(stone.centroid - centre).cross_matrix();
+            j.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
+            j
+        };
+        let mut normal = Matrix6::identity() * 1e-9;
+        let mut parts: BTreeMap<usize, SMatrix<f64, 6, 3>> = BTreeMap::new();
+        for stone in &stones {
+            let j = lever(stone).transpose();
+            normal += j * j.transpose();
+            for (first, coefficients) in difference_row(stone, pair.sources, unknowns) {
+                *parts.entry(first).or_default() += j * coefficients;
+            }
+        }
+        let inverse = normal.try_inverse().unwrap_or_else(Matrix6::zeros);
+        let mut error = Vector6::zeros();
+        let mut covariance = Matrix6::zeros();
+        for (w, solution) in &self.solutions {
+            for (a, of_a) in &parts {
+                error += inverse * of_a * solution.mean.fixed_rows::<3>(*a) * *w;
+                for (b, of_b) in &parts {
+                    let block = solution.covariance.fixed_view::<3, 3>(*a, *b);
+                    covariance += inverse * of_a * block * of_b.transpose() * inverse * *w;
+                }
+            }
+        }
+        RigidError {
+            centre,
+            error,
+            covariance: 0.5 * (covariance + covariance.transpose()),
+        }
+    }
+
+    fn sources(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<SourceError> {
+        let of_epoch = |e: usize| -> Vec<usize> {
+            (0..pair.sources.len())
+                .filter(|&s| pair.sources[s].epoch == e)
+                .collect()
+        };
+        let describe = |(s, source): (usize, &Source)| {
+            let all = of_epoch(source.epoch);
+            let share = 1.0 / all.len() as f64;
+            let mut row: Row = all
+                .iter()
+                .map(|&o| (unknowns.translation(o), Matrix3::identity() * -share))
+                .collect();
+            row.push((unknowns.translation(s), Matrix3::identity()));
+            let found = self.function(&row);
+            SourceError {
+                name: source.name.clone(),
+                epoch: source.epoch,
+                against_epoch: found.mean,
+                sd: found.covariance.diagonal().map(|v| v.max(0.0).sqrt()),
+            }
+        };
+        pair.sources.iter().enumerate().map(describe).collect()
+    }
+}
+
+/// The later epoch's error less that of the reference at a stone: each source counts by its share of the stone's points.
+fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &Unknowns) -> Row {
+    let total = [0, 1].map(|e| {
+        let own = stone.sights.iter().filter(|s| sources[s.source].epoch == e);
+        own.map(|s| s.count as f64).sum::<f64>().max(1.0)
+    });
+    let mut row = Row::new();
+    for s in &stone.sights {
+        let epoch = sources[s.source].epoch;
+        let share = [-1.0, 1.0][epoch] * s.count as f64 / total[epoch];
+        let sight = Sight {
+            source: s.source,
+            time_s: s.time_s,
+            place: stone.centroid,
+        };
+        row.extend(unknowns.row(&sight).into_iter().map(|(k, m)| (k, m * share)));
+    }
+    row
+}
+
+fn applied(row: &Row, solution: &Solution) -> (Vector3<f64>, Matrix3<f64>) {
+    let mut mean = Vector3::zeros();
+    let mut covariance = Matrix3::zeros();
+    for (a, of_a) in row {
+        mean += of_a * solution.mean.fixed_rows::<3>(*a);
+        for (b, of_b) in row {
+            covariance += of_a * solution.covariance.fixed_view::<3, 3>(*a, *b) * of_b.transpose();
+        }
+    }
+    (mean, 0.5 * (covariance + covariance.transpose()))
+}
+
+/// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96 standard deviations hold 95 %.
+fn tail_factor(parts: &[(f64, f64)]) -> f64 {
+    let mean: f64 = parts.iter().map(|(w, v)| w * v).sum();
+    let Ok(law) = Normal::new(0.0, 1.0) else {
+        return 1.0;
+    };
+    if !(mean.is_finite() && mean > 0.0) {
+        return 1.0;
+    }
+    let beyond = |limit: f64| -> f64 {
+        parts
+            .iter()
+            .filter(|(_, v)| *v > 0.0)
+            .map(|(w, v)| w * 2.0 * law.cdf(-limit / v.sqrt()))
+            .sum()
+    };
+    let (mut low, mut high) = (0.0, 20.0 * mean.sqrt());
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if beyond(middle) > 0.05 {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let quantile = -law.inverse_cdf(0.025);
+    (high / quantile).powi(2) / mean
+}

@@ -1,0 +1,331 @@
+//! The unknown errors of the sources, and their prior.
+
+use super::components::ObserverComponents;
+use super::observation::Observation;
+use super::sight::{Sight, Source};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
+
+/// Sights for each knot of a source's drift, and the least and most knots.
+const SIGHTS_PER_KNOT: usize = 8;
+const KNOTS: [usize; 2] = [4, 32];
+/// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix invertible.
+const KNOT_NUGGET: f64 = 1e-6;
+
+/// Where the unknowns of a source stand, and how its sights depend on them.
+///
+/// Per source: translation (3), rotation about the middle of its sights (3, in metres at `radius_m` from it), and its drift at each
+/// knot (3 each).
+#[derive(Clone, Debug)]
+struct Block {
+    first: usize,
+    middle: Point3<f64>,
+    radius_m: f64,
+    /// Direction along which places are ordered where times cannot order them.
+    along: Option<Vector3<f64>>,
+    knots: Vec<f64>,
+}
+
+/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3).
+#[derive(Clone, Debug)]
+pub(super) struct Unknowns {
+    /// Block of each source; sources of one survey share theirs.
+    blocks: Vec<Block>,
+    of_source: Vec<usize>,
+    epochs: Vec<usize>,
+    whole: usize,
+}
+
+/// Standard deviations of the prior, metres.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    pub translation_m: f64,
+    pub rotation_m: f64,
+    pub drift_m: f64,
+    pub drift_length: f64,
+    /// Of the later epoch against the reference, as a whole; 0: none.
+    pub whole_m: f64,
+}
+
+impl Prior {
+    pub fn new(components: &ObserverComponents, whole_m: f64) -> Self {
+        Self {
+            translation_m: components.translation_m,
+            rotation_m: components.rotation_m,
+            drift_m: components.drift_m,
+            drift_length: components.drift_length,
+            whole_m,
+        }
+    }
+}
+
+/// A row of the design: coefficients of a world displacement, block by block of three unknowns.
+pub(super) type Row = Vec<(usize, Matrix3<f64>)>;
+
+impl Unknowns {
+    /// `same_as[s]`: the source whose error source s shares, itself where it has its own.
+    pub fn new(sources: &[Source], same_as: &[usize], sights: &[Sight]) -> Self {
+        let mut blocks = Vec::new();
+        let mut of_source = vec![0; sources.len()];
+        let mut first = 0;
+        for s in 0..sources.len() {
+            if same_as[s] != s {
+                of_source[s] = of_source[same_as[s]];
+                continue;
+            }
+            let own: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
+            let block = Block::new(first, &own, sources[s].has_times);
+            first += 6 + 3 * block.knots.len();
+            of_source[s] = blocks.len();
+            blocks.push(block);
+        }
+        Self {
+            blocks,
+            of_source,
+            epochs: sources.iter().map(|s| s.epoch).collect(),
+            whole: first,
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.whole + 3
+    }
+
+    /// First unknown of a source's translation.
+    pub fn translation(&self, source: usize) -> usize {
+        self.blocks[self.of_source[source]].first
+    }
+
+    /// How a sight's error depends on the unknowns.
+    pub fn row(&self, sight: &Sight) -> Row {
+        let block = &self.blocks[self.of_source[sight.source]];
+        let arm = (sight.place - block.middle) / block.radius_m;
+        let mut row = vec![
+            (block.first, Matrix3::identity()),
+            (block.first + 3, -arm.cross_matrix()),
+        ];
+        for (k, weight) in block.between(block.order(sight)) {
+            row.push((block.first + 6 + 3 * k, Matrix3::identity() * weight));
+        }
+        if self.epochs[sight.source] == 1 {
+            row.push((self.whole, Matrix3::identity()));
+        }
+        row
+    }
+
+    /// Rows of an observation's differences, dense over the unknowns that it touches: indices and matrix.
+    pub fn design(&self, observation: &Observation) -> (Vec<usize>, DMatrix<f64>) {
+        let rows: Vec<Row> = observation.sights.iter().map(|s| self.row(s)).collect();
+        let mut firsts: Vec<usize> = rows.iter().flatten().map(|r| r.0).collect();
+        firsts.sort_unstable();
+        firsts.dedup();
+        let m = observation.directions.len();
+        let mut matrix = DMatrix::zeros(m * (rows.len() - 1), 3 * firsts.len());
+        for (k, row) in rows.iter().enumerate().skip(1) {
+            for (part, sign) in [(row, 1.0), (&rows[0], -1.0)] {
+                for (first, coefficients) in part {
+                    let Ok(at) = firsts.binary_search(first) else {
+                        continue;
+                    };
+                    for (d, direction) in observation.directions.iter().enumerate() {
+                        let mut target = matrix.view_mut(((k - 1) * m + d, 3 * at), (1, 3));
+                        target += direction.transpose() * coefficients * sign;
+                    }
+                }
+            }
+        }
+        let indices = firsts.iter().flat_map(|f| [*f, f + 1, f + 2]).collect();
+        (indices, matrix)
+    }
+
+    /// Information of the prior, and the logarithm of its determinant.
+    pub fn prior(&self, prior: &Prior) -> (DMatrix<f64>, f64) {
+        let mut matrix = DMatrix::zeros(self.count(), self.count());
+        let mut log_det = 0.0;
+        let mut diagonal = |matrix: &mut DMatrix<f64>, first: usize, sd: f64| {
+            for k in first..first + 3 {
+                matrix[(k, k)] = 1.0 / (sd * sd);
+            }
+            log_det -= 6.0 * sd.ln();
+        };
+        for block in &self.blocks {
+            diagonal(&mut matrix, block.first, prior.translation_m);
+            diagonal(&mut matrix, block.first + 3, prior.rotation_m);
+        }
+        diagonal(&mut matrix, self.whole, prior.whole_m.max(1e-7));
+        for block in &self.blocks {
+            let (inverse, knots_log_det) = knot_information(&block.knots, prior);
+            log_det += 3.0 * knots_log_det;
+            for ((r, c), value) in (0..block.knots.len())
+                .flat_map(|r| (0..block.knots.len()).map(move |c| (r, c)))
+                .map(|at| (at, inverse[at]))
+            {
+                for axis in 0..3 {
+                    let at = block.first + 6 + axis;
+                    matrix[(at + 3 * r, at + 3 * c)] = value;
+                }
+            }
+        }
+        (matrix, log_det)
+    }
+}
+
+impl Block {
+    fn new(first: usize, sights: &[&Sight], has_times: bool) -> Self {
+        let count = sights.len().max(1) as f64;
+        let middle = Point3::from(sights.iter().map(|s| s.place.coords).sum::<Vector3<f64>>() / count);
+        let squares: f64 = sights.iter().map(|s| (s.place - middle).norm_squared()).sum();
+        let mut block = Self {
+            first,
+            middle,
+            radius_m: (squares / count).sqrt().max(0.1),
+            along: (!has_times).then(|| principal_axis(sights, &middle)),
+            knots: Vec::new(),
+        };
+        let mut order: Vec<f64> = sights.iter().map(|s| block.order(s)).collect();
+        order.sort_by(f64::total_cmp);
+        let (low, high) = (order.first().copied(), order.last().copied());
+        let (low, high) = (low.unwrap_or(0.0), high.unwrap_or(1.0));
+        let knots = (sights.len() / SIGHTS_PER_KNOT).clamp(KNOTS[0], KNOTS[1]);
+        let step = ((high - low) / (knots - 1) as f64).max(1e-6);
+        block.knots = (0..knots).map(|k| low + step * k as f64).collect();
+        block
+    }
+
+    /// What orders a source's errors: its time, or the place along it.
+    fn order(&self, sight: &Sight) -> f64 {
+        match &self.along {
+            Some(axis) => (sight.place - self.middle).dot(axis),
+            None => sight.time_s,
+        }
+    }
+
+    /// The two knots around `t` with their weights.
+    fn between(&self, t: f64) -> [(usize, f64); 2] {
+        let last = self.knots.len() - 1;
+        let step = self.knots[1] - self.knots[0];
+        let at = ((t - self.knots[0]) / step).clamp(0.0, last as f64);
+        let k = (at.floor() as usize).min(last - 1);
+        let share = at - k as f64;
+        [(k, 1.0 - share), (k + 1, share)]
+    }
+}
+
+/// Information of a drift at its knots and the logarithm of its determinant, for one axis; length in units of the source's duration.
+fn knot_information(knots: &[f64], prior: &Prior) -> (DMatrix<f64>, f64) {
+    let n = knots.len();
+    let duration = knots[n - 1] - knots[0];
+    let length = prior.drift_length * duration;
+    let variance = prior.drift_m * prior.drift_m;
+    let covariance = DMatrix::from_fn(n, n, |r, c| {
+        let scaled = 3f64.sqrt() * (knots[r] - knots[c]).abs() / length;
+        let nugget = if r == c { KNOT_NUGGET } else { 0.0 };
+        variance * ((1.0 + scaled) * (-scaled).exp() + nugget)
+    });
+    match Cholesky::<f64, Dyn>::new(covariance) {
+        Some(factor) => {
+            let log_det = -2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+            (factor.inverse(), log_det)
+        }
+        // Numbers this far apart: independent knots.
+        None => (DMatrix::identity(n, n) / variance, -(n as f64) * variance.ln()),
+    }
+}
+
+/// Direction in which places spread most.
+fn principal_axis(sights: &[&Sight], middle: &Point3<f64>) -> Vector3<f64> {
+    let mut spread = Matrix3::zeros();
+    for sight in sights {
+        let d = sight.place - middle;
+        spread += d * d.transpose();
+    }
+    let eigen = spread.symmetric_eigen();
+    eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned()
+}
+
+/// Normal equations of all observations about given variances.
+pub(super) struct Solution {
+    pub mean: DVector<f64>,
+    /// Covariance of the unknowns.
+    pub covariance: DMatrix<f64>,
+    /// Minus twice the log marginal likelihood, up to a constant.
+    pub deviance: f64,
+}
+
+/// Observations with the unknowns that they touch.
+pub(super) struct Problem<'a> {
+    pub unknowns: &'a Unknowns,
+    designs: Vec<(&'a Observation, Vec<usize>, DMatrix<f64>)>,
+}
+
+impl<'a> Problem<'a> {
+    pub fn new(unknowns: &'a Unknowns, observations: &[&'a Observation]) -> Self {
+        let designs = observations.iter().map(|o| {
+            let (indices, matrix) = unknowns.design(o);
+            (*o, indices, matrix)
+        });
+        Self {
+            unknowns,
+            designs: designs.collect(),
+        }
+    }
+
+    /// Normal equations: information and vector with the prior's, and the deviance of what does not depend on the unknowns.
+    fn normal(
+        &self,
+        prior: &Prior,
+        components: &ObserverComponents,
+    ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>, f64)> {
+        let (mut information, prior_log_det) = self.unknowns.prior(prior);
+        let mut vector = DVector::zeros(self.unknowns.count());
+        let mut deviance = -prior_log_det;
+        for (observation, indices, design) in &self.designs {
+            let covariance = observation.covariance(components.noise_scale, components.nugget_m);
+            let factor = Cholesky::new(covariance)?;
+            let scaled = factor.solve(design);
+            let of_values = factor.solve(&observation.values);
+            deviance +=
+                2.0 * factor.l_dirty().diagonal().map(f64::ln).sum() + observation.values.dot(&of_values);
+            let block = design.transpose() * scaled;
+            let part = design.transpose() * of_values;
+            for (r, &row) in indices.iter().enumerate() {
+                vector[row] += part[r];
+                for (c, &column) in indices.iter().enumerate() {
+                    information[(row, column)] += block[(r, c)];
+                }
+            }
+        }
+        Some((Cholesky::new(information)?, vector, deviance))
+    }
+
+    /// Minus twice the log marginal likelihood, up to a constant; `None` where the numbers fail.
+    pub fn deviance(&self, prior: &Prior, components: &ObserverComponents) -> Option<f64> {
+        let (factor, vector, deviance) = self.normal(prior, components)?;
+        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        Some(deviance + log_det - vector.dot(&factor.solve(&vector)))
+    }
+
+    /// The unknowns; `None` where the numbers fail.
+    pub fn solve(&self, prior: &Prior, components: &ObserverComponents) -> Option<Solution> {
+        let (factor, vector, deviance) = self.normal(prior, components)?;
+        let mean = factor.solve(&vector);
+        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        Some(Solution {
+            deviance: deviance + log_det - vector.dot(&mean),
+            mean,
+            covariance: factor.inverse(),
+        })
+    }
+
+    /// Squared standardised residual of each observation per difference, at `mean`.
+    pub fn misfits(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+        let misfit = |(observation, indices, design): &(&Observation, Vec<usize>, DMatrix<f64>)| {
+            let part = DVector::from_iterator(indices.len(), indices.iter().map(|&i| mean[i]));
+            let residual = &observation.values - design * part;
+            let covariance =
+                observation.covariance(components.noise_scale, components.nugget_m) * observation.weight;
+            Cholesky::new(covariance).map_or(0.0, |f| residual.dot(&f.solve(&residual)))
+                / observation.len().max(1) as f64
+        };
+        self.designs.iter().map(misfit).collect()
+    }
+}

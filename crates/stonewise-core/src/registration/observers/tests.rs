@@ -1,0 +1,271 @@
+//! The observers' errors, against surveys drawn from their model and against closed forms.
+
+use super::component_estimate::estimate;
+use super::components::{ObserverComponents, SensorClass};
+use super::epoch_error::{Datum, EpochErrorParams, EpochPair, epoch_errors};
+use super::model::{Prior, Problem, Unknowns};
+use super::observation::Observation;
+use super::sight::{SeenStone, Sight, Source, SourcePoints};
+use super::stable::{StableParams, StablePoints, stable_observations};
+use crate::cloud::Cloud;
+use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0
+}
+
+fn sources(count: usize) -> Vec<Source> {
+    (0..2 * count)
+        .map(|s| Source {
+            name: format!("{s}"),
+            epoch: s / count,
+            has_times: true,
+        })
+        .collect()
+}
+
+fn sight(source: usize, place: Point3<f64>) -> Sight {
+    Sight {
+        source,
+        time_s: 10.0 * source as f64 + place.y,
+        place,
+    }
+}
+
+/// Differences of `count` sources on 60 places, each source shifted by `errors`, seen with noise `sd_m`.
+fn observations(epoch: usize, errors: &[Vector3<f64>], sd_m: f64, seed: u64) -> Vec<Observation> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let count = errors.len() / 2;
+    let of_epoch: Vec<usize> = (0..errors.len()).filter(|s| s / count == epoch).collect();
+    (0..60)
+        .map(|k| {
+            let place = Point3::new(0.0, 0.3 * f64::from(k % 12), 0.25 * f64::from(k / 12));
+            let seen: Vec<Vector3<f64>> = of_epoch
+                .iter()
+                .map(|&s| errors[s] + Vector3::from_fn(|_, _| sd_m * normal(&mut rng)))
+                .collect();
+            let others = of_epoch.len() - 1;
+            let values = DVector::from_fn(3 * others, |r, _| seen[1 + r / 3][r % 3] - seen[0][r % 3]);
+            let covariance = DMatrix::from_fn(3 * others, 3 * others, |r, c| {
+                let shared = if r % 3 == c % 3 { 1.0 } else { 0.0 };
+                sd_m * sd_m * (shared + if r == c { 1.0 } else { 0.0 })
+            });
+            Observation {
+                sights: of_epoch.iter().map(|&s| sight(s, place)).collect(),
+                directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
+                values,
+                covariance,
+                face_from_world: Matrix3::identity(),
+                weight: 1.0,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_size_of_the_sources_errors_is_found_within_its_sampling_range() {
+    // Ten sources in each epoch: 54 independent numbers, so that their scatter is known to 10 %.
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let count = 10;
+    let errors: Vec<Vector3<f64>> = (0..2 * count)
+        .map(|_| Vector3::from_fn(|_, _| 0.003 * normal(&mut rng)))
+        .collect();
+    let list: Vec<Observation> = (0..2)
+        .flat_map(|e| observations(e, &errors, 0.002, 7 + e as u64))
+        .collect();
+    let all: Vec<&Observation> = list.iter().collect();
+    let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
+    let same: Vec<usize> = (0..2 * count).collect();
+    let unknowns = Unknowns::new(&sources(count), &same, &sights);
+    let found = estimate(&Problem::new(&unknowns, &all), SensorClass::Airborne);
+    assert!((0.0022..0.0042).contains(&found.translation_m), "{found:?}");
+    assert!(found.drift_m < 0.001 && found.noise_scale < 1.5, "{found:?}");
+}
+
+#[test]
+fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
+    let errors = [
+        Vector3::new(0.001, 0.0, 0.002),
+        Vector3::zeros(),
+        Vector3::zeros(),
+        Vector3::zeros(),
+    ];
+    let list = observations(0, &errors, 0.001, 3);
+    let list: Vec<Observation> = list.into_iter().step_by(9).collect();
+    let all: Vec<&Observation> = list.iter().collect();
+    let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
+    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights);
+    let problem = Problem::new(&unknowns, &all);
+    let dense = |c: &ObserverComponents| {
+        let prior = Prior::new(c, 1e-3);
+        let covariance_of_unknowns = unknowns.prior(&prior).0.try_inverse().unwrap();
+        let rows: usize = all.iter().map(|o| o.len()).sum();
+        let mut design = DMatrix::zeros(rows, unknowns.count());
+        let mut values = DVector::zeros(rows);
+        let mut noise = DMatrix::zeros(rows, rows);
+        let mut at = 0;
+        for o in &all {
+            let (indices, matrix) = unknowns.design(o);
+            for (k, &i) in indices.iter().enumerate() {
+                design
+                    .view_mut((at, i), (o.len(), 1))
+                    .copy_from(&matrix.column(k));
+            }
+            values.rows_mut(at, o.len()).copy_from(&o.values);
+            let own = o.covariance(c.noise_scale, c.nugget_m);
+            noise.view_mut((at, at), (o.len(), o.len())).copy_from(&own);
+            at += o.len();
+        }
+        let total = &design * covariance_of_unknowns * design.transpose() + noise;
+        let log_det: f64 = total.clone().symmetric_eigenvalues().iter().map(|v| v.ln()).sum();
+        log_det + values.dot(&(total.try_inverse().unwrap() * &values))
+    };
+    let a = ObserverComponents::expected(SensorClass::Airborne);
+    let b = a.scaled(0.5);
+    let fast = |c: &ObserverComponents| problem.deviance(&Prior::new(c, 1e-3), c).unwrap();
+    let (expected, found) = (dense(&a) - dense(&b), fast(&a) - fast(&b));
+    assert!(
+        (expected - found).abs() < 1e-4 * expected.abs().max(1.0),
+        "{expected} {found}"
+    );
+}
+
+/// A plane z = 0 with a wall y = 2, each source shifted as a whole.
+fn stable_points(errors: &[Vector3<f64>], noise_m: f64) -> Vec<StablePoints> {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut part = |source: usize| {
+        let points: Vec<Point3<f64>> = (0..9000)
+            .map(|k| {
+                let (a, b) = (rng.random_range(0.0..2.0), rng.random_range(0.0..2.0));
+                let off = noise_m * normal(&mut rng);
+                let p = match k % 3 {
+                    0 => Point3::new(a, b, off),
+                    1 => Point3::new(a, 2.0 + off, b),
+                    _ => Point3::new(2.0 + off, a, b),
+                };
+                p + errors[source]
+            })
+            .collect();
+        StablePoints {
+            area: 0,
+            source,
+            points: Cloud::from_world(Point3::new(1.0, 1.0, 1.0), points),
+            times_s: vec![10.0 * source as f64; 9000],
+        }
+    };
+    (0..errors.len()).map(&mut part).collect()
+}
+
+#[test]
+fn cells_of_a_plane_on_a_cell_boundary_show_its_whole_offset() {
+    // The ground lies on z = 0, where cubes meet: cut there, the noise of 10 mm would halve what is seen of 5 mm.
+    let errors = [Vector3::zeros(), Vector3::new(0.0, 0.0, 0.005)];
+    let cells = stable_observations(&stable_points(&errors, 0.01), 0.01, &StableParams::default());
+    let ground: Vec<f64> = cells
+        .iter()
+        .filter(|(_, o)| o.directions[0].z.abs() > 0.9)
+        .map(|(_, o)| o.values[0] * o.directions[0].z.signum())
+        .collect();
+    let mean = ground.iter().sum::<f64>() / ground.len() as f64;
+    assert!(
+        ground.len() >= 40 && (mean - 0.005).abs() < 1e-3,
+        "{} cells, {mean}",
+        ground.len()
+    );
+}
+
+/// A wall of bumpy stones seen by sources with these errors.
+fn wall(errors: &[Vector3<f64>], noise_m: f64, seed: u64) -> Vec<SeenStone> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    (0..20)
+        .map(|k| {
+            let centroid = Point3::new(0.0, 0.3 * f64::from(k % 5), 0.3 * f64::from(k / 5));
+            let phase: f64 = rng.random_range(0.0..6.0);
+            let sights = (0..errors.len()).map(|source| {
+                let points = (0..900).map(|_| {
+                    let (y, z): (f64, f64) = (rng.random_range(-0.12..0.12), rng.random_range(-0.12..0.12));
+                    let relief = 0.008 * ((35.0 * y + phase).sin() + (30.0 * z - phase).cos());
+                    let local = Vector3::new(relief + noise_m * normal(&mut rng), y, z);
+                    centroid + local + errors[source]
+                });
+                SourcePoints {
+                    source,
+                    count: 900,
+                    time_s: 10.0 * source as f64 + centroid.y,
+                    points: Cloud::from_world(centroid, points.collect::<Vec<_>>()),
+                }
+            });
+            SeenStone {
+                centroid,
+                normal: Vector3::x(),
+                sights: sights.collect(),
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
+    let errors = [
+        Vector3::new(0.001, 0.0, -0.001),
+        Vector3::new(-0.001, 0.001, 0.0),
+        Vector3::new(0.004, -0.003, 0.002),
+        Vector3::new(0.002, -0.002, 0.004),
+    ];
+    let stones = wall(&errors, 0.002, 1);
+    let stable = stable_points(&errors, 0.002);
+    let sources = sources(2);
+    let found = |stable: &[StablePoints]| {
+        let pair = EpochPair {
+            sources: &sources,
+            same_as: &[0, 1, 2, 3],
+            stones: &stones,
+            stable,
+            sigma_m: 0.002,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default())
+    };
+    let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
+    let with = found(&stable);
+    assert_eq!(with.datum, Datum::Stable);
+    for at in &with.at {
+        for a in 0..3 {
+            let sd = at.covariance[(a, a)].sqrt();
+            assert!(
+                (at.mean[a] - truth[a]).abs() < 4.0 * sd && sd < 5e-4,
+                "{} {sd} {truth}",
+                at.mean
+            );
+        }
+    }
+    // Without them the mean of each epoch's sources stays as uncertain as the sources are unlike each other.
+    let without = found(&[]);
+    assert_eq!(without.datum, Datum::Sources);
+    let sd = without.at[0].covariance[(0, 0)].sqrt();
+    assert!((6e-4..4e-3).contains(&sd), "{sd}");
+    assert!(without.at[0].mean.norm() < 5e-4, "{}", without.at[0].mean);
+}
+
+#[test]
+fn sources_without_errors_leave_the_datum_unknown() {
+    let errors = [Vector3::zeros(); 4];
+    let stones = wall(&errors, 0.002, 2);
+    let sources = sources(2);
+    let pair = EpochPair {
+        sources: &sources,
+        same_as: &[0, 1, 2, 3],
+        stones: &stones,
+        stable: &[],
+        sigma_m: 0.002,
+    };
+    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    assert_eq!(
+        found.datum,
+        Datum::Unknown,
+        "{:?} {}",
+        found.components,
+        found.significance
+    );
+}

@@ -1,0 +1,161 @@
+//! The part of a stone's face in which points count.
+
+use crate::cloud::GridIndex;
+use crate::geometry::{FaceFrame, OutlineParams, outline, signed_area};
+use crate::statistics::upper_median;
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+/// Points of a stone on which its noise is measured: their median is known to some percent, and more only
+/// cost time.
+const NOISE_SAMPLES: usize = 300;
+/// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
+/// mixed pixels and what hangs in front of the stone.
+const DEPTH_TAIL: f64 = 0.02;
+/// Noise levels by which the depth of a stone is widened: the noise of four points in 100,000 is larger.
+const DEPTH_NOISES: f64 = 4.0;
+/// How much farther than its neighbours' shift a stone may be followed into points without its label, metres:
+/// twice the typical motion of a loose stone.
+const REACH_M: f64 = 0.03;
+/// The median of |a - b| in standard deviations of a, for two values of a normal variable.
+const MEDIAN_DIFFERENCE: f64 = 0.954;
+
+/// The part of a stone's face that both epochs show, about its centroid in the first. In the second it moves
+/// with the stone: were it put where the stone is thought to be, the points' edge would pull the stone's
+/// motion away from there, by as much as the thought was wrong in noisy clouds.
+#[derive(Clone, Debug)]
+pub struct Window {
+    face_from_world: Matrix3<f64>,
+    /// Outline of each epoch, in the place of the first.
+    rings: [Vec<Point2<f64>>; 2],
+    /// Width of the border along the inside of the rings.
+    border_m: f64,
+    /// Lowest and highest place across the face.
+    depth: [f64; 2],
+}
+
+impl Window {
+    pub(super) fn new(
+        labelled: [&[[f32; 3]]; 2],
+        normal: &Vector3<f64>,
+        shift: &Vector3<f64>,
+        border_noises: f64,
+    ) -> Option<Self> {
+        if border_noises <= 0.0 {
+            return None;
+        }
+        let face_from_world = FaceFrame::from_normal(normal).face_from_world();
+        let first = Face::new(labelled[0], &face_from_world, &Vector3::zeros())?;
+        let second = Face::new(labelled[1], &face_from_world, shift)?;
+        Some(Self {
+            face_from_world,
+            border_m: border_noises * first.noise_m.max(second.noise_m),
+            depth: [
+                first.depth[0].max(second.depth[0]),
+                first.depth[1].min(second.depth[1]),
+            ],
+            rings: [first.ring, second.ring],
+        })
+    }
+
+    /// From world axes to the window's: along, up and out of the face.
+    pub(crate) fn face_from_world(&self) -> &Matrix3<f64> {
+        &self.face_from_world
+    }
+
+    /// Whether a point counts that lies here, in the window's axes about the stone's centroid.
+    pub(crate) fn holds(&self, at: &Point3<f64>, labelled: bool) -> bool {
+        let (flat, [low, high]) = (at.xy(), self.depth);
+        let is_close = |ring: &Vec<Point2<f64>>| distance_to_ring(ring, &flat) < self.border_m;
+        self.rings.iter().all(|ring| is_inside(ring, &flat))
+            && match self.rings.iter().any(is_close) {
+                true => at.z > low && at.z < high,
+                false => labelled,
+            }
+    }
+
+    /// Whether a point that lies here may come to lie in the window once the stone's motion is known better.
+    pub(super) fn is_near(&self, at: &Point3<f64>) -> bool {
+        let flat = at.xy();
+        let is_near =
+            |ring: &Vec<Point2<f64>>| is_inside(ring, &flat) || distance_to_ring(ring, &flat) < REACH_M;
+        self.rings.iter().all(is_near)
+    }
+
+    pub(super) fn place(&self, offset: &[f32; 3]) -> Point3<f64> {
+        place(&self.face_from_world, offset)
+    }
+}
+
+/// Outline, noise and depth of a stone's labelled points in one epoch.
+struct Face {
+    ring: Vec<Point2<f64>>,
+    noise_m: f64,
+    depth: [f64; 2],
+}
+
+impl Face {
+    fn new(labelled: &[[f32; 3]], face_from_world: &Matrix3<f64>, shift: &Vector3<f64>) -> Option<Self> {
+        let shift = face_from_world * shift;
+        let local: Vec<Point3<f64>> = labelled
+            .iter()
+            .map(|p| place(face_from_world, p) - shift)
+            .collect();
+        let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
+        let ring = outline(&flat, &OutlineParams::default())?;
+        let noise_m = noise_m(&local, signed_area(&ring).abs().sqrt());
+        let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+        heights.sort_by(f64::total_cmp);
+        let tail = (DEPTH_TAIL * heights.len() as f64) as usize;
+        Some(Self {
+            ring,
+            noise_m,
+            depth: [
+                heights[tail] - DEPTH_NOISES * noise_m,
+                heights[heights.len() - 1 - tail] + DEPTH_NOISES * noise_m,
+            ],
+        })
+    }
+}
+
+fn place(face_from_world: &Matrix3<f64>, offset: &[f32; 3]) -> Point3<f64> {
+    Point3::from(face_from_world * Vector3::from(offset.map(f64::from)))
+}
+
+/// Noise along z of points of a face of `size_m`: the median difference of neighbours that are nearest in x
+/// and y.
+///
+/// Relief within one point spacing counts as noise; on terrestrial scans that is about as much as the
+/// scanner's.
+fn noise_m(local: &[Point3<f64>], size_m: f64) -> f64 {
+    let flat: Vec<Point3<f64>> = local.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
+    let index = GridIndex::new(&flat, 2.0 * size_m / (flat.len() as f64).sqrt());
+    let mut differences: Vec<f64> = (0..flat.len())
+        .step_by((flat.len() / NOISE_SAMPLES).max(1))
+        .filter_map(|i| {
+            let near = index.nearest_k(&flat[i], 2, size_m);
+            let other = near.iter().find(|(j, _)| *j != i)?.0;
+            Some((local[i].z - local[other].z).abs())
+        })
+        .collect();
+    upper_median(&mut differences).map_or(0.0, |median| median / MEDIAN_DIFFERENCE)
+}
+
+fn edges(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
+    ring.iter().zip(ring.iter().cycle().skip(1))
+}
+
+/// Even-odd rule.
+fn is_inside(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
+    let crossings = edges(ring)
+        .filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x));
+    crossings.count() % 2 == 1
+}
+
+fn distance_to_ring(ring: &[Point2<f64>], p: &Point2<f64>) -> f64 {
+    let to_edge = |(a, b): (&Point2<f64>, &Point2<f64>)| {
+        let edge = b - a;
+        let t = ((p - a).dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        (p - (a + edge * t)).norm()
+    };
+    edges(ring).map(to_edge).fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,226 @@
+//! The chunks of a compressed file: their table, and the layers inside them.
+//!
+//! Format: LAZ specification 1.4 R1 (chunk table, compressors 1 to 3). A chunk of layers begins with its
+//! first point, the number of its points, and the size of every layer; the decoder takes memory for a layer
+//! before it looks for its bytes.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom};
+
+use laz::laszip::ChunkTable;
+use laz::{LazItemType, LazVlr};
+
+use super::compression::{Compression, Order};
+use super::envelope::Envelope;
+use super::las_error::las_error;
+use crate::cloud::CloudError;
+
+/// Chunks larger than this when unpacked are read by one thread, which needs no memory for them; LAZ chunks
+/// are usually 50,000 points.
+const LARGE_CHUNK_BYTES: u64 = 1 << 26;
+/// Points for each byte of a file, at most: a point like the one before it takes a small part of a bit.
+const MAX_POINTS_PER_BYTE: u64 = 1 << 20;
+/// Bytes of the place of the chunk table, in front of the first chunk.
+const TABLE_PLACE_BYTES: u64 = 8;
+
+/// What the reader needs of the chunks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Chunks {
+    /// There is no table that says where they are.
+    pub lacks_table: bool,
+    /// One of them is too large to be unpacked at once.
+    pub are_large: bool,
+}
+
+impl Chunks {
+    /// Checks that the chunks and their layers lie inside the file and hold the points that the header
+    /// claims.
+    pub fn check(file: &Envelope, compression: &Compression) -> Result<Self, CloudError> {
+        let (points, path) = (file.points(), &file.path);
+        if points == 0 {
+            return Ok(Self::default());
+        }
+        let bytes = file.length - file.start();
+        if points / MAX_POINTS_PER_BYTE > bytes {
+            let reason = format!("it holds {bytes} bytes of points, and its header claims {points} points");
+            return Err(CloudError::truncated(path, reason));
+        }
+        let lacks_table = Self {
+            lacks_table: true,
+            are_large: false,
+        };
+        if compression.order == Order::Stream {
+            return Ok(lacks_table);
+        }
+        let vlr = &compression.vlr;
+        let Some(place) = table_place(file)? else {
+            return match compression.order {
+                Order::Layers => walk_layers(file, vlr).map(|()| lacks_table),
+                _ if vlr.uses_variable_size_chunks() => Err(CloudError::malformed(
+                    path,
+                    "the table of its chunks is missing: write the file again",
+                )),
+                _ => Ok(lacks_table),
+            };
+        };
+        let table = read_table(file, vlr, place)?;
+        check_table(file, vlr, &table)?;
+        if compression.order == Order::Layers {
+            check_layers(file, vlr, &table)?;
+        }
+        let largest = table.as_ref().iter().map(|entry| entry.point_count).max();
+        let are_large = largest.unwrap_or(0).saturating_mul(file.record_bytes()) > LARGE_CHUNK_BYTES;
+        if are_large && compression.order == Order::Layers {
+            // One thread goes by the layers, and not by the table.
+            walk_layers(file, vlr)?;
+        }
+        Ok(Self {
+            lacks_table: false,
+            are_large,
+        })
+    }
+}
+
+/// Where the table of chunks is; `None` where there is none.
+fn table_place(file: &Envelope) -> Result<Option<u64>, CloudError> {
+    let mut source = open(file)?;
+    let mut place = number_at(file, &mut source, file.start())?;
+    if place <= file.start().cast_signed() {
+        // A writer that could not go back has put the place at the very end.
+        place = number_at(file, &mut source, file.length - TABLE_PLACE_BYTES)?;
+    } else if place.cast_unsigned() > file.length {
+        let reason = "the table of its chunks, which comes last, is missing";
+        return Err(CloudError::truncated(&file.path, reason));
+    }
+    let place = u64::try_from(place).unwrap_or(0);
+    let first_chunk = file.start() + TABLE_PLACE_BYTES;
+    Ok((first_chunk < place && place <= file.length - TABLE_PLACE_BYTES).then_some(place))
+}
+
+fn read_table(file: &Envelope, vlr: &LazVlr, place: u64) -> Result<ChunkTable, CloudError> {
+    let mut source = open(file)?;
+    let head = number_at(file, &mut source, place)?.cast_unsigned();
+    let room = (place - file.start()) / file.record_bytes().max(1);
+    if head >> 32 > room.min(file.points()) {
+        // The first point of a chunk is not compressed.
+        let reason = format!(
+            "its table names {} chunks, more than there is room for",
+            head >> 32
+        );
+        return Err(CloudError::malformed(&file.path, reason));
+    }
+    seek(file, &mut source, file.start())?;
+    ChunkTable::read_from(&mut source, vlr).map_err(|e| las_error(&file.path, las::Error::from(e)))
+}
+
+fn check_table(file: &Envelope, vlr: &LazVlr, table: &ChunkTable) -> Result<(), CloudError> {
+    let entries = table.as_ref();
+    let held = entries.iter().fold(0u64, |n, e| n.saturating_add(e.point_count));
+    let bytes = entries.iter().fold(0u64, |n, e| n.saturating_add(e.byte_count));
+    let points = file.points();
+    if held < points || (vlr.uses_variable_size_chunks() && held != points) {
+        let reason = format!("its chunks hold {held} of {points} points");
+        return Err(CloudError::truncated(&file.path, reason));
+    }
+    if bytes > file.length - file.start() {
+        return Err(CloudError::truncated(
+            &file.path,
+            "its chunks are larger than the file",
+        ));
+    }
+    Ok(())
+}
+
+/// Checks that no chunk of the table has layers that are larger than it.
+fn check_layers(file: &Envelope, vlr: &LazVlr, table: &ChunkTable) -> Result<(), CloudError> {
+    let mut source = open(file)?;
+    let mut place = file.start() + TABLE_PLACE_BYTES;
+    for (number, entry) in (1..).zip(table.as_ref()).filter(|(_, e)| e.byte_count > 0) {
+        let layers = Layers::read(file, vlr, &mut source, place)?;
+        if layers.bytes > entry.byte_count {
+            let reason = format!(
+                "the layers of chunk {number} take {} bytes, and the chunk has {}",
+                layers.bytes, entry.byte_count
+            );
+            return Err(CloudError::malformed(&file.path, reason));
+        }
+        place += entry.byte_count;
+    }
+    Ok(())
+}
+
+/// Walks from chunk to chunk by the sizes of their layers, for files without a table.
+fn walk_layers(file: &Envelope, vlr: &LazVlr) -> Result<(), CloudError> {
+    let mut source = open(file)?;
+    let mut place = file.start() + TABLE_PLACE_BYTES;
+    let mut held = 0;
+    while held < file.points() {
+        let layers = Layers::read(file, vlr, &mut source, place)?;
+        place += layers.bytes;
+        if place > file.length || layers.points == 0 {
+            let reason = format!("its whole chunks hold {held} of {} points", file.points());
+            return Err(CloudError::truncated(&file.path, reason));
+        }
+        held += layers.points;
+    }
+    Ok(())
+}
+
+/// A chunk of layers, as its head describes it.
+struct Layers {
+    points: u64,
+    /// Bytes of the chunk, its head included.
+    bytes: u64,
+}
+
+impl Layers {
+    fn read(
+        file: &Envelope,
+        vlr: &LazVlr,
+        source: &mut BufReader<File>,
+        place: u64,
+    ) -> Result<Self, CloudError> {
+        let mut word = [0; 4];
+        let mut next = |source: &mut BufReader<File>| {
+            let read = source.read_exact(&mut word);
+            read.map_err(|e| CloudError::read(&file.path, e))?;
+            Ok(u64::from(u32::from_le_bytes(word)))
+        };
+        seek(file, source, place + file.record_bytes())?;
+        let points = next(source)?;
+        let mut bytes = file.record_bytes() + 4;
+        for _ in 0..layer_count(vlr) {
+            bytes += 4 + next(source)?;
+        }
+        Ok(Self { points, bytes })
+    }
+}
+
+fn layer_count(vlr: &LazVlr) -> usize {
+    let layers = |kind: LazItemType| match kind {
+        LazItemType::Point14 => 9,
+        LazItemType::RGB14 | LazItemType::WavePacket14 => 1,
+        LazItemType::RGBNIR14 => 2,
+        LazItemType::Byte14(bytes) => usize::from(bytes),
+        _ => 0,
+    };
+    vlr.items().iter().map(|item| layers(item.item_type())).sum()
+}
+
+fn open(file: &Envelope) -> Result<BufReader<File>, CloudError> {
+    let opened = File::open(&file.path).map_err(|e| CloudError::read(&file.path, e))?;
+    Ok(BufReader::new(opened))
+}
+
+fn seek(file: &Envelope, source: &mut BufReader<File>, place: u64) -> Result<(), CloudError> {
+    let moved = source.seek(SeekFrom::Start(place));
+    moved.map(|_| ()).map_err(|e| CloudError::read(&file.path, e))
+}
+
+fn number_at(file: &Envelope, source: &mut BufReader<File>, place: u64) -> Result<i64, CloudError> {
+    seek(file, source, place)?;
+    let mut bytes = [0; 8];
+    let read = source.read_exact(&mut bytes);
+    read.map_err(|e| CloudError::read(&file.path, e))?;
+    Ok(i64::from_le_bytes(bytes))
+}

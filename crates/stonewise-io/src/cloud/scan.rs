@@ -1,0 +1,14 @@
+//! The scans that a file keeps apart.
+
+use nalgebra::Point3;
+
+/// One scan of an E57 file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// Its name, or its number where it has none.
+    pub name: String,
+    /// Number of records.
+    pub records: u64,
+    /// Position of the scanner in the world frame, where the file has a pose.
+    pub origin: Option<Point3<f64>>,
+}

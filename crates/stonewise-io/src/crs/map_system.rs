@@ -1,0 +1,273 @@
+//! Geographic, geocentric and projected systems with all that is needed to project into them.
+
+use super::ellipsoid::Ellipsoid;
+use super::epsg;
+use super::projection::{MapOrigin, Projection};
+use super::wkt::Node;
+
+/// A system that is tied to the earth.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapSystem {
+    /// Name, as the definition has it.
+    pub name: String,
+    /// Geodetic datum, in small letters and digits; WGS 84 and ETRS89 are one here.
+    datum: String,
+    /// Code of the geographic system under it, where that is given.
+    geographic: Option<i32>,
+    /// Ellipsoid of the datum.
+    pub ellipsoid: Ellipsoid,
+    /// What the coordinates are.
+    pub coordinates: Coordinates,
+}
+
+/// Kind of coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coordinates {
+    /// Earth-centred x, y, z, metres.
+    Geocentric,
+    /// Latitude and longitude.
+    Geographic,
+    /// Easting and northing, metres.
+    Projected(Projection),
+}
+
+impl MapSystem {
+    /// The system that a WKT (1 or 2) or `EPSG:` and a code define; `None` for a local frame.
+    ///
+    /// # Errors
+    /// Why the system is not covered: another projection, heights above a geoid, units that are not metres, a
+    /// code that is not known, a text that cannot be understood.
+    pub fn parse(text: &str) -> Result<Option<Self>, String> {
+        let text = text.trim();
+        if let Some(code) = text.strip_prefix("EPSG:") {
+            let known = code.trim().parse().ok().and_then(epsg::definition);
+            let wkt =
+                known.ok_or_else(|| format!("{text} is not among the systems known by their number"))?;
+            return Self::parse(&wkt);
+        }
+        let node = Node::parse(text).ok_or("the definition of the system cannot be understood")?;
+        Self::of(&node)
+    }
+
+    /// Whether two systems are on one geodetic datum. WGS 84 and ETRS89, whose ellipsoids differ by 0.1 mm,
+    /// count as one.
+    pub fn shares_datum(&self, other: &Self) -> bool {
+        let (a, b) = (&self.ellipsoid, &other.ellipsoid);
+        let same_size = (a.semi_major_m - b.semi_major_m).abs() < 1e-3;
+        let same_shape = (a.flattening() - b.flattening()).abs() < 1e-9;
+        let same_code = self.geographic.is_some() && self.geographic == other.geographic;
+        same_size && same_shape && (same_code || self.datum == other.datum)
+    }
+
+    fn of(node: &Node<'_>) -> Result<Option<Self>, String> {
+        match node.keyword.to_ascii_uppercase().as_str() {
+            "COMPD_CS" | "COMPOUNDCRS" => {
+                if let Some(heights) = node.children.iter().find(|c| is_geoid(c)) {
+                    let name = heights.name().unwrap_or_default();
+                    return Err(format!(
+                        "its heights are above a geoid ({name}), which is not known here"
+                    ));
+                }
+                node.children
+                    .iter()
+                    .find(|c| c.is_crs())
+                    .map_or(Ok(None), Self::of)
+            }
+            "BOUNDCRS" => {
+                let source = node
+                    .child(&["SOURCECRS"])
+                    .and_then(|source| source.children.first());
+                source.map_or(Ok(None), Self::of)
+            }
+            "GEOGCS" | "GEOGCRS" | "GEOGRAPHICCRS" => {
+                Self::earthly(node, node, Coordinates::Geographic).map(Some)
+            }
+            "GEOCCS" => Self::earthly(node, node, Coordinates::Geocentric).map(Some),
+            "GEODCRS" | "GEODETICCRS" => {
+                let axes = node.child(&["CS"]).and_then(|cs| cs.values.first());
+                let is_cartesian = axes.is_some_and(|kind| kind.eq_ignore_ascii_case("cartesian"));
+                let coordinates = if is_cartesian {
+                    Coordinates::Geocentric
+                } else {
+                    Coordinates::Geographic
+                };
+                Self::earthly(node, node, coordinates).map(Some)
+            }
+            "PROJCS" | "PROJCRS" | "PROJECTEDCRS" => {
+                let base = node.child(&["GEOGCS", "BASEGEOGCRS", "BASEGEODCRS"]);
+                let base = base.ok_or("the definition names no geographic system")?;
+                let projection = projection(node, base)?;
+                Self::earthly(node, base, Coordinates::Projected(projection)).map(Some)
+            }
+            "LOCAL_CS" | "ENGCRS" | "ENGINEERINGCRS" => Ok(None),
+            other => Err(format!("{other:?} is no kind of system that is known")),
+        }
+    }
+
+    fn earthly(node: &Node<'_>, base: &Node<'_>, coordinates: Coordinates) -> Result<Self, String> {
+        let datum = base.child(&["DATUM", "GEODETICDATUM", "TRF", "ENSEMBLE"]);
+        let datum = datum.ok_or("the definition names no datum")?;
+        let spheroid = datum.child(&["SPHEROID", "ELLIPSOID"]);
+        let number = |place: usize| spheroid.and_then(|s| s.values.get(place)?.parse::<f64>().ok());
+        let (Some(semi_major_m), Some(inverse_flattening)) = (number(1), number(2)) else {
+            return Err("the definition names no ellipsoid".to_owned());
+        };
+        if !(6e6..7e6).contains(&semi_major_m) || !(inverse_flattening == 0.0 || inverse_flattening > 100.0) {
+            return Err("the definition has an impossible ellipsoid".to_owned());
+        }
+        Ok(Self {
+            name: node.name().unwrap_or_default(),
+            datum: datum_name(&datum.name().unwrap_or_default()),
+            geographic: base.code(),
+            ellipsoid: Ellipsoid {
+                semi_major_m,
+                inverse_flattening,
+            },
+            coordinates,
+        })
+    }
+}
+
+/// Small letters and digits of a datum's name. Map programs take WGS 84 and ETRS89 for the same, and so do
+/// the files they write.
+fn datum_name(name: &str) -> String {
+    let plain = plain(name);
+    let bare = plain
+        .strip_prefix('d')
+        .filter(|_| name.starts_with("D_"))
+        .unwrap_or(&plain);
+    let same = [
+        "wgs84",
+        "wgs1984",
+        "worldgeodeticsystem1984",
+        "worldgeodeticsystem1984ensemble",
+        "etrs89",
+        "etrs1989",
+        "europeanterrestrialreferencesystem1989",
+        "europeanterrestrialreferencesystem1989ensemble",
+    ];
+    if same.contains(&bare) { "wgs84" } else { bare }.to_owned()
+}
+
+/// Whether a vertical system counts heights from anything but the ellipsoid.
+fn is_geoid(node: &Node<'_>) -> bool {
+    let keyword = node.keyword.to_ascii_uppercase();
+    let is_vertical = ["VERT_CS", "VERTCRS", "VERTICALCRS"].contains(&keyword.as_str());
+    is_vertical && !node.text.to_lowercase().contains("ellipsoid")
+}
+
+fn projection(node: &Node<'_>, base: &Node<'_>) -> Result<Projection, String> {
+    let conversion = node.child(&["CONVERSION"]).unwrap_or(node);
+    let method = conversion.child(&["PROJECTION", "METHOD"]).and_then(Node::name);
+    let method = method.unwrap_or_default();
+    if node
+        .child(&["UNIT", "LENGTHUNIT"])
+        .is_some_and(|unit| unit.factor() != Some(1.0))
+    {
+        return Err("its unit is not the metre".to_owned());
+    }
+    let parameters = Parameters {
+        conversion,
+        radians: base.child(&["UNIT", "ANGLEUNIT"]).and_then(Node::factor),
+        meridian: base
+            .child(&["PRIMEM"])
+            .and_then(|m| m.values.get(1)?.parse().ok())
+            .unwrap_or(0.0),
+    };
+    let scale = parameters
+        .plain(&["scalefactor", "scalefactoratnaturalorigin"])
+        .unwrap_or(1.0);
+    let origin = parameters.origin();
+    let possible = scale > 0.0 && origin.latitude.abs() < 1.6 && origin.longitude.abs() < 7.0;
+    if !possible {
+        return Err("its projection has impossible parameters".to_owned());
+    }
+    match plain(&method).as_str() {
+        "transversemercator" | "gausskruger" | "gausskrueger" => {
+            Ok(Projection::TransverseMercator { origin, scale })
+        }
+        "lambertconformalconic"
+        | "lambertconformalconic1sp"
+        | "lambertconicconformal1sp"
+        | "lambertconformalconic2sp"
+        | "lambertconicconformal2sp" => {
+            let first = parameters.angle(&["standardparallel1", "latitudeof1ststandardparallel"]);
+            let first = first.unwrap_or(origin.latitude);
+            let second = parameters.angle(&["standardparallel2", "latitudeof2ndstandardparallel"]);
+            let parallels = [first, second.unwrap_or(first)];
+            if parallels.iter().any(|p| !(1e-6..1.57).contains(&p.abs())) || first * parallels[1] < 0.0 {
+                return Err("its cone has impossible parallels".to_owned());
+            }
+            Ok(Projection::LambertConic {
+                origin,
+                parallels,
+                scale,
+            })
+        }
+        _ => Err(format!("its projection, {method:?}, is not covered")),
+    }
+}
+
+/// The parameters of a projection.
+struct Parameters<'a> {
+    conversion: &'a Node<'a>,
+    /// Size of the unit of angles in WKT 1.
+    radians: Option<f64>,
+    /// Prime meridian, degrees from Greenwich.
+    meridian: f64,
+}
+
+impl Parameters<'_> {
+    fn origin(&self) -> MapOrigin {
+        let latitude = [
+            "latitudeoforigin",
+            "latitudeofnaturalorigin",
+            "latitudeoffalseorigin",
+            "latitudeofcenter",
+        ];
+        let longitude = [
+            "centralmeridian",
+            "longitudeofnaturalorigin",
+            "longitudeoffalseorigin",
+            "longitudeoforigin",
+            "longitudeofcenter",
+        ];
+        let east = self.plain(&["falseeasting", "eastingatfalseorigin"]);
+        let north = self.plain(&["falsenorthing", "northingatfalseorigin"]);
+        MapOrigin {
+            latitude: self.angle(&latitude).unwrap_or(0.0),
+            longitude: self.angle(&longitude).unwrap_or(0.0) + self.meridian.to_radians(),
+            false_m: [east.unwrap_or(0.0), north.unwrap_or(0.0)],
+        }
+    }
+
+    fn node(&self, names: &[&str]) -> Option<&Node<'_>> {
+        let is_named = |n: &&Node| {
+            n.name()
+                .is_some_and(|name| names.contains(&plain(&name).as_str()))
+        };
+        let parameters = self.conversion.children.iter();
+        parameters
+            .filter(|n| n.keyword.eq_ignore_ascii_case("PARAMETER"))
+            .find(is_named)
+    }
+
+    fn plain(&self, names: &[&str]) -> Option<f64> {
+        let value: f64 = self.node(names)?.values.get(1)?.parse().ok()?;
+        Some(value).filter(|v| v.is_finite())
+    }
+
+    fn angle(&self, names: &[&str]) -> Option<f64> {
+        let own = self
+            .node(names)?
+            .child(&["ANGLEUNIT", "UNIT"])
+            .and_then(Node::factor);
+        let radians = own.or(self.radians).unwrap_or(std::f64::consts::PI / 180.0);
+        Some(self.plain(names)? * radians)
+    }
+}
+
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(char::is_ascii_alphanumeric);
+    letters.map(|c| c.to_ascii_lowercase()).collect()
+}

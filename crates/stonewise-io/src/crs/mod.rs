@@ -1,0 +1,13 @@
+//! Coordinate reference systems: their names, and the map projections of those that cameras come in.
+
+mod ellipsoid;
+mod epsg;
+mod map_system;
+mod projection;
+mod system;
+mod wkt;
+
+pub use ellipsoid::{Ellipsoid, Geodetic};
+pub use map_system::{Coordinates, MapSystem};
+pub use projection::{MapOrigin, Projection};
+pub use system::Crs;

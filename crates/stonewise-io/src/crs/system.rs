@@ -1,0 +1,97 @@
+//! Coordinate reference systems as point clouds name them.
+
+use super::epsg::definition;
+use super::wkt::Node;
+
+/// A coordinate reference system of the EPSG register.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Crs {
+    /// EPSG code.
+    pub epsg: i32,
+    /// Name.
+    pub name: String,
+    /// Definition as WKT 1 or WKT 2; empty where only the code is known, and it is none of the common ones.
+    pub wkt: String,
+}
+
+impl Crs {
+    /// The system that a text names: WKT 1 or 2 with the authority's code, or `EPSG:25832`.
+    ///
+    /// Of a compound system without a code of its own, the horizontal part counts. `None` where the text
+    /// holds no EPSG code: a local frame.
+    pub fn parse(text: &str) -> Option<Self> {
+        let text = text.trim();
+        if let Some(code) = text.strip_prefix("EPSG:") {
+            let epsg: i32 = code.trim().parse().ok()?;
+            return match u32::try_from(epsg).ok().and_then(definition) {
+                Some(wkt) => Self::parse(&wkt),
+                None => Some(Self {
+                    epsg,
+                    name: text.to_owned(),
+                    wkt: String::new(),
+                }),
+            };
+        }
+        let root = Node::parse(text)?;
+        let crs = if root.code().is_some() {
+            &root
+        } else {
+            root.children.iter().find(|c| c.code().is_some() && c.is_crs())?
+        };
+        Some(Self {
+            epsg: crs.code()?,
+            name: crs.name()?,
+            wkt: crs.text.to_owned(),
+        })
+    }
+
+    /// The definition, or the code where there is none: [`Crs::parse`] gives the same system again.
+    pub fn text(&self) -> String {
+        if self.wkt.is_empty() {
+            format!("EPSG:{}", self.epsg)
+        } else {
+            self.wkt.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const UTM: &str = r#"PROJCS["ETRS89 / UTM zone 32N",GEOGCS["ETRS89",DATUM["European",SPHEROID["GRS 1980",6378137,298.257222101]],
+        AUTHORITY["EPSG","4258"]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],UNIT["metre",1],AUTHORITY["EPSG","25832"]]"#;
+
+    #[test]
+    fn the_code_is_the_systems_own_and_not_that_of_its_parts() {
+        let crs = Crs::parse(UTM).unwrap();
+        assert_eq!((crs.epsg, crs.name.as_str()), (25832, "ETRS89 / UTM zone 32N"));
+        assert_eq!(crs.wkt, UTM);
+        let wkt2 = r#"PROJCRS["NAD83 / Texas", BASEGEOGCRS["NAD83", ID["EPSG",4269]], CS[Cartesian,2], ID["EPSG",2277]]"#;
+        assert_eq!(Crs::parse(wkt2).unwrap().epsg, 2277);
+        assert_eq!(Crs::parse("EPSG:31467").unwrap().epsg, 31467);
+    }
+
+    #[test]
+    fn the_horizontal_part_of_a_compound_system_counts() {
+        let compound = format!(
+            r#"COMPD_CS["both",{UTM},VERT_CS["DHHN2016",VERT_DATUM["x",2005],AUTHORITY["EPSG","7837"]]]"#
+        );
+        let crs = Crs::parse(&compound).unwrap();
+        assert_eq!(crs.epsg, 25832);
+        assert_eq!(crs.wkt, UTM);
+    }
+
+    #[test]
+    fn local_frames_and_broken_texts_have_none() {
+        for text in [
+            r#"LOCAL_CS["dam frame",UNIT["metre",1]]"#,
+            "",
+            "PROJCS[\"open\"",
+            "EPSG:",
+            "PROJCS[\"a\"]]",
+        ] {
+            assert_eq!(Crs::parse(text), None, "{text}");
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Files that lie about their sizes are refused at once; files that only lack what is not needed are read.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use nalgebra::Point3;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use stonewise_io::cameras::read_cameras;
+use stonewise_io::cloud::{CloudError, cloud_info, measure_cloud, read_cloud, read_mesh};
+use stonewise_io::crs::Crs;
+use stonewise_io::image_io::read_rgb;
+use stonewise_io::masks::{LabelFolder, read_label_png};
+
+fn testdata(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata")
+        .join(name)
+}
+
+/// Long for a refusal, short for a machine that is busy with other tests.
+const AT_ONCE: Duration = Duration::from_millis(500);
+
+fn refusal<T, E: std::fmt::Display>(path: &Path, read: impl FnOnce(&Path) -> Result<T, E>) -> String {
+    let started = Instant::now();
+    let message = read(path).err().map(|e| e.to_string()).unwrap_or_default();
+    let spent = started.elapsed();
+    assert!(spent < AT_ONCE, "{spent:?} for {}", path.display());
+    let message = message.replace(&format!("{}", path.display()), "FILE");
+    assert!(!message.contains('\n'), "{message}");
+    message
+}
+
+#[test]
+fn clouds_that_lie_about_their_sizes_are_refused_at_once() {
+    for (name, expected) in [
+        (
+            "hostile/layer_sizes.laz",
+            "FILE: the layers of chunk 1 take 2464074412 bytes, and the chunk has 2919",
+        ),
+        (
+            "hostile/laz_2e60.laz",
+            "FILE is cut off: it holds 2971 bytes of points, and its header claims 1152921504606846976 points",
+        ),
+        (
+            "hostile/las_2e60.las",
+            "FILE is cut off: it holds 400 of 1152921504606846976 points",
+        ),
+        (
+            "hostile/ply_element_without_properties.ply",
+            "FILE: the header claims 18446744073709551615 elements note that have no properties",
+        ),
+        (
+            "hostile/ply_huge_element_at_eof.ply",
+            "FILE is cut off: it has room for 0 of the 9000000000000000000 elements note that its header claims",
+        ),
+    ] {
+        assert_eq!(refusal(&testdata(name), measure_cloud), expected);
+        assert_eq!(refusal(&testdata(name), cloud_info), expected);
+    }
+    let mesh = refusal(&testdata("hostile/ply_huge_element_at_eof.ply"), read_mesh);
+    assert!(mesh.contains("element"), "{mesh}");
+}
+
+#[test]
+fn pictures_that_lie_about_their_sizes_are_refused_at_once() {
+    let path = testdata("hostile/claim.png");
+    assert_eq!(
+        refusal(&path, read_label_png),
+        "the header claims 60000x60000 pixels, and the file has 69 bytes: write the label image again: FILE"
+    );
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(&path, folder.path().join("photo.png")).unwrap();
+    let masks = LabelFolder::open(folder.path()).unwrap();
+    let message = refusal(&path, |_| masks.labels_for("photo.jpg", 4000, 3000));
+    assert!(
+        message.contains("are 60000x60000 px, its camera 4000x3000 px"),
+        "{message}"
+    );
+    assert!(refusal(&path, read_rgb).starts_with("cannot read the image: "));
+    assert!(refusal(&testdata("hostile/lie.jpg"), read_rgb).starts_with("cannot read the image: "));
+}
+
+#[test]
+fn a_label_image_of_another_size_is_refused_before_it_is_decoded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("photo.png");
+    let labels = stonewise_core::raster::Raster::filled(400, 300, 7u32);
+    stonewise_io::masks::write_label_png(&path, &labels).unwrap();
+    let whole = fs::read(&path).unwrap();
+    // The pixels are gone; the size is still there.
+    fs::write(&path, &whole[..60]).unwrap();
+    let masks = LabelFolder::open(folder.path()).unwrap();
+    let message = refusal(&path, |_| masks.labels_for("photo.jpg", 4000, 3000));
+    assert!(
+        message.contains("are 400x300 px, its camera 4000x3000 px"),
+        "{message}"
+    );
+}
+
+#[test]
+fn camera_files_that_grow_without_bound_are_refused_at_once() {
+    for name in ["hostile/bomb.xml", "hostile/xxe.xml"] {
+        let message = refusal(&testdata(name), read_cameras);
+        assert!(message.contains("broken xml"), "{message}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("deep.xml");
+    fs::write(&path, "<document>".repeat(300_000)).unwrap();
+    let message = refusal(&path, read_cameras);
+    assert!(
+        message.contains("elements inside elements, more than 64 deep"),
+        "{message}"
+    );
+    let json = folder.path().join("deep.json");
+    fs::write(&json, "[".repeat(300_000)).unwrap();
+    assert!(refusal(&json, read_cameras).contains("not an OpenSfM reconstruction"));
+    assert_eq!(Crs::parse(&"A[".repeat(300_000)), None);
+}
+
+#[test]
+fn cameras_of_impossible_size_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("cameras.txt"),
+        "1 SIMPLE_PINHOLE 60000 60000 3000 2000 1500\n",
+    )
+    .unwrap();
+    fs::write(folder.path().join("images.txt"), "1 1 0 0 0 0 0 0 1 one.jpg\n\n").unwrap();
+    let message = refusal(folder.path(), read_cameras);
+    assert!(
+        message.contains("60000x60000 pixels, more than any photo, at photo one.jpg"),
+        "{message}"
+    );
+}
+
+fn points(path: &Path) -> Vec<Point3<f64>> {
+    let mut all = Vec::new();
+    read_cloud(path, 50, |chunk| {
+        all.extend(&chunk.positions);
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    all
+}
+
+fn number(bytes: &[u8], place: usize) -> usize {
+    u32::from_le_bytes([bytes[place], bytes[place + 1], bytes[place + 2], bytes[place + 3]]) as usize
+}
+
+#[test]
+fn compressed_clouds_without_a_table_of_chunks_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    for name in ["clouds/las12_format2.laz", "clouds/las14_format7_extra.laz"] {
+        let expected = points(&testdata(name));
+        let mut bytes = fs::read(testdata(name)).unwrap();
+        let start = number(&bytes, 96);
+        let table = number(&bytes, start);
+        bytes.truncate(table);
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(points(&path), expected, "{name}, table cut off");
+        bytes[start..start + 8].copy_from_slice(&(-1i64).to_le_bytes());
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(points(&path), expected, "{name}, no table written");
+        // Without a table the end of the points is still missed.
+        bytes.truncate(table - 40);
+        fs::write(&path, &bytes).unwrap();
+        assert!(refusal(&path, measure_cloud).contains("is cut off"), "{name}");
+    }
+}
+
+#[test]
+fn compressed_clouds_with_chunks_of_gigabytes_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    for name in ["clouds/las12_format2.laz", "clouds/las14_format7_extra.laz"] {
+        let mut bytes = fs::read(testdata(name)).unwrap();
+        let user = b"laszip encoded";
+        let record = bytes.windows(user.len()).position(|w| w == user).unwrap() - 2;
+        // Behind compressor, coder, version and options.
+        let chunk_size = record + 54 + 12;
+        bytes[chunk_size..chunk_size + 4].copy_from_slice(&0x7fff_ffffu32.to_le_bytes());
+        fs::write(&path, &bytes).unwrap();
+        assert_eq!(points(&path), points(&testdata(name)), "{name}");
+    }
+}
+
+#[test]
+fn a_false_number_of_records_does_not_hide_the_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    for name in [
+        "clouds/las12_format2.laz",
+        "clouds/las14_format7_extra.laz",
+        "clouds/las14_format8.las",
+    ] {
+        let expected = points(&testdata(name));
+        let sound = fs::read(testdata(name)).unwrap();
+        for count in [0u32, 1000, u32::MAX] {
+            let mut bytes = sound.clone();
+            bytes[100..104].copy_from_slice(&count.to_le_bytes());
+            fs::write(&path, &bytes).unwrap();
+            assert_eq!(points(&path), expected, "{name}, {count} records");
+        }
+    }
+}
+
+#[test]
+fn a_ply_file_may_have_spaces_after_its_first_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let sound = fs::read(testdata("clouds/little.ply")).unwrap();
+    let mut bytes = b"ply ".to_vec();
+    bytes.extend(&sound[3..]);
+    fs::write(&path, &bytes).unwrap();
+    assert_eq!(points(&path), points(&testdata("clouds/little.ply")));
+}
+
+#[test]
+fn long_parts_without_points_can_be_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ply");
+    let header = "ply\nformat ascii 1.0\nelement note 1000\nproperty uchar a\nelement vertex 1\nproperty float x\n\
+                  property float y\nproperty float z\nend_header\n";
+    fs::write(&path, format!("{header}{}1 2 3\n", "7\n".repeat(1000))).unwrap();
+    let mut visits = 0;
+    let stopped = read_cloud(&path, 10, |chunk| {
+        assert!(chunk.is_empty());
+        visits += 1;
+        if visits == 3 {
+            Err(CloudError::UnknownFormat(path.clone()))
+        } else {
+            Ok(())
+        }
+    });
+    assert!(matches!(stopped, Err(CloudError::UnknownFormat(_))));
+    assert_eq!(visits, 3);
+}

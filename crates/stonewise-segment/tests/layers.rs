@@ -1,0 +1,32 @@
+//! Keeps the modules of the detector's crate in their order: a module uses only those below it, and no files use
+//! each other in a circle.
+#![allow(clippy::unwrap_used, clippy::panic)] // a test that cannot read the sources must stop
+
+#[path = "../../../testing/module_graph.rs"]
+mod module_graph;
+
+use module_graph::ModuleGraph;
+use std::path::Path;
+
+/// Modules from the bottom up; those on one line do not see each other.
+const LAYERS: [&[&str]; 6] = [
+    &["backend", "detection", "jpeg", "sample", "seed", "segmentation"],
+    &["evaluation", "model", "synth", "tiling"],
+    &["built_in", "onnx"],
+    &["stone_finder", "augment"],
+    &["train"],
+    &["dataset"],
+];
+
+#[test]
+fn modules_use_only_those_below_them_and_never_in_a_circle() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let graph = ModuleGraph::read(&src);
+    assert!(
+        graph.use_count() > 100,
+        "only {} uses found: the search is broken",
+        graph.use_count()
+    );
+    graph.assert_layers(&LAYERS);
+    graph.assert_no_circle();
+}

@@ -1,0 +1,46 @@
+//! A look at a survey before the work: what will go wrong, in seconds.
+
+mod alignment;
+mod cameras;
+mod clouds;
+mod edges;
+mod finding;
+mod page;
+mod photos;
+mod resources;
+mod sample;
+
+pub use finding::{Finding, Report, Verdict};
+pub(crate) use resources::is_about_this_machine;
+
+use crate::error::Result;
+use crate::project::Project;
+use std::path::Path;
+use stonewise_core::progress::Progress;
+
+/// Looks at everything that a project names.
+///
+/// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk, memory and time.
+/// `out`: where the results are to go, for the disk's free space. Of each epoch the first six million points of its clouds
+/// are read, and three photos are decoded.
+///
+/// Errors: a cloud or a camera file cannot be read, or the caller stopped it.
+pub fn check(project: &Project, out: &Path, progress: &dyn Progress) -> Result<Report> {
+    progress.begin("check", project.epochs.len() as u64);
+    let mut report = Report::default();
+    let mut surveys = Vec::new();
+    for epoch in &project.epochs {
+        progress.check()?;
+        let survey = sample::sample(epoch)?;
+        report.findings.extend(photos::look(epoch)?);
+        let (findings, picture) = cameras::look(epoch, &survey)?;
+        report.findings.extend(findings);
+        report.pictures.extend(picture);
+        surveys.push(survey);
+        progress.advance(1);
+    }
+    report.findings.extend(clouds::look(project, &surveys));
+    report.findings.extend(resources::look(project, &surveys, out));
+    report.sort(project);
+    Ok(report)
+}

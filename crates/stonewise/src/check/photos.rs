@@ -1,0 +1,112 @@
+//! Are the photos there, whole, and as large as their cameras say?
+
+use super::finding::{Finding, Verdict};
+use crate::error::{Error, Result};
+use crate::project::Epoch;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+use stonewise_io::cameras::find_photos;
+use stonewise_io::image_io::image_size;
+
+/// Bytes at the end of a JPEG among which its end marker must be; some cameras append previews.
+const TAIL: u64 = 64 << 10;
+/// Names in a message at most.
+const NAMES: usize = 4;
+
+/// Looks at the header and the end of every photo that a camera names.
+pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
+    let cameras = epoch.read_cameras()?;
+    let photos = find_photos(&epoch.images, &cameras)?;
+    let (mut broken, mut sizes, mut found) = (Vec::new(), Vec::new(), 0);
+    for (view, path) in cameras.views.iter().zip(&photos.paths) {
+        let Some(path) = path else { continue };
+        found += 1;
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        match image_size(path) {
+            Err(_) => broken.push(name),
+            Ok(_) if is_cut_off(path)? => broken.push(name),
+            Ok((width, height)) if (width, height) != (view.camera.width, view.camera.height) => {
+                sizes.push(format!(
+                    "{name} is {width}x{height} px, its camera {}x{} px",
+                    view.camera.width, view.camera.height
+                ));
+            }
+            Ok(_) => {}
+        }
+    }
+    let mut out = Vec::new();
+    let mut add =
+        |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, "photos", verdict, text));
+    let total = cameras.views.len();
+    match found {
+        0 => add(
+            Verdict::Wrong,
+            format!(
+                "none of the {total} photos that {} names is in {}",
+                epoch.cameras.display(),
+                epoch.images.display()
+            ),
+        ),
+        n if n < total => add(
+            Verdict::Note,
+            format!("{n} of the {total} posed photos are there"),
+        ),
+        _ => add(Verdict::Fine, format!("all {total} posed photos are there")),
+    }
+    if !photos.without_camera.is_empty() {
+        let names = photos.without_camera.iter();
+        let names: Vec<String> = names
+            .map(|p| p.file_name().unwrap_or_default().to_string_lossy().into_owned())
+            .collect();
+        add(
+            Verdict::Note,
+            format!("without a camera, left out: {}", some(&names)),
+        );
+    }
+    if !broken.is_empty() {
+        add(
+            Verdict::Doubt,
+            format!(
+                "cannot be read or are cut off: {}; copy them again",
+                some(&broken)
+            ),
+        );
+    }
+    if !sizes.is_empty() {
+        add(
+            Verdict::Doubt,
+            format!("{}: give the photos as they were posed", some(&sizes)),
+        );
+    }
+    Ok(out)
+}
+
+/// The first of many, and how many more.
+fn some(all: &[String]) -> String {
+    let first = all.iter().take(NAMES).cloned().collect::<Vec<_>>().join(", ");
+    match all.len().saturating_sub(NAMES) {
+        0 => first,
+        more => format!("{first} and {more} more"),
+    }
+}
+
+/// Whether a JPEG's end marker is missing; decoders paint what is not there grey without a word.
+fn is_cut_off(path: &Path) -> Result<bool> {
+    let failed = || Error::io("reading", path);
+    let mut file = File::open(path).map_err(failed())?;
+    let mut start = [0; 2];
+    if file.read_exact(&mut start).is_err() || start != [0xff, 0xd8] {
+        return Ok(false);
+    }
+    let length = file.seek(SeekFrom::End(0)).map_err(failed())?;
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
+        .map_err(failed())?;
+    let mut tail = Vec::new();
+    file.read_to_end(&mut tail).map_err(failed())?;
+    Ok(!tail.windows(2).any(|pair| pair == [0xff, 0xd9]))
+}

@@ -1,0 +1,120 @@
+//! The clouds of an epoch, as far as a look needs them.
+
+use crate::error::Result;
+use crate::project::Epoch;
+use nalgebra::Point3;
+use std::collections::HashMap;
+use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_io::cloud::{CloudError, cloud_info, read_cloud};
+
+/// Points of an epoch that are looked at.
+const POINTS: u64 = 6_000_000;
+/// Points read at a time.
+const CHUNK: usize = 250_000;
+/// Edge of the cells in which the density of points is counted, metres.
+const CELL_M: f64 = 0.05;
+
+/// What is known of an epoch's clouds.
+pub(super) struct Sample {
+    /// Box around all points.
+    pub bounds: Option<Bounds>,
+    /// Number of points.
+    pub records: u64,
+    /// The first points of each cloud.
+    pub points: Vec<Point3<f64>>,
+    /// Distance between neighbours on the surface, metres.
+    pub spacing_m: Option<f64>,
+    /// Coordinate systems, as the clouds name them; `None` where one names none.
+    pub crs: Vec<Option<String>>,
+}
+
+/// Reads what is needed of an epoch's clouds.
+pub(super) fn sample(epoch: &Epoch) -> Result<Sample> {
+    let mut sample = Sample {
+        bounds: None,
+        records: 0,
+        points: Vec::new(),
+        spacing_m: None,
+        crs: Vec::new(),
+    };
+    let share = POINTS / epoch.clouds.len().max(1) as u64;
+    for path in &epoch.clouds {
+        let info = cloud_info(path)?;
+        sample.records += info.records;
+        sample.crs.push(info.crs);
+        if let Some(bounds) = info.bounds {
+            sample.bounds = Some(sample.bounds.map_or(bounds, |b| b.union(&bounds)));
+        }
+        let mut left = share as usize;
+        let read = read_cloud(path, CHUNK, |chunk| {
+            let taken = left.min(chunk.positions.len());
+            sample.points.extend_from_slice(&chunk.positions[..taken]);
+            left -= taken;
+            if left == 0 { Err(Stop::Enough) } else { Ok(()) }
+        });
+        match read {
+            Ok(_) | Err(Stop::Enough) => {}
+            Err(Stop::Failed(error)) => return Err(error.into()),
+        }
+    }
+    sample.spacing_m = spacing(&sample.points);
+    Ok(sample)
+}
+
+/// Why reading ends before the end of the file.
+enum Stop {
+    Enough,
+    Failed(CloudError),
+}
+
+impl From<CloudError> for Stop {
+    fn from(error: CloudError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Median distance between neighbours on a surface: the root of the area that each point of a cell has for itself.
+fn spacing(points: &[Point3<f64>]) -> Option<f64> {
+    let mut cell_m = CELL_M;
+    // Sparser clouds are counted in larger cells.
+    for _ in 0..8 {
+        let mut counts: HashMap<[i64; 3], u32> = HashMap::new();
+        for p in points {
+            *counts.entry(cell_of(p, cell_m)).or_default() += 1;
+        }
+        // Sorted, so that the map's order does not matter.
+        let mut counts: Vec<u32> = counts.into_values().collect();
+        counts.sort_unstable();
+        // The cell of the usual point, not the usual cell: sparse surroundings take much room.
+        let half = points.len() as u64 / 2;
+        let mut passed = 0;
+        let median = counts.iter().copied().find(|n| {
+            passed += u64::from(*n);
+            passed >= half
+        })?;
+        if median >= 6 {
+            return Some(cell_m / f64::from(median).sqrt());
+        }
+        cell_m *= 2.0;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spacing_of_a_grid_is_found() {
+        for step in [0.004, 0.011, 0.03] {
+            let side = (2.0 / step) as i32;
+            let grid = (0..side).flat_map(|i| (0..side).map(move |j| (f64::from(i), f64::from(j))));
+            let points: Vec<_> = grid
+                .map(|(i, j)| Point3::new(1.0 + i * step, 0.01, j * step))
+                .collect();
+            let found = spacing(&points).unwrap();
+            assert!((found / step - 1.0).abs() < 0.15, "{step}: {found}");
+        }
+        assert_eq!(spacing(&[]), None);
+    }
+}

@@ -1,0 +1,55 @@
+//! The joints as a layer of lines.
+
+use super::layer_style::line_style;
+use crate::figure::Scale;
+use crate::results::{Joint, JointMotion, ResultSet, nice_scale_m};
+use nalgebra::Point3;
+use stonewise_io::crs::Crs;
+use stonewise_io::layers::{Geometry, Layer};
+use stonewise_io::table::{Table, TableError};
+
+/// The joints as lines; their motions are empty where a stone was not measured.
+pub(super) fn joint_layer(
+    name: &str,
+    title: &str,
+    geometry: Geometry,
+    crs: Option<Crs>,
+    joints: &[Joint],
+    results: &ResultSet,
+    line: impl Fn(&Joint) -> Vec<Point3<f64>>,
+) -> Result<Layer, TableError> {
+    let mut table = Table::new();
+    for (k, column) in ["stone_1", "stone_2"].into_iter().enumerate() {
+        let id = |j: &Joint| results.stones[j.stones[k]].stone_id;
+        table.push(column, joints.iter().map(id).collect::<Vec<u32>>())?;
+    }
+    table.push("width", joints.iter().map(|j| j.width_m).collect::<Vec<f64>>())?;
+    let of = |pick: fn(&JointMotion) -> f64| -> Vec<Option<f64>> {
+        joints.iter().map(|j| j.motion.as_ref().map(pick)).collect()
+    };
+    table.push("opening", of(|m| m.opening_m))?;
+    table.push("sliding", of(|m| m.sliding_m))?;
+    table.push("step_out", of(|m| m.step_m))?;
+    table.push("sigma_opening", of(|m| m.opening_sigma_m))?;
+    let significant = joints
+        .iter()
+        .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
+    table.push("significant", significant.collect::<Vec<Option<u8>>>())?;
+    let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
+    Ok(Layer {
+        name: name.to_owned(),
+        title: title.to_owned(),
+        description:
+            "joints between neighbouring stones; opening across, sliding along, step out of the face, metres"
+                .into(),
+        geometry,
+        crs,
+        attributes: table,
+        vertices: joints.iter().map(line).collect(),
+        styles: vec![line_style(
+            "Joint opening",
+            "opening",
+            Scale::Diverging(nice_scale_m(openings)),
+        )],
+    })
+}

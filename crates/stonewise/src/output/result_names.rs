@@ -1,0 +1,120 @@
+//! The names of all files that a run publishes in its folder.
+
+use crate::project::Project;
+use crate::results::names::{EVIDENCE_DIR, REPORT_DIR, WORK_DIR};
+use std::path::{Path, PathBuf};
+
+/// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
+const STEMS: [&str; 14] = [
+    "stones",
+    "matches",
+    "registration",
+    "m3c2",
+    "evaluation",
+    "evaluation_truth",
+    "outlines",
+    "displacements",
+    "run",
+    "series",
+    "verdict",
+    "audit_epoch",
+    "c2c",
+    "c2m",
+];
+/// Their extensions; `csv-metadata.json` is `json`.
+const EXTENSIONS: [&str; 10] = [
+    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg",
+];
+/// Excerpts of the survey, without the numbers of epochs and pictures.
+const EVIDENCE: [&str; 5] = ["crops", "crop_outlines", "sections", "cloud", "cameras"];
+
+/// Folders in an output folder that a run of the project writes into.
+pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
+    let epochs = (1..=project.epochs.len()).map(|n| PathBuf::from(format!("epoch{n}")));
+    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, super::PREVIOUS_DIR];
+    epochs.chain(others.map(PathBuf::from)).collect()
+}
+
+/// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see [`cloud_names`].
+pub(super) fn is_result(file: &Path) -> bool {
+    let name = file
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let (stem, extension) = match name.split_once('.') {
+        Some((stem, rest)) => (stem.to_owned(), rest.rsplit('.').next().unwrap_or_default()),
+        None => return false,
+    };
+    // `stones_2` is `stones`, `audit_epoch1` is `audit_epoch`, `crops_1_000` is `crops`.
+    let stem = stem.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_');
+    if !EXTENSIONS.contains(&extension) {
+        return false;
+    }
+    match file.parent().unwrap_or(Path::new("")).to_str() {
+        // `m3c2` ends with a digit of its own, as do `c2c` and `c2m` not.
+        Some("") => STEMS.contains(&stem) || name.starts_with("m3c2.") || name.starts_with("m3c2_"),
+        Some(EVIDENCE_DIR) => EVIDENCE.contains(&stem),
+        Some(REPORT_DIR) => stem == "index",
+        _ => false,
+    }
+}
+
+/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs that share a
+/// stem are told apart by a number.
+pub(crate) fn cloud_names(number: usize, clouds: &[PathBuf]) -> Vec<PathBuf> {
+    let stem = |p: &PathBuf| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let name = |(i, cloud): (usize, &PathBuf)| {
+        let twins = clouds[..i].iter().filter(|c| stem(c) == stem(cloud)).count();
+        let number_of_twin = if twins == 0 {
+            String::new()
+        } else {
+            format!("_{}", twins + 1)
+        };
+        PathBuf::from(format!("epoch{number}")).join(format!("{}{number_of_twin}.laz", stem(cloud)))
+    };
+    clouds.iter().enumerate().map(name).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_of_every_epoch_are_recognised_and_other_files_are_not() {
+        for name in [
+            "stones.csv",
+            "stones_2.parquet",
+            "stones.csv-metadata.json",
+            "m3c2.laz",
+            "m3c2_3.csv",
+            "audit_epoch2.csv",
+            "evaluation_truth.json",
+            "report/index.html",
+            "report/index_2.html",
+            "evidence/crops_1_000.jpg",
+            "evidence/crop_outlines_2.parquet",
+        ] {
+            assert!(is_result(Path::new(name)), "{name}");
+        }
+        for name in [
+            "notes.csv",
+            "stones.txt",
+            "stones",
+            "report/notes.html",
+            "survey/stones.csv",
+            "evidence/mine.jpg",
+            "my_stones.csv",
+            "stonewise.toml",
+        ] {
+            assert!(!is_result(Path::new(name)), "{name}");
+        }
+    }
+
+    #[test]
+    fn clouds_of_one_stem_get_names_of_their_own() {
+        let clouds = ["a/wall.laz", "b/wall.e57", "c.ply"].map(PathBuf::from);
+        let names = ["epoch2/wall.laz", "epoch2/wall_2.laz", "epoch2/c.laz"].map(PathBuf::from);
+        assert_eq!(cloud_names(2, &clouds), names);
+    }
+}

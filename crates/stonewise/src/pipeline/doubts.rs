@@ -1,0 +1,86 @@
+//! Doubts about the results of a pair of epochs as a whole.
+
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::register::Registered;
+use crate::results::records::EstimatorRecord;
+use crate::results::{Status, StoneRow};
+use stonewise_core::stone::StoneMotion;
+
+/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which something other
+/// than noise hides the motions.
+const LIMIT_EXCESS: f64 = 100.0;
+/// Half width of a 95 % interval, in standard deviations.
+const SIGMAS_95: f64 = 1.96;
+
+/// Warns where the motions of a pair of epochs cannot be relied on.
+pub fn note_doubts(context: &Context, number: usize, registered: &Registered, rows: &[StoneRow]) {
+    let epoch = &context.project.epochs[number - 1].name;
+    let found = [unsettled(registered), few_measured(rows), blind(registered, rows)];
+    for message in found.into_iter().flatten() {
+        context.warnings.doubt("register", epoch, message);
+    }
+}
+
+/// The adjustment stopped before its motions had settled.
+fn unsettled(registered: &Registered) -> Option<String> {
+    let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
+        return None;
+    };
+    let iterations = adjustment.iterations;
+    (!adjustment.converged).then(|| {
+        format!(
+            "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
+             on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at \
+             its pictures"
+        )
+    })
+}
+
+/// Most of the stones that were found in both epochs could not be measured.
+fn few_measured(rows: &[StoneRow]) -> Option<String> {
+    let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
+    let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
+    (2 * measured < matched).then(|| {
+        let counts = Status::ALL.iter().filter_map(|status| {
+            let n = rows
+                .iter()
+                .filter(|r| r.status == *status && r.matched_id.is_some() && *status != Status::Ok)
+                .count();
+            (n > 0).then(|| format!("{n} {}", status.word()))
+        });
+        format!(
+            "only {measured} of the {matched} stones found in both epochs could be measured ({}). That no motion is shown for \
+             the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
+             `stonewise check` on the project and look at its pictures",
+            counts.collect::<Vec<_>>().join(", ")
+        )
+    })
+}
+
+/// Motions are far less certain than the points allow.
+fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
+    let points: std::collections::BTreeMap<u32, [f64; 2]> = rows
+        .iter()
+        .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
+        .collect();
+    let ratio = |(stone, motion): (u32, &StoneMotion)| {
+        let [one, two] = points.get(&stone)?.map(|n| n.max(1.0));
+        let allowed = motion.rmse_m * (1.0 / one + 1.0 / two).sqrt();
+        let covariance = motion.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let sd = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
+        (allowed > 0.0).then_some((sd / allowed, sd))
+    };
+    let measured = registered.results.iter();
+    let measured = measured.filter_map(|r| Some((r.first.0, r.motion.as_ref().ok()?)));
+    let mut all: Vec<(f64, f64)> = measured.filter_map(ratio).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let &(excess, sd) = all.get(all.len() / 2)?;
+    (excess > LIMIT_EXCESS).then(|| {
+        format!(
+            "motions below about {:.0} mm cannot be detected in the weakest direction, {excess:.0} times what the spacing and the \
+             noise of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each \
+             other; run `stonewise check` on the project",
+            1e3 * SIGMAS_95 * sd
+        )
+    })
+}

@@ -1,0 +1,71 @@
+//! The look at a survey with which every run begins.
+
+use crate::check::{Report, Verdict, check, is_about_this_machine};
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::segment::listing;
+use crate::pipeline::storage::step::Key;
+
+/// Name of the step, and of its page.
+const STEP: &str = "check";
+
+/// Looks at the survey before the work. What is doubtful becomes a warning; what cannot be right stops the run, unless it
+/// is forced.
+///
+/// Errors: something cannot be right; a cloud or camera file cannot be read.
+pub fn look(context: &Context, forced: bool) -> Result<()> {
+    let project = context.project;
+    let mut inputs = Vec::new();
+    for epoch in &project.epochs {
+        for cloud in &epoch.clouds {
+            inputs.push(context.digest(cloud)?);
+        }
+        inputs.extend([context.digest(&epoch.cameras)?, listing(&epoch.images)?]);
+    }
+    let names: Vec<&String> = project.epochs.iter().map(|e| &e.name).collect();
+    let key = Key::new(
+        STEP,
+        &names,
+        &inputs.iter().map(String::as_str).collect::<Vec<_>>(),
+    );
+    let step = context.step(STEP, key, |step, _| {
+        let report = check(project, &context.out, context.progress)?;
+        report.write_page(&step.file("check.html"), project)?;
+        write_json(&step.file("check.json"), &report)
+    })?;
+    let page = step.file("check.html");
+    let report: Report = read_json(&step.file("check.json"))?;
+    let about_survey = || report.doubtful().filter(|f| !is_about_this_machine(f));
+    let wrong: Vec<String> = about_survey()
+        .filter(|f| f.verdict == Verdict::Wrong)
+        .map(|f| format!("  {} {}: {}", f.epoch, f.topic, f.text))
+        .collect();
+    if !wrong.is_empty() && !forced {
+        return Err(Error::Check(format!(
+            "this survey cannot be right (--force goes on all the same):\n{}\n  pictures: {}",
+            wrong.join("\n"),
+            page.display()
+        )));
+    }
+    for finding in about_survey() {
+        let subject = if finding.epoch.is_empty() {
+            &project.name
+        } else {
+            &finding.epoch
+        };
+        let message = format!(
+            "{}: {} (pictures: {})",
+            finding.topic,
+            finding.text,
+            page.display()
+        );
+        context.warnings.doubt(STEP, subject, message);
+    }
+    for finding in report.doubtful().filter(|f| is_about_this_machine(f)) {
+        context
+            .progress
+            .note(&format!("{}: {}", finding.topic, finding.text));
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! The input clouds again, with the stone of every point.
+
+use crate::error::{Error, Result};
+use crate::output::cloud_names;
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::storage::step::Key;
+use crate::results::StoneRow;
+use crate::results::names::epoch_dir;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+use stonewise_core::cloud::TileSource;
+use stonewise_core::id::StoneId;
+use stonewise_io::cloud::{LabelColumns, PointLabel, PointMotion, write_labelled};
+
+/// Writes every cloud of an epoch, in input order, with `stone_id`; with motions too where rows are given.
+pub fn write_clouds(
+    context: &Context,
+    number: usize,
+    labelled: &Labelled,
+    rows: Option<&[StoneRow]>,
+) -> Result<()> {
+    let epoch = &context.project.epochs[number - 1];
+    let folder = context.out.join(epoch_dir(number));
+    fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
+    let names = cloud_names(number, &epoch.clouds);
+    if let Some(output) = context.output {
+        names.iter().try_for_each(|name| output.bring_back(name))?;
+    }
+    let outputs: Vec<PathBuf> = names.iter().map(|name| context.out.join(name)).collect();
+    let motions = rows.map_or_else(BTreeMap::new, motions);
+    let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
+    context.step_publishing(&format!("clouds-{number}"), key, &outputs, |_, _| {
+        for stale in outputs.iter().filter(|o| o.exists()) {
+            fs::remove_file(stale).map_err(Error::io("removing a cloud of an earlier run", stale))?;
+        }
+        for (file, (input, output)) in epoch.clouds.iter().zip(&outputs).enumerate() {
+            let stones = stones_of_file(labelled, file as u32)?;
+            let columns = if rows.is_some() {
+                LabelColumns::StoneAndMotion
+            } else {
+                LabelColumns::Stone
+            };
+            let title = format!(
+                "write {}",
+                output.file_name().unwrap_or_default().to_string_lossy()
+            );
+            context.progress.begin(&title, stones.len() as u64);
+            write_labelled(input, output, columns, |chunk| {
+                context.progress.check()?;
+                context.progress.advance(chunk.len() as u64);
+                let label = |&index: &u64| {
+                    let stone = stones.get(index as usize).copied().filter(|&s| s != 0);
+                    PointLabel {
+                        stone: stone.map(StoneId),
+                        motion: stone.and_then(|s| motions.get(&s).copied()),
+                        dropped: false,
+                    }
+                };
+                Ok::<_, Error>(chunk.indices.iter().map(label).collect())
+            })?;
+        }
+        Ok(())
+    })?;
+    Ok(())
+}
+
+fn motions(rows: &[StoneRow]) -> BTreeMap<u32, PointMotion> {
+    let motion = |row: &StoneRow| {
+        let m = row.motion.as_ref()?;
+        Some((
+            row.stone_id,
+            PointMotion {
+                displacement_m: m.displacement.cast(),
+                significant: m.significant,
+            },
+        ))
+    };
+    rows.iter().filter_map(motion).collect()
+}
+
+/// Stone of every record of one input file, 0 for none.
+fn stones_of_file(labelled: &Labelled, file: u32) -> Result<Vec<u32>> {
+    let tiles = &labelled.ingested.tiles.surveyed;
+    let mut stones = Vec::new();
+    for tile in 0..tiles.tile_count() {
+        let (origin, labels) = (tiles.provenance(tile)?, labelled.labels(tile)?);
+        for ((&from, &index), &stone) in origin.file.iter().zip(&origin.index).zip(&labels.stone) {
+            if from == file {
+                let index = index as usize;
+                if stones.len() <= index {
+                    stones.resize(index + 1, 0);
+                }
+                stones[index] = stone;
+            }
+        }
+    }
+    Ok(stones)
+}

@@ -1,0 +1,55 @@
+//! A thinned cloud.
+
+use crate::error::Result;
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::results::ThinPoint;
+use nalgebra::Point3;
+use stonewise_core::cloud::TileSource;
+
+/// Points kept of an epoch, about.
+const WANTED: u64 = 220_000;
+/// Colour of a point that no photo shows.
+const GREY: [u8; 3] = [150; 3];
+
+/// A kept point on its way to a colour.
+pub struct Candidate {
+    pub point: ThinPoint,
+    /// Where it was surveyed; elsewhere only where the project moves the epoch.
+    pub surveyed: Point3<f64>,
+    /// The photo that will colour it.
+    pub photo: Option<usize>,
+}
+
+/// Every n-th point at random, the same ones in every run.
+pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>> {
+    let tiles = &epoch.ingested.tiles;
+    let every = tiles.surveyed.point_count().div_ceil(WANTED).max(1);
+    let mut kept = Vec::new();
+    context.progress.begin("thin cloud", tiles.tile_count() as u64);
+    for tile in 0..tiles.tile_count() {
+        context.progress.check()?;
+        let (moved, surveyed, labels) = (tiles.load(tile)?, tiles.surveyed.load(tile)?, epoch.labels(tile)?);
+        let chosen =
+            (0..moved.len()).filter(|&i| mixed((tile as u64) << 40 | i as u64).is_multiple_of(every));
+        kept.extend(chosen.map(|i| Candidate {
+            point: ThinPoint {
+                position: moved.world(i),
+                colour: GREY,
+                stone: labels.stone[i],
+            },
+            surveyed: surveyed.world(i),
+            photo: None,
+        }));
+        context.progress.advance(1);
+    }
+    Ok(kept)
+}
+
+/// A number that looks random (the finaliser of SplitMix64; Steele, Lea & Flood 2014).
+fn mixed(value: u64) -> u64 {
+    let v = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    v ^ (v >> 31)
+}

@@ -1,0 +1,63 @@
+//! The M3C2 core points as cloud and table.
+
+use crate::error::Result;
+use crate::results::names::PairFile;
+use nalgebra::Point3;
+use std::path::Path;
+use stonewise_core::change::{ChangeField, ChangePoint};
+use stonewise_io::cloud::{ExtraColumn, write_points_laz};
+use stonewise_io::crs::Crs;
+use stonewise_io::table::{Table, write_csv};
+
+/// Writes `m3c2.laz` and `m3c2.csv` (of the third epoch `m3c2_2.laz`, and so on) with PDAL's dimension names.
+///
+/// In the LAZ an unknown number is NaN; in the CSV its cell is empty.
+pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
+    let points = &field.points;
+    let real = |of: fn(&ChangePoint) -> Option<f64>| points.iter().map(of).collect::<Vec<_>>();
+    let columns: [(&str, Vec<Option<f64>>); 7] = [
+        ("NormalX", real(|p| Some(p.normal.x))),
+        ("NormalY", real(|p| Some(p.normal.y))),
+        ("NormalZ", real(|p| Some(p.normal.z))),
+        ("m3c2_distance", real(|p| p.distance_m)),
+        ("m3c2_uncertainty", real(|p| p.detection_limit_m)),
+        ("m3c2_std_dev1", real(|p| p.spread_m[0])),
+        ("m3c2_std_dev2", real(|p| p.spread_m[1])),
+    ];
+    let significant: Vec<u16> = points.iter().map(|p| u16::from(p.is_significant())).collect();
+    let counts = [0, 1].map(|e| points.iter().map(|p| p.counts[e]).collect::<Vec<u32>>());
+
+    let mut table = Table::new();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        table.push(
+            name,
+            points.iter().map(|p| p.position[axis]).collect::<Vec<f64>>(),
+        )?;
+    }
+    for (name, values) in &columns {
+        table.push(name, values.clone())?;
+    }
+    table.push("m3c2_significant", significant.clone())?;
+    table.push("m3c2_count1", counts[0].clone())?;
+    table.push("m3c2_count2", counts[1].clone())?;
+    write_csv(&dir.join(PairFile::M3c2Csv.name(pair)), &table)?;
+
+    let positions: Vec<Point3<f64>> = points.iter().map(|p| p.position).collect();
+    let dense: Vec<(&str, Vec<f64>)> = columns
+        .iter()
+        .map(|(name, v)| (*name, v.iter().map(|c| c.unwrap_or(f64::NAN)).collect()))
+        .collect();
+    let mut extra: Vec<(&str, ExtraColumn)> = dense
+        .iter()
+        .map(|(name, v)| (*name, ExtraColumn::F64(v)))
+        .collect();
+    extra.push(("m3c2_significant", ExtraColumn::U16(&significant)));
+    extra.push(("m3c2_count1", ExtraColumn::U32(&counts[0])));
+    extra.push(("m3c2_count2", ExtraColumn::U32(&counts[1])));
+    Ok(write_points_laz(
+        &dir.join(PairFile::M3c2Laz.name(pair)),
+        crs.map(Crs::text).as_deref(),
+        &positions,
+        &extra,
+    )?)
+}

@@ -1,0 +1,51 @@
+//! The outlines of the first epoch's stones.
+
+use crate::error::{Error, Result};
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::storage::step::Key;
+use crate::results::names::OUTLINES;
+use crate::results::{StoneOutline, write_outlines};
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+use std::fs;
+use stonewise_core::cloud::TileSource;
+use stonewise_core::geometry::{OutlineParams, face_outline};
+use stonewise_core::stone::Stone;
+use stonewise_io::atomic::write_atomically;
+
+/// Writes the outlines of the first epoch's stones.
+pub fn write_stone_outlines(context: &Context, first: &Labelled) -> Result<()> {
+    let key = Key::new("outlines", &(), &[first.key.as_str()]);
+    let step = context.step("outlines", key, |step, _| {
+        write_outlines(step.path(), &stone_outlines(context, first)?)
+    })?;
+    let to = context.out.join(OUTLINES);
+    write_atomically(&to, |partial| fs::copy(step.file(OUTLINES), partial).map(|_| ()))
+        .map_err(Error::io("writing", &to))
+}
+
+fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
+    let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
+    context
+        .progress
+        .begin("outlines", first.ingested.tiles.tile_count() as u64);
+    for tile in 0..first.ingested.tiles.tile_count() {
+        context.progress.check()?;
+        let (cloud, labels) = (first.ingested.tiles.load(tile)?, first.labels(tile)?);
+        for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
+            points.entry(stone).or_default().push(cloud.world(i));
+        }
+        context.progress.advance(1);
+    }
+    let params = OutlineParams::default();
+    let outline = |stone: &Stone| {
+        let ring = face_outline(points.get(&stone.id.0)?, &stone.normal, &params)?;
+        Some(StoneOutline {
+            stone_id: stone.id.0,
+            normal: stone.normal,
+            ring,
+        })
+    };
+    Ok(first.stones.iter().filter_map(outline).collect())
+}

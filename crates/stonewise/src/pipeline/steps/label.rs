@@ -1,0 +1,157 @@
+//! An epoch's points with the stone of each.
+
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::ingest::Ingested;
+use crate::pipeline::steps::segment::Segmented;
+use crate::pipeline::storage::step::{Key, StepDir};
+use crate::pipeline::storage::tiles::DiskTiles;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_core::cloud::TileSource;
+use stonewise_core::geometry::Bounds;
+use stonewise_core::progress::Progress;
+use stonewise_core::stone::Stone;
+use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
+use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// A labelled epoch: its points (moved, where the project says so), their labels, its stones.
+pub struct Labelled {
+    /// Points.
+    pub ingested: Ingested,
+    /// Stones, ascending by id.
+    pub stones: Vec<Stone>,
+    /// Which instances make up each stone, and what was decided about them.
+    pub transfer: Transfer,
+    /// Key of everything above.
+    pub key: Key,
+    store: DiskLabels,
+}
+
+impl Labelled {
+    /// Labels of a tile's points.
+    pub fn labels(&self, tile: usize) -> Result<TileLabels> {
+        self.store.read(tile)
+    }
+
+    /// Box around the points of every stone. Cost: one pass over all tiles.
+    pub fn extents(&self, progress: &dyn Progress) -> Result<BTreeMap<u32, Bounds>> {
+        let tiles = &self.ingested.tiles;
+        let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
+        progress.begin("find stones", tiles.tile_count() as u64);
+        for tile in 0..tiles.tile_count() {
+            progress.check()?;
+            let (cloud, labels) = (tiles.load(tile)?, self.labels(tile)?);
+            for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
+                let place = cloud.world(i);
+                let point = Bounds {
+                    min: place,
+                    max: place,
+                };
+                let extent = extents.entry(labels.stone[i]).or_insert(point);
+                *extent = extent.union(&point);
+            }
+            progress.advance(1);
+        }
+        Ok(extents)
+    }
+}
+
+/// Carries the photos' labels into the points of an epoch; then moves the points, where the project says so.
+pub fn label(context: &Context, number: usize, ingested: Ingested, photos: &Segmented) -> Result<Labelled> {
+    let params = &context.project.settings.label;
+    let tiles = &ingested.tiles.surveyed;
+    let map = &context.project.epochs[number - 1].map;
+    let key = Key::new(
+        "label",
+        &(params, &map.crs, map.false_origin),
+        &[ingested.step.key().as_str(), photos.step.key().as_str()],
+    );
+    let step = context.step(&format!("label-{number}"), key, |step, _| {
+        let mut store = DiskLabels::new(step.path(), tiles);
+        let mask = |image| photos.labels(image).map(Some);
+        let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
+        write_json(&step.file("transfer.json"), &transfer)
+    })?;
+    let transfer = read_json(&step.file("transfer.json"))?;
+    let store = DiskLabels::new(step.path(), tiles);
+    tabulate(context, number, photos, ingested, transfer, store, &step)
+}
+
+fn tabulate(
+    context: &Context,
+    number: usize,
+    photos: &Segmented,
+    ingested: Ingested,
+    transfer: Transfer,
+    store: DiskLabels,
+    labelled: &StepDir,
+) -> Result<Labelled> {
+    let params = &context.project.settings.stones;
+    let key = Key::new(
+        "stones",
+        &(params, &ingested.tiles.motion),
+        &[labelled.key().as_str()],
+    );
+    let step = context.step(&format!("stones-{number}"), key, |step, _| {
+        let stones = build_stones(
+            &ingested.tiles,
+            &store,
+            &photos.views,
+            &transfer.stones,
+            params,
+            context.progress,
+        )?;
+        write_json(&step.file("stones.json"), &stones)
+    })?;
+    let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
+    if stones.is_empty() {
+        return Err(Error::Survey(format!(
+            "no stone of epoch {:?} got any points: do its cameras and clouds share one frame?",
+            context.project.epochs[number - 1].name
+        )));
+    }
+    Ok(Labelled {
+        ingested,
+        stones,
+        transfer,
+        key: step.key().clone(),
+        store,
+    })
+}
+
+/// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
+struct DiskLabels {
+    files: Vec<PathBuf>,
+}
+
+impl DiskLabels {
+    fn new(dir: &Path, tiles: &DiskTiles) -> Self {
+        let file = |tile| dir.join(format!("{}.parquet", tiles.name(tile)));
+        Self {
+            files: (0..tiles.tile_count()).map(file).collect(),
+        }
+    }
+}
+
+impl LabelStore for DiskLabels {
+    type Error = Error;
+
+    fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<()> {
+        let mut table = Table::new();
+        table.push("stone", labels.stone.clone())?;
+        table.push("confidence", labels.confidence.clone())?;
+        table.push("seen", labels.seen.clone())?;
+        Ok(write_parquet(&self.files[tile], &table)?)
+    }
+
+    fn read(&self, tile: usize) -> Result<TileLabels> {
+        let table = read_columns(&self.files[tile], &["stone", "confidence", "seen"])?;
+        Ok(TileLabels {
+            stone: table.required("stone")?.to_vec(),
+            confidence: table.required("confidence")?.to_vec(),
+            seen: table.required("seen")?.to_vec(),
+        })
+    }
+}

@@ -1,0 +1,9 @@
+//! The steps, in their order: ingest, segment, label, match, register, m3c2, evaluate.
+
+pub mod evaluate;
+pub mod ingest;
+pub mod label;
+pub mod m3c2;
+pub mod r#match;
+pub mod register;
+pub mod segment;

@@ -1,0 +1,80 @@
+//! What is known about the registration of a later epoch against the first.
+
+use super::Registered;
+use crate::project::Project;
+use crate::results::records::{Datum, DatumState, SourceError};
+use nalgebra::{Matrix6, Point3};
+use stonewise_core::registration::observers::{self, EpochErrors};
+use stonewise_core::stone::Stone;
+
+/// The registration error of a later epoch, from the first of these that there is: stable areas, the error that the project states,
+/// differences between the sources of each epoch.
+///
+/// `number`: of the later epoch, from 1. `stones`: of the first epoch; their middle is the centre of a stated error.
+pub fn datum(project: &Project, number: usize, registered: &Registered, stones: &[Stone]) -> Datum {
+    let mut datum = of_errors(project, number, registered.epoch_errors.as_ref(), stones);
+    if let Some(errors) = &registered.epoch_errors {
+        let epochs = [0, number - 1].map(|e| project.epochs[e].name.clone());
+        datum.sources = errors
+            .sources
+            .iter()
+            .map(|s| SourceError {
+                epoch: epochs[s.epoch].clone(),
+                source: s.name.clone(),
+                error_m: s.against_epoch.into(),
+                sd_m: s.sd.into(),
+            })
+            .collect();
+    }
+    datum
+}
+
+fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {
+    let known = |state, errors: &EpochErrors, note| {
+        Datum::known(state, &errors.rigid.centre, &errors.rigid.covariance, note)
+    };
+    let shift_mm = |errors: &EpochErrors| 1e3 * errors.rigid.error.fixed_rows::<3>(0).norm();
+    if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Stable) {
+        let note = format!(
+            "the stable areas show a registration error of {:.2} mm at the middle of the wall: it is taken off the motions, and what \
+             stays uncertain of it is in limits and intervals",
+            shift_mm(errors)
+        );
+        return known(DatumState::Stable, errors, note);
+    }
+    let centre = middle(stones);
+    if let Some(error_m) = project.settings.registration.epoch_error_m {
+        // Both epochs carry the error of their registration.
+        let variance = 2.0 * error_m * error_m;
+        let covariance = Matrix6::from_diagonal(&[variance, variance, variance, 0.0, 0.0, 0.0].into());
+        let note = format!(
+            "the project states a registration error of {:.1} mm per axis and epoch; limits and intervals hold it",
+            1e3 * error_m
+        );
+        return Datum::known(DatumState::Stated, &centre, &covariance, note);
+    }
+    if project.epochs[number - 1].same_survey_as == Some(0)
+        && let Some(errors) = errors
+    {
+        let note =
+            "both epochs are parts of one survey: there is no registration error between them".to_owned();
+        return known(DatumState::Stated, errors, note);
+    }
+    if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Sources) {
+        let note = format!(
+            "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {:.1} mm \
+             per axis that all sources of an epoch share; limits and intervals hold both",
+            1e3 * errors.shared_error_m
+        );
+        return known(DatumState::Sources, errors, note);
+    }
+    let note = "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \
+                common rigid motion of the measured stones"
+        .to_owned();
+    Datum::unknown(&centre, note)
+}
+
+fn middle(stones: &[Stone]) -> Point3<f64> {
+    let sum: nalgebra::Vector3<f64> = stones.iter().map(|s| s.centroid.coords).sum();
+    Point3::from(sum / stones.len().max(1) as f64)
+}

@@ -1,0 +1,215 @@
+//! The motion of every matched stone.
+
+mod datum;
+mod pairs;
+mod sights;
+mod windows;
+
+use crate::error::Result;
+use crate::files::{read_json, write_json};
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::r#match::Matched;
+use crate::pipeline::storage::step::Key;
+use crate::project::Estimator;
+use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord};
+pub use datum::datum;
+use pairs::DiskPairs;
+use serde::{Deserialize, Serialize};
+use sights::Sights;
+use std::collections::BTreeMap;
+use stonewise_core::id::StoneId;
+use stonewise_core::registration::observers::{
+    self, EpochErrorParams, EpochErrors, EpochPair, ErrorAt, epoch_errors,
+};
+use stonewise_core::registration::{AdjustmentReport, adjust};
+use stonewise_core::stone::PairResult;
+use windows::align_windows;
+
+/// Name of the step.
+const STEP: &str = "register";
+
+/// Motions of a pair of epochs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Registered {
+    /// One result per matched stone, ascending by stone of the first epoch.
+    pub results: Vec<PairResult>,
+    /// What the estimator says about itself.
+    pub estimator: EstimatorRecord,
+    /// Error of the later epoch against the reference, as sources and stable areas show it.
+    pub epoch_errors: Option<EpochErrors>,
+    /// The stones at which that error is given, in its order.
+    pub error_stones: Vec<StoneId>,
+}
+
+/// Measures the motion of every matched stone.
+pub fn register(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+    matched: &Matched,
+    number: usize,
+) -> Result<Registered> {
+    let params = &context.project.settings.registration;
+    // The pairs themselves, not how they were found: other parameters of the matching that find the same pairs cost nothing.
+    let matches = matched.pairs();
+    let key = Key::new(
+        STEP,
+        &(
+            params,
+            &matches,
+            context.project.epochs[number - 1].same_survey_as,
+        ),
+        &[first.key.as_str(), second.key.as_str()],
+    );
+    let step = context.step(&format!("{STEP}-{number}"), key, |step, _| {
+        let mut registered = match params.estimator {
+            Estimator::Adjustment => {
+                let pairs = DiskPairs::gather(
+                    first,
+                    second,
+                    &matches,
+                    params.border_noises,
+                    step,
+                    context.progress,
+                )?;
+                let report = adjust(&pairs, &params.adjustment, context.progress)?;
+                pairs.remove()?;
+                of_adjustment(report)
+            }
+            Estimator::Gicp => {
+                let size_m = context.project.settings.ingest.size_m;
+                of_windows(align_windows(
+                    first,
+                    second,
+                    &matches,
+                    size_m,
+                    &params.gicp,
+                    context.progress,
+                )?)
+            }
+        };
+        let sights = Sights::gather(
+            context.project,
+            [first, second],
+            number,
+            &matches,
+            params.observers.contrasts.max_stones,
+            context.progress,
+        )?;
+        let pair = EpochPair {
+            sources: &sights.sources,
+            same_as: &sights.same_as,
+            stones: &sights.seen,
+            stable: &sights.stable,
+            sigma_m: registered.noise_m(),
+        };
+        let observers = EpochErrorParams {
+            shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),
+            ..params.observers.clone()
+        };
+        registered.epoch_errors = Some(epoch_errors(&pair, &observers));
+        registered.error_stones = sights.stones;
+        write_json(&step.file("motions.json"), &registered)
+    })?;
+    let registered: Registered = read_json(&step.file("motions.json"))?;
+    report_datum(context, number, &registered);
+    Ok(registered)
+}
+
+impl Registered {
+    /// Error of the later epoch against the reference, by stone of the reference.
+    pub fn errors(&self) -> BTreeMap<StoneId, &ErrorAt> {
+        let errors = self.epoch_errors.iter().flat_map(|e| &e.at);
+        self.error_stones.iter().copied().zip(errors).collect()
+    }
+
+    /// Noise of single points along the normal, metres: the larger of the epochs'.
+    fn noise_m(&self) -> f64 {
+        match &self.estimator {
+            EstimatorRecord::Adjustment(adjustment) => {
+                adjustment.noise_m.iter().flatten().copied().fold(0.0, f64::max)
+            }
+            EstimatorRecord::Gicp(_) => {
+                let motions = self.results.iter().filter_map(|r| r.motion.as_ref().ok());
+                let mut residuals: Vec<f64> = motions.map(|m| m.rmse_m).filter(|r| r.is_finite()).collect();
+                residuals.sort_by(f64::total_cmp);
+                residuals.get(residuals.len() / 2).copied().unwrap_or(0.0)
+            }
+        }
+    }
+}
+
+/// Says how the stones moved in common, and what is known about the registration of the epochs.
+fn report_datum(context: &Context, number: usize, registered: &Registered) {
+    let epoch = &context.project.epochs[number - 1].name;
+    let text = |mean: [f64; 3], variance: [f64; 3]| {
+        let parts = mean.iter().zip(variance);
+        let parts: Vec<String> = parts
+            .map(|(m, v)| format!("{:.2} +- {:.2}", 1e3 * m, 1e3 * v.max(0.0).sqrt()))
+            .collect();
+        format!("x {}, y {}, z {} mm", parts[0], parts[1], parts[2])
+    };
+    if let EstimatorRecord::Adjustment(adjustment) = &registered.estimator {
+        let c = &adjustment.common_motion_covariance_m2;
+        let common = text(adjustment.common_motion_m, [c[0][0], c[1][1], c[2][2]]);
+        let message = format!(
+            "common motion (mean of the measured stones that are not loose, before any correction of the datum): {common}; \
+             these errors leave out that of the epochs' registration"
+        );
+        context.warnings.notice(STEP, epoch, message);
+    }
+    let named = context.project.settings.registration.stable.len();
+    let cells = registered.epoch_errors.as_ref().map_or(0, |e| e.observations[2]);
+    let is_stable = registered
+        .epoch_errors
+        .as_ref()
+        .is_some_and(|e| e.datum == observers::Datum::Stable);
+    if named > 0 && !is_stable {
+        let message = format!(
+            "[[registration.stable]] does not show the epochs' registration: {cells} plane cells seen in both epochs are too few; it is \
+             taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m"
+        );
+        context.warnings.skipped(STEP, epoch, message);
+    }
+}
+
+fn of_adjustment(mut report: AdjustmentReport) -> Registered {
+    report.results.sort_by_key(|r| r.first);
+    let finite = |v: f64| v.is_finite().then_some(v);
+    let c = report.common_covariance;
+    let adjustment = AdjustmentRecord {
+        converged: report.converged,
+        iterations: report.iterations,
+        noise_m: report.sigma_m.map(finite),
+        roughness_m: finite(report.roughness_m),
+        surface_cell_m: finite(report.cell_m),
+        correlation_factor: finite(report.correlation_factor),
+        variance_components: report.components,
+        common_motion_m: report.common_motion.into(),
+        common_motion_covariance_m2: std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)])),
+        loose: report.loose,
+        breaks: report.breaks,
+    };
+    Registered {
+        results: report.results,
+        estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
+        epoch_errors: None,
+        error_stones: Vec::new(),
+    }
+}
+
+fn of_windows(results: Vec<PairResult>) -> Registered {
+    let measured = results.iter().filter_map(|r| r.motion.as_ref().ok());
+    let gicp = GicpRecord {
+        stones: results.len(),
+        measured: measured.clone().count(),
+        loose: measured.filter(|m| m.loose).count(),
+    };
+    Registered {
+        results,
+        estimator: EstimatorRecord::Gicp(gicp),
+        epoch_errors: None,
+        error_stones: Vec::new(),
+    }
+}

@@ -1,0 +1,231 @@
+//! What each station and strip shows of the matched stones and of the stable areas, gathered in one pass over the tiles.
+
+use crate::error::Result;
+use crate::pipeline::sources::EpochSources;
+use crate::pipeline::steps::label::Labelled;
+use crate::project::Project;
+use crate::stable::StableArea;
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_core::id::StoneId;
+use stonewise_core::progress::Progress;
+use stonewise_core::registration::observers::{SeenStone, Source, SourcePoints, StablePoints};
+use stonewise_core::stone::Stone;
+
+/// Edge of the cells in which the points of a stable area are counted, metres, and the most that one source keeps in a cell.
+const STABLE_CELL_M: f64 = 0.1;
+const STABLE_POINTS: u32 = 40;
+
+/// The sources of two epochs and what they show.
+pub struct Sights {
+    /// Those of the reference epoch, then those of the later one.
+    pub sources: Vec<Source>,
+    /// For each source, the one whose error it shares: itself, or for halves of one survey that of the first half.
+    pub same_as: Vec<usize>,
+    /// Stones of the reference epoch, in the order of `seen`.
+    pub stones: Vec<StoneId>,
+    /// What the sources show of them.
+    pub seen: Vec<SeenStone>,
+    /// Points in stable areas.
+    pub stable: Vec<StablePoints>,
+}
+
+impl Sights {
+    /// `number`: of the later epoch, from 1. At most `most_stones` keep their points, evenly chosen among the matches.
+    pub fn gather(
+        project: &Project,
+        epochs: [&Labelled; 2],
+        number: usize,
+        matches: &[(StoneId, StoneId)],
+        most_stones: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let numbers = [1, number];
+        let mut of_epoch = Vec::new();
+        for (epoch, n) in epochs.iter().zip(numbers) {
+            let raw = epoch.ingested.tiles.surveyed.raw_sources()?;
+            of_epoch.push(EpochSources::new(&raw, &project.epochs[n - 1].clouds));
+        }
+        let sources: Vec<Source> = of_epoch
+            .iter()
+            .enumerate()
+            .flat_map(|(epoch, list)| {
+                list.list.iter().map(move |s| Source {
+                    name: s.name.clone(),
+                    epoch,
+                    has_times: s.has_times,
+                })
+            })
+            .collect();
+        let is_one_survey = project.epochs[number - 1].same_survey_as == Some(0);
+        let places = matched_stones(&epochs[0].stones, matches);
+        let mut sights = Self {
+            same_as: shared_errors(&sources, is_one_survey),
+            stones: places.iter().map(|(first, _, _)| *first).collect(),
+            seen: Vec::new(),
+            stable: Vec::new(),
+            sources,
+        };
+        let stride = places.len().div_ceil(most_stones.max(1)).max(1);
+        let mut collected: Vec<BTreeMap<usize, Collected>> = vec![BTreeMap::new(); places.len()];
+        for (e, epoch) in epochs.iter().enumerate() {
+            let ids = places
+                .iter()
+                .enumerate()
+                .map(|(k, (first, second, _))| ([first, second][e].0, k));
+            let pass = Pass {
+                epoch,
+                sources: &of_epoch[e],
+                first_source: e * of_epoch[0].list.len(),
+                stones: ids.collect(),
+                areas: &project.settings.registration.stable,
+            };
+            pass.stones(&places, stride, &mut collected, progress)?;
+            pass.stable(&mut sights.stable)?;
+        }
+        sights.seen = places
+            .iter()
+            .zip(collected)
+            .map(|((_, _, stone), parts)| SeenStone {
+                centroid: stone.centroid,
+                normal: stone.normal,
+                sights: parts
+                    .into_iter()
+                    .map(|(s, c)| c.finish(s, &stone.centroid))
+                    .collect(),
+            })
+            .collect();
+        Ok(sights)
+    }
+}
+
+/// Matched pairs with their stone in the reference epoch.
+fn matched_stones<'a>(
+    stones: &'a [Stone],
+    matches: &[(StoneId, StoneId)],
+) -> Vec<(StoneId, StoneId, &'a Stone)> {
+    let by_id: BTreeMap<StoneId, &Stone> = stones.iter().map(|s| (s.id, s)).collect();
+    let found = matches
+        .iter()
+        .filter_map(|(first, second)| Some((*first, *second, *by_id.get(first)?)));
+    found.collect()
+}
+
+/// Sources of the same name have one error where both epochs are parts of one survey.
+fn shared_errors(sources: &[Source], is_one_survey: bool) -> Vec<usize> {
+    let same = |k: usize| {
+        let twin = sources[..k]
+            .iter()
+            .position(|s| s.epoch == 0 && s.name == sources[k].name);
+        twin.filter(|_| is_one_survey && sources[k].epoch == 1)
+            .unwrap_or(k)
+    };
+    (0..sources.len()).map(same).collect()
+}
+
+/// Points of one source on one stone, as far as they are gathered.
+#[derive(Clone, Default)]
+struct Collected {
+    count: u64,
+    time_sum_s: f64,
+    offsets: Vec<[f32; 3]>,
+}
+
+impl Collected {
+    fn finish(self, source: usize, centroid: &Point3<f64>) -> SourcePoints {
+        SourcePoints {
+            source,
+            count: self.count,
+            time_s: self.time_sum_s / self.count.max(1) as f64,
+            points: Cloud::new(*centroid, self.offsets),
+        }
+    }
+}
+
+/// One epoch's pass over its tiles.
+struct Pass<'a> {
+    epoch: &'a Labelled,
+    sources: &'a EpochSources,
+    /// Number of this epoch's first source.
+    first_source: usize,
+    /// Place in the list of matched stones, by the stone's number in this epoch.
+    stones: BTreeMap<u32, usize>,
+    areas: &'a [StableArea],
+}
+
+impl Pass<'_> {
+    fn stones(
+        &self,
+        places: &[(StoneId, StoneId, &Stone)],
+        stride: usize,
+        collected: &mut [BTreeMap<usize, Collected>],
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let tiles = &self.epoch.ingested.tiles;
+        progress.begin("compare sources", tiles.tile_count() as u64);
+        for tile in 0..tiles.tile_count() {
+            progress.check()?;
+            let labels = self.epoch.labels(tile)?;
+            if labels.stone.iter().any(|s| self.stones.contains_key(s)) {
+                let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
+                for (i, stone) in labels.stone.iter().enumerate() {
+                    let Some(&k) = self.stones.get(stone) else {
+                        continue;
+                    };
+                    let (source, time_s) = self.sources.of(origins.source[i], origins.time_s[i]);
+                    let part = collected[k].entry(self.first_source + source).or_default();
+                    part.count += 1;
+                    part.time_sum_s += time_s;
+                    if k % stride == 0 {
+                        let offset: Vector3<f64> = cloud.world(i) - places[k].2.centroid;
+                        part.offsets.push(offset.cast::<f32>().into());
+                    }
+                }
+            }
+            progress.advance(1);
+        }
+        Ok(())
+    }
+
+    fn stable(&self, list: &mut Vec<StablePoints>) -> Result<()> {
+        let tiles = &self.epoch.ingested.tiles;
+        for (number, area) in self.areas.iter().enumerate() {
+            let Some(bounds) = area.bounds() else { continue };
+            let mut parts: BTreeMap<usize, (Vec<Point3<f64>>, Vec<f64>)> = BTreeMap::new();
+            let mut counts: BTreeMap<(usize, [i64; 3]), u32> = BTreeMap::new();
+            for tile in (0..tiles.tile_count()).filter(|&t| tiles.bounds(t).intersects(&bounds)) {
+                let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
+                for i in 0..cloud.len() {
+                    let place = cloud.world(i);
+                    if !Self::is_in(area, &bounds, &place) {
+                        continue;
+                    }
+                    let (source, time_s) = self.sources.of(origins.source[i], origins.time_s[i]);
+                    let source = self.first_source + source;
+                    let count = counts
+                        .entry((source, cell_of(&place, STABLE_CELL_M)))
+                        .or_default();
+                    *count += 1;
+                    if *count <= STABLE_POINTS {
+                        let part = parts.entry(source).or_default();
+                        part.0.push(place);
+                        part.1.push(time_s);
+                    }
+                }
+            }
+            list.extend(parts.into_iter().map(|(source, (points, times_s))| StablePoints {
+                area: number,
+                source,
+                points: Cloud::from_world(bounds.centre(), points),
+                times_s,
+            }));
+        }
+        Ok(())
+    }
+
+    fn is_in(area: &StableArea, bounds: &Bounds, place: &Point3<f64>) -> bool {
+        bounds.contains(place) && area.contains(place)
+    }
+}

@@ -1,0 +1,63 @@
+//! Photos with masks: their stones, as label images.
+
+use super::voting_photo::{Instance, STEP, VotingPhoto, check_any, label_path, posed_photos};
+use crate::error::Result;
+use crate::pipeline::context::Context;
+use crate::pipeline::storage::step::StepDir;
+use crate::project::Epoch;
+use crate::warnings::Warnings;
+use rayon::prelude::*;
+use std::path::Path;
+use stonewise_io::masks::{MaskSource, write_label_png};
+
+/// Brings the masks of every posed photo of an epoch into one label image each.
+pub fn write_labels(
+    context: &Context,
+    epoch: &Epoch,
+    masks: &Path,
+    step: &StepDir,
+    warnings: &Warnings,
+) -> Result<Vec<VotingPhoto>> {
+    let candidates = posed_photos(epoch, warnings)?;
+    let source = MaskSource::open(masks)?;
+    context
+        .progress
+        .begin(&format!("masks of {}", epoch.name), candidates.len() as u64);
+    let read = candidates
+        .par_iter()
+        .map(|(view, path)| {
+            context.progress.check()?;
+            let size = (view.camera.width, view.camera.height);
+            let labelled = source.labels_for(&path.to_string_lossy(), size.0, size.1);
+            context.progress.advance(1);
+            Ok(match labelled {
+                Ok(Some(labelled)) => Some(labelled),
+                Ok(None) => {
+                    warnings.skipped(
+                        STEP,
+                        path.to_string_lossy(),
+                        format!("no masks for this photo in {}", masks.display()),
+                    );
+                    None
+                }
+                Err(error) => {
+                    warnings.skipped(STEP, path.to_string_lossy(), error.to_string());
+                    None
+                }
+            })
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let mut photos = Vec::new();
+    for ((view, path), labelled) in candidates.into_iter().zip(read) {
+        let Some(labelled) = labelled else { continue };
+        write_label_png(&label_path(step, photos.len()), &labelled.labels)?;
+        let instances = labelled.instances.into_iter().map(Instance::from).collect();
+        photos.push(VotingPhoto {
+            camera: view.name,
+            path,
+            instances,
+        });
+    }
+    check_any(&photos, epoch, warnings)?;
+    Ok(photos)
+}

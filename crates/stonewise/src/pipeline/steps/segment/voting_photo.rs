@@ -1,0 +1,114 @@
+//! A photo that can vote, and how photos and cameras find each other.
+
+use crate::error::{Error, Result};
+use crate::pipeline::storage::step::StepDir;
+use crate::project::Epoch;
+use crate::warnings::Warnings;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use stonewise_core::geometry::View;
+use stonewise_io::cameras::find_photos;
+use stonewise_io::masks::InstanceInfo;
+
+/// Name of the step.
+pub const STEP: &str = "segment";
+/// List of the photos that can vote, in the step's folder.
+pub const PHOTOS: &str = "photos.json";
+
+/// A photo that can vote.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct VotingPhoto {
+    /// Name of its camera.
+    pub camera: String,
+    /// The photo.
+    pub path: PathBuf,
+    /// Its instances, as the masks name them.
+    pub instances: Vec<Instance>,
+}
+
+/// One segmented instance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Instance {
+    /// Value in the label image.
+    pub id: u32,
+    /// Score of the segmentation, 0..1.
+    pub score: f64,
+    /// Reference stone that the masks themselves name; for evaluation only.
+    pub stone_ref: Option<u64>,
+}
+
+impl From<InstanceInfo> for Instance {
+    fn from(info: InstanceInfo) -> Self {
+        Self {
+            id: info.id,
+            score: info.score,
+            stone_ref: info.stone_ref,
+        }
+    }
+}
+
+/// An epoch of which no photo can be used cannot be measured.
+pub fn check_any(photos: &[VotingPhoto], epoch: &Epoch, warnings: &Warnings) -> Result<()> {
+    if !photos.is_empty() {
+        return Ok(());
+    }
+    let reasons: Vec<String> = warnings
+        .sorted()
+        .iter()
+        .map(|w| format!("{}: {}", w.subject, w.message))
+        .collect();
+    Err(Error::Survey(format!(
+        "no photo of epoch {:?} can be used:\n  {}",
+        epoch.name,
+        reasons.join("\n  ")
+    )))
+}
+
+/// Views with their photos; whatever cannot be used is named.
+pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, PathBuf)>> {
+    let cameras = epoch.read_cameras()?;
+    let file = epoch.cameras.to_string_lossy();
+    cameras
+        .warnings
+        .iter()
+        .for_each(|w| warnings.notice(STEP, file.clone(), w.clone()));
+    let photos = find_photos(&epoch.images, &cameras)?;
+    for path in &photos.without_camera {
+        let reason = reason_without_camera(path, &cameras.skipped);
+        warnings.skipped(
+            STEP,
+            path.to_string_lossy(),
+            format!("{reason} in {file}; the photo is left out"),
+        );
+    }
+    for (name, reason) in &cameras.skipped {
+        warnings.notice(STEP, name.clone(), format!("camera not used: {reason}"));
+    }
+    let mut posed = Vec::new();
+    for (view, path) in cameras.views.into_iter().zip(photos.paths) {
+        match path {
+            Some(path) => posed.push((view, path)),
+            None => warnings.notice(
+                STEP,
+                view.name,
+                format!("camera not used: no such photo in {}", epoch.images.display()),
+            ),
+        }
+    }
+    Ok(posed)
+}
+
+fn reason_without_camera(photo: &Path, skipped: &[(String, String)]) -> String {
+    let stem = |name: &str| Path::new(name).file_stem().map(|s| s.to_ascii_lowercase());
+    let reason = skipped
+        .iter()
+        .find(|(name, _)| stem(name) == stem(&photo.to_string_lossy()));
+    reason.map_or("no camera".to_owned(), |(_, reason)| {
+        format!("its camera cannot be used ({reason})")
+    })
+}
+
+/// Where the label image of a photo lies in the step's folder.
+pub fn label_path(step: &StepDir, image: usize) -> PathBuf {
+    step.file(format!("{image:05}.png"))
+}

@@ -1,0 +1,6 @@
+//! What lies on disk between steps: their folders, tiles of clouds, records sorted into bins.
+
+pub mod epoch_tiles;
+pub mod spill;
+pub mod step;
+pub mod tiles;

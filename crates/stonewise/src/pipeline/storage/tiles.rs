@@ -1,0 +1,348 @@
+//! An epoch's cloud on disk, cut into cubic tiles.
+//!
+//! Each tile is a Parquet file of x, y, z (f32 offsets from the tile's origin, metres), file (which of the
+//! epoch's clouds), index (which record of it), source (which entry of `sources.json`) and time (seconds since that
+//! source's first point). `tiles.json` lists origins, bounds and counts.
+
+use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
+use crate::pipeline::sources::{PointSource, RawSource, SourceList, SourceRule};
+use crate::pipeline::storage::spill::Spill;
+use crate::pipeline::storage::step::StepDir;
+use nalgebra::Point3;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_core::progress::Progress;
+use stonewise_io::cloud::{claimed_records, read_cloud};
+use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// File of the epoch's sources.
+const SOURCES: &str = "sources.json";
+/// Points read from a cloud file at a time.
+const CHUNK: usize = 1 << 20;
+/// Tiles kept in memory by a [`DiskTiles`]: a tile and its neighbours are asked for again and again.
+const CACHED_TILES: usize = 12;
+
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct TileEntry {
+    name: String,
+    origin: Point3<f64>,
+    bounds: Bounds,
+    points: u64,
+}
+
+/// Where each point of a tile came from.
+pub struct Provenance {
+    /// Which of the epoch's clouds.
+    pub file: Vec<u32>,
+    /// Which record of that cloud, from 0.
+    pub index: Vec<u64>,
+}
+
+/// The tiles of one epoch, read when asked for.
+pub struct DiskTiles {
+    dir: PathBuf,
+    tiles: Vec<TileEntry>,
+    cache: Mutex<VecDeque<(usize, Arc<Cloud>)>>,
+}
+
+impl DiskTiles {
+    /// Opens the tiles that [`cut_into_tiles`] wrote.
+    pub fn open(dir: &Path) -> Result<Self> {
+        let tiles = read_json(&dir.join("tiles.json"))?;
+        Ok(Self {
+            dir: dir.to_path_buf(),
+            tiles,
+            cache: Mutex::new(VecDeque::new()),
+        })
+    }
+
+    /// Number of points in all tiles.
+    pub fn point_count(&self) -> u64 {
+        self.tiles.iter().map(|t| t.points).sum()
+    }
+
+    /// File-name stem of a tile, for files that go beside it.
+    pub fn name(&self, tile: usize) -> &str {
+        &self.tiles[tile].name
+    }
+
+    /// Where the points of a tile came from, in the order of its points.
+    pub fn provenance(&self, tile: usize) -> Result<Provenance> {
+        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
+        let table = read_columns(&path, &["file", "index"])?;
+        Ok(Provenance {
+            file: table.required("file")?.to_vec(),
+            index: table.required("index")?.to_vec(),
+        })
+    }
+}
+
+/// Of each point of a tile: its number in the epoch's list of sources, and its time since that source began, seconds.
+pub struct TileOrigins {
+    /// Entry of `sources.json`.
+    pub source: Vec<u32>,
+    /// Seconds.
+    pub time_s: Vec<f32>,
+}
+
+impl DiskTiles {
+    /// The epoch's sources, as its files number them.
+    pub fn raw_sources(&self) -> Result<Vec<RawSource>> {
+        read_json(&self.dir.join(SOURCES))
+    }
+
+    /// Source and time of the points of a tile, in the order of its points.
+    pub fn origins(&self, tile: usize) -> Result<TileOrigins> {
+        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
+        let table = read_columns(&path, &["source", "time"])?;
+        Ok(TileOrigins {
+            source: table.required("source")?.to_vec(),
+            time_s: table.required("time")?.to_vec(),
+        })
+    }
+}
+
+impl TileSource for DiskTiles {
+    type Error = Error;
+
+    fn tile_count(&self) -> usize {
+        self.tiles.len()
+    }
+
+    fn bounds(&self, tile: usize) -> Bounds {
+        self.tiles[tile].bounds
+    }
+
+    fn load(&self, tile: usize) -> Result<Cloud> {
+        let cached = |queue: &VecDeque<(usize, Arc<Cloud>)>| {
+            queue.iter().find(|e| e.0 == tile).map(|e| Arc::clone(&e.1))
+        };
+        if let Some(cloud) = cached(&self.cache.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return Ok((*cloud).clone());
+        }
+        let entry = &self.tiles[tile];
+        let table = read_columns(
+            &self.dir.join(format!("{}.parquet", entry.name)),
+            &["x", "y", "z"],
+        )?;
+        let (x, y, z) = (
+            table.required::<f32>("x")?,
+            table.required("y")?,
+            table.required("z")?,
+        );
+        let offsets = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
+        let cloud = Arc::new(Cloud::new(entry.origin, offsets));
+        let mut queue = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        queue.push_back((tile, Arc::clone(&cloud)));
+        if queue.len() > CACHED_TILES {
+            queue.pop_front();
+        }
+        Ok((*cloud).clone())
+    }
+}
+
+/// Cuts clouds into tiles in one streaming pass; points of a tile keep the order of files and records.
+///
+/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of records without finite coordinates, which no tile holds.
+pub fn cut_into_tiles(
+    clouds: &[PathBuf],
+    rule: SourceRule,
+    size_m: f64,
+    takes_part: impl Fn(&Point3<f64>) -> bool,
+    step: &StepDir,
+    progress: &dyn Progress,
+) -> Result<u64> {
+    let mut spill = Spill::new(&step.file("spill"), |k: &[i64; 3]| {
+        format!("t_{}_{}_{}", k[0], k[1], k[2])
+    })?;
+    let mut invalid = 0;
+    let mut sources = SourceList::new(rule);
+    let records = clouds
+        .iter()
+        .map(|c| most_records(c))
+        .collect::<Result<Vec<u64>>>()?;
+    let mut occupied = OccupiedTiles::new(records.iter().sum(), size_m);
+    for (file, (path, &records)) in clouds.iter().zip(&records).enumerate() {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        progress.begin(&format!("ingest {name}"), records);
+        let summary = read_cloud(path, CHUNK, |chunk| {
+            progress.check()?;
+            let origins = sources.of_chunk(file, chunk);
+            let taken = chunk
+                .positions
+                .iter()
+                .zip(&chunk.indices)
+                .zip(origins)
+                .filter(|((p, _), _)| takes_part(p));
+            for ((p, &index), source) in taken {
+                let key = cell_of(p, size_m);
+                let record = Record {
+                    offset: (p - tile_origin(&key, size_m)).cast::<f32>().into(),
+                    file: file as u32,
+                    index,
+                    source,
+                };
+                if spill.push(key, &record.encode())? {
+                    occupied.add(key, path)?;
+                }
+            }
+            progress.advance(chunk.len() as u64);
+            Ok::<(), Error>(())
+        })?;
+        invalid += summary.skipped;
+    }
+    let bins = spill.finish()?;
+    progress.begin("sort tiles", bins.keys().len() as u64);
+    let entries = bins
+        .keys()
+        .par_iter()
+        .map(|key| {
+            progress.check()?;
+            let bytes = bins.read(key)?;
+            let records: Vec<Record> = bytes.chunks_exact(RECORD).map(Record::decode).collect();
+            let name = format!("{}_{}_{}", key[0], key[1], key[2]);
+            let entry = write_tile(step, &name, tile_origin(key, size_m), &records)?;
+            progress.advance(1);
+            Ok(entry)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    write_json(&step.file(SOURCES), &sources.finish())?;
+    write_index(step, &entries)?;
+    Ok(invalid)
+}
+
+/// Records of a file at most; a line of text with three numbers has six bytes at least.
+fn most_records(path: &Path) -> Result<u64> {
+    match claimed_records(path)? {
+        Some(records) => Ok(records),
+        None => Ok(fs::metadata(path).map_err(Error::io("reading", path))?.len() / 6),
+    }
+}
+
+/// The tiles that got a point, to stop before points that are no wall become a file each.
+struct OccupiedTiles {
+    tiles: Vec<[i64; 3]>,
+    most: usize,
+    size_m: f64,
+}
+
+impl OccupiedTiles {
+    /// Tiles that any survey may have: those of 1 km of wall with its surroundings.
+    const ANY: u64 = 5000;
+    /// Points in a tile that more tiles must have, on average; a tile of a coarse cloud has thousands.
+    const LEAST_POINTS: u64 = 50;
+
+    fn new(records: u64, size_m: f64) -> Self {
+        Self {
+            tiles: Vec::new(),
+            most: Self::ANY.max(records / Self::LEAST_POINTS) as usize,
+            size_m,
+        }
+    }
+
+    fn add(&mut self, tile: [i64; 3], path: &Path) -> Result<()> {
+        self.tiles.push(tile);
+        if self.tiles.len() <= self.most {
+            return Ok(());
+        }
+        let extent_km = |axis: usize| {
+            let places = || self.tiles.iter().map(|t| t[axis]);
+            let cells = places().max().unwrap_or(0) - places().min().unwrap_or(0);
+            cells as f64 * self.size_m / 1000.0
+        };
+        let longest = (0..3).map(extent_km).fold(0.0, f64::max);
+        Err(Error::Input {
+            path: path.to_path_buf(),
+            message: format!(
+                "the points lie up to {longest:.0} km apart, in more than {} tiles of {} m with less than {} points each: \
+                 are coordinates in metres, and without stray points?",
+                self.most,
+                self.size_m,
+                Self::LEAST_POINTS
+            ),
+        })
+    }
+}
+
+/// Middle of the tile, so that offsets stay small.
+fn tile_origin(key: &[i64; 3], size_m: f64) -> Point3<f64> {
+    Point3::from(key.map(|k| (k as f64 + 0.5) * size_m))
+}
+
+/// A point on its way to its tile.
+struct Record {
+    offset: [f32; 3],
+    file: u32,
+    index: u64,
+    source: PointSource,
+}
+
+const RECORD: usize = 30;
+
+impl Record {
+    fn encode(&self) -> [u8; RECORD] {
+        let mut bytes = [0; RECORD];
+        for (axis, value) in self.offset.iter().enumerate() {
+            bytes[4 * axis..4 * axis + 4].copy_from_slice(&value.to_le_bytes());
+        }
+        bytes[12..16].copy_from_slice(&self.file.to_le_bytes());
+        bytes[16..24].copy_from_slice(&self.index.to_le_bytes());
+        bytes[24..26].copy_from_slice(&self.source.0.to_le_bytes());
+        bytes[26..].copy_from_slice(&self.source.1.to_le_bytes());
+        bytes
+    }
+
+    /// `bytes`: [`RECORD`] of them.
+    fn decode(bytes: &[u8]) -> Self {
+        let word = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
+        let long = |at: usize| u64::from(u32::from_le_bytes(word(at)));
+        Self {
+            offset: [0, 4, 8].map(|at| f32::from_le_bytes(word(at))),
+            file: u32::from_le_bytes(word(12)),
+            index: long(16) | long(20) << 32,
+            source: (
+                u16::from_le_bytes([bytes[24], bytes[25]]),
+                f32::from_le_bytes(word(26)),
+            ),
+        }
+    }
+}
+
+fn write_tile(step: &StepDir, name: &str, origin: Point3<f64>, records: &[Record]) -> Result<TileEntry> {
+    let cloud = Cloud::new(origin, records.iter().map(|r| r.offset).collect());
+    let mut table = Table::new();
+    for (axis, column) in ["x", "y", "z"].into_iter().enumerate() {
+        table.push(
+            column,
+            records.iter().map(|r| r.offset[axis]).collect::<Vec<f32>>(),
+        )?;
+    }
+    table.push("file", records.iter().map(|r| r.file).collect::<Vec<u32>>())?;
+    table.push("index", records.iter().map(|r| r.index).collect::<Vec<u64>>())?;
+    let sources = records.iter().map(|r| u32::from(r.source.0));
+    table.push("source", sources.collect::<Vec<u32>>())?;
+    table.push("time", records.iter().map(|r| r.source.1).collect::<Vec<f32>>())?;
+    write_parquet(&step.file(format!("{name}.parquet")), &table)?;
+    let points = (0..cloud.len()).map(|i| cloud.world(i));
+    let bounds = Bounds::of(points).unwrap_or(Bounds {
+        min: origin,
+        max: origin,
+    });
+    Ok(TileEntry {
+        name: name.to_owned(),
+        origin,
+        bounds,
+        points: cloud.len() as u64,
+    })
+}
+
+fn write_index(step: &StepDir, entries: &[TileEntry]) -> Result<()> {
+    write_json(&step.file("tiles.json"), &entries)
+}

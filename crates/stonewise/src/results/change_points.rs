@@ -1,0 +1,122 @@
+//! The M3C2 core points, as the report reads them.
+
+use crate::error::Error;
+use nalgebra::{Point3, Vector3};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// A core point with its distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DistancePoint {
+    /// Where, world.
+    pub position: Point3<f64>,
+    /// Unit normal out of the wall, where the file has normals.
+    pub normal: Option<Vector3<f64>>,
+    /// Signed distance along the normal, metres.
+    pub distance_m: f64,
+    /// 95 % detection limit, metres.
+    pub detection_limit_m: f64,
+}
+
+/// Reads an `m3c2.csv`, columns by name, rows without a distance left out; empty where there is no such file.
+///
+/// # Errors
+/// The file cannot be read, lacks a column or holds something that is no number.
+pub(super) fn read_distance_points(path: &Path) -> Result<Vec<DistancePoint>, Error> {
+    let file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) => return Err(Error::io("reading the distances", path)(e)),
+    };
+    let content = |message: String| Error::Results {
+        path: path.into(),
+        message,
+    };
+    let mut lines = BufReader::new(file).lines();
+    let header = lines
+        .next()
+        .transpose()
+        .map_err(Error::io("reading the distances", path))?
+        .unwrap_or_default();
+    let names: Vec<&str> = header.trim().split(',').collect();
+    let find = |wanted: &[&str]| {
+        names
+            .iter()
+            .position(|n| wanted.iter().any(|w| n.eq_ignore_ascii_case(w)))
+    };
+    let need = |wanted: &[&str]| find(wanted).ok_or_else(|| content(format!("no column {:?}", wanted[0])));
+    let place = [need(&["x"])?, need(&["y"])?, need(&["z"])?];
+    let (distance, limit) = (need(&["m3c2_distance"])?, need(&["m3c2_uncertainty"])?);
+    let normal = [
+        find(&["nx", "normalx"]),
+        find(&["ny", "normaly"]),
+        find(&["nz", "normalz"]),
+    ];
+    let mut points = Vec::new();
+    for (number, line) in lines.enumerate() {
+        let line = line.map_err(Error::io("reading the distances", path))?;
+        let cells: Vec<&str> = line.trim().split(',').collect();
+        let value = |column: usize| match cells.get(column) {
+            None | Some(&"") => Ok(f64::NAN),
+            Some(cell) => cell
+                .parse()
+                .map_err(|_| content(format!("line {}: {cell:?} is no number", number + 2))),
+        };
+        let distance_m = value(distance)?;
+        if !distance_m.is_finite() {
+            continue;
+        }
+        let normal = match normal {
+            [Some(x), Some(y), Some(z)] => Some(Vector3::new(value(x)?, value(y)?, value(z)?)),
+            _ => None,
+        };
+        points.push(DistancePoint {
+            position: Point3::new(value(place[0])?, value(place[1])?, value(place[2])?),
+            normal,
+            distance_m,
+            detection_limit_m: value(limit)?,
+        });
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_found_by_name_and_empty_distances_left_out() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(
+            read_distance_points(&folder.path().join("m3c2.csv"))
+                .unwrap()
+                .is_empty()
+        );
+        let csv = "x,y,z,m3c2_uncertainty,m3c2_distance\n1,2,3,0.001,-0.02\n1,2,3,,\n1,2,3,NaN,nan\n";
+        std::fs::write(folder.path().join("m3c2.csv"), csv).unwrap();
+        let points = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
+        assert_eq!(points.len(), 1);
+        assert_eq!(
+            (
+                points[0].distance_m,
+                points[0].detection_limit_m,
+                points[0].normal
+            ),
+            (-0.02, 0.001, None)
+        );
+    }
+
+    #[test]
+    fn a_word_where_a_number_should_be_is_named_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("m3c2.csv"),
+            "x,y,z,m3c2_distance,m3c2_uncertainty\n1,2,up,0,0\n",
+        )
+        .unwrap();
+        let message = read_distance_points(&folder.path().join("m3c2.csv"))
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("line 2") && message.contains("up"), "{message}");
+    }
+}

@@ -1,0 +1,71 @@
+//! What the report shows of the survey itself: photo crops, sections, thinned clouds, cameras.
+//!
+//! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the survey. Files
+//! are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
+
+mod cameras;
+mod cloud;
+mod crops;
+mod sections;
+
+pub use cameras::{PosedPhoto, write_cameras};
+pub use cloud::{ThinPoint, write_thin_cloud};
+pub use crops::{Crop, crop_side_px, write_crops};
+pub use sections::{Cut, SectionPoint, write_sections};
+
+use super::names::EVIDENCE_DIR;
+use crate::error::Error;
+use crops::StoredCrops;
+use std::path::{Path, PathBuf};
+use stonewise_io::table::{Table, read_parquet};
+
+/// The excerpts of one pair of epochs; whatever is missing is empty.
+#[derive(Clone, Debug, Default)]
+pub struct Evidence {
+    /// Photo crops of the first and of the later epoch.
+    pub(crate) crops: [Option<StoredCrops>; 2],
+    /// Points of both epochs near the middle of each stone.
+    pub(crate) sections: Vec<SectionPoint>,
+    /// Thinned clouds.
+    pub(crate) clouds: [Vec<ThinPoint>; 2],
+    /// Posed photos.
+    pub(crate) cameras: [Vec<PosedPhoto>; 2],
+}
+
+impl Evidence {
+    /// Reads the excerpts of the first epoch and of epoch `later` in `dir`.
+    ///
+    /// # Errors
+    /// A file is damaged.
+    pub(super) fn read(dir: &Path, later: usize) -> Result<Self, Error> {
+        let both = [1, later];
+        let [first_crops, second_crops] = both.map(|e| crops::read_crops(dir, e));
+        let [first_cloud, second_cloud] = both.map(|e| cloud::read_thin_cloud(dir, e));
+        let [first_cameras, second_cameras] = both.map(|e| cameras::read_cameras(dir, e));
+        Ok(Self {
+            crops: [first_crops?, second_crops?],
+            sections: sections::read_sections(dir, later)?,
+            clouds: [first_cloud?, second_cloud?],
+            cameras: [first_cameras?, second_cameras?],
+        })
+    }
+}
+
+/// A file of the folder.
+fn path(dir: &Path, stem: &str, epoch: usize, extension: &str) -> PathBuf {
+    dir.join(EVIDENCE_DIR).join(format!("{stem}_{epoch}.{extension}"))
+}
+
+/// Makes the folder.
+fn make_dir(dir: &Path) -> Result<(), Error> {
+    let folder = dir.join(EVIDENCE_DIR);
+    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))
+}
+
+/// A table, or `None` where the file is missing.
+fn read_table(path: &Path) -> Result<Option<Table>, Error> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    Ok(Some(read_parquet(path)?))
+}

@@ -1,0 +1,128 @@
+//! What is known about the registration of a later epoch, and so about motions that all stones share.
+
+use nalgebra::{Matrix3, Matrix6, Point3};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use stonewise_core::geometry::lever;
+
+/// Where the error of an epoch's registration is known from, in order of precedence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DatumState {
+    /// From areas that did not move.
+    Stable,
+    /// Stated by the project.
+    Stated,
+    /// From how stations and strips of one epoch differ.
+    Sources,
+    /// Nothing is known: uncertainties hold for motions against the common rigid motion of the measured stones.
+    Unknown,
+}
+
+impl DatumState {
+    /// The word in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Stable => "stable",
+            Self::Stated => "stated",
+            Self::Sources => "sources",
+            Self::Unknown => "unknown",
+        }
+    }
+}
+
+impl fmt::Display for DatumState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// The registration of a later epoch against the first.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Datum {
+    /// Where the error is known from.
+    pub state: DatumState,
+    /// Place that the covariance refers to, world, metres.
+    pub centre: [f64; 3],
+    /// Covariance of the registration error at the centre as (shift x, y, z; rotation vector x, y, z), m^2, m rad, rad^2; absent
+    /// where the state is unknown.
+    pub covariance_6x6: Option<[[f64; 6]; 6]>,
+    /// Errors of single stations and strips, where they were estimated.
+    pub sources: Vec<SourceError>,
+    /// The same in one sentence.
+    pub note: String,
+}
+
+/// The estimated error of one station or strip against the mean of its epoch's sources, world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SourceError {
+    /// Name of its epoch.
+    pub epoch: String,
+    /// Name of the source: file and point source id, or scan of an E57.
+    pub source: String,
+    /// Estimated error in the middle of what it shows, metres.
+    pub error_m: [f64; 3],
+    /// Standard deviation of the estimate per axis, metres.
+    pub sd_m: [f64; 3],
+}
+
+impl Datum {
+    /// A registration of which nothing is known.
+    pub fn unknown(centre: &Point3<f64>, note: String) -> Self {
+        Self {
+            state: DatumState::Unknown,
+            centre: centre.coords.into(),
+            covariance_6x6: None,
+            sources: Vec::new(),
+            note,
+        }
+    }
+
+    /// A registration whose error has this covariance at the centre, see [`Self::covariance_6x6`].
+    pub fn known(state: DatumState, centre: &Point3<f64>, covariance: &Matrix6<f64>, note: String) -> Self {
+        Self {
+            state,
+            centre: centre.coords.into(),
+            covariance_6x6: Some(std::array::from_fn(|i| {
+                std::array::from_fn(|j| covariance[(i, j)])
+            })),
+            sources: Vec::new(),
+            note,
+        }
+    }
+
+    /// Whether the error was estimated, so that it can be taken off the motions.
+    pub fn is_estimated(&self) -> bool {
+        matches!(self.state, DatumState::Stable | DatumState::Sources)
+    }
+
+    /// Covariance of the registration error at a place, m^2, world; `None` where nothing is known.
+    pub fn covariance_at(&self, place: &Point3<f64>) -> Option<Matrix3<f64>> {
+        let rows = self.covariance_6x6.as_ref()?;
+        let covariance = Matrix6::from_fn(|i, j| rows[i][j]);
+        let lever = lever(&(place - Point3::from(self.centre)));
+        Some(lever * covariance * lever.transpose())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_turn_grows_with_the_distance_from_the_centre() {
+        // A rotation about z with a standard deviation of 1 mrad: 4 mm across an arm of 4 m.
+        let covariance = Matrix6::from_diagonal(&[1e-6, 1e-6, 1e-6, 0.0, 0.0, 1e-6].into());
+        let centre = Point3::new(100.0, 200.0, 50.0);
+        let datum = Datum::known(DatumState::Stable, &centre, &covariance, String::new());
+        let there = datum.covariance_at(&(centre + Vector3::x() * 4.0)).unwrap();
+        assert!((there[(1, 1)] - 1e-6 - 16e-6).abs() < 1e-15, "{there}");
+        assert!((there[(0, 0)] - 1e-6).abs() < 1e-15 && (there[(2, 2)] - 1e-6).abs() < 1e-15);
+        assert!(
+            Datum::unknown(&centre, String::new())
+                .covariance_at(&centre)
+                .is_none()
+        );
+    }
+}

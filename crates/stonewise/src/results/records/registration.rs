@@ -1,0 +1,111 @@
+//! `registration.json`: what the estimator says about itself, and the registration of the epochs.
+
+use super::Datum;
+use serde::{Deserialize, Serialize};
+use stonewise_core::registration::observers::{EpochErrors, ObserverComponents, SensorClass};
+use stonewise_core::registration::{Break, VarianceComponents};
+
+/// What is known about the motions of one pair of epochs as a whole.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RegistrationRecord {
+    /// The estimator and what it found.
+    #[serde(flatten)]
+    pub estimator: EstimatorRecord,
+    /// The registration of the later epoch.
+    pub datum: Datum,
+    /// What stations, strips and stable areas show of the error of the later epoch; absent where nothing was compared.
+    pub observers: Option<ObserversRecord>,
+}
+
+/// What stations, strips and stable areas show.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObserversRecord {
+    /// Class of the sensor, by the noise of its points.
+    pub sensor: SensorClass,
+    /// Error that all sources of an epoch are assumed to share, per axis, metres.
+    pub assumed_shared_error_m: f64,
+    /// Variances of the sources' errors; absent where an epoch has no two sources that overlap.
+    pub components: Option<ObserverComponents>,
+    /// Twice the log likelihood that errors of the sources gain over none.
+    pub significance: f64,
+    /// Stones on which sources were compared, per epoch.
+    pub compared_stones: [usize; 2],
+    /// Plane cells in stable areas.
+    pub stable_cells: usize,
+    /// Apparent shift of the middle of the wall and rotation vector about it, m, rad; what is taken off the motions where the datum is
+    /// known from stable areas or sources.
+    pub error: [f64; 6],
+}
+
+impl From<&EpochErrors> for ObserversRecord {
+    fn from(errors: &EpochErrors) -> Self {
+        Self {
+            sensor: errors.class,
+            assumed_shared_error_m: errors.shared_error_m,
+            components: errors.components,
+            significance: errors.significance,
+            compared_stones: [errors.observations[0], errors.observations[1]],
+            stable_cells: errors.observations[2],
+            error: errors.rigid.error.into(),
+        }
+    }
+}
+
+/// What an estimator says about itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "estimator", rename_all = "snake_case")]
+pub enum EstimatorRecord {
+    /// All stones together.
+    #[serde(alias = "network")]
+    Adjustment(Box<AdjustmentRecord>),
+    /// Each stone by itself.
+    Gicp(GicpRecord),
+}
+
+/// The adjustment of all stones together. Absent numbers were not estimated, for lack of stones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AdjustmentRecord {
+    /// Whether the last iteration moved no stone beyond the tolerance.
+    pub converged: bool,
+    /// Iterations made.
+    pub iterations: usize,
+    /// Noise of the points along the normal per epoch, metres.
+    pub noise_m: [Option<f64>; 2],
+    /// Roughness of the stones: standard deviation of a second difference over one cell, metres.
+    pub roughness_m: Option<f64>,
+    /// Cell of the surface grid, metres.
+    pub surface_cell_m: Option<f64>,
+    /// Factor by which correlation between points raises variances; 1 for independent noise.
+    pub correlation_factor: Option<f64>,
+    /// How unlike neighbours move.
+    pub variance_components: VarianceComponents,
+    /// Mean motion of all stones that are not loose, world, metres: a check of the datum.
+    pub common_motion_m: [f64; 3],
+    /// Covariance of the mean motion, m^2, row by row; without registration error of the epochs.
+    pub common_motion_covariance_m2: [[f64; 3]; 3],
+    /// Number of loose stones.
+    pub loose: usize,
+    /// Neighbours between which the field of motion broke.
+    pub breaks: Vec<Break>,
+}
+
+/// Plane-to-plane ICP of every stone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GicpRecord {
+    /// Matched stones.
+    pub stones: usize,
+    /// Measured ones among them.
+    pub measured: usize,
+    /// Loose ones among these.
+    pub loose: usize,
+}
+
+impl EstimatorRecord {
+    /// Whether the estimate settled; every stone of its own estimate has a status instead.
+    pub fn converged(&self) -> bool {
+        match self {
+            Self::Adjustment(adjustment) => adjustment.converged,
+            Self::Gicp(_) => true,
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! All that a report is made of.
+
+use super::change_points::{DistancePoint, read_distance_points};
+use super::names::{PairFile, RUN, audit};
+use super::outlines::{StoneOutline, read_outlines};
+use super::records::{Datum, RegistrationRecord, RunRecord};
+use super::stone_table::read_stones;
+use super::{Evidence, Facade, RowMotion, StoneRow};
+use crate::error::Error;
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+use std::path::Path;
+use stonewise_core::evaluate::Evaluation;
+use stonewise_core::geometry::FaceFrame;
+
+/// The result files of one pair of epochs, read back; photos and clouds are not needed.
+#[derive(Clone, Debug)]
+pub struct ResultSet {
+    /// Which later epoch is compared with the first: 1 for the second epoch, 2 for the third.
+    pub pair: usize,
+    /// Number of pairs in the folder.
+    pub pairs: usize,
+    /// Rows of `stones.parquet` (of the second pair `stones_2.parquet`, and so on), by stone id.
+    pub stones: Vec<StoneRow>,
+    /// `outlines.json`, by stone id; empty where the file is missing.
+    pub outlines: BTreeMap<u32, StoneOutline>,
+    /// `m3c2.csv`; empty where the file is missing.
+    pub distances: Vec<DistancePoint>,
+    /// `evaluation.json`, where truth is known.
+    pub evaluation: Option<Evaluation>,
+    /// `run.json`, where there is one.
+    pub run: Option<RunRecord>,
+    /// `registration.json`, where there is one.
+    pub registration: Option<RegistrationRecord>,
+    /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance, stones, share, points.
+    pub decisions: Vec<Vec<Vec<String>>>,
+    /// Excerpts of the survey; empty where the folder is missing.
+    pub evidence: Evidence,
+    /// The unrolled wall.
+    pub facade: Facade,
+}
+
+impl ResultSet {
+    /// Reads the results of the second epoch against the first, or of the only two epochs, in `dir`.
+    ///
+    /// # Errors
+    /// There is no stone table, or a file is damaged.
+    pub fn read(dir: &Path) -> Result<Self, Error> {
+        Self::read_pair(dir, 1)
+    }
+
+    /// Reads the results of one pair of epochs in `dir`; see `pair`.
+    ///
+    /// # Errors
+    /// There is no stone table of this pair, or a file is damaged.
+    pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, Error> {
+        let path = dir.join(PairFile::StonesParquet.name(pair));
+        if !path.exists() {
+            return Err(Error::NoResults(dir.into()));
+        }
+        let mut stones = read_stones(&path)?;
+        stones.sort_by_key(|s| s.stone_id);
+        let outlines = read_outlines(dir)?;
+        Ok(Self {
+            facade: facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines),
+            stones,
+            outlines,
+            pair,
+            pairs: (1..)
+                .take_while(|p| dir.join(PairFile::StonesParquet.name(*p)).exists())
+                .count(),
+            distances: read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?,
+            evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
+            run: read_json(&dir.join(RUN))?,
+            registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
+            decisions: read_decisions(dir)?,
+            evidence: Evidence::read(dir, pair + 1)?,
+        })
+    }
+
+    /// What is known about the registration of the later epoch; `None` where `registration.json` is missing.
+    pub fn datum(&self) -> Option<&Datum> {
+        self.registration.as_ref().map(|r| &r.datum)
+    }
+
+    /// Measured stones with their motion.
+    pub fn measured(&self) -> Vec<(&StoneRow, &RowMotion)> {
+        self.stones
+            .iter()
+            .filter_map(|s| s.motion.as_ref().map(|m| (s, m)))
+            .collect()
+    }
+
+    /// Outward normal of a stone's face; of the wall at its place where the outline is missing.
+    pub fn normal(&self, stone: &StoneRow) -> Vector3<f64> {
+        let own = self.outlines.get(&stone.stone_id).map(|o| o.normal);
+        own.unwrap_or_else(|| self.facade.frame_at(&stone.centroid).out)
+    }
+
+    /// Covariance of a stone's displacement as (along, up, out), m^2.
+    pub fn face_covariance(&self, stone: &StoneRow, motion: &RowMotion) -> Matrix3<f64> {
+        let face = FaceFrame::from_normal(&self.normal(stone)).face_from_world();
+        face * motion.covariance * face.transpose()
+    }
+
+    /// Outline of a stone in the unrolled facade, metres; a square of its area where the outline is missing.
+    pub fn unrolled(&self, stone: &StoneRow) -> Vec<Point2<f64>> {
+        match self.outlines.get(&stone.stone_id) {
+            Some(o) => o
+                .ring
+                .iter()
+                .map(|p| self.facade.place_in_stone(p, &stone.centroid, &o.normal))
+                .collect(),
+            None => {
+                let half = stone.area_m2.max(1e-4).sqrt() / 2.0;
+                let c = self.facade.place(&stone.centroid);
+                let corner = |x: f64, y: f64| Point2::new(c.x + x * half, c.y + y * half);
+                vec![
+                    corner(-1.0, -1.0),
+                    corner(1.0, -1.0),
+                    corner(1.0, 1.0),
+                    corner(-1.0, 1.0),
+                ]
+            }
+        }
+    }
+}
+
+/// The facade of stones, by their ids and centroids; where outlines are missing, of the mean plane through the centroids.
+pub(crate) fn facade_of(
+    stones: impl Iterator<Item = (u32, Point3<f64>)>,
+    outlines: &BTreeMap<u32, StoneOutline>,
+) -> Facade {
+    let stones: Vec<(u32, Point3<f64>)> = stones.collect();
+    let mut known: Vec<_> = stones
+        .iter()
+        .filter_map(|(id, centroid)| outlines.get(id).map(|o| (*centroid, o.normal)))
+        .collect();
+    if known.is_empty() {
+        let centroids: Vec<_> = stones.iter().map(|s| s.1).collect();
+        let normal = stonewise_core::geometry::Plane::fit(&centroids).map_or(Vector3::x(), |p| p.normal);
+        known = centroids.into_iter().map(|c| (c, normal)).collect();
+    }
+    Facade::new(&known)
+}
+
+fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Error> {
+    match std::fs::read(path) {
+        Ok(text) => serde_json::from_slice(&text)
+            .map(Some)
+            .map_err(|e| Error::Results {
+                path: path.into(),
+                message: e.to_string(),
+            }),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io("reading results", path)(e)),
+    }
+}
+
+/// Rows of `audit_epoch1.csv`, `audit_epoch2.csv`, ... without the head, as cells.
+fn read_decisions(dir: &Path) -> Result<Vec<Vec<Vec<String>>>, Error> {
+    let mut epochs = Vec::new();
+    loop {
+        let path = dir.join(audit(epochs.len() + 1));
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(epochs),
+            Err(e) => return Err(Error::io("reading results", &path)(e)),
+        };
+        epochs.push(
+            text.lines()
+                .skip(1)
+                .map(cells)
+                .filter(|c| !c[0].is_empty())
+                .collect(),
+        );
+    }
+}
+
+/// Cells of a line of CSV; quoted cells may hold commas and doubled quotes (RFC 4180).
+fn cells(line: &str) -> Vec<String> {
+    let (mut all, mut cell, mut quoted) = (Vec::new(), String::new(), false);
+    let mut rest = line.chars().peekable();
+    while let Some(c) = rest.next() {
+        match c {
+            '"' if quoted && rest.peek() == Some(&'"') => {
+                rest.next();
+                cell.push('"');
+            }
+            '"' => quoted = !quoted,
+            ',' if !quoted => all.push(std::mem::take(&mut cell)),
+            c => cell.push(c),
+        }
+    }
+    all.push(cell);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quoted_cells_keep_their_commas() {
+        assert_eq!(cells(r#"a,"b, ""c""",,d"#), ["a", "b, \"c\"", "", "d"]);
+        assert_eq!(cells(""), [""]);
+    }
+}

@@ -1,0 +1,210 @@
+//! Which source files of a crate use which, for the tests of layers of all crates.
+//!
+//! A use is a path through `crate`, `super` or `self`, or an import from a child module, outside comments and
+//! outside the tests at the end of a file. It points at the file that owns the item: re-exports are followed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Names of the modules from the crate's root to a file.
+type Module = Vec<String>;
+
+/// The source files of a crate, and the files that each uses.
+pub struct ModuleGraph {
+    uses: BTreeMap<Module, Vec<Module>>,
+}
+
+impl ModuleGraph {
+    /// Reads all source files below a crate's `src`.
+    pub fn read(src: &Path) -> Self {
+        let mut texts = BTreeMap::new();
+        collect(src, &[], &mut texts);
+        let paths: BTreeMap<Module, Vec<Module>> = texts
+            .iter()
+            .map(|(module, text)| (module.clone(), paths(text)))
+            .collect();
+        let uses = paths.iter().map(|(module, list)| {
+            let used = list.iter().filter_map(|path| owner(module, path, &paths));
+            let mut used: Vec<Module> = used.filter(|used| used != module).collect();
+            used.sort();
+            used.dedup();
+            (module.clone(), used)
+        });
+        Self { uses: uses.collect() }
+    }
+
+    /// Number of uses found.
+    pub fn use_count(&self) -> usize {
+        self.uses.values().map(Vec::len).sum()
+    }
+
+    /// Fails where a top-level module is not listed, or uses one that is neither itself nor listed before its
+    /// line. Modules on one line do not see each other.
+    pub fn assert_layers(&self, layers: &[&[&str]]) {
+        let level = |module: &str| layers.iter().position(|line| line.contains(&module));
+        for (module, used) in &self.uses {
+            let Some(top) = module.first() else { continue };
+            let own = level(top);
+            assert!(own.is_some(), "module {top} is missing in the list of layers");
+            for other in used.iter().filter_map(|path| path.first()) {
+                assert!(
+                    other == top || level(other) < own,
+                    "{} uses {other}, which is not below {top}",
+                    module.join("::")
+                );
+            }
+        }
+    }
+
+    /// Fails where files use each other in a circle, and names one.
+    pub fn assert_no_circle(&self) {
+        let mut done = Vec::new();
+        for module in self.uses.keys() {
+            if let Some(circle) = self.circle(module, &mut Vec::new(), &mut done) {
+                let names: Vec<String> = circle.iter().map(|path| path.join("::")).collect();
+                panic!("files use each other in a circle: {}", names.join(" -> "));
+            }
+        }
+    }
+
+    fn circle(&self, module: &Module, open: &mut Vec<Module>, done: &mut Vec<Module>) -> Option<Vec<Module>> {
+        if let Some(from) = open.iter().position(|m| m == module) {
+            return Some([&open[from..], std::slice::from_ref(module)].concat());
+        }
+        if done.contains(module) {
+            return None;
+        }
+        open.push(module.clone());
+        let found = self.uses[module]
+            .iter()
+            .find_map(|used| self.circle(used, open, done));
+        open.pop();
+        done.push(module.clone());
+        found
+    }
+}
+
+/// Texts of the files below a folder by module path, without comments, strings and tests.
+fn collect(folder: &Path, module: &[String], texts: &mut BTreeMap<Module, String>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let inner = [module, std::slice::from_ref(&name)].concat();
+        if path.is_dir() {
+            collect(&path, &inner, texts);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            let is_root = name == "mod" || name == "lib" || name == "main";
+            let at = if is_root { module.to_vec() } else { inner };
+            let text = fs::read_to_string(&path).unwrap();
+            texts.insert(at, code(&text));
+        }
+    }
+}
+
+fn code(text: &str) -> String {
+    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let without_comment = |line: &str| line.split("//").next().unwrap_or("").to_owned();
+    text[..end]
+        .lines()
+        .map(without_comment)
+        .collect::<Vec<_>>()
+        .join("\n")
+}
+
+/// All paths in a file that begin with `crate`, `super` or `self`, and all imports; trees are expanded.
+fn paths(code: &str) -> Vec<Module> {
+    let mut found = Vec::new();
+    let is_name = |c: char| c.is_alphanumeric() || c == '_';
+    for keyword in ["crate::", "super::", "self::"] {
+        for (at, _) in code.match_indices(keyword) {
+            let before = &code[..at];
+            if !before.ends_with("::") && !before.ends_with(is_name) {
+                tree(&code[at..], &[], &mut found);
+            }
+        }
+    }
+    for (at, _) in code.match_indices("use ") {
+        let starts_line = code[..at].rsplit('\n').next().is_some_and(|line| {
+            let line = line.trim();
+            line.is_empty() || line.starts_with("pub")
+        });
+        if starts_line {
+            tree(&code[at + 4..], &[], &mut found);
+        }
+    }
+    found
+}
+
+/// Expands `a::{b, c::D}` into its paths; returns the length of the tree.
+fn tree(text: &str, before: &[String], found: &mut Vec<Module>) -> usize {
+    let mut path = before.to_vec();
+    let mut at = 0;
+    loop {
+        let rest = &text[at..];
+        let skipped = rest.len() - rest.trim_start().len();
+        let rest = rest.trim_start();
+        at += skipped;
+        if rest.starts_with('{') {
+            at += 1;
+            while at < text.len() && !text[at..].trim_start().starts_with('}') {
+                at += tree(&text[at..], &path, found);
+                let rest = &text[at..];
+                let comma = rest
+                    .find(|c: char| !c.is_whitespace() && c != ',')
+                    .unwrap_or(rest.len());
+                at += comma;
+                if comma == 0 && !text[at..].starts_with('}') {
+                    return at;
+                }
+            }
+            at += text[at..].find('}').map_or(0, |k| k + 1);
+            return at;
+        }
+        let end = rest
+            .find(|c: char| !(c.is_alphanumeric() || c == '_'))
+            .unwrap_or(rest.len());
+        path.push(rest[..end].to_owned());
+        at += end;
+        if text[at..].starts_with("::") {
+            at += 2;
+            continue;
+        }
+        if text[at..].trim_start().starts_with("as ") {
+            at = text[at..].find([',', ';', '}']).map_or(text.len(), |k| at + k);
+        }
+        found.push(path);
+        return at;
+    }
+}
+
+/// The module that owns what a path in `module` leads to; `None` for other crates. `paths`: of all modules.
+fn owner(module: &Module, path: &[String], paths: &BTreeMap<Module, Vec<Module>>) -> Option<Module> {
+    let mut at = match path.first()?.as_str() {
+        "crate" => Vec::new(),
+        "super" | "self" => module.clone(),
+        child => {
+            let inner = [module.as_slice(), &[child.to_owned()]].concat();
+            paths.contains_key(&inner).then(|| module.clone())?
+        }
+    };
+    for segment in path {
+        match segment.as_str() {
+            "crate" | "self" => {}
+            "super" => drop(at.pop()),
+            name => {
+                let inner = [at.as_slice(), &[name.to_owned()]].concat();
+                if !paths.contains_key(&inner) {
+                    let exported = paths[&at]
+                        .iter()
+                        .find(|p| p.last().is_some_and(|last| last == name));
+                    let follows = at != *module && exported.is_some_and(|p| p != path);
+                    let from = exported.filter(|_| follows);
+                    return from.and_then(|p| owner(&at, p, paths)).or(Some(at));
+                }
+                at = inner;
+            }
+        }
+    }
+    Some(at)
+}
