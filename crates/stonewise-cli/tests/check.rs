@@ -217,10 +217,11 @@ fn clouds_far_off_their_photos_end_in_exit_code_3_even_by_force() {
     });
     let out = survey.path().join("out");
     let (code, log) = run(survey.path(), &out, &["--force"]);
-    assert!([1, 3].contains(&code), "{log}");
-    if code == 3 {
-        assert!(log.contains("DOUBT: "), "{log}");
-    }
+    assert_eq!(code, 3, "{log}");
+    assert!(
+        log.contains("DOUBT: ") && log.contains("off the stones that the photos show"),
+        "{log}"
+    );
 }
 
 #[test]

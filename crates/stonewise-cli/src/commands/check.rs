@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stonewise::Project;
-use stonewise::check::{Verdict, check as look_at};
+use stonewise::check::{Depth, Verdict, check as look_at};
 
 /// Ends the title of every page that this command writes.
 const TITLE_END: &str = "a look at the survey</title>";
@@ -16,7 +16,7 @@ const TITLE_END: &str = "a look at the survey</title>";
 pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read(&args.project)?;
     let page = page_path(args, force)?;
-    let report = look_at(&project, &args.out, printer)?;
+    let report = look_at(&project, &args.out, Depth::Full, printer)?;
     printer.finish();
     write!(std::io::stdout(), "{}", report.text())?;
     match report.write_page(&page, &project) {

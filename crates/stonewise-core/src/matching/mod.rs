@@ -4,12 +4,16 @@
 //! then a smooth field of local shifts follows settlements and bulges. Distances in the ratio test are what remains.
 
 mod centroids;
+mod face_patch;
 mod field;
 mod footprints;
 mod match_stones;
+mod offset;
 mod params;
 mod shift;
 
+pub use face_patch::{FaceGrid, FacePatch};
 pub use footprints::{Footprints, footprint_overlap};
 pub use match_stones::{MatchQuality, MatchReport, Overlap, Surroundings, match_stones};
+pub use offset::{Offset, OffsetVote};
 pub use params::MatchParams;

@@ -18,22 +18,30 @@ use crate::project::Project;
 use std::path::Path;
 use stonewise_core::progress::Progress;
 
+/// How closely to look.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depth {
+    /// At the first 500,000 points of each epoch, without pictures: what a run affords before it works.
+    Quick,
+    /// At the first six million points of each epoch and the edges in three photos, with pictures.
+    Full,
+}
+
 /// Looks at everything that a project names.
 ///
 /// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk, memory and time.
-/// `out`: where the results are to go, for the disk's free space. Of each epoch the first six million points of its clouds
-/// are read, and three photos are decoded.
+/// `out`: where the results are to go, for the disk's free space.
 ///
 /// Errors: a cloud or a camera file cannot be read, or the caller stopped it.
-pub fn check(project: &Project, out: &Path, progress: &dyn Progress) -> Result<Report> {
+pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progress) -> Result<Report> {
     progress.begin("check", project.epochs.len() as u64);
     let mut report = Report::default();
     let mut surveys = Vec::new();
     for epoch in &project.epochs {
         progress.check()?;
-        let survey = sample::sample(epoch)?;
+        let survey = sample::sample(epoch, depth)?;
         report.findings.extend(photos::look(epoch)?);
-        let (findings, picture) = cameras::look(epoch, &survey)?;
+        let (findings, picture) = cameras::look(epoch, &survey, depth)?;
         report.findings.extend(findings);
         report.pictures.extend(picture);
         surveys.push(survey);

@@ -1,5 +1,6 @@
 //! The clouds of an epoch, as far as a look needs them.
 
+use super::Depth;
 use crate::error::Result;
 use crate::project::Epoch;
 use nalgebra::Point3;
@@ -7,8 +8,8 @@ use std::collections::HashMap;
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_io::cloud::{CloudError, cloud_info, read_cloud};
 
-/// Points of an epoch that are looked at.
-const POINTS: u64 = 6_000_000;
+/// Points of an epoch that are looked at, quickly and fully.
+const POINTS: [u64; 2] = [500_000, 6_000_000];
 /// Points read at a time.
 const CHUNK: usize = 250_000;
 /// Edge of the cells in which the density of points is counted, metres.
@@ -28,8 +29,15 @@ pub(super) struct Sample {
     pub crs: Vec<Option<String>>,
 }
 
+impl Sample {
+    /// Whether every point was read.
+    pub fn is_whole(&self) -> bool {
+        self.points.len() as u64 >= self.records
+    }
+}
+
 /// Reads what is needed of an epoch's clouds.
-pub(super) fn sample(epoch: &Epoch) -> Result<Sample> {
+pub(super) fn sample(epoch: &Epoch, depth: Depth) -> Result<Sample> {
     let mut sample = Sample {
         bounds: None,
         records: 0,
@@ -37,7 +45,8 @@ pub(super) fn sample(epoch: &Epoch) -> Result<Sample> {
         spacing_m: None,
         crs: Vec::new(),
     };
-    let share = POINTS / epoch.clouds.len().max(1) as u64;
+    let points = POINTS[usize::from(depth == Depth::Full)];
+    let share = points / epoch.clouds.len().max(1) as u64;
     for path in &epoch.clouds {
         let info = cloud_info(path)?;
         sample.records += info.records;

@@ -19,7 +19,8 @@ use stonewise_io::mesh_ply::write_coloured_mesh;
 /// displacements as vectors, for ParaView. The PLY is a mesh
 /// of the stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than two epochs,
 /// the GeoPackage has the layers of the third against the first as `stones_2` and so on; the other files are of the second epoch.
-/// Its time stamps are the end of the run.
+/// Its time stamps are the date of the latest survey, so that the same inputs give the same bytes; 1 January 1970 where the project
+/// states no date.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or a file cannot be written.
@@ -30,11 +31,7 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
         let later = ResultSet::read_pair(dir, pair)?;
         layers.extend(self::layers(&later)?);
     }
-    let finished = results
-        .run
-        .as_ref()
-        .map_or(Timestamp::EPOCH, |run| run.finished_at);
-    write_geopackage(&dir.join(GEOPACKAGE), &layers, &finished.to_string())?;
+    write_geopackage(&dir.join(GEOPACKAGE), &layers, &surveyed(&results).to_string())?;
     if let Some(world) = layers.first() {
         write_geojson(&dir.join(GEOJSON), world)?;
     }
@@ -48,6 +45,19 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
     let mesh = dir.join(FACES_PLY);
     write_coloured_mesh(&mesh, &face_mesh(&results)).map_err(Error::io("writing the mesh", &mesh))?;
     Ok(())
+}
+
+/// Midnight of the latest date that the project states.
+fn surveyed(results: &ResultSet) -> Timestamp {
+    let dates = results
+        .run
+        .iter()
+        .flat_map(|run| &run.epochs)
+        .filter_map(|e| e.date.as_deref());
+    let latest = dates
+        .max()
+        .and_then(|day| format!("{day}T00:00:00.000Z").parse().ok());
+    latest.unwrap_or(Timestamp::EPOCH)
 }
 
 #[cfg(test)]

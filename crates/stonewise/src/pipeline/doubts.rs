@@ -1,6 +1,7 @@
 //! Doubts about the results of a pair of epochs as a whole.
 
 use crate::pipeline::context::Context;
+use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
@@ -12,13 +13,73 @@ const LIMIT_EXCESS: f64 = 100.0;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
 
+/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a tenth of a small
+/// stone.
+const OFFSET_M: f64 = 0.03;
+/// Labels lie beside the stones where the surface at their own place is less alike than this share of the best place's.
+const UNLIKE: f64 = 0.6;
+/// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same surface is about 0.9.
+const LIKE: f64 = 0.3;
+
 /// Warns where the motions of a pair of epochs cannot be relied on.
-pub fn note_doubts(context: &Context, number: usize, registered: &Registered, rows: &[StoneRow]) {
+pub fn note_doubts(
+    context: &Context,
+    number: usize,
+    offsets: &LabelOffsets,
+    registered: &Registered,
+    rows: &[StoneRow],
+) {
     let epoch = &context.project.epochs[number - 1].name;
+    for (name, message) in beside(context, number, offsets) {
+        context.warnings.doubt("label", name, message);
+    }
     let found = [unsettled(registered), few_measured(rows), blind(registered, rows)];
     for message in found.into_iter().flatten() {
         context.warnings.doubt("register", epoch, message);
     }
+}
+
+/// Labels beside the stones: cameras and clouds do not fit each other.
+fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(String, String)> {
+    let [first, second] = [0, number - 1].map(|e| &context.project.epochs[e].name);
+    let advice = "so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
+                  clouds into one frame; `stonewise check` shows the edges of the cloud over a photo";
+    // The first epoch takes part in every pair.
+    let of_first = offsets.first.filter(|_| number == 2);
+    let within = [(first, &of_first), (second, &offsets.second)]
+        .into_iter()
+        .filter_map(|(name, offset)| {
+            let place = place_of(offset.as_ref()?)?;
+            Some((
+                name.clone(),
+                format!("the cloud lies {place} off the stones that the photos show, {advice}"),
+            ))
+        });
+    let within: Vec<(String, String)> = within.collect();
+    let between = || {
+        let place = place_of(offsets.between.as_ref()?)?;
+        let message = format!(
+            "the cloud lies {place} off the stones that the photos show, compared with epoch {first:?}, {advice}"
+        );
+        Some((second.clone(), message))
+    };
+    match within.is_empty() {
+        true => between().into_iter().collect(),
+        false => within,
+    }
+}
+
+/// An offset in words, if it is clear and large.
+fn place_of(offset: &LabelOffset) -> Option<String> {
+    let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
+    let is_off = is_clear && offset.length_m() > OFFSET_M;
+    let [along, up] = offset.along_up_m.map(|m| 1e3 * m);
+    is_off.then(|| {
+        format!(
+            "{:.0} mm ({along:+.0} along, {up:+.0} up)",
+            1e3 * offset.length_m()
+        )
+    })
 }
 
 /// The adjustment stopped before its motions had settled.

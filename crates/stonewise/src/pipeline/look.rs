@@ -1,13 +1,13 @@
 //! The look at a survey with which every run begins.
 
-use crate::check::{Report, Verdict, check, is_about_this_machine};
+use crate::check::{Depth, Report, Verdict, check, is_about_this_machine};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::segment::listing;
 use crate::pipeline::storage::step::Key;
 
-/// Name of the step, and of its page.
+/// Name of the step.
 const STEP: &str = "check";
 
 /// Looks at the survey before the work. What is doubtful becomes a warning; what cannot be right stops the run, unless it
@@ -30,11 +30,9 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         &inputs.iter().map(String::as_str).collect::<Vec<_>>(),
     );
     let step = context.step(STEP, key, |step, _| {
-        let report = check(project, &context.out, context.progress)?;
-        report.write_page(&step.file("check.html"), project)?;
+        let report = check(project, &context.out, Depth::Quick, context.progress)?;
         write_json(&step.file("check.json"), &report)
     })?;
-    let page = step.file("check.html");
     let report: Report = read_json(&step.file("check.json"))?;
     let about_survey = || report.doubtful().filter(|f| !is_about_this_machine(f));
     let wrong: Vec<String> = about_survey()
@@ -43,9 +41,8 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         .collect();
     if !wrong.is_empty() && !forced {
         return Err(Error::Check(format!(
-            "this survey cannot be right (--force goes on all the same):\n{}\n  pictures: {}",
-            wrong.join("\n"),
-            page.display()
+            "this survey cannot be right (--force goes on all the same; `stonewise check` shows more):\n{}",
+            wrong.join("\n")
         )));
     }
     for finding in about_survey() {
@@ -54,12 +51,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         } else {
             &finding.epoch
         };
-        let message = format!(
-            "{}: {} (pictures: {})",
-            finding.topic,
-            finding.text,
-            page.display()
-        );
+        let message = format!("{}: {}", finding.topic, finding.text);
         context.warnings.doubt(STEP, subject, message);
     }
     for finding in report.doubtful().filter(|f| is_about_this_machine(f)) {

@@ -22,6 +22,7 @@ use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::label::{Labelled, label};
 use crate::pipeline::steps::m3c2::m3c2;
 use crate::pipeline::steps::r#match::r#match;
+use crate::pipeline::steps::offsets::label_offsets;
 use crate::pipeline::steps::register::{datum, register};
 use crate::pipeline::steps::segment::{Segmented, segment};
 use crate::project::Project;
@@ -196,6 +197,7 @@ fn measure(
     if until == Until::Matched {
         return Ok(PairSummary::default());
     }
+    let offsets = label_offsets(context, first, second, &matched, number)?;
     let registered = register(context, first, second, &matched, number)?;
     let datum = datum(context.project, number, &registered, &first.stones);
     if datum.state == DatumState::Unknown {
@@ -203,7 +205,7 @@ fn measure(
         context.warnings.notice("register", epoch, &datum.note);
     }
     let rows = stone_rows([first, second], &matched, &registered, &datum, facade);
-    note_doubts(context, number, &registered, &rows);
+    note_doubts(context, number, &offsets, &registered, &rows);
     write_stones(&context.out, pair, &rows)?;
     let record = RegistrationRecord {
         estimator: registered.estimator,

@@ -1,9 +1,10 @@
-//! The steps, in their order: ingest, segment, label, match, register, m3c2, evaluate.
+//! The steps, in their order: ingest, segment, label, match, offsets, register, m3c2, evaluate.
 
 pub mod evaluate;
 pub mod ingest;
 pub mod label;
 pub mod m3c2;
 pub mod r#match;
+pub mod offsets;
 pub mod register;
 pub mod segment;
