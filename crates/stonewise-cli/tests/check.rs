@@ -71,7 +71,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 8] = [
+const CASES: [Case; 9] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -95,6 +95,16 @@ const CASES: [Case; 8] = [
             })
         },
         "do not overlap",
+        true,
+    ),
+    (
+        "cameras elsewhere",
+        |dir| {
+            for cloud in ["epoch1/cloud_tls.laz", CLOUD_2] {
+                map_cloud(&dir.join(cloud), |p| p + nalgebra::Vector3::new(0.0, 100.0, 0.0));
+            }
+        },
+        "no photo sees the cloud",
         true,
     ),
     (

@@ -65,7 +65,7 @@ fn info_tells_what_pictures_and_masks_there_are() {
     let masks = folder.path().join("masks.json");
     fs::write(
         &masks,
-        "{\"images\": [], \"annotations\": [], \"categories\": []}",
+        "{\"images\": [{\"id\": 1, \"file_name\": \"one.jpg\", \"width\": 64, \"height\": 48}], \"annotations\": [], \"categories\": []}",
     )
     .unwrap();
     let (code, out, log) = info(&[

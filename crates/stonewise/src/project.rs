@@ -6,6 +6,7 @@ use crate::part::Part;
 use crate::pipeline::SourceRule;
 use crate::stable::StableArea;
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
@@ -34,11 +35,11 @@ pub struct Project {
     pub path: PathBuf,
     /// Name of the structure.
     pub name: String,
-    /// The surveys, in time order; two at least.
+    /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in time order.
     pub epochs: Vec<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
-    /// Keys of the file that have a new name, one sentence each.
+    /// What a user should know about how the file was read, one sentence each: keys with a new name, another numbering of epochs.
     pub notes: Vec<String>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
@@ -230,6 +231,7 @@ struct RawProject {
 #[serde(deny_unknown_fields)]
 struct RawHeader {
     name: Spanned<String>,
+    reference: Option<Spanned<String>>,
     crs: Option<Spanned<String>>,
     #[serde(default)]
     false_origin: [f64; 3],
@@ -294,12 +296,16 @@ impl Project {
         for epoch in raw.epochs {
             epochs.push(source.epoch(epoch, &map, &epochs)?);
         }
+        let mut notes = renamed_keys(&text);
+        if let Some(name) = &raw.project.reference {
+            notes.extend(source.put_reference_first(name, &mut epochs)?);
+        }
         Ok(Self {
             path: path.to_path_buf(),
             name: raw.project.name.into_inner(),
             epochs,
             settings,
-            notes: renamed_keys(&text),
+            notes,
             part: None,
         })
     }
@@ -447,6 +453,39 @@ impl Source<'_> {
         })
     }
 
+    /// Moves the named epoch to the front; a note where that changes the numbers of epochs.
+    fn put_reference_first(&self, name: &Spanned<String>, epochs: &mut [Epoch]) -> Result<Option<String>> {
+        let Some(at) = epochs.iter().position(|e| e.name == *name.get_ref()) else {
+            let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+            let message = format!("reference must name an epoch: {}", names.join(", "));
+            return Err(self.error(name.span(), message));
+        };
+        for epoch in epochs.iter_mut() {
+            epoch.same_survey_as = epoch.same_survey_as.map(|same| match same.cmp(&at) {
+                Ordering::Less => same + 1,
+                Ordering::Equal => 0,
+                Ordering::Greater => same,
+            });
+        }
+        epochs[..=at].rotate_right(1);
+        // An epoch names an earlier one; the reference now comes before that one.
+        if let Some(same) = epochs[0].same_survey_as.take() {
+            if let Some(twin) = epochs.get_mut(same) {
+                twin.same_survey_as = Some(0);
+            }
+        }
+        let note = || {
+            let numbered = epochs.iter().zip(1..).map(|(e, n)| format!("{n} {}", e.name));
+            let numbered: Vec<String> = numbered.collect();
+            format!(
+                "motions count from epoch {:?}; in the results the epochs are numbered {}",
+                name.get_ref(),
+                numbered.join(", ")
+            )
+        };
+        Ok((at > 0).then(note))
+    }
+
     /// The index of the epoch of that name.
     fn earlier(&self, name: &Spanned<String>, earlier: &[Epoch]) -> Result<usize> {
         let found = earlier.iter().position(|e| e.name == *name.get_ref());
@@ -552,5 +591,65 @@ mod tests {
         assert!(renamed_keys(&today).is_empty());
         let written = toml::to_string(&former).unwrap();
         assert!(written.contains("[adjustment]") && !written.contains("network"));
+    }
+
+    fn with_reference(reference: &str, same: [Option<&str>; 3]) -> Result<Project> {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["cloud.laz", "cameras.xml"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let mut text = format!("[project]\nname = \"wall\"\nreference = \"{reference}\"\n");
+        for (name, same) in ["2024", "2025", "2026"].into_iter().zip(same) {
+            text += &format!(
+                "[[epochs]]\nname = \"{name}\"\nclouds = [\"cloud.laz\"]\nimages = \".\"\ncameras = \"cameras.xml\"\n"
+            );
+            text += &same.map_or(String::new(), |same| format!("same_survey_as = \"{same}\"\n"));
+        }
+        let file = dir.path().join("stonewise.toml");
+        fs::write(&file, text).unwrap();
+        Project::read(&file)
+    }
+
+    #[test]
+    fn the_reference_comes_first_and_parts_of_a_survey_stay_together() {
+        let order = |project: &Project| {
+            let one = |e: &Epoch| {
+                (
+                    e.name.clone(),
+                    e.same_survey_as.map(|i| project.epochs[i].name.clone()),
+                )
+            };
+            project.epochs.iter().map(one).collect::<Vec<_>>()
+        };
+        let entry = |name: &str, same: Option<&str>| (name.to_owned(), same.map(str::to_owned));
+        let project = with_reference("2025", [None, Some("2024"), Some("2024")]).unwrap();
+        assert_eq!(
+            order(&project),
+            [
+                entry("2025", None),
+                entry("2024", Some("2025")),
+                entry("2026", Some("2024"))
+            ]
+        );
+        assert!(
+            project.notes[0].contains("1 2025, 2 2024, 3 2026"),
+            "{:?}",
+            project.notes
+        );
+        let unchanged = with_reference("2024", [None, None, Some("2025")]).unwrap();
+        assert_eq!(
+            order(&unchanged),
+            [
+                entry("2024", None),
+                entry("2025", None),
+                entry("2026", Some("2025"))
+            ]
+        );
+        assert!(unchanged.notes.is_empty());
+        let error = with_reference("2023", [None; 3]).unwrap_err().to_string();
+        assert!(
+            error.contains("stonewise.toml:3") && error.contains("2024, 2025, 2026"),
+            "{error}"
+        );
     }
 }
