@@ -13,7 +13,7 @@ use stonewise_core::progress::{Progress, Silent};
 use stonewise_core::registration::{
     AdjustError, AdjustmentParams, AdjustmentReport, MemoryPairs, PairPoints, PairSource, adjust,
 };
-use stonewise_core::stone::{MotionFailure, StoneMotion};
+use stonewise_core::stone::{MotionFailure, PairResult, StoneMotion};
 
 /// A wall of stones facing x (radius: of its plan, infinite where flat), its sensor and its motion.
 struct Wall {
@@ -544,6 +544,26 @@ fn every_phase_stops_when_no_iterations_are_left() {
         assert_eq!((report.iterations, report.converged), (allowed, false));
         assert_eq!(report.results.len(), if allowed == 0 { 0 } else { 12 });
     }
+}
+
+#[test]
+fn a_stone_that_still_moves_has_no_motion() {
+    let wall = Wall::default();
+    let own = |k: u32| Vector3::new(0.0, 0.0, if k % 2 == 0 { 0.004 } else { -0.004 });
+    let source = MemoryPairs::new(wall.pairs(|k, _| (own(k), Vector3::zeros())));
+    let after = |max_iterations: usize| {
+        let params = AdjustmentParams {
+            max_iterations,
+            ..AdjustmentParams::default()
+        };
+        let report = adjust(&source, &params, &Silent).unwrap();
+        let unsettled = |r: &&PairResult| matches!(r.motion, Err(MotionFailure::NotConverged));
+        report.results.iter().filter(unsettled).count()
+    };
+    let stones = wall.rows * wall.columns;
+    // The first step takes every stone from its neighbours' motion to its own.
+    assert!(after(1) > stones as usize / 2, "{} of {stones}", after(1));
+    assert_eq!(after(60), 0);
 }
 
 /// Stops after so many checks.

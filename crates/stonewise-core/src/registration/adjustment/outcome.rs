@@ -122,7 +122,10 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
         false => BAD_SHARE,
     };
     let disagrees = shows_two_surfaces(e, adjustment.surface.correlation.factor(), share);
-    (e.overlap < params.min_overlap || disagrees).then_some(MotionFailure::Disagreement)
+    if e.overlap < params.min_overlap || disagrees {
+        return Some(MotionFailure::Disagreement);
+    }
+    stone.swings.then_some(MotionFailure::NotConverged)
 }
 
 /// Whether more than a share of a stone's cells shows two surfaces; `inflation`: factor on the expected

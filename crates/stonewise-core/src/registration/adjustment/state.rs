@@ -45,6 +45,8 @@ pub(crate) struct StoneState {
     pub ratio: LikelihoodRatio,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
+    /// Whether its last step exceeded the uncertainty of its motion.
+    pub swings: bool,
     /// Effective degrees of freedom: how many unknowns the stone's own points determine.
     pub effective_freedom: f64,
 }
@@ -98,6 +100,7 @@ impl StoneState {
             on_own: None,
             ratio: LikelihoodRatio::default(),
             p_with_field: 1.0,
+            swings: false,
             effective_freedom: 0.0,
         }
     }

@@ -12,6 +12,8 @@ const RESTLESS: usize = 50;
 /// A stone's own optimum is followed once its points make it so many times more probably loose than it was
 /// without them.
 const SUSPECT: f64 = 1.5;
+/// A stone whose last step exceeds so many standard deviations of its motion swings between two optima: neither is its motion.
+const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
 
@@ -36,14 +38,16 @@ impl Adjustment {
             self.stones[i].effective_freedom = tied.effective_freedom;
             let origin = self.common_in(i);
             let limits = StepLimits::of(self);
-            restless += usize::from(limits.follow(&mut self.stones[i].with_field, &tied, &origin, p));
-            restless += usize::from(self.step_on_own(i, &solution.equations[i], &solution.field));
+            let with_field = limits.follow(&mut self.stones[i].with_field, &tied, &origin, p);
+            let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
+            restless += usize::from(with_field.counts) + usize::from(on_own.counts);
+            self.stones[i].swings = with_field.swings || on_own.swings;
         }
         restless * RESTLESS <= self.stones.len()
     }
 
-    /// Moves a stone on its own, or begins to where that has become likely; whether it still moved.
-    fn step_on_own(&mut self, i: usize, equations: &StoneEquations, field: &Field) -> bool {
+    /// Moves a stone on its own, or begins to where that has become likely.
+    fn step_on_own(&mut self, i: usize, equations: &StoneEquations, field: &Field) -> Step {
         let wide = self.loose.own_variances(&self.components);
         let prediction = &field.from_others[i];
         let origin = self.common_in(i);
@@ -60,7 +64,10 @@ impl Adjustment {
             own.move_to(&start, limits.max_step_m);
             stone.on_own = Some(own);
         }
-        is_suspect
+        Step {
+            counts: is_suspect,
+            swings: false,
+        }
     }
 
     /// A stone's motion about the common translation, looseness averaged out.
@@ -94,6 +101,15 @@ impl Adjustment {
     }
 }
 
+/// What a step of a stone says about its rest.
+#[derive(Clone, Copy)]
+struct Step {
+    /// The stone still moves.
+    counts: bool,
+    /// It moves further than its motion is uncertain.
+    swings: bool,
+}
+
 /// How far a stone steps, and what step still counts.
 #[derive(Clone, Copy)]
 struct StepLimits {
@@ -109,17 +125,20 @@ impl StepLimits {
         }
     }
 
-    /// Moves a candidate to its posterior mean; whether that step still counts. A candidate of little
-    /// probability `p` moves the stone's estimate by that share only.
+    /// Moves a candidate to its posterior mean. A candidate of little probability `p` moves the stone's estimate
+    /// by that share only.
     fn follow(
         self,
         candidate: &mut CandidateMotion,
         posterior: &Posterior,
         origin: &StoneVector,
         p: f64,
-    ) -> bool {
-        let step = candidate.move_to(&(posterior.mean + *origin), self.max_step_m);
+    ) -> Step {
+        let step = p * candidate.move_to(&(posterior.mean + *origin), self.max_step_m);
         let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
-        p * step > self.tolerance_m.max(SETTLED * sd)
+        Step {
+            counts: step > self.tolerance_m.max(SETTLED * sd),
+            swings: step > self.tolerance_m.max(SWINGING * sd),
+        }
     }
 }
