@@ -16,6 +16,7 @@ const WRONG_USAGE: u8 = 2;
 const IN_DOUBT: u8 = 3;
 
 fn main() -> ExitCode {
+    say_panics_once();
     let args = <args::Args as clap::Parser>::parse();
     let printer = printer::Printer::new(args.quiet);
     let outcome = commands::dispatch(args, &printer);
@@ -32,6 +33,17 @@ fn main() -> ExitCode {
             })
         }
     }
+}
+
+/// Panics of decoders become errors that name the file, so nothing is said of them; any other is a defect of this program.
+fn say_panics_once() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !stonewise_io::wall::is_behind_wall() {
+            usual(panic);
+            printer::note("error: this is a defect of stonewise; please report it with the lines above");
+        }
+    }));
 }
 
 /// Whether the command was given something that cannot be.

@@ -11,3 +11,4 @@ pub mod masks;
 pub mod mesh_ply;
 mod photo_name;
 pub mod table;
+pub mod wall;

@@ -170,6 +170,32 @@ fn compressed_clouds_without_a_table_of_chunks_are_read() {
 }
 
 #[test]
+fn a_table_of_chunks_is_not_read_for_a_cloud_without_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    let mut bytes = fs::read(testdata("clouds/las12_format2.laz")).unwrap();
+    // No points, and a table that claims four billion chunks: 64 GB of entries.
+    bytes[107..111].fill(0);
+    let table = number(&bytes, number(&bytes, 96));
+    bytes[table + 4..table + 8].fill(255);
+    fs::write(&path, &bytes).unwrap();
+    assert!(points(&path).is_empty());
+}
+
+#[test]
+fn sizes_of_compressed_items_that_overflow_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.laz");
+    let mut bytes = fs::read(testdata("clouds/las12_format2.laz")).unwrap();
+    let record = bytes.windows(9).position(|w| w == b"laszip en").unwrap() - 2;
+    // Size of the second item: behind the record's head, the description, and the first item.
+    let size = record + 54 + 34 + 6 + 2;
+    bytes[size..size + 2].fill(255);
+    fs::write(&path, &bytes).unwrap();
+    assert!(refusal(&path, measure_cloud).contains("does not fit the point format"));
+}
+
+#[test]
 fn compressed_clouds_with_chunks_of_gigabytes_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.laz");

@@ -1,7 +1,6 @@
 //! Tables read from Parquet files.
 
 use std::fs::File;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use parquet::basic::{LogicalType, Type as Physical};
@@ -15,6 +14,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use super::column::Values;
 use super::{Column, Table, TableError};
+use crate::wall::behind_wall;
 
 /// Reads all columns of a Parquet file.
 ///
@@ -185,7 +185,7 @@ fn unsupported(descriptor: &ColumnDescriptor) -> ParquetError {
 
 /// Damaged files make the decoder panic in places; this turns that into an error.
 fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T, TableError>) -> Result<T, TableError> {
-    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(unreadable(path, "the file is damaged")))
+    behind_wall(read).unwrap_or_else(|| Err(unreadable(path, "the file is damaged")))
 }
 
 fn unreadable(path: &Path, reason: impl ToString) -> TableError {

@@ -37,18 +37,19 @@ impl Chunks {
     /// claims.
     pub fn check(file: &Envelope, compression: &Compression) -> Result<Self, CloudError> {
         let (points, path) = (file.points(), &file.path);
+        let lacks_table = Self {
+            lacks_table: true,
+            are_large: false,
+        };
         if points == 0 {
-            return Ok(Self::default());
+            // Whatever its table says, the decoder must not read it.
+            return Ok(lacks_table);
         }
         let bytes = file.length - file.start();
         if points / MAX_POINTS_PER_BYTE > bytes {
             let reason = format!("it holds {bytes} bytes of points, and its header claims {points} points");
             return Err(CloudError::truncated(path, reason));
         }
-        let lacks_table = Self {
-            lacks_table: true,
-            are_large: false,
-        };
         if compression.order == Order::Stream {
             return Ok(lacks_table);
         }

@@ -37,7 +37,9 @@ impl Compression {
             )
         })?;
         let vlr = LazVlr::from_buffer(data).map_err(|e| las_error(path, las::Error::from(e)))?;
-        if vlr.items_size() != envelope.record_bytes() {
+        // Summed here, because the library's sum of 16 bits overflows on damaged sizes.
+        let size: u64 = vlr.items().iter().map(|item| u64::from(item.size())).sum();
+        if size != envelope.record_bytes() {
             let reason = "the compression record does not fit the point format";
             return Err(CloudError::malformed(path, reason));
         }
