@@ -27,9 +27,11 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Do everything: from clouds and photos to results and a report; resumes after an interruption.
-    #[command(after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/\n  \
+    #[command(
+        after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/\n  \
         stonewise run survey/stonewise.toml --out results/ --exit-on alarm\n\n\
-        Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 as --exit-on asks.")]
+        Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 as --exit-on asks."
+    )]
     Run(RunArgs),
     /// Make a small survey with known motion, and measure it.
     #[command(after_help = "Example:\n  stonewise demo --out demo")]

@@ -53,7 +53,11 @@ const MAX_LOGO_BYTES: u64 = 1_000_000;
 /// # Errors
 /// It is neither a PNG nor a JPEG, or is too large; the text says what to do.
 pub(crate) fn logo_type(path: &Path) -> Result<&'static str, String> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let extension = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
     let kind = match extension.as_str() {
         "png" => "image/png",
         "jpg" | "jpeg" => "image/jpeg",
@@ -61,7 +65,10 @@ pub(crate) fn logo_type(path: &Path) -> Result<&'static str, String> {
     };
     let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
     if bytes > MAX_LOGO_BYTES {
-        return Err(format!("{} is larger than 1 MB: give a smaller picture", path.display()));
+        return Err(format!(
+            "{} is larger than 1 MB: give a smaller picture",
+            path.display()
+        ));
     }
     Ok(kind)
 }

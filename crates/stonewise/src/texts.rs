@@ -100,6 +100,7 @@ pub(crate) struct PageTexts {
     pub chance: &'static str,
     pub doubts: &'static str,
     pub in_numbers: &'static str,
+    pub summary: &'static str,
     pub rest_in_english: &'static str,
     pub no_registration: &'static str,
 }
@@ -143,7 +144,10 @@ static ENGLISH: Texts = Texts {
             "{n} joint opened beyond the attention threshold of {t} mm",
             "{n} joints opened beyond the attention threshold of {t} mm",
         ],
-        moved: ["{n} of {m} measured stones moved", "{n} of {m} measured stones moved"],
+        moved: [
+            "{n} of {m} measured stones moved",
+            "{n} of {m} measured stones moved",
+        ],
         loose: [
             "{n} stone is loose: it moved unlike its neighbours",
             "{n} stones are loose: they moved unlike their neighbours",
@@ -220,6 +224,7 @@ static ENGLISH: Texts = Texts {
             that remain when the false discovery rate over all stones is held at 5 %: {n}.",
         doubts: "These results must not be relied on as they stand.",
         in_numbers: "In numbers",
+        summary: "Summary",
         rest_in_english: "",
         no_registration: "Nothing is recorded about the registration of the epochs.",
     },
@@ -355,6 +360,7 @@ static GERMAN: Texts = Texts {
             gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
         in_numbers: "In Zahlen",
+        summary: "Zusammenfassung",
         rest_in_english: "Karten, Tabellen und Anh\u{e4}nge sind auf Englisch.",
         no_registration: "\u{dc}ber die Registrierung der Epochen ist nichts festgehalten.",
     },
@@ -416,9 +422,9 @@ impl Texts {
 
 /// A text with its braces filled in.
 pub(crate) fn fill(text: &str, values: &[(&str, &str)]) -> String {
-    values
-        .iter()
-        .fold(text.to_owned(), |text, (name, value)| text.replace(&format!("{{{name}}}"), value))
+    values.iter().fold(text.to_owned(), |text, (name, value)| {
+        text.replace(&format!("{{{name}}}"), value)
+    })
 }
 
 /// The text for so many, with `{n}` filled in.
@@ -433,7 +439,11 @@ mod tests {
 
     /// Every brace of a text, in order.
     fn braces(text: &str) -> Vec<String> {
-        let mut all: Vec<String> = text.split('{').skip(1).filter_map(|t| Some(t.split_once('}')?.0.to_owned())).collect();
+        let mut all: Vec<String> = text
+            .split('{')
+            .skip(1)
+            .filter_map(|t| Some(t.split_once('}')?.0.to_owned()))
+            .collect();
         all.sort();
         all
     }
@@ -443,7 +453,11 @@ mod tests {
         // The same places of both tables, as they are printed for debugging.
         let strings = |texts: &Texts| {
             let text = format!("{texts:?}");
-            text.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>()
+            text.split('"')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
         };
         let (english, german) = (strings(&ENGLISH), strings(&GERMAN));
         assert_eq!(english.len(), german.len());
@@ -462,7 +476,10 @@ mod tests {
     #[test]
     fn one_and_many_are_told_apart() {
         let clauses = &Language::English.texts().clauses;
-        assert_eq!(counted(clauses.joints_alarm, 1, &[("t", "5")]), "1 joint opened beyond the alarm threshold of 5 mm");
+        assert_eq!(
+            counted(clauses.joints_alarm, 1, &[("t", "5")]),
+            "1 joint opened beyond the alarm threshold of 5 mm"
+        );
         assert!(counted(clauses.lost, 2, &[]).starts_with("2 stones are lost"));
         assert_eq!(Language::German.texts().mm(0.000_24), "0,24");
         assert_eq!(Language::German.texts().threshold(2.5), "2,5");

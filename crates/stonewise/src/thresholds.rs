@@ -279,13 +279,22 @@ mod tests {
     #[test]
     fn impossible_thresholds_name_the_key_and_the_fix() {
         for (text, words) in [
-            ("attention_mm = 10.0\nalarm_mm = 5.0", "attention_mm = 10 in [thresholds] must be below alarm_mm = 5"),
+            (
+                "attention_mm = 10.0\nalarm_mm = 5.0",
+                "attention_mm = 10 in [thresholds] must be below alarm_mm = 5",
+            ),
             ("attention_mm = 5.0\nalarm_mm = 5.0", "must be below"),
             ("alarm_mm = 0.0", "alarm_mm = 0 in [thresholds] is not possible"),
             ("attention_mm = nan", "a length above 0"),
-            ("joints = { attention_mm = -1.0 }", "attention_mm = -1 in joints of [thresholds]"),
+            (
+                "joints = { attention_mm = -1.0 }",
+                "attention_mm = -1 in joints of [thresholds]",
+            ),
             ("alarm = 5.0", "unknown field `alarm`"),
-            ("[[zones]]\nname = \"a\"\npolygon = [[0.0, 0.0], [1.0, 0.0]]", "three corners"),
+            (
+                "[[zones]]\nname = \"a\"\npolygon = [[0.0, 0.0], [1.0, 0.0]]",
+                "three corners",
+            ),
             ("[[zones]]\nname = \" \"\npolygon = []", "a name of its own"),
         ] {
             let message = read(text).unwrap_err();

@@ -36,8 +36,8 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
 mod tests {
     use super::*;
     use crate::files::write_json;
-    use crate::results::names::RUN;
     use crate::report_params::Language;
+    use crate::results::names::RUN;
     use crate::results::records::{Datum, EstimatorRecord, RegistrationRecord, RunRecord, StepTime};
     use crate::results::testing::{folder, outlines, registration_record, rows, run_record};
     use crate::results::{Status, StoneRow, write_logo, write_outlines, write_stones};
@@ -119,7 +119,10 @@ mod tests {
             assert!(html.contains(&format!("<section id=\"{id}\">")), "{id}");
         }
         assert!(html.contains("<b>20 <small>83\u{a0}%</small></b><span>of 24 stones measured"));
-        assert!(html.contains("<div class=\"verdict cannot-tell\"") && html.contains("Cannot tell: the adjustment did not converge"));
+        assert!(
+            html.contains("<div class=\"verdict cannot-tell\"")
+                && html.contains("Cannot tell: the adjustment did not converge")
+        );
         // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
         assert!(html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
@@ -129,7 +132,9 @@ mod tests {
             "maps, histograms, scatter plots"
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
-        assert!(html.contains("is included in the limits: the stable areas show a registration error of 3.2 mm."));
+        assert!(
+            html.contains("is included in the limits: the stable areas show a registration error of 3.2 mm.")
+        );
         assert!(html.contains("finished <b>2026-04-30 12:00 UTC</b>") && html.contains("temperature_c 9.5"));
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
@@ -228,7 +233,9 @@ mod tests {
         write_json(&folder.path().join("registration.json"), &registration).unwrap();
         let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
         let first = html.split("<ul class=\"findings\"><li>").nth(1).unwrap();
-        assert!(first.starts_with("Registration error between the surveys is unknown and is <b>not</b> included"));
+        assert!(
+            first.starts_with("Registration error between the surveys is unknown and is <b>not</b> included")
+        );
         let header = html.split("</header>").next().unwrap();
         assert!(header.contains("<p class=\"datum\">Registration error between the surveys is unknown"));
     }
@@ -237,7 +244,11 @@ mod tests {
     fn settled(moving: &[u32], params: &crate::ReportParams) -> String {
         let mut stones = rows();
         for stone in &mut stones {
-            if let Some(motion) = stone.motion.as_mut().filter(|_| !moving.contains(&stone.stone_id)) {
+            if let Some(motion) = stone
+                .motion
+                .as_mut()
+                .filter(|_| !moving.contains(&stone.stone_id))
+            {
                 motion.displacement *= 0.01;
                 motion.relative *= 0.01;
                 (motion.significant, motion.loose) = (false, false);
@@ -265,9 +276,15 @@ mod tests {
     #[test]
     fn a_still_wall_is_fine_and_the_page_never_says_that_a_stone_moved() {
         let html = settled(&[], &crate::ReportParams::default());
-        assert!(html.contains("<div class=\"verdict fine\"") && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)"));
+        assert!(
+            html.contains("<div class=\"verdict fine\"")
+                && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)")
+        );
         assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
-        assert!(html.contains("No stone calls for a closer look.") && html.contains("<span>no stone moved</span>"));
+        assert!(
+            html.contains("No stone calls for a closer look.")
+                && html.contains("<span>no stone moved</span>")
+        );
         let html = written(&html);
         for claim in ["moved significantly", "significant motion", "Largest motions"] {
             assert!(!html.contains(claim), "{claim}");
@@ -303,7 +320,12 @@ mod tests {
         };
         let html = settled(&[8, 15], &german);
         assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
-        for words in ["Achtung: 2 von 20 gemessenen Steinen haben sich bewegt", "temperature 9,5", "<p>Unterschrift</p>", "Nachweisgrenze: 1,4 mm"] {
+        for words in [
+            "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
+            "temperature 9,5",
+            "<p>Unterschrift</p>",
+            "Nachweisgrenze: 1,4 mm",
+        ] {
             assert!(html.contains(words), "{words}");
         }
     }

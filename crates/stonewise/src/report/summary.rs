@@ -77,7 +77,11 @@ impl<'a> Summary<'a> {
             limits: Sorted::new(measured.iter().map(|(_, m)| m.detection_limit_m)),
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
             above_limit: measured.iter().filter(|(_, m)| m.significant).count(),
-            cover: results.run.as_ref().map(|r| r.parameters.report.clone()).unwrap_or_default(),
+            cover: results
+                .run
+                .as_ref()
+                .map(|r| r.parameters.report.clone())
+                .unwrap_or_default(),
             moved,
             measured,
             verdict,
@@ -117,10 +121,7 @@ impl<'a> Summary<'a> {
 /// A tenth of the stones that moved must be at least so many to have a place of their own.
 const LEAST_STRONGEST: usize = 5;
 
-fn strongest(
-    results: &ResultSet,
-    moved: &[(&StoneRow, &RowMotion)],
-) -> Option<(f64, [Point2<f64>; 2])> {
+fn strongest(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<(f64, [Point2<f64>; 2])> {
     let tenth = &moved[..moved.len() / 10];
     let least = tenth.last().filter(|_| tenth.len() >= LEAST_STRONGEST)?;
     Some((least.1.displacement.norm(), region(results, tenth)?))
@@ -133,8 +134,13 @@ fn verdict(results: &ResultSet) -> EpochVerdict {
         return verdict.clone();
     }
     let run = results.run.as_ref();
-    let name = |epoch: usize| run.and_then(|r| Some(r.epochs.get(epoch)?.name.clone())).unwrap_or_default();
-    let later = run.into_iter().flat_map(|r| r.epochs.iter().skip(1).map(|e| e.name.as_str()));
+    let name = |epoch: usize| {
+        run.and_then(|r| Some(r.epochs.get(epoch)?.name.clone()))
+            .unwrap_or_default()
+    };
+    let later = run
+        .into_iter()
+        .flat_map(|r| r.epochs.iter().skip(1).map(|e| e.name.as_str()));
     let later_name = name(results.pair);
     let in_doubt = run.is_some_and(|r| is_doubted(&r.warnings, &later_name, later));
     let thresholds = run.map(|r| r.parameters.thresholds.clone()).unwrap_or_default();

@@ -21,8 +21,8 @@ pub(crate) mod testing;
 pub use change_points::DistancePoint;
 use column_metadata::column_metadata;
 pub(crate) use columns::column;
-pub(crate) use comparison::{Comparison, compare};
 pub use columns::{STONE_COLUMNS, StoneColumn};
+pub(crate) use comparison::{Comparison, compare};
 pub use evidence::{
     Crop, Cut, Evidence, Logo, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras, write_crops,
     write_logo, write_sections, write_thin_cloud,

@@ -25,12 +25,16 @@ impl Judged {
 
     /// Stones of a zone, or all.
     pub(super) fn stones_in(&self, zone: Option<usize>) -> impl Iterator<Item = &JudgedStone> + Clone {
-        self.stones.iter().filter(move |s| zone.is_none() || s.zone == zone)
+        self.stones
+            .iter()
+            .filter(move |s| zone.is_none() || s.zone == zone)
     }
 
     /// Joints of a zone, or all.
     pub(super) fn joints_in(&self, zone: Option<usize>) -> impl Iterator<Item = &JudgedJoint> + Clone {
-        self.joints.iter().filter(move |j| zone.is_none() || j.zone == zone)
+        self.joints
+            .iter()
+            .filter(move |j| zone.is_none() || j.zone == zone)
     }
 }
 
@@ -64,20 +68,34 @@ pub(super) fn area(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: 
         lost: count(|s| s.verdict.lost),
         by_state,
         smallest_q: q.min_by(f64::total_cmp),
-        largest: largest(|s| largest_of(s.verdict.moved, s.verdict.stone_id, s.verdict.length_mm, s.verdict.interval_mm)),
+        largest: largest(|s| {
+            largest_of(
+                s.verdict.moved,
+                s.verdict.stone_id,
+                s.verdict.length_mm,
+                s.verdict.interval_mm,
+            )
+        }),
         largest_against_neighbours: largest(|s| {
             let v = &s.verdict;
             largest_of(v.loose, v.stone_id, v.neighbours_mm, v.neighbours_interval_mm)
         }),
         largest_opening: widest.map(|j| j.verdict),
-        detection_limit: limit(0.5).zip(limit(0.9)).map(|(median_mm, percentile_90_mm)| DetectionLimit {
-            median_mm,
-            percentile_90_mm,
-        }),
+        detection_limit: limit(0.5)
+            .zip(limit(0.9))
+            .map(|(median_mm, percentile_90_mm)| DetectionLimit {
+                median_mm,
+                percentile_90_mm,
+            }),
     }
 }
 
-fn largest_of(counts: bool, stone_id: u32, length: Option<f64>, interval: Option<[f64; 2]>) -> Option<Largest> {
+fn largest_of(
+    counts: bool,
+    stone_id: u32,
+    length: Option<f64>,
+    interval: Option<[f64; 2]>,
+) -> Option<Largest> {
     Some(Largest {
         stone_id,
         length_mm: length.filter(|_| counts)?,
@@ -104,7 +122,12 @@ fn state_of(reason: ReasonCode) -> State {
 }
 
 /// Every reason that applies; the first decides the state.
-fn reason_codes(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: Option<usize>) -> Vec<ReasonCode> {
+fn reason_codes(
+    case: &Case,
+    thresholds: &Thresholds,
+    judged: &Judged,
+    zone: Option<usize>,
+) -> Vec<ReasonCode> {
     use ReasonCode as R;
     let stones = || judged.stones_in(zone);
     let joints = || judged.joints_in(zone);
@@ -137,9 +160,17 @@ fn reason_codes(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: Opt
         (length_matters && !case.has_datum(), R::DatumUnknown),
         (reaches, R::IntervalReachesThreshold),
     ];
-    let mut codes: Vec<R> = all.into_iter().filter(|(holds, _)| *holds).map(|(_, code)| code).collect();
+    let mut codes: Vec<R> = all
+        .into_iter()
+        .filter(|(holds, _)| *holds)
+        .map(|(_, code)| code)
+        .collect();
     if codes.is_empty() {
-        codes.push(if without { R::NoMotionShown } else { R::BelowThresholds });
+        codes.push(if without {
+            R::NoMotionShown
+        } else {
+            R::BelowThresholds
+        });
     }
     codes
 }

@@ -260,8 +260,8 @@ fn judge_joint(case: &Case, joint: &JointCase, q: f64, thresholds: &Thresholds) 
 
 /// Joints that are not below their thresholds, where joints have any.
 fn noted(judged: &Judged, thresholds: &Thresholds) -> Vec<JointVerdict> {
-    let asked = !thresholds.wall.joints.is_empty()
-        || thresholds.zones.iter().any(|z| !z.measures.joints.is_empty());
+    let asked =
+        !thresholds.wall.joints.is_empty() || thresholds.zones.iter().any(|z| !z.measures.joints.is_empty());
     let worth = |j: &&JudgedJoint| asked && (j.opened || j.opening > Level::Below);
     let finite = |j: &JudgedJoint| j.verdict.interval_mm.iter().all(|v| v.is_finite());
     judged
@@ -287,10 +287,8 @@ pub(super) fn millimetres(metres: f64) -> f64 {
 }
 
 /// A number with so many digits.
-fn significant_digits(value: f64, digits: i32) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let scale = 10f64.powi(digits - 1 - value.abs().log10().floor() as i32);
-    if scale.is_finite() { (value * scale).round() / scale } else { value }
+fn significant_digits(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits.saturating_sub(1))
+        .parse()
+        .unwrap_or(value)
 }

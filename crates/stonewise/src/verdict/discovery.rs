@@ -29,8 +29,8 @@ mod tests {
     fn the_published_example_has_four_discoveries() {
         // Benjamini & Hochberg 1995, section 3.
         let p = [
-            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719, 0.6528,
-            0.7590, 1.0,
+            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719,
+            0.6528, 0.7590, 1.0,
         ];
         let q = q_values(&p);
         assert_eq!(q.iter().filter(|q| **q <= 0.05).count(), 4);
@@ -57,7 +57,11 @@ mod tests {
                     .p_value()
                 })
                 .collect();
-            let found: Vec<usize> = (0..200).zip(q_values(&p)).filter(|(_, q)| *q <= 0.05).map(|(i, _)| i).collect();
+            let found: Vec<usize> = (0..200)
+                .zip(q_values(&p))
+                .filter(|(_, q)| *q <= 0.05)
+                .map(|(i, _)| i)
+                .collect();
             let false_ones = found.iter().filter(|i| **i >= 20).count();
             shares.push(false_ones as f64 / found.len().max(1) as f64);
         }

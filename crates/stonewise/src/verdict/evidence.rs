@@ -24,7 +24,10 @@ pub(crate) fn verdict_on(
     thresholds: &Thresholds,
     language: Language,
 ) -> EpochVerdict {
-    let converged = results.registration.as_ref().is_none_or(|r| r.estimator.converged());
+    let converged = results
+        .registration
+        .as_ref()
+        .is_none_or(|r| r.estimator.converged());
     let case = Case {
         epochs,
         datum: results.datum().map(|d| d.state),

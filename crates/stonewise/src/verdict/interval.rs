@@ -46,7 +46,11 @@ impl Estimate {
     pub(crate) fn p_value(&self) -> f64 {
         let solved = self.covariance.cholesky().map(|c| c.solve(&self.vector));
         let square = solved.map_or(0.0, |s| self.vector.dot(&s));
-        if square.is_finite() { beyond(square.max(0.0).sqrt(), 0.0) } else { 1.0 }
+        if square.is_finite() {
+            beyond(square.max(0.0).sqrt(), 0.0)
+        } else {
+            1.0
+        }
     }
 
     /// The same of a single number with its standard deviation: both tails of the normal distribution.
@@ -192,7 +196,10 @@ mod tests {
         };
         for length in [0.0, 0.001, 0.005, 0.1] {
             let [low, high] = round(length).length_interval();
-            assert!((high - (length + QUANTILE * 1e-3)).abs() < 1e-9, "{length} {high}");
+            assert!(
+                (high - (length + QUANTILE * 1e-3)).abs() < 1e-9,
+                "{length} {high}"
+            );
             assert!(low <= length && low >= 0.0);
         }
         // Far away the interval is the first-order one.
@@ -203,7 +210,11 @@ mod tests {
 
     #[test]
     fn a_covariance_that_is_none_gives_no_limits() {
-        for covariance in [Matrix3::zeros(), Matrix3::identity() * f64::NAN, -Matrix3::identity()] {
+        for covariance in [
+            Matrix3::zeros(),
+            Matrix3::identity() * f64::NAN,
+            -Matrix3::identity(),
+        ] {
             let estimate = Estimate {
                 vector: Vector3::x(),
                 covariance,
@@ -240,7 +251,10 @@ mod tests {
             for (j, direction) in directions.iter().enumerate() {
                 for (i, length) in [0.0, 1.0, 3.0, 8.0, 40.0, 400.0].into_iter().enumerate() {
                     let share = coverage(direction * length, *sd, (100 * k + 10 * j + i) as u64);
-                    assert!(share > 0.9416, "{share} at {length} along {direction:?} with {sd:?}");
+                    assert!(
+                        share > 0.9416,
+                        "{share} at {length} along {direction:?} with {sd:?}"
+                    );
                     // Not needlessly wide where the first order holds; with very unequal errors the bound on the curvature costs more.
                     let most = if sd.max() / sd.min() > 10.0 { 0.99 } else { 0.965 };
                     assert!(

@@ -66,15 +66,32 @@ impl Speaker<'_> {
     fn deciding(&self) -> Vec<ReasonCode> {
         use ReasonCode as R;
         let wanted = |r: &R| match self.wall.state {
-            State::Alarm => matches!(r, R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::StonesLost),
+            State::Alarm => matches!(
+                r,
+                R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::StonesLost
+            ),
             State::Attention => matches!(
                 r,
-                R::LengthAttention | R::NeighboursAttention | R::JointsAttention | R::StonesLost | R::MotionShown
+                R::LengthAttention
+                    | R::NeighboursAttention
+                    | R::JointsAttention
+                    | R::StonesLost
+                    | R::MotionShown
             ),
             State::CannotTell | State::Fine => true,
         };
-        let most = if matches!(self.wall.state, State::CannotTell | State::Fine) { 1 } else { 4 };
-        self.wall.reasons.iter().copied().filter(wanted).take(most).collect()
+        let most = if matches!(self.wall.state, State::CannotTell | State::Fine) {
+            1
+        } else {
+            4
+        };
+        self.wall
+            .reasons
+            .iter()
+            .copied()
+            .filter(wanted)
+            .take(most)
+            .collect()
     }
 
     fn clause(&self, reason: ReasonCode) -> String {
@@ -91,9 +108,7 @@ impl Speaker<'_> {
             R::JointsAlarm => self.joints(c.joints_alarm, Level::Alarm),
             R::JointsAttention => self.joints(c.joints_attention, Level::Attention),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
-            R::MotionShown if wall.moved > 0 => {
-                counted(c.moved, wall.moved, &[("m", &count(wall.measured))])
-            }
+            R::MotionShown if wall.moved > 0 => counted(c.moved, wall.moved, &[("m", &count(wall.measured))]),
             R::MotionShown => counted(c.loose, wall.loose, &[]),
             R::NothingMeasured => c.nothing_measured.to_owned(),
             R::FewMeasured => counted(c.few_measured, wall.measured, &[("m", &count(wall.stones))]),
@@ -158,10 +173,18 @@ impl Speaker<'_> {
 
     fn reaching(&self) -> String {
         let reaches = |level: Level| level == Level::Reaches;
-        let stones = self.judged.stones.iter().filter(|s| reaches(s.length) || reaches(s.neighbours));
+        let stones = self
+            .judged
+            .stones
+            .iter()
+            .filter(|s| reaches(s.length) || reaches(s.neighbours));
         let joints = self.judged.joints.iter().filter(|j| reaches(j.opening));
         let zones: Vec<Option<usize>> = stones.map(|s| s.zone).chain(joints.map(|j| j.zone)).collect();
-        let t = self.limits(|m| [m.length, m.neighbours, m.joints], Levels::attention_m, Some(&zones));
+        let t = self.limits(
+            |m| [m.length, m.neighbours, m.joints],
+            Levels::attention_m,
+            Some(&zones),
+        );
         counted(self.texts.clauses.reaches, zones.len(), &[("t", &t)])
     }
 
@@ -214,7 +237,11 @@ impl Speaker<'_> {
             interval_mm: [low, high],
         } = self.wall.largest?;
         let c = &self.texts.clauses;
-        let text = if self.case.has_datum() { c.largest } else { c.largest_common };
+        let text = if self.case.has_datum() {
+            c.largest
+        } else {
+            c.largest_common
+        };
         let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
         Some(fill(
             text,
@@ -230,7 +257,10 @@ impl Speaker<'_> {
     fn limit(&self) -> Option<String> {
         let limit = self.wall.detection_limit?;
         let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
-        let values = [("median", &*mm(limit.median_mm)), ("high", &*mm(limit.percentile_90_mm))];
+        let values = [
+            ("median", &*mm(limit.median_mm)),
+            ("high", &*mm(limit.percentile_90_mm)),
+        ];
         Some(fill(self.texts.clauses.limit, &values))
     }
 }

@@ -70,9 +70,9 @@ fn still_walls_are_fine_and_never_alarm() {
         let verdict = judge(&case, &usual());
         assert_eq!(verdict.state, State::Fine, "{}", verdict.sentence);
         assert!(
-            verdict
-                .sentence
-                .starts_with("Fine: none of the 100 measured stones reaches the attention threshold of 5 mm; detection"),
+            verdict.sentence.starts_with(
+                "Fine: none of the 100 measured stones reaches the attention threshold of 5 mm; detection"
+            ),
             "{}",
             verdict.sentence
         );
@@ -100,14 +100,17 @@ fn a_known_motion_beyond_a_threshold_is_an_alarm_or_calls_for_attention() {
     }
     let verdict = judge(&wall(3, 0.015, 4), &usual());
     assert!(
-        verdict
-            .sentence
-            .starts_with("Alarm: 3 stones moved beyond the alarm threshold of 10 mm; the largest motion is 1"),
+        verdict.sentence.starts_with(
+            "Alarm: 3 stones moved beyond the alarm threshold of 10 mm; the largest motion is 1"
+        ),
         "{}",
         verdict.sentence
     );
     let verdict = judge(&wall(3, 0.015, 4), &Thresholds::default());
-    assert_eq!((verdict.state, codes(&verdict)), (State::Attention, vec![ReasonCode::MotionShown]));
+    assert_eq!(
+        (verdict.state, codes(&verdict)),
+        (State::Attention, vec![ReasonCode::MotionShown])
+    );
 }
 
 #[test]
@@ -121,9 +124,18 @@ fn a_run_in_doubt_cannot_tell_whatever_it_shows() {
         assert!(verdict.stones.iter().all(|s| s.state == State::CannotTell));
         case.not_converged = true;
         let verdict = judge(&case, &thresholds);
-        assert!(verdict.sentence.starts_with("Cannot tell: the adjustment did not converge"));
+        assert!(
+            verdict
+                .sentence
+                .starts_with("Cannot tell: the adjustment did not converge")
+        );
         let apparent = moving > 0 && !thresholds.is_empty();
-        assert_eq!(verdict.sentence.contains("as computed, 5 stones"), apparent, "{}", verdict.sentence);
+        assert_eq!(
+            verdict.sentence.contains("as computed, 5 stones"),
+            apparent,
+            "{}",
+            verdict.sentence
+        );
     }
 }
 
@@ -135,7 +147,13 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
         let verdict = judge(&case, &thresholds);
         assert_eq!(verdict.state, State::CannotTell);
         assert_eq!(codes(&verdict), [ReasonCode::DatumUnknown]);
-        assert!(verdict.sentence.contains("no stone moved against the common motion"), "{}", verdict.sentence);
+        assert!(
+            verdict
+                .sentence
+                .contains("no stone moved against the common motion"),
+            "{}",
+            verdict.sentence
+        );
     }
     // Only motions against neighbours are asked for: a common motion does not matter.
     let neighbours = thresholds("neighbours = { attention_mm = 3.0, alarm_mm = 6.0 }");
@@ -146,7 +164,11 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
     for thresholds in [usual(), neighbours] {
         let verdict = judge(&case, &thresholds);
         assert_eq!(verdict.state, State::Alarm, "{}", verdict.sentence);
-        assert!(verdict.sentence.contains("against the common motion of the wall is"));
+        assert!(
+            verdict
+                .sentence
+                .contains("against the common motion of the wall is")
+        );
     }
 }
 
@@ -157,7 +179,11 @@ fn lost_stones_call_for_attention() {
         (case.stones[4].lost, case.stones[4].measured) = (true, None);
         let verdict = judge(&case, &thresholds);
         assert_eq!((verdict.state, verdict.wall.lost), (State::Attention, 1));
-        assert!(verdict.sentence.starts_with("Attention: 1 stone is lost"), "{}", verdict.sentence);
+        assert!(
+            verdict.sentence.starts_with("Attention: 1 stone is lost"),
+            "{}",
+            verdict.sentence
+        );
         assert_eq!(verdict.stones[4].state, State::Attention);
     }
 }
@@ -170,7 +196,11 @@ fn a_run_that_measured_little_or_nothing_cannot_tell() {
     }
     let verdict = judge(&case, &usual());
     assert_eq!(codes(&verdict), [ReasonCode::FewMeasured]);
-    assert!(verdict.sentence.starts_with("Cannot tell: only 40 of 100 stones were measured"));
+    assert!(
+        verdict
+            .sentence
+            .starts_with("Cannot tell: only 40 of 100 stones were measured")
+    );
     case.stones.iter_mut().for_each(|s| s.measured = None);
     assert_eq!(codes(&judge(&case, &usual())), [ReasonCode::NothingMeasured]);
     assert_eq!(judge(&Case::default(), &usual()).state, State::CannotTell);
@@ -179,7 +209,10 @@ fn a_run_that_measured_little_or_nothing_cannot_tell() {
     for stone in &mut case.stones {
         stone.measured.as_mut().unwrap().motion.covariance *= 36.0;
     }
-    assert_eq!(codes(&judge(&case, &usual())), [ReasonCode::IntervalReachesThreshold]);
+    assert_eq!(
+        codes(&judge(&case, &usual())),
+        [ReasonCode::IntervalReachesThreshold]
+    );
 }
 
 #[test]
@@ -187,12 +220,25 @@ fn zones_are_judged_by_their_own_thresholds() {
     let zone = "attention_mm = 20.0\nalarm_mm = 40.0\n[[zones]]\nname = \"crest\"\npolygon = [[-0.5, -0.5], [9.5, -0.5], [9.5, 0.5], \
         [-0.5, 0.5]]\nattention_mm = 3.0\nalarm_mm = 4.0\n[[zones]]\nname = \"empty\"\npolygon = [[50.0, 0.0], [51.0, 0.0], [51.0, 1.0]]\n";
     let verdict = judge(&wall(2, 0.006, 9), &thresholds(zone));
-    assert_eq!((verdict.state, verdict.zones[0].area.state), (State::Alarm, State::Alarm));
-    assert_eq!((verdict.zones[0].area.stones, verdict.zones[0].area.moved), (10, 2));
+    assert_eq!(
+        (verdict.state, verdict.zones[0].area.state),
+        (State::Alarm, State::Alarm)
+    );
+    assert_eq!(
+        (verdict.zones[0].area.stones, verdict.zones[0].area.moved),
+        (10, 2)
+    );
     assert_eq!(verdict.zones[1].area.reasons, [ReasonCode::NothingMeasured]);
-    assert!(verdict.sentence.contains("2 stones moved beyond the alarm threshold of 4 mm"));
+    assert!(
+        verdict
+            .sentence
+            .contains("2 stones moved beyond the alarm threshold of 4 mm")
+    );
     assert_eq!(verdict.stones[0].zone.as_deref(), Some("crest"));
-    assert_eq!((verdict.stones[10].zone.clone(), verdict.stones[10].state), (None, State::Fine));
+    assert_eq!(
+        (verdict.stones[10].zone.clone(), verdict.stones[10].state),
+        (None, State::Fine)
+    );
     // The crest did not move, the rest did by less than its own threshold.
     let mut case = wall(0, 0.0, 9);
     case.stones[50] = stone(51, [0.0, 5.0], Vector3::x() * 0.006, &mut Normal::new(1));
@@ -220,7 +266,11 @@ fn an_opening_joint_is_judged_and_a_closing_one_is_not() {
         });
         let verdict = judge(&case, &joints);
         assert_eq!(verdict.state, state, "{opening_m}: {}", verdict.sentence);
-        assert_eq!(verdict.joints.len(), usize::from(opening_m > 0.001), "{opening_m}");
+        assert_eq!(
+            verdict.joints.len(),
+            usize::from(opening_m > 0.001),
+            "{opening_m}"
+        );
     }
 }
 

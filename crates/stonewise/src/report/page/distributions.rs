@@ -2,9 +2,9 @@
 
 use super::html::{figure, section, table};
 use crate::figure::{count, escape, mm, mm_or_dash};
-use crate::results::Comparison;
 use crate::report::draw::{Series, histogram, scatter};
 use crate::report::summary::Summary;
+use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{ResultSet, Sorted};
 

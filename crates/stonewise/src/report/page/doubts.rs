@@ -11,7 +11,10 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
     if all.is_empty() {
         return String::new();
     }
-    let mut out = format!("<div role=\"alert\" class=\"doubts\"><b>{}</b><ul>", texts.page.doubts);
+    let mut out = format!(
+        "<div role=\"alert\" class=\"doubts\"><b>{}</b><ul>",
+        texts.page.doubts
+    );
     for warning in all {
         let _ = write!(
             out,

@@ -8,8 +8,8 @@ use super::excerpts;
 use super::{epoch_names, known_translation_mm};
 use crate::error::Error;
 use crate::figure::{colours, nice_above};
-use crate::results::Comparison;
 use crate::report::summary::Summary;
+use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
 use nalgebra::{Point2, Point3, Vector3};
@@ -195,7 +195,10 @@ fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
     };
     block.u8("significant", flag(|m| m.significant));
     let moved: BTreeSet<u32> = facts.moved.iter().map(|(s, _)| s.stone_id).collect();
-    block.u8("moved", rows.iter().map(|s| u8::from(moved.contains(&s.stone_id))));
+    block.u8(
+        "moved",
+        rows.iter().map(|s| u8::from(moved.contains(&s.stone_id))),
+    );
     block.u8("loose", flag(|m| m.loose));
 }
 

@@ -13,13 +13,16 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// Stones that are named as the first to look at.
-const FIRST: usize = 6;
+const FIRST: usize = 5;
 
 /// Logo and kind of the document.
 pub(super) fn letterhead(results: &ResultSet, texts: &Texts) -> String {
     let logo = results.evidence.logo.as_ref().map_or(String::new(), |logo| {
         let data = STANDARD.encode(&logo.bytes);
-        format!("<img class=\"logo\" alt=\"\" src=\"data:{};base64,{data}\">", logo.media_type)
+        format!(
+            "<img class=\"logo\" alt=\"\" src=\"data:{};base64,{data}\">",
+            logo.media_type
+        )
     });
     format!("{logo}<p class=\"kind\">{}</p>", texts.page.kind)
 }
@@ -55,7 +58,10 @@ pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
     let items: String = given
         .iter()
         .filter_map(|(name, value)| {
-            Some(format!("<div><dt>{name}</dt><dd>{}</dd></div>", escape(value.as_ref()?)))
+            Some(format!(
+                "<div><dt>{name}</dt><dd>{}</dd></div>",
+                escape(value.as_ref()?)
+            ))
         })
         .collect();
     let mut out = String::new();
@@ -65,7 +71,11 @@ pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
     if let Some(run) = &results.run {
         let dash = || "\u{2013}".to_owned();
         let row = |(i, epoch): (usize, &EpochRecord)| {
-            let note = if i == 0 { format!(" ({})", page.reference) } else { String::new() };
+            let note = if i == 0 {
+                format!(" ({})", page.reference)
+            } else {
+                String::new()
+            };
             vec![
                 format!("<b>{}</b>{note}", escape(&epoch.name)),
                 epoch.date.as_deref().map_or_else(dash, escape),
@@ -114,7 +124,7 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
         motion_map(results, facts)
     };
     format!(
-        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}<h3>{}</h3>{}{}</div>{map}</div>\
+        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}<h3>{}</h3>{}</div><div>{map}{}</div></div>\
          <div class=\"sign\"><p>{}</p><p>{}</p><p>{}</p></div>",
         limit(facts),
         page.look_first,
@@ -140,7 +150,10 @@ fn limit(facts: &Summary) -> String {
         &[("median", &*texts.mm(median)), ("high", &*texts.mm(high))],
     );
     let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    let first = letters
+        .next()
+        .map(|c| c.to_uppercase().to_string())
+        .unwrap_or_default();
     format!("<b>{first}{}</b>", letters.as_str())
 }
 
@@ -157,7 +170,10 @@ fn look_first(results: &ResultSet, facts: &Summary) -> String {
     let size = |s: &StoneVerdict| if s.moved { s.length_mm } else { s.neighbours_mm };
     worst.sort_by(|a, b| {
         let (p, q) = (size(a).unwrap_or(f64::INFINITY), size(b).unwrap_or(f64::INFINITY));
-        b.state.cmp(&a.state).then(q.total_cmp(&p)).then(a.stone_id.cmp(&b.stone_id))
+        b.state
+            .cmp(&a.state)
+            .then(q.total_cmp(&p))
+            .then(a.stone_id.cmp(&b.stone_id))
     });
     let item = |stone: &&StoneVerdict| {
         let row = rows.get(&stone.stone_id)?;
@@ -204,7 +220,11 @@ fn found(stone: &StoneVerdict, texts: &Texts) -> String {
         all.push(said(page.moved_stone, stone.length_mm, stone.interval_mm));
     }
     if stone.loose {
-        all.push(said(page.loose_stone, stone.neighbours_mm, stone.neighbours_interval_mm));
+        all.push(said(
+            page.loose_stone,
+            stone.neighbours_mm,
+            stone.neighbours_interval_mm,
+        ));
     }
     all.join("; ")
 }
@@ -255,16 +275,24 @@ fn zones(facts: &Summary) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = facts.verdict.zones.iter().map(row).collect();
-    let head = [page.zone, page.state, page.stones, page.measured, page.moved, page.largest];
+    let head = [
+        page.zone,
+        page.state,
+        page.stones,
+        page.measured,
+        page.moved,
+        page.largest,
+    ];
     format!("<h3>{}</h3>{}", page.zones, table(&head, &rows, 2))
 }
 
 /// What is known about the registration of the epochs.
 pub(super) fn registration(datum: Option<&Datum>, texts: &Texts) -> String {
     match datum {
-        Some(datum) if datum.state != DatumState::Unknown => {
-            fill(texts.page.registration_included, &[("note", &*escape(&datum.note))])
-        }
+        Some(datum) if datum.state != DatumState::Unknown => fill(
+            texts.page.registration_included,
+            &[("note", &*escape(&datum.note))],
+        ),
         Some(_) => texts.page.registration_unknown.to_owned(),
         None => texts.page.no_registration.to_owned(),
     }

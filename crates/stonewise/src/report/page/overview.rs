@@ -17,16 +17,24 @@ const MAX_ROWS: usize = 25;
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     let mut out = tiles(facts);
     out.push_str(&first_page::body(results, facts));
-    let _ = write!(out, "<h3 class=\"numbers\">{}</h3>", facts.texts().page.in_numbers);
+    let _ = write!(
+        out,
+        "<h3 class=\"numbers\">{}</h3>",
+        facts.texts().page.in_numbers
+    );
     if facts.cover.language != Language::English {
-        let _ = write!(out, "<p class=\"note\">{}</p>", facts.texts().page.rest_in_english);
+        let _ = write!(
+            out,
+            "<p class=\"note\">{}</p>",
+            facts.texts().page.rest_in_english
+        );
     }
     out.push_str("<ul class=\"findings\">");
     for sentence in sentences(results, facts) {
         let _ = write!(out, "<li>{sentence}</li>");
     }
     out.push_str("</ul>");
-    section("summary", "Summary", &out)
+    section("summary", facts.texts().page.summary, &out)
 }
 
 fn tiles(facts: &Summary) -> String {
@@ -62,7 +70,10 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
             .iter()
             .map(|(s, stones)| format!("{}: {}", escape(texts.status(*s)), count(stones.len())));
         let reasons = lost.collect::<Vec<_>>().join("; ");
-        return vec![format!("<b>{}.</b> {reasons}", capital(texts.clauses.nothing_measured))];
+        return vec![format!(
+            "<b>{}.</b> {reasons}",
+            capital(texts.clauses.nothing_measured)
+        )];
     }
     let mut out = vec![first_page::registration(results.datum(), texts), chance(facts)];
     let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
@@ -128,7 +139,10 @@ fn chance(facts: &Summary) -> String {
 /// The text with a capital at its beginning.
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
-    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    let first = letters
+        .next()
+        .map(|c| c.to_uppercase().to_string())
+        .unwrap_or_default();
     format!("{first}{}", letters.as_str())
 }
 

@@ -11,8 +11,8 @@ pub use registration::{AdjustmentRecord, EstimatorRecord, GicpRecord, ObserversR
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
 pub use verdict::{
-    Area, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict, Largest, Reason, ReasonCode, State, StoneVerdict,
-    VERDICT_VERSION, Verdict, ZoneVerdict,
+    Area, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict, Largest, Reason, ReasonCode,
+    State, StoneVerdict, VERDICT_VERSION, Verdict, ZoneVerdict,
 };
 
 #[cfg(test)]

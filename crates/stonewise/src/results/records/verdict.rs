@@ -286,7 +286,137 @@ impl Verdict {
                 state: self.state,
                 sentence: self.sentence.clone(),
             },
-            epochs: self.epochs.iter().map(|e| (e.epoch.clone(), headline(e))).collect(),
+            epochs: self
+                .epochs
+                .iter()
+                .map(|e| (e.epoch.clone(), headline(e)))
+                .collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
+
+    fn keys(object: &Value) -> BTreeSet<String> {
+        object.as_object().unwrap().keys().cloned().collect()
+    }
+
+    fn words(list: &Value) -> BTreeSet<String> {
+        list.as_array()
+            .unwrap()
+            .iter()
+            .filter_map(|v| Some(v.as_str()?.to_owned()))
+            .collect()
+    }
+
+    /// A verdict in which nothing is missing.
+    fn sample() -> Verdict {
+        let joint = JointVerdict {
+            stones: [1, 2],
+            state: State::Fine,
+            opening_mm: 1.0,
+            interval_mm: [0.5, 1.5],
+            q: 0.01,
+        };
+        let largest = Largest {
+            stone_id: 1,
+            length_mm: 2.0,
+            interval_mm: [1.0, 3.0],
+        };
+        let area = Area {
+            reasons: vec![ReasonCode::LengthAlarm],
+            largest: Some(largest),
+            largest_opening: Some(joint),
+            detection_limit: Some(DetectionLimit {
+                median_mm: 0.2,
+                percentile_90_mm: 0.3,
+            }),
+            ..Area::default()
+        };
+        let epoch = EpochVerdict {
+            reasons: vec![Reason {
+                code: ReasonCode::LengthAlarm,
+                text: "moved".to_owned(),
+            }],
+            wall: area.clone(),
+            zones: vec![ZoneVerdict {
+                name: "crest".to_owned(),
+                area,
+            }],
+            stones: vec![StoneVerdict::default()],
+            joints: vec![joint],
+            ..EpochVerdict::default()
+        };
+        Verdict::new(&Thresholds::default(), vec![epoch])
+    }
+
+    #[test]
+    fn the_schema_in_the_docs_names_every_key_and_word() {
+        let docs = include_str!("../../../../../docs/src/verdict.md");
+        let block = docs
+            .rsplit("```json")
+            .next()
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
+        let schema: Value = serde_json::from_str(block).unwrap();
+        let of = |name: &str| schema["$defs"][name].clone();
+        let verdict = serde_json::to_value(sample()).unwrap();
+        let epoch = &verdict["epochs"][0];
+        let checks = [
+            (schema.clone(), &verdict),
+            (of("epoch"), epoch),
+            (of("area"), &epoch["wall"]),
+            (of("stone"), &epoch["stones"][0]),
+            (of("joint"), &epoch["joints"][0]),
+            (of("largest"), &epoch["wall"]["largest"]),
+        ];
+        for (schema, value) in checks {
+            assert_eq!(keys(&schema["properties"]), keys(value));
+            assert_eq!(words(&schema["required"]), keys(value));
+        }
+        let states = State::WORST_FIRST.map(|s| serde_json::to_value(s).unwrap());
+        assert_eq!(words(&of("state")["enum"]), words(&Value::from(states.to_vec())));
+        for word in words(&of("code")["enum"]) {
+            assert!(serde_json::from_value::<ReasonCode>(Value::from(word)).is_ok());
+        }
+        assert_eq!(
+            words(&of("code")["enum"]).len(),
+            ReasonCode::NoMotionShown as usize + 1
+        );
+    }
+
+    #[test]
+    fn the_worst_epoch_speaks_and_of_equals_the_newest() {
+        let epoch = |name: &str, state| EpochVerdict {
+            epoch: name.to_owned(),
+            sentence: name.to_owned(),
+            state,
+            ..EpochVerdict::default()
+        };
+        let of = |states: &[State]| {
+            let epochs = states
+                .iter()
+                .zip(["B", "C", "D"])
+                .map(|(s, name)| epoch(name, *s));
+            Verdict::new(&Thresholds::default(), epochs.collect())
+        };
+        let verdict = of(&[State::Alarm, State::Alarm, State::Fine]);
+        assert_eq!((verdict.state, verdict.sentence.as_str()), (State::Alarm, "C"));
+        assert_eq!(verdict.headlines().epochs["D"].state, State::Fine);
+        assert_eq!(of(&[State::Fine, State::CannotTell]).state, State::CannotTell);
+        assert_eq!(of(&[State::CannotTell, State::Attention]).state, State::Attention);
+        assert_eq!(of(&[]).state, State::CannotTell);
+    }
+
+    #[test]
+    fn it_comes_back_as_it_was_written() {
+        let text = serde_json::to_string(&sample()).unwrap();
+        assert_eq!(serde_json::from_str::<Verdict>(&text).unwrap(), sample());
     }
 }
