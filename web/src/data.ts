@@ -77,7 +77,10 @@ export interface Stones {
   readonly correlation: Three<Float64Array>;
   readonly limit: Float64Array;
   readonly observability: Float64Array;
+  /** Above its own 95 % limit. */
   readonly significant: ArrayLike<number>;
+  /** Moved, with the false discovery rate over all stones controlled. */
+  readonly moved: ArrayLike<number>;
   readonly loose: ArrayLike<number>;
   /** Median M3C2 distance of the core points on the stone. */
   readonly m3c2: Float64Array;
@@ -173,6 +176,7 @@ function readStones(columns: Columns): Stones {
     limit: numbers("limit"),
     observability: numbers("observability"),
     significant: columns.integers("significant"),
+    moved: columns.integers("moved"),
     loose: columns.integers("loose"),
     m3c2: numbers("m3c2"),
     a: numbers("a"),

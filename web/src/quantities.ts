@@ -49,7 +49,7 @@ export function quantities(report: Report): readonly Quantity[] {
     },
     {
       key: "limit", label: "Detection limit (LoD95)", unit: "mm", scale: "sequential", limit: limits.limit, fades: false,
-      decimals: 2, value: (i) => stones.limit[i]! * 1e3, note: "What a motion must exceed to be significant.",
+      decimals: 2, value: (i) => stones.limit[i]! * 1e3, note: "What a motion must exceed to be above its 95 % limit.",
     },
     {
       key: "relative", label: "Against the neighbours", unit: "mm", scale: "sequential", limit: limits.relative, fades: false,

@@ -27,8 +27,12 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Do everything: from clouds and photos to results and a report; resumes after an interruption.
-    #[command(after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/")]
-    Run(ProjectArgs),
+    #[command(
+        after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/\n  \
+        stonewise run survey/stonewise.toml --out results/ --exit-on alarm\n\n\
+        Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 as --exit-on asks."
+    )]
+    Run(RunArgs),
     /// Make a small survey with known motion, and measure it.
     #[command(after_help = "Example:\n  stonewise demo --out demo")]
     Demo(DemoArgs),
@@ -108,6 +112,26 @@ pub struct ProjectArgs {
     /// Folder of the results; made if need be.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, ClapArgs)]
+pub struct RunArgs {
+    /// The project and the folder of its results.
+    #[command(flatten)]
+    pub project: ProjectArgs,
+    /// End with exit code 4 where the verdict is this or worse; with 3 where the results cannot tell.
+    #[arg(long, value_enum, value_name = "STATE")]
+    pub exit_on: Option<ExitOn>,
+}
+
+/// Verdicts that can end a run with an exit code of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExitOn {
+    /// Attention or alarm.
+    Attention,
+    /// Alarm.
+    Alarm,
 }
 
 /// Arguments of `check`.

@@ -14,6 +14,8 @@ const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 /// Finished, but some inputs were left out, or the results as a whole are in doubt.
 const IN_DOUBT: u8 = 3;
+/// The verdict is one that `--exit-on` asks for.
+const VERDICT: u8 = 4;
 
 fn main() -> ExitCode {
     say_panics_once();
@@ -24,6 +26,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(commands::Outcome::Done) => ExitCode::from(DONE),
         Ok(commands::Outcome::InDoubt) => ExitCode::from(IN_DOUBT),
+        Ok(commands::Outcome::Verdict) => ExitCode::from(VERDICT),
         Err(error) => {
             printer::note(&format!("error: {}", explain(&error)));
             ExitCode::from(if is_wrong_usage(&error) {

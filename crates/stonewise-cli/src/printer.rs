@@ -15,6 +15,8 @@ pub struct Printer {
     cancelled: Arc<AtomicBool>,
     listening: Once,
     started: Instant,
+    /// The last line of progress where there is no terminal: work that begins anew many times is one line.
+    last: Mutex<String>,
 }
 
 impl Printer {
@@ -28,6 +30,7 @@ impl Printer {
             cancelled: Arc::new(AtomicBool::new(false)),
             listening: Once::new(),
             started: Instant::now(),
+            last: Mutex::default(),
         }
     }
 
@@ -77,6 +80,10 @@ impl Progress for Printer {
         let mut bar = self.bar();
         bar.finish_and_clear();
         if !self.terminal {
+            let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+            if std::mem::replace(&mut *last, what.to_owned()) == what {
+                return;
+            }
             note(&format!(
                 "[{:7.1} s] {what}",
                 self.started.elapsed().as_secs_f64()

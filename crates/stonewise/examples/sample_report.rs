@@ -314,6 +314,7 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
             wkt: String::new(),
         }),
         datum: [("2026".to_owned(), DatumState::Unknown)].into(),
+        verdict: None,
         epochs: vec![epoch("2025 <b>"), epoch("2026")],
         part: None,
         parameters: stonewise::Settings::default(),

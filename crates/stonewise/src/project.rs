@@ -4,7 +4,9 @@ use crate::error::{Error, Result};
 use crate::limits::impossible;
 use crate::part::Part;
 use crate::pipeline::SourceRule;
+use crate::report_params::{ReportParams, logo_type};
 use crate::stable::StableArea;
+use crate::thresholds::Thresholds;
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -126,6 +128,10 @@ pub struct Settings {
     /// Scoring against a known motion.
     #[serde(alias = "evaluation")]
     pub evaluate: EvaluationParams,
+    /// Which motions call for attention, and which for an alarm.
+    pub thresholds: Thresholds,
+    /// The first page of the report.
+    pub report: ReportParams,
 }
 
 /// Tables of the project file by the names that they had, with the names of today; both are read.
@@ -225,6 +231,10 @@ struct RawProject {
     m3c2: M3c2Params,
     #[serde(default, alias = "evaluation")]
     evaluate: EvaluationParams,
+    #[serde(default)]
+    thresholds: Thresholds,
+    #[serde(default)]
+    report: ReportParams,
 }
 
 #[derive(Deserialize)]
@@ -288,6 +298,8 @@ impl Project {
             registration: raw.registration,
             m3c2: raw.m3c2,
             evaluate: raw.evaluate,
+            thresholds: raw.thresholds,
+            report: source.report(raw.report)?,
         };
         source.check_settings(&settings)?;
         let map = source.map_frame(&raw.project)?;
@@ -323,6 +335,7 @@ impl Project {
         if let Weights::File(file) = Weights::named(&self.settings.segment.model) {
             inputs.push(file);
         }
+        inputs.extend(self.settings.report.logo.clone());
         // Comparisons of clouds alone have neither photos nor cameras.
         inputs.retain(|path| !path.as_os_str().is_empty());
         inputs
@@ -505,6 +518,19 @@ impl Source<'_> {
         }
         if let Some((key, what)) = params.tiling.impossible() {
             return Err(self.error(at(key)..at(key), format!("{key} {what}")));
+        }
+        Ok(params)
+    }
+
+    /// The logo, like all paths, is relative to the project file.
+    fn report(&self, mut params: ReportParams) -> Result<ReportParams> {
+        if let Some(logo) = params.logo {
+            let start = self.text.find("logo").unwrap_or(0);
+            let path = self.existing(Spanned::new(start..start, logo))?;
+            if let Err(reason) = logo_type(&path) {
+                return Err(self.error(start..start, format!("logo: {reason}")));
+            }
+            params.logo = Some(path);
         }
         Ok(params)
     }

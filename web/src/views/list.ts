@@ -14,7 +14,7 @@ interface Column {
   readonly text: (stone: number) => string;
 }
 
-const FILTERS = ["all", "moved significantly", "loose", "below the limit", "not measured"] as const;
+const FILTERS = ["all", "moved", "above the limit", "loose", "below the limit", "not measured"] as const;
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
@@ -37,7 +37,8 @@ export function stoneList(report: Report, store: Store): HTMLElement {
   ];
   const passes: Record<string, (i: number) => boolean> = {
     all: () => true,
-    "moved significantly": (i) => stones.significant[i] === 1,
+    "moved": (i) => stones.moved[i] === 1,
+    "above the limit": (i) => stones.significant[i] === 1,
     "loose": (i) => stones.loose[i] === 1,
     "below the limit": (i) => isMeasured(stones, i) && !stones.significant[i],
     "not measured": (i) => !isMeasured(stones, i),

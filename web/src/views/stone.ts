@@ -22,7 +22,7 @@ export class StonePanel {
   readonly #store: Store;
   readonly #photos: Photos;
   readonly #sections: Sections;
-  /** Stones in the order of the buttons: largest significant motion first, then the rest by id. */
+  /** Stones in the order of the buttons: those that moved by size, then those above their limit by size, then the rest by id. */
   readonly #order: readonly number[];
   readonly #lineThrough: (stone: number, upright: boolean) => void;
 
@@ -61,7 +61,7 @@ export class StonePanel {
   }
 
   #nothing(): Node {
-    const start = button("Largest motion", "choose the stone with the largest significant motion", () => this.#step(-1, 1));
+    const start = button("Largest motion", "choose the stone with the largest motion", () => this.#step(-1, 1));
     return el("div", { class: "nothing" },
       el("p", {}, "Choose a stone: click it on the map, or enter its number above. Its motion, uncertainty, photos, section and neighbours appear here."),
       el("p", {}, "Drag moves the map; the wheel zooms once the map was clicked; a double click zooms in."),
@@ -78,7 +78,7 @@ export class StonePanel {
     const { stones, document: { statuses } } = this.#report;
     const badge = (text: string, kind: string) => el("span", { class: `badge ${kind}` }, text);
     const badges = isMeasured(stones, stone)
-      ? [stones.significant[stone] ? badge("moved significantly", "strong") : badge("below its limit", "weak"),
+      ? [stones.moved[stone] ? badge("moved", "strong") : badge(stones.significant[stone] ? "above its limit" : "below its limit", "weak"),
         ...(stones.loose[stone] ? [badge("loose", "alarm")] : [])]
       : [badge(statuses[stones.state[stone]!]!.word, "weak")];
     return el("div", { class: "stone-head" },
@@ -175,11 +175,12 @@ export class StonePanel {
   }
 }
 
-/** Indices of all stones: significant ones by size of motion, then the others as they come. */
+/** Indices of all stones: those that moved by size of motion, then those above their limit by size, then the others as they come. */
 export function byMotion(stones: Stones): number[] {
   const all = Array.from({ length: stones.count }, (_, i) => i);
+  const rank = (i: number) => stones.moved[i]! + stones.significant[i]!;
   const size = (i: number) => (stones.significant[i] ? norm(stones.move, i) : -1);
-  return all.sort((p, q) => size(q) - size(p) || p - q);
+  return all.sort((p, q) => rank(q) - rank(p) || size(q) - size(p) || p - q);
 }
 
 /** The nearest stones on the wall, nearest first. */

@@ -27,6 +27,8 @@ pub enum Outcome {
     Done,
     /// Done, but for inputs that were left out, or with a doubt about the whole.
     InDoubt,
+    /// The verdict on the wall is one that the caller wanted to hear of.
+    Verdict,
 }
 
 /// Runs the command that was asked for.
@@ -38,7 +40,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     }
     let force = args.force;
     match args.command {
-        Command::Run(args) => run::run(&args, Until::Reported, force, printer),
+        Command::Run(args) => run::run_all(&args, force, printer),
         Command::Segment(args) => segment::segment(args, force, printer),
         Command::Train(args) => train::train(&args, force, printer),
         Command::Label(args) => run::run(&args, Until::Labelled, force, printer),

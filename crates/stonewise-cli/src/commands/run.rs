@@ -1,12 +1,26 @@
 //! `run`, and the steps of it.
 
-use crate::args::ProjectArgs;
+use crate::args::{ExitOn, ProjectArgs, RunArgs};
 use crate::commands::Outcome;
 use crate::printer::{Printer, note};
 use anyhow::{Context, Result};
 use std::path::Path;
+use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
 use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
+
+/// Runs a whole project; the verdict decides the exit code where that is asked for.
+pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let project = Project::read(&args.project.project)?;
+    let folder = OutputFolder::of_project(&args.project.out, &project, force)?;
+    let (outcome, summary) = run_to(&folder, &project, Until::Reported, printer)?;
+    let state = summary.verdict.as_ref().map(|v| v.state);
+    Ok(match (args.exit_on, state) {
+        (Some(_), Some(State::Alarm)) | (Some(ExitOn::Attention), Some(State::Attention)) => Outcome::Verdict,
+        (Some(_), Some(State::CannotTell)) => Outcome::InDoubt,
+        _ => outcome,
+    })
+}
 
 /// Runs a project as far as asked.
 pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -17,6 +31,15 @@ pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> 
 
 /// The same in a folder that is claimed already.
 pub fn run_in(folder: &OutputFolder, project: &Project, until: Until, printer: &Printer) -> Result<Outcome> {
+    Ok(run_to(folder, project, until, printer)?.0)
+}
+
+fn run_to(
+    folder: &OutputFolder,
+    project: &Project,
+    until: Until,
+    printer: &Printer,
+) -> Result<(Outcome, Summary)> {
     let out = folder.path();
     let summary = stonewise::run(project, folder, until, printer)
         .with_context(|| unfinished(out))
@@ -26,11 +49,11 @@ pub fn run_in(folder: &OutputFolder, project: &Project, until: Until, printer: &
     if until == Until::Reported {
         printer.log(&format!("results: {}", out.display()));
     }
-    Ok(if summary.skipped_inputs() || summary.doubts().next().is_some() {
-        Outcome::InDoubt
-    } else {
-        Outcome::Done
-    })
+    let outcome = match summary.skipped_inputs() || summary.doubts().next().is_some() {
+        true => Outcome::InDoubt,
+        false => Outcome::Done,
+    };
+    Ok((outcome, summary))
 }
 
 /// Where results of an earlier run are now.
@@ -55,25 +78,28 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         printer.log(&format!("{word}: {}: {}", warning.subject, warning.message));
     }
     for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
-        if !pair.rows.is_empty() {
-            printer.log(&format!(
-                "{} against {}: {}",
-                epoch.name,
-                project.epochs[0].name,
-                counts(&pair.rows)
-            ));
+        if pair.rows.is_empty() {
+            continue;
+        }
+        let verdicts = summary.verdict.iter().flat_map(|v| &v.epochs);
+        let verdict = verdicts.into_iter().find(|v| v.epoch == epoch.name);
+        let against = format!("{} against {}", epoch.name, project.epochs[0].name);
+        printer.log(&format!("{against}: {}", counts(&pair.rows, verdict)));
+        if let Some(verdict) = verdict {
+            printer.log(&format!("{against}: {}", verdict.sentence));
         }
     }
 }
 
-fn counts(rows: &[StoneRow]) -> String {
+fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>) -> String {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
-    let moved = motions().filter(|m| m.significant).count();
+    let above = motions().filter(|m| m.significant).count();
     let loose = motions().filter(|m| m.loose).count();
+    let moved = verdict.map_or(String::new(), |v| format!("{} moved, ", v.wall.moved));
     format!(
-        "{} stones, {matched} matched, {measured} measured, {moved} moved significantly, {loose} loose",
+        "{} stones, {matched} matched, {measured} measured, {above} above their limit, {moved}{loose} loose",
         rows.len()
     )
 }

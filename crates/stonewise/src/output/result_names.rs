@@ -22,11 +22,11 @@ const STEMS: [&str; 14] = [
     "c2m",
 ];
 /// Their extensions; `csv-metadata.json` is `json`.
-const EXTENSIONS: [&str; 10] = [
-    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg",
+const EXTENSIONS: [&str; 11] = [
+    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png",
 ];
 /// Excerpts of the survey, without the numbers of epochs and pictures.
-const EVIDENCE: [&str; 5] = ["crops", "crop_outlines", "sections", "cloud", "cameras"];
+const EVIDENCE: [&str; 6] = ["crops", "crop_outlines", "sections", "cloud", "cameras", "logo"];
 
 /// Folders in an output folder that a run of the project writes into.
 pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
@@ -94,6 +94,8 @@ mod tests {
             "report/index_2.html",
             "evidence/crops_1_000.jpg",
             "evidence/crop_outlines_2.parquet",
+            "evidence/logo.png",
+            "verdict.json",
         ] {
             assert!(is_result(Path::new(name)), "{name}");
         }

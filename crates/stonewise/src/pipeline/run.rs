@@ -16,7 +16,8 @@ use crate::pipeline::outputs::m3c2::write_m3c2;
 use crate::pipeline::outputs::outlines::write_stone_outlines;
 use crate::pipeline::outputs::run_record::write_run_record;
 use crate::pipeline::outputs::series::write_series;
-use crate::pipeline::outputs::stone_rows::stone_rows;
+use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
+use crate::pipeline::outputs::verdict::write_verdict;
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::label::{Labelled, label};
@@ -28,7 +29,7 @@ use crate::pipeline::steps::segment::{Segmented, segment};
 use crate::project::Project;
 use crate::report::write_report;
 use crate::results::names::PairFile;
-use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRecord};
+use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRecord, Verdict};
 use crate::results::{Facade, StoneRow, facade_of, read_outlines, write_stones};
 use crate::warnings::Warning;
 use nalgebra::Point3;
@@ -63,6 +64,8 @@ pub struct Summary {
     pub warnings: Vec<Warning>,
     /// Each later epoch against the first.
     pub pairs: Vec<PairSummary>,
+    /// The verdict; `None` where the run did not go so far.
+    pub verdict: Option<Verdict>,
 }
 
 /// What came out for a later epoch against the first.
@@ -142,9 +145,13 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     if until == Until::Matched {
         return Ok(summary(context, pairs));
     }
+    let verdict = context.timed("verdict", || write_verdict(context, pairs.len()))?;
     if until < Until::Reported {
-        write_run_record(context, &photos, &labelled, &datums(&pairs))?;
-        return Ok(summary(context, pairs));
+        write_run_record(context, &photos, &labelled, &datums(&pairs), &verdict)?;
+        return Ok(Summary {
+            verdict: Some(verdict),
+            ..summary(context, pairs)
+        });
     }
     let rows: Vec<&[StoneRow]> = pairs.iter().map(|pair| pair.rows.as_slice()).collect();
     context.timed("evidence", || {
@@ -162,10 +169,13 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         context.timed("face cloud", || write_face_cloud(context, &labelled[0], rows))?;
     }
     write_series(context, &rows)?;
-    write_run_record(context, &photos, &labelled, &datums(&pairs))?;
+    write_run_record(context, &photos, &labelled, &datums(&pairs), &verdict)?;
     context.timed("report", || write_report(&context.out))?;
     context.timed("layers", || write_layers(&context.out))?;
-    Ok(summary(context, pairs))
+    Ok(Summary {
+        verdict: Some(verdict),
+        ..summary(context, pairs)
+    })
 }
 
 /// Stones of the first epoch, before any known motion is asked for.
@@ -199,7 +209,8 @@ fn measure(
     }
     let offsets = label_offsets(context, first, second, &matched, number)?;
     let registered = register(context, first, second, &matched, number)?;
-    let datum = datum(context.project, number, &registered, &first.stones);
+    let common = motion_in_common(first, &registered);
+    let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
     if datum.state == DatumState::Unknown {
         let epoch = &context.project.epochs[number - 1].name;
         context.warnings.notice("register", epoch, &datum.note);
@@ -275,5 +286,6 @@ fn summary(context: &Context, pairs: Vec<PairSummary>) -> Summary {
     Summary {
         warnings: context.warnings.sorted(),
         pairs,
+        verdict: None,
     }
 }

@@ -1,6 +1,5 @@
 //! The report, made from result files alone.
 
-mod comparison;
 mod draw;
 mod page;
 mod report_file;

@@ -36,10 +36,11 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
 mod tests {
     use super::*;
     use crate::files::write_json;
+    use crate::report_params::Language;
     use crate::results::names::RUN;
-    use crate::results::records::{Datum, RegistrationRecord, RunRecord, StepTime};
+    use crate::results::records::{Datum, EstimatorRecord, RegistrationRecord, RunRecord, StepTime};
     use crate::results::testing::{folder, outlines, registration_record, rows, run_record};
-    use crate::results::{Status, StoneRow, write_outlines, write_stones};
+    use crate::results::{Status, StoneRow, write_logo, write_outlines, write_stones};
     use crate::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
 
@@ -81,7 +82,7 @@ mod tests {
 
     /// Every opened element is closed, in order.
     fn check_nesting(html: &str) {
-        let void = ["meta", "path", "rect", "i", "input", "br"];
+        let void = ["meta", "path", "rect", "i", "input", "br", "img"];
         let mut open: Vec<&str> = Vec::new();
         let body = &html[html.find("<header>").unwrap()..html.find("</main>").unwrap() + 7];
         for tag in body.split('<').skip(1) {
@@ -117,9 +118,13 @@ mod tests {
         ] {
             assert!(html.contains(&format!("<section id=\"{id}\">")), "{id}");
         }
-        // 20 of 24 measured, two of them moved: no more than chance may flag, so nothing is proven.
         assert!(html.contains("<b>20 <small>83\u{a0}%</small></b><span>of 24 stones measured"));
-        assert!(html.contains("No motion is proven."));
+        assert!(
+            html.contains("<div class=\"verdict cannot-tell\"")
+                && html.contains("Cannot tell: the adjustment did not converge")
+        );
+        // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
+        assert!(html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
         assert_eq!(
             html.matches("<svg role=\"img\"").count(),
@@ -127,8 +132,9 @@ mod tests {
             "maps, histograms, scatter plots"
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
-        assert!(html.contains("before it settled"));
-        assert!(html.contains("Datum: the stable areas show a registration error of 3.2 mm."));
+        assert!(
+            html.contains("is included in the limits: the stable areas show a registration error of 3.2 mm.")
+        );
         assert!(html.contains("finished <b>2026-04-30 12:00 UTC</b>") && html.contains("temperature_c 9.5"));
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
@@ -227,8 +233,101 @@ mod tests {
         write_json(&folder.path().join("registration.json"), &registration).unwrap();
         let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
         let first = html.split("<ul class=\"findings\"><li>").nth(1).unwrap();
-        assert!(first.starts_with("<b>The registration error of the epochs is unknown</b>"));
-        assert!(html.contains("against the common motion of the wall"));
+        assert!(
+            first.starts_with("Registration error between the surveys is unknown and is <b>not</b> included")
+        );
+        let header = html.split("</header>").next().unwrap();
+        assert!(header.contains("<p class=\"datum\">Registration error between the surveys is unknown"));
+    }
+
+    /// The report of a wall that settled, of which nothing moved but the stones of these ids.
+    fn settled(moving: &[u32], params: &crate::ReportParams) -> String {
+        let mut stones = rows();
+        for stone in &mut stones {
+            if let Some(motion) = stone
+                .motion
+                .as_mut()
+                .filter(|_| !moving.contains(&stone.stone_id))
+            {
+                motion.displacement *= 0.01;
+                motion.relative *= 0.01;
+                (motion.significant, motion.loose) = (false, false);
+            }
+            // Stone 3 is not lost: no photo shows its place.
+            if stone.status == Status::UnmatchedLost {
+                stone.status = Status::UnmatchedUnseen;
+            }
+        }
+        let folder = folder(&stones);
+        let mut registration = registration_record();
+        if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+            adjustment.converged = true;
+        }
+        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        let mut run = run_record("Wall", &["A", "B"]);
+        run.parameters.report = params.clone();
+        write_json(&folder.path().join(RUN), &run).unwrap();
+        write_logo(folder.path(), &folder.path().join(RUN), "image/png").unwrap();
+        let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        check_nesting(&html);
+        html
+    }
+
+    #[test]
+    fn a_still_wall_is_fine_and_the_page_never_says_that_a_stone_moved() {
+        let html = settled(&[], &crate::ReportParams::default());
+        assert!(
+            html.contains("<div class=\"verdict fine\"")
+                && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)")
+        );
+        assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
+        assert!(
+            html.contains("No stone calls for a closer look.")
+                && html.contains("<span>no stone moved</span>")
+        );
+        let html = written(&html);
+        for claim in ["moved significantly", "significant motion", "Largest motions"] {
+            assert!(!html.contains(claim), "{claim}");
+        }
+    }
+
+    #[test]
+    fn the_first_page_names_who_measured_and_what_to_look_at_in_both_languages() {
+        let params = crate::ReportParams {
+            operator: Some("River <Authority>".to_owned()),
+            instruments: Some("Scanner X".to_owned()),
+            reference_number: Some("T-17".to_owned()),
+            logo: None,
+            language: Language::English,
+        };
+        let html = settled(&[8, 15], &params);
+        assert!(html.contains("Attention: 2 of 20 measured stones moved; the largest motion is 20."));
+        for words in [
+            "<dt>Reference number</dt><dd>T-17</dd>",
+            "River &lt;Authority&gt;",
+            "temperature 9.5\u{a0}\u{b0}C",
+            "<a data-stone=\"15\">Stone 15</a>, 0.80 m along, 0.50 m up: moved 20.4 mm",
+            "4 of 24 stones were not measured",
+            "Detection limit: 1.4 mm (median), 1.4 mm (90th percentile)",
+            "<p>Signature</p>",
+            "src=\"data:image/png;base64,",
+        ] {
+            assert!(html.contains(words), "{words}");
+        }
+        let german = crate::ReportParams {
+            language: Language::German,
+            ..params
+        };
+        let html = settled(&[8, 15], &german);
+        assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
+        for words in [
+            "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
+            "temperature 9,5",
+            "<p>Unterschrift</p>",
+            "Nachweisgrenze: 1,4 mm",
+        ] {
+            assert!(html.contains(words), "{words}");
+        }
     }
 
     #[test]

@@ -1,10 +1,15 @@
 //! The facts that the report states in words.
 
 use crate::figure::number;
+use crate::report_params::{Language, ReportParams};
+use crate::results::records::{EpochVerdict, StoneVerdict};
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m};
+use crate::texts::Texts;
+use crate::verdict::{is_doubted, verdict_on};
 use nalgebra::Point2;
+use std::collections::BTreeMap;
 
-/// Share of stones at rest that the 95 % test calls significant.
+/// Share of stones at rest whose motion the 95 % test finds above its limit.
 pub(crate) const FALSE_ALARMS: f64 = 0.05;
 
 /// Counts and order statistics of one run.
@@ -14,17 +19,23 @@ pub(crate) struct Summary<'a> {
     pub by_status: Vec<(Status, Vec<&'a StoneRow>)>,
     /// Measured stones with their motion.
     pub measured: Vec<(&'a StoneRow, &'a RowMotion)>,
-    /// Those that moved significantly, largest motion first.
-    pub significant: Vec<(&'a StoneRow, &'a RowMotion)>,
+    /// Those above their own 95 % limit.
+    pub above_limit: usize,
+    /// Those that moved, with the false discovery rate over all stones controlled; largest motion first.
+    pub moved: Vec<(&'a StoneRow, &'a RowMotion)>,
+    /// The verdict on this pair of epochs.
+    pub verdict: EpochVerdict,
+    /// What the first page says beside the results.
+    pub cover: ReportParams,
     /// Loose ones, largest relative motion first.
     pub loose: Vec<(&'a StoneRow, &'a RowMotion)>,
     /// Detection limits, metres.
     pub limits: Sorted,
     /// Components along, up, out of the measured stones, metres.
     pub components: [Sorted; 3],
-    /// Where nine tenths of the significant stones lie: (along, up) from and to, metres.
+    /// Where nine tenths of the stones that moved lie: (along, up) from and to, metres.
     pub region: Option<[Point2<f64>; 2]>,
-    /// The least of the largest tenth of the significant motions, metres, and where nine tenths of those lie; `None` for
+    /// The least of the largest tenth of their motions, metres, and where nine tenths of those lie; `None` for
     /// few stones.
     pub strongest: Option<(f64, [Point2<f64>; 2])>,
 }
@@ -32,8 +43,11 @@ pub(crate) struct Summary<'a> {
 impl<'a> Summary<'a> {
     pub(crate) fn new(results: &'a ResultSet) -> Self {
         let measured = results.measured();
-        let pick = |keep: fn(&RowMotion) -> bool, size: fn(&RowMotion) -> f64| {
-            let mut all: Vec<_> = measured.iter().copied().filter(|(_, m)| keep(m)).collect();
+        let verdict = verdict(results);
+        let judged: BTreeMap<u32, &StoneVerdict> = verdict.stones.iter().map(|s| (s.stone_id, s)).collect();
+        let has_moved = |s: &StoneRow| judged.get(&s.stone_id).is_some_and(|j| j.moved);
+        let pick = |keep: &dyn Fn(&StoneRow, &RowMotion) -> bool, size: fn(&RowMotion) -> f64| {
+            let mut all: Vec<_> = measured.iter().copied().filter(|(s, m)| keep(s, m)).collect();
             all.sort_by(|a, b| {
                 size(b.1)
                     .total_cmp(&size(a.1))
@@ -41,7 +55,8 @@ impl<'a> Summary<'a> {
             });
             all
         };
-        let significant = pick(|m| m.significant, |m| m.displacement.norm());
+        let moved = pick(&|s, _| has_moved(s), |m| m.displacement.norm());
+        let loose = pick(&|_, m| m.loose, |m| m.relative.norm());
         let of_status = |status| {
             results
                 .stones
@@ -56,21 +71,26 @@ impl<'a> Summary<'a> {
                 .into_iter()
                 .filter(|(_, s)| !s.is_empty())
                 .collect(),
-            region: region(results, &significant),
-            strongest: strongest(results, &significant),
-            loose: pick(|m| m.loose, |m| m.relative.norm()),
+            region: region(results, &moved),
+            strongest: strongest(results, &moved),
+            loose,
             limits: Sorted::new(measured.iter().map(|(_, m)| m.detection_limit_m)),
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
-            significant,
+            above_limit: measured.iter().filter(|(_, m)| m.significant).count(),
+            cover: results
+                .run
+                .as_ref()
+                .map(|r| r.parameters.report.clone())
+                .unwrap_or_default(),
+            moved,
             measured,
+            verdict,
         }
     }
 
-    /// Whether more stones moved significantly than the test's false alarms explain (three standard deviations).
-    pub(crate) fn motion_is_proven(&self) -> bool {
-        let n = self.measured.len() as f64;
-        let expected = FALSE_ALARMS * n;
-        self.significant.len() as f64 > expected + 3.0 * (expected * (1.0 - FALSE_ALARMS)).sqrt().max(1.0)
+    /// The texts in the language of the report.
+    pub(crate) fn texts(&self) -> &'static Texts {
+        self.cover.language.texts()
     }
 
     /// Decimals of a millimetre in tables: one, two where the typical detection limit is below 1 mm.
@@ -98,20 +118,38 @@ impl<'a> Summary<'a> {
     }
 }
 
-/// A tenth of the significant stones must be at least so many to have a place of their own.
+/// A tenth of the stones that moved must be at least so many to have a place of their own.
 const LEAST_STRONGEST: usize = 5;
 
-fn strongest(
-    results: &ResultSet,
-    significant: &[(&StoneRow, &RowMotion)],
-) -> Option<(f64, [Point2<f64>; 2])> {
-    let tenth = &significant[..significant.len() / 10];
+fn strongest(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<(f64, [Point2<f64>; 2])> {
+    let tenth = &moved[..moved.len() / 10];
     let least = tenth.last().filter(|_| tenth.len() >= LEAST_STRONGEST)?;
     Some((least.1.displacement.norm(), region(results, tenth)?))
 }
 
-fn region(results: &ResultSet, significant: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {
-    let places: Vec<Point2<f64>> = significant
+/// The verdict on the pair: from verdict.json; made from the tables where an earlier version wrote none.
+fn verdict(results: &ResultSet) -> EpochVerdict {
+    let written = results.verdict.as_ref();
+    if let Some(verdict) = written.and_then(|v| v.epochs.get(results.pair - 1)) {
+        return verdict.clone();
+    }
+    let run = results.run.as_ref();
+    let name = |epoch: usize| {
+        run.and_then(|r| Some(r.epochs.get(epoch)?.name.clone()))
+            .unwrap_or_default()
+    };
+    let later = run
+        .into_iter()
+        .flat_map(|r| r.epochs.iter().skip(1).map(|e| e.name.as_str()));
+    let later_name = name(results.pair);
+    let in_doubt = run.is_some_and(|r| is_doubted(&r.warnings, &later_name, later));
+    let thresholds = run.map(|r| r.parameters.thresholds.clone()).unwrap_or_default();
+    let language = run.map_or(Language::default(), |r| r.parameters.report.language);
+    verdict_on(results, [name(0), later_name], in_doubt, &thresholds, language)
+}
+
+fn region(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<[Point2<f64>; 2]> {
+    let places: Vec<Point2<f64>> = moved
         .iter()
         .map(|(s, _)| results.facade.place(&s.centroid))
         .collect();

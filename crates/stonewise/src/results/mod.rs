@@ -3,6 +3,7 @@
 mod change_points;
 mod column_metadata;
 mod columns;
+mod comparison;
 mod evidence;
 mod facade;
 mod joints;
@@ -21,9 +22,10 @@ pub use change_points::DistancePoint;
 use column_metadata::column_metadata;
 pub(crate) use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};
+pub(crate) use comparison::{Comparison, compare};
 pub use evidence::{
-    Crop, Cut, Evidence, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras, write_crops,
-    write_sections, write_thin_cloud,
+    Crop, Cut, Evidence, Logo, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras, write_crops,
+    write_logo, write_sections, write_thin_cloud,
 };
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};

@@ -4,6 +4,8 @@ use std::fmt;
 
 /// What was run, on what, how, and how long it took.
 pub const RUN: &str = "run.json";
+/// The state of the wall, its zones and its stones for all later epochs.
+pub const VERDICT: &str = "verdict.json";
 /// Polygons of the stones of the first epoch.
 pub const OUTLINES: &str = "outlines.json";
 /// Rows of all later epochs, where there are more than one.

@@ -1,9 +1,9 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{PairFile, RUN, audit};
+use super::names::{PairFile, RUN, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
-use super::records::{Datum, RegistrationRecord, RunRecord};
+use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
 use super::stone_table::read_stones;
 use super::{Evidence, Facade, RowMotion, StoneRow};
 use crate::error::Error;
@@ -33,6 +33,8 @@ pub struct ResultSet {
     pub run: Option<RunRecord>,
     /// `registration.json`, where there is one.
     pub registration: Option<RegistrationRecord>,
+    /// `verdict.json`, where there is one.
+    pub verdict: Option<Verdict>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance, stones, share, points.
     pub decisions: Vec<Vec<Vec<String>>>,
     /// Excerpts of the survey; empty where the folder is missing.
@@ -55,6 +57,19 @@ impl ResultSet {
     /// # Errors
     /// There is no stone table of this pair, or a file is damaged.
     pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, Error> {
+        Ok(Self {
+            verdict: read_json(&dir.join(VERDICT))?,
+            decisions: read_decisions(dir)?,
+            evidence: Evidence::read(dir, pair + 1)?,
+            ..Self::read_measured(dir, pair)?
+        })
+    }
+
+    /// The same without the verdict, the decisions about masks and the excerpts of the survey.
+    ///
+    /// # Errors
+    /// As [`Self::read_pair`].
+    pub(crate) fn read_measured(dir: &Path, pair: usize) -> Result<Self, Error> {
         let path = dir.join(PairFile::StonesParquet.name(pair));
         if !path.exists() {
             return Err(Error::NoResults(dir.into()));
@@ -74,8 +89,9 @@ impl ResultSet {
             evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
-            decisions: read_decisions(dir)?,
-            evidence: Evidence::read(dir, pair + 1)?,
+            verdict: None,
+            decisions: Vec::new(),
+            evidence: Evidence::default(),
         })
     }
 

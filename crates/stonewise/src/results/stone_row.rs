@@ -145,7 +145,7 @@ impl Status {
             }
             Self::FailedPoints => "too few points for an estimate",
             Self::FailedConvergence => "the estimate did not settle",
-            Self::FailedDisagreement => "the two epochs do not show the same surface: a wrong or spoilt mask",
+            Self::FailedDisagreement => "the two epochs do not show the same surface: probably a wrong mask",
             Self::Unobservable => "the surface is too flat to show the motion",
         }
     }

@@ -52,6 +52,7 @@ pub(crate) fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
             .skip(1)
             .map(|e| ((*e).to_owned(), DatumState::Stable))
             .collect(),
+        verdict: None,
         epochs: epochs.iter().map(epoch).collect(),
         part: None,
         parameters: Settings::default(),

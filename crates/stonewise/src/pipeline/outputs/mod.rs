@@ -10,3 +10,4 @@ pub mod outlines;
 pub mod run_record;
 pub mod series;
 pub mod stone_rows;
+pub mod verdict;

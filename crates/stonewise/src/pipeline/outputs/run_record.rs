@@ -9,16 +9,17 @@ use crate::pipeline::steps::segment::Segmented;
 use crate::project::Epoch;
 use crate::results::names::RUN;
 use crate::results::records::{
-    CrsRecord, DatumState, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp,
+    CrsRecord, DatumState, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp, Verdict,
 };
 use std::path::Path;
 
-/// Writes `run.json`; `datums`: what is known about the registration of each later epoch.
+/// Writes `run.json`; `datums`: what is known about the registration of each later epoch, `verdict`: the verdict on the run.
 pub fn write_run_record(
     context: &Context,
     photos: &[Segmented],
     labelled: &[Labelled],
     datums: &[DatumState],
+    verdict: &Verdict,
 ) -> Result<()> {
     let project = context.project;
     let found = photos.iter().zip(labelled);
@@ -37,6 +38,7 @@ pub fn write_run_record(
             wkt: crs.wkt,
         }),
         datum: later.zip(datums.iter().copied()).collect(),
+        verdict: Some(verdict.headlines()),
         epochs: epochs
             .map(|(epoch, (photos, labelled))| epoch_record(context, epoch, photos, labelled))
             .collect::<Result<_>>()?,

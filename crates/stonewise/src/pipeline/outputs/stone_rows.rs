@@ -61,7 +61,15 @@ pub fn stone_rows(
     first.iter().filter_map(row).collect()
 }
 
-/// The common rigid motion of the measured stones that are not loose.
+/// The common rigid motion of the measured stones that are not loose, which motions are tested against where the datum is unknown.
+pub fn motion_in_common(first: &Labelled, registered: &Registered) -> Option<SmallMotion> {
+    common_motion(
+        &first.stones,
+        &registered.results.iter().map(|r| (r.first, r)).collect(),
+    )
+}
+
+/// The same, motions by stone.
 fn common_motion(stones: &[Stone], motions: &BTreeMap<StoneId, &PairResult>) -> Option<SmallMotion> {
     let sample = |stone: &Stone| {
         let motion = motions

@@ -2,9 +2,9 @@
 
 use super::html::{figure, section, table};
 use crate::figure::{count, escape, mm, mm_or_dash};
-use crate::report::comparison::Comparison;
 use crate::report::draw::{Series, histogram, scatter};
 use crate::report::summary::Summary;
+use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{ResultSet, Sorted};
 
@@ -143,14 +143,14 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         "direction",
         "all: median mm",
         "all: NMAD mm",
-        "not significant: median mm",
-        "not significant: NMAD mm",
+        "below their limit: median mm",
+        "below their limit: NMAD mm",
     ];
     let body = format!(
         "<p>Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
-         error of that registration; only stable points outside the wall can tell. Stones that did not move significantly should \
+         error of that registration; only stable points outside the wall can tell. Stones below their own limit should \
          scatter around zero.</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
-         deviation of normally distributed values. {} stones in all, {} not significant.</p>",
+         deviation of normally distributed values. {} stones in all, {} below their limit.</p>",
         registration(results),
         table(&head, &rows, 1),
         count(facts.measured.len()),

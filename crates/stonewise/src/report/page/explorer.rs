@@ -8,12 +8,13 @@ use super::excerpts;
 use super::{epoch_names, known_translation_mm};
 use crate::error::Error;
 use crate::figure::{colours, nice_above};
-use crate::report::comparison::Comparison;
 use crate::report::summary::Summary;
+use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
 use nalgebra::{Point2, Point3, Vector3};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 use stonewise_core::geometry::FaceFrame;
@@ -39,7 +40,7 @@ pub(super) fn data(
     joints: &[Joint],
 ) -> Result<String, Error> {
     let mut blocks = vec![
-        ("stones", stones(results, compared)),
+        ("stones", stones(results, facts, compared)),
         ("joints", joint_block(joints, &origin(results))),
         ("change", change(results)),
     ];
@@ -105,7 +106,7 @@ fn origin(results: &ResultSet) -> Point3<f64> {
 }
 
 /// One row for each stone; rings as (along, up) from the stone's place, their vertices in a column of their own.
-fn stones(results: &ResultSet, compared: &Comparison) -> Block {
+fn stones(results: &ResultSet, facts: &Summary, compared: &Comparison) -> Block {
     let rows = &results.stones;
     let mut block = Block::default();
     block.u32("id", rows.iter().map(|s| s.stone_id));
@@ -120,7 +121,7 @@ fn stones(results: &ResultSet, compared: &Comparison) -> Block {
         rows.iter().map(|s| u16::try_from(s.photos).unwrap_or(u16::MAX)),
     );
     block.i8("confidence", 0.01, rows.iter().map(|s| s.confidence));
-    motions(results, &mut block);
+    motions(results, facts, &mut block);
     block.i32(
         "m3c2",
         MICROMETRE,
@@ -153,7 +154,7 @@ fn stones(results: &ResultSet, compared: &Comparison) -> Block {
 }
 
 /// Columns of what was measured: motions, their covariances and rotations in the face frame (along, up, out).
-fn motions(results: &ResultSet, block: &mut Block) {
+fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
     let rows = &results.stones;
     let of = |pick: &dyn Fn(&StoneRow, &RowMotion) -> f64| -> Vec<f64> {
         let value = |s: &StoneRow| s.motion.as_ref().map_or(f64::NAN, |m| pick(s, m));
@@ -193,6 +194,11 @@ fn motions(results: &ResultSet, block: &mut Block) {
             .map(move |s| u8::from(s.motion.as_ref().is_some_and(of)))
     };
     block.u8("significant", flag(|m| m.significant));
+    let moved: BTreeSet<u32> = facts.moved.iter().map(|(s, _)| s.stone_id).collect();
+    block.u8(
+        "moved",
+        rows.iter().map(|s| u8::from(moved.contains(&s.stone_id))),
+    );
     block.u8("loose", flag(|m| m.loose));
 }
 

@@ -8,8 +8,8 @@ use crate::report::summary::Summary;
 use crate::results::{Joint, ResultSet, StoneRow, nice_scale_m};
 
 /// What the marks in the maps mean.
-const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>significant at 95 %</span>\
-    <span><i class=\"key pale\"></i>below the detection limit (faded)</span>\
+const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>above its own 95 % limit</span>\
+    <span><i class=\"key pale\"></i>below its own limit (faded)</span>\
     <span><i class=\"key hatched\"></i>not measured</span><span><i class=\"key ring\"></i>loose</span></p>";
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
@@ -100,8 +100,8 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         arrows: true,
         loose: false,
     };
-    let note = "Arrows: in-plane part of significant motions, thinned where they would touch. Pale: not significant; hatched: not \
-                measured.";
+    let note = "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
+                not measured.";
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
     format!(
         "<div class=\"{class}\">{}</div>",
@@ -138,7 +138,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         true,
     ));
     let note = format!(
-        "What a motion must exceed to be significant; median {} mm.",
+        "What a motion must exceed to be above its 95 % limit; median {} mm.",
         facts.limits.median().map_or("–".into(), mm)
     );
     out.push_str(&draw(

@@ -7,19 +7,19 @@ mod doubts;
 mod evaluation;
 mod excerpts;
 mod explorer;
+mod first_page;
 mod html;
 mod maps;
 mod method;
 mod overview;
 mod survey;
 
-use super::comparison::compare;
 use super::summary::Summary;
 use crate::error::Error;
 use crate::figure::escape;
 use crate::results::names::PairFile;
 use crate::results::records::RunRecord;
-use crate::results::{ResultSet, joints};
+use crate::results::{ResultSet, compare, joints};
 
 #[cfg(test)]
 pub(super) use explorer::{SCRIPT, STYLE};
@@ -47,6 +47,7 @@ const SECTIONS: [(&str, &str); 8] = [
 /// None in practice: compressing in memory does not fail.
 pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
     let facts = Summary::new(results);
+    let texts = facts.texts();
     let (compared, joints) = (compare(results), joints(results));
     let mut body = String::new();
     body.push_str(&overview::summary(results, &facts));
@@ -85,23 +86,52 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
          <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
          <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n\
-         <header>{}<p class=\"kind\">Deformation report, stone by stone</p><h1>{title}</h1>{}</header>\n<nav>{links}</nav>\n\
-         <main>\n{body}</main>\n{data}",
-        doubts::doubts(results.run.as_ref().map_or(&[], |run| run.warnings.as_slice())),
+         <header>{}<h1>{title}</h1>{}{}{}{}{}</header>\n<nav>{links}</nav>\n<main>\n{body}</main>\n{data}",
+        first_page::letterhead(results, texts),
+        first_page::verdict(&facts),
+        doubts::doubts(
+            results.run.as_ref().map_or(&[], |run| run.warnings.as_slice()),
+            texts
+        ),
+        first_page::datum_warning(results.datum(), texts),
+        first_page::cover(results, &facts),
         cover(results)
     );
     // Of all that the page holds, so that no input can guess it.
     let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
     Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+        "<!DOCTYPE html>\n<html lang=\"{}\"><head><meta charset=\"utf-8\">\
          <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'nonce-{nonce}'; \
          style-src 'unsafe-inline'; img-src blob: data:; base-uri 'none'; form-action 'none'\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: stone by stone</title>\n\
-         <style>\n{PAGE_STYLE}{}</style></head>\n{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
+         <style>\n{PAGE_STYLE}{}{}</style></head>\n{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
+        facts.cover.language.tag(),
+        footer(results),
         explorer::STYLE,
         explorer::SCRIPT
     ))
+}
+
+/// The rule that prints project and epochs at the foot of every page.
+fn footer(results: &ResultSet) -> String {
+    let Some(run) = &results.run else {
+        return String::new();
+    };
+    let epochs = epoch_names(run, results.pair).map_or(String::new(), |[a, b]| format!(", {a} \u{2192} {b}"));
+    let text = format!("{}{epochs}, {}", run.project.name, run.finished_at.minute());
+    // Every other character as its number (CSS Syntax 3, 4.3.7), so that no name can end the string.
+    let quoted: String = text
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() {
+                c.to_string()
+            } else {
+                format!("\\{:x} ", u32::from(c))
+            }
+        })
+        .collect();
+    format!("@media print{{@page{{@bottom-left{{content:\"{quoted}\"}}}}}}\n")
 }
 
 /// Name of the structure.
@@ -126,7 +156,6 @@ fn cover(results: &ResultSet) -> String {
     let run = results.run.as_ref();
     let line = |pair: usize| run.and_then(|run| epochs(run, pair));
     let mut facts: Vec<String> = Vec::new();
-    facts.extend(line(results.pair).map(|e| format!("Epochs <b>{e}</b>")));
     if let Some(run) = run {
         facts.push(format!("finished <b>{}</b>", run.finished_at.minute()));
         facts.push(format!("stonewise <b>{}</b>", escape(&run.version)));

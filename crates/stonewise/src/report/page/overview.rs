@@ -1,11 +1,12 @@
 //! The summary and the tables of stones.
 
+use super::first_page;
 use super::html::{details, section, table};
-use super::maps::motion_map;
 use crate::figure::{count, escape, mm, mm_or_dash, number, percent};
 use crate::report::summary::{FALSE_ALARMS, Summary};
-use crate::results::records::{Datum, DatumState};
+use crate::report_params::Language;
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
+use crate::texts::fill;
 use nalgebra::Point2;
 use std::fmt::Write;
 
@@ -14,92 +15,74 @@ const MAX_ROWS: usize = 25;
 
 /// What moved, how many, where, how sure.
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
-    let datum = results.datum();
-    let mut out = tiles(facts, datum);
-    out.push_str("<div class=\"statement\"><ul class=\"findings\">");
-    for sentence in sentences(results, facts, datum) {
+    let mut out = tiles(facts);
+    out.push_str(&first_page::body(results, facts));
+    let _ = write!(
+        out,
+        "<h3 class=\"numbers\">{}</h3>",
+        facts.texts().page.in_numbers
+    );
+    if facts.cover.language != Language::English {
+        let _ = write!(
+            out,
+            "<p class=\"note\">{}</p>",
+            facts.texts().page.rest_in_english
+        );
+    }
+    out.push_str("<ul class=\"findings\">");
+    for sentence in sentences(results, facts) {
         let _ = write!(out, "<li>{sentence}</li>");
     }
     out.push_str("</ul>");
-    if !facts.measured.is_empty() {
-        out.push_str(&motion_map(results, facts));
-    }
-    out.push_str("</div>");
-    section("summary", "Summary", &out)
+    section("summary", facts.texts().page.summary, &out)
 }
 
-fn tiles(facts: &Summary, datum: Option<&Datum>) -> String {
+fn tiles(facts: &Summary) -> String {
+    let (texts, page) = (facts.texts(), &facts.texts().page);
     let tile =
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
     let share = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.stones));
     let of_measured = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.measured.len()));
-    let largest = facts.significant.first().map(|(_, m)| m.displacement.norm());
-    format!(
-        "<div class=\"tiles\">{}{}{}{}{}</div>",
+    let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
+    let largest = facts.verdict.wall.largest;
+    let tiles = [
         tile(
             share(facts.measured.len()),
-            &format!("of {} stones measured", count(facts.stones))
+            &fill(page.tile_measured, &[("m", &count(facts.stones))]),
         ),
-        tile(
-            of_measured(facts.significant.len()),
-            "of these moved significantly"
-        ),
-        tile(count(facts.loose.len()), "loose: move unlike their neighbours"),
-        tile(
-            format!("{} <small>mm</small>", mm_or_dash(facts.limits.median())),
-            if is_known(datum) {
-                "typical detection limit (95 %, median), registration error included"
-            } else {
-                "typical detection limit (95 %, median) against the common motion of the wall"
-            }
-        ),
-        tile(
-            format!("{} <small>mm</small>", mm_or_dash(largest)),
-            "largest significant motion"
-        ),
-    )
+        tile(of_measured(facts.moved.len()), page.tile_moved),
+        tile(of_measured(facts.above_limit), page.tile_above),
+        tile(count(facts.loose.len()), page.tile_loose),
+        tile(mm(facts.limits.median()), page.tile_limit),
+        match largest {
+            Some(largest) => tile(mm(Some(largest.length_mm / 1e3)), page.tile_largest),
+            None => tile("\u{2013}".to_owned(), page.tile_no_motion),
+        },
+    ];
+    format!("<div class=\"tiles\">{}</div>", tiles.concat())
 }
 
-fn sentences(results: &ResultSet, facts: &Summary, datum: Option<&Datum>) -> Vec<String> {
+fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
+    let texts = facts.texts();
     if facts.measured.is_empty() {
         let lost = facts
             .by_status
             .iter()
-            .map(|(s, stones)| format!("{}: {}", escape(s.meaning()), count(stones.len())));
+            .map(|(s, stones)| format!("{}: {}", escape(texts.status(*s)), count(stones.len())));
         let reasons = lost.collect::<Vec<_>>().join("; ");
-        return vec![format!("<b>No stone was measured.</b> {reasons}")];
+        return vec![format!(
+            "<b>{}.</b> {reasons}",
+            capital(texts.clauses.nothing_measured)
+        )];
     }
-    let mut out = vec![significance(facts)];
-    // What all numbers refer to comes first where it is not the ground.
-    out.insert(usize::from(is_known(datum)), registration(datum));
+    let mut out = vec![first_page::registration(results.datum(), texts), chance(facts)];
     let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
     out.push(format!(
         "Median of all measured stones: <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
          the wall."
     ));
-    if facts.motion_is_proven() {
+    if !facts.moved.is_empty() {
         out.extend(places(facts));
-    }
-    if let Some((stone, motion)) = facts.significant.first() {
-        let place = results.facade.place(&stone.centroid);
-        out.push(format!(
-            "The largest significant motion is {} mm (detection limit {} mm), stone {} at {} m along, {} m up.",
-            mm(motion.displacement.norm()),
-            mm(motion.detection_limit_m),
-            stone.stone_id,
-            number(place.x, 2),
-            number(place.y, 2)
-        ));
-    }
-    if results
-        .registration
-        .as_ref()
-        .is_some_and(|r| !r.estimator.converged())
-    {
-        out.push(
-            "<b>The joint adjustment reached its limit of iterations before it settled</b>; see the audit."
-                .into(),
-        );
     }
     out.push(match facts.loose.len() {
         0 => "No stone is loose: none moves unlike its neighbours beyond what the noise explains.".into(),
@@ -109,9 +92,6 @@ fn sentences(results: &ResultSet, facts: &Summary, datum: Option<&Datum>) -> Vec
             count(n)
         ),
     });
-    if facts.not_measured() > 0 {
-        out.push(not_measured(facts));
-    }
     out
 }
 
@@ -127,17 +107,17 @@ fn places(facts: &Summary) -> Vec<String> {
         )
     };
     let mut out = Vec::new();
-    if 10 * facts.significant.len() >= 9 * facts.measured.len() {
-        out.push("Significant motions are found all over the measured wall.".into());
+    if 10 * facts.moved.len() >= 9 * facts.measured.len() {
+        out.push("Stones that moved are found all over the measured wall.".into());
     } else if let Some(region) = facts.region {
         out.push(format!(
-            "Nine tenths of the significant stones lie {}.",
+            "Nine tenths of the stones that moved lie {}.",
             between(region)
         ));
     }
     if let Some((least, region)) = facts.strongest {
         out.push(format!(
-            "The largest tenth of the significant motions, {} mm and more, lies {}.",
+            "The largest tenth of their motions, {} mm and more, lies {}.",
             mm(least),
             between(region)
         ));
@@ -145,56 +125,25 @@ fn places(facts: &Summary) -> Vec<String> {
     out
 }
 
-/// Whether the error of the registration of the epochs is known.
-fn is_known(datum: Option<&Datum>) -> bool {
-    datum.is_some_and(|d| d.state != DatumState::Unknown)
+/// How many stones are above their limit, how many chance alone would bring there, and how many moved.
+fn chance(facts: &Summary) -> String {
+    let expected = (FALSE_ALARMS * facts.measured.len() as f64).round() as usize;
+    let values = [
+        ("above", &*count(facts.above_limit)),
+        ("chance", &*count(expected)),
+        ("n", &*count(facts.moved.len())),
+    ];
+    fill(facts.texts().page.chance, &values)
 }
 
-/// What is known about the registration of the epochs.
-fn registration(datum: Option<&Datum>) -> String {
-    match datum {
-        Some(datum) if is_known(Some(datum)) => format!("Datum: {}.", escape(&datum.note)),
-        _ => "<b>The registration error of the epochs is unknown</b>: limits, intervals and significance hold for motions against the \
-            common rigid motion of the measured stones. A motion of the wall as a whole cannot be told from an error of the \
-            registration; stable areas outside the wall would show it."
-            .into(),
-    }
-}
-
-/// How many stones have no motion, and why.
-fn not_measured(facts: &Summary) -> String {
-    let reasons = facts
-        .by_status
-        .iter()
-        .filter(|(status, _)| *status != Status::Ok)
-        .map(|(status, stones)| format!("{} because {}", count(stones.len()), escape(status.meaning())));
-    format!(
-        "{} stones ({}) were not measured, hatched in the maps: {}.",
-        count(facts.not_measured()),
-        percent(facts.not_measured(), facts.stones),
-        reasons.collect::<Vec<_>>().join("; ")
-    )
-}
-
-fn significance(facts: &Summary) -> String {
-    let expected = count((FALSE_ALARMS * facts.measured.len() as f64).round() as usize);
-    let n = count(facts.significant.len());
-    let sure = format!(
-        "half of the stones would show a motion of {} mm, nine tenths one of {} mm",
-        mm_or_dash(facts.limits.median()),
-        mm_or_dash(facts.limits.quantile(0.9))
-    );
-    if facts.motion_is_proven() {
-        format!(
-            "<b>{n} stones moved significantly</b> at the 95 % level; chance alone would flag about {expected} if nothing had \
-             moved. How sure: {sure}."
-        )
-    } else {
-        format!(
-            "<b>No motion is proven.</b> {n} stones exceed their 95 % limit, and chance alone would flag about {expected}. How \
-             sure: {sure}."
-        )
-    }
+/// The text with a capital at its beginning.
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters
+        .next()
+        .map(|c| c.to_uppercase().to_string())
+        .unwrap_or_default();
+    format!("{first}{}", letters.as_str())
 }
 
 /// Outcomes, largest motions, loose stones, stretches.
@@ -213,9 +162,9 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
         })
         .collect();
     out.push_str(&table(&["status", "meaning", "stones", "share"], &rows, 2));
-    if !facts.significant.is_empty() {
-        out.push_str("<h3>Largest significant motions</h3>");
-        out.push_str(&stone_rows(results, facts, &facts.significant));
+    if !facts.moved.is_empty() {
+        out.push_str("<h3>Largest motions of stones that moved</h3>");
+        out.push_str(&stone_rows(results, facts, &facts.moved));
     }
     if !facts.loose.is_empty() {
         out.push_str("<h3>Loose stones</h3>");
@@ -298,7 +247,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
             edge(i) <= x && (x < edge(i + 1) || i + 1 == n)
         };
         let part: Vec<_> = facts.measured.iter().filter(|(s, _)| inside(s)).collect();
-        let significant = part.iter().filter(|(_, m)| m.significant).count();
+        let above = part.iter().filter(|(_, m)| m.significant).count();
         let median = |of: fn(&RowMotion) -> f64| {
             facts.mm(Sorted::new(part.iter().map(|(_, m)| of(m)))
                 .median()
@@ -307,7 +256,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
         vec![
             format!("{} – {}", number(edge(i), 1), number(edge(i + 1), 1)),
             count(part.len()),
-            percent(significant, part.len()),
+            percent(above, part.len()),
             median(|m| m.face.x),
             median(|m| m.face.y),
             median(|m| m.face.z),
@@ -317,7 +266,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
     let head = [
         "along the wall m",
         "measured",
-        "significant",
+        "above their limit",
         "d along mm",
         "d up mm",
         "d out mm",

@@ -6,11 +6,13 @@
 mod cameras;
 mod cloud;
 mod crops;
+mod logo;
 mod sections;
 
 pub use cameras::{PosedPhoto, write_cameras};
 pub use cloud::{ThinPoint, write_thin_cloud};
 pub use crops::{Crop, crop_side_px, write_crops};
+pub use logo::{Logo, write_logo};
 pub use sections::{Cut, SectionPoint, write_sections};
 
 use super::names::EVIDENCE_DIR;
@@ -30,6 +32,8 @@ pub struct Evidence {
     pub(crate) clouds: [Vec<ThinPoint>; 2],
     /// Posed photos.
     pub(crate) cameras: [Vec<PosedPhoto>; 2],
+    /// The picture of the first page.
+    pub(crate) logo: Option<Logo>,
 }
 
 impl Evidence {
@@ -47,6 +51,7 @@ impl Evidence {
             sections: sections::read_sections(dir, later)?,
             clouds: [first_cloud?, second_cloud?],
             cameras: [first_cameras?, second_cameras?],
+            logo: logo::read_logo(dir)?,
         })
     }
 }

@@ -1,9 +1,9 @@
 //! What is known about the registration of a later epoch, and so about motions that all stones share.
 
-use nalgebra::{Matrix3, Matrix6, Point3};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use stonewise_core::geometry::lever;
+use stonewise_core::geometry::{SmallMotion, lever};
 
 /// Where the error of an epoch's registration is known from, in order of precedence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +47,10 @@ pub struct Datum {
     /// Covariance of the registration error at the centre as (shift x, y, z; rotation vector x, y, z), m^2, m rad, rad^2; absent
     /// where the state is unknown.
     pub covariance_6x6: Option<[[f64; 6]; 6]>,
+    /// Where the state is unknown: the common rigid motion of the measured stones that motions are tested against, as (shift at the centre x, y, z;
+    /// rotation vector x, y, z), m, rad.
+    #[serde(default)]
+    pub common_motion: Option<[f64; 6]>,
     /// Errors of single stations and strips, where they were estimated.
     pub sources: Vec<SourceError>,
     /// The same in one sentence.
@@ -73,6 +77,7 @@ impl Datum {
             state: DatumState::Unknown,
             centre: centre.coords.into(),
             covariance_6x6: None,
+            common_motion: None,
             sources: Vec::new(),
             note,
         }
@@ -86,9 +91,23 @@ impl Datum {
             covariance_6x6: Some(std::array::from_fn(|i| {
                 std::array::from_fn(|j| covariance[(i, j)])
             })),
+            common_motion: None,
             sources: Vec::new(),
             note,
         }
+    }
+
+    /// The same with the common rigid motion that motions are tested against; only where nothing else is known.
+    pub fn against(mut self, common: Option<&SmallMotion>) -> Self {
+        if self.state == DatumState::Unknown {
+            let centre = Point3::from(self.centre);
+            self.common_motion = common.map(|common| {
+                let shift = common.at(&centre);
+                let turn = common.motion.fixed_rows::<3>(3);
+                [shift.x, shift.y, shift.z, turn[0], turn[1], turn[2]]
+            });
+        }
+        self
     }
 
     /// Whether the error was estimated, so that it can be taken off the motions.
@@ -103,12 +122,17 @@ impl Datum {
         let lever = lever(&(place - Point3::from(self.centre)));
         Some(lever * covariance * lever.transpose())
     }
+
+    /// The common rigid motion at a place, metres, world; `None` where motions are tested against the ground.
+    pub fn common_motion_at(&self, place: &Point3<f64>) -> Option<Vector3<f64>> {
+        let motion = Vector6::from(self.common_motion?);
+        Some(lever(&(place - Point3::from(self.centre))) * motion)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     #[test]
     fn a_turn_grows_with_the_distance_from_the_centre() {

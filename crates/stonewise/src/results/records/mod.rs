@@ -4,11 +4,16 @@ mod datum;
 mod registration;
 mod run;
 mod timestamp;
+mod verdict;
 
 pub use datum::{Datum, DatumState, SourceError};
 pub use registration::{AdjustmentRecord, EstimatorRecord, GicpRecord, ObserversRecord, RegistrationRecord};
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
+pub use verdict::{
+    Area, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict, Largest, Reason, ReasonCode,
+    State, StoneVerdict, VERDICT_VERSION, Verdict, ZoneVerdict,
+};
 
 #[cfg(test)]
 mod tests {

@@ -1,6 +1,6 @@
 //! `run.json`: what was run, on what, how, and how long it took.
 
-use super::{DatumState, Timestamp};
+use super::{DatumState, Headlines, Timestamp};
 use crate::part::Part;
 use crate::project::Settings;
 use crate::warnings::Warning;
@@ -22,6 +22,9 @@ pub struct RunRecord {
     pub crs: Option<CrsRecord>,
     /// What is known about the registration of each later epoch, by its name.
     pub datum: BTreeMap<String, DatumState>,
+    /// The verdict in a word and a sentence; absent in records of earlier versions.
+    #[serde(default)]
+    pub verdict: Option<Headlines>,
     /// The epochs, in time order.
     pub epochs: Vec<EpochRecord>,
     /// The part of the survey that took part; absent: all.

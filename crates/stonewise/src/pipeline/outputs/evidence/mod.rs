@@ -6,11 +6,14 @@ mod simplify;
 mod thin;
 mod window;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
-use crate::results::{PosedPhoto, StoneOutline, StoneRow, write_cameras, write_sections, write_thin_cloud};
+use crate::report_params::logo_type;
+use crate::results::{
+    PosedPhoto, StoneOutline, StoneRow, write_cameras, write_logo, write_sections, write_thin_cloud,
+};
 use crops::write_epoch_crops;
 use sections::sections;
 use std::collections::BTreeMap;
@@ -25,6 +28,10 @@ pub fn write_evidence(
     outlines: &BTreeMap<u32, StoneOutline>,
     pairs: &[&[StoneRow]],
 ) -> Result<()> {
+    if let Some(logo) = &context.project.settings.report.logo {
+        let media_type = logo_type(logo).map_err(Error::Survey)?;
+        write_logo(&context.out, logo, media_type)?;
+    }
     let windows = windows(&labelled[0].stones, outlines);
     for (i, (photos, labelled)) in photos.iter().zip(labelled).enumerate() {
         let epoch = i + 1;

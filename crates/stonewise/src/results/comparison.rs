@@ -1,6 +1,6 @@
 //! Stones against the M3C2 core points on them.
 
-use crate::results::{ResultSet, Sorted, StoneRow};
+use super::{ResultSet, Sorted, StoneRow};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 

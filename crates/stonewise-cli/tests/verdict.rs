@@ -1,0 +1,116 @@
+//! The verdict of a run: in verdict.json, run.json, the log, the report and the exit code.
+#![allow(clippy::unwrap_used)] // a test that cannot go on must stop
+
+mod support;
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use support::{copy_of, run, survey};
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// The survey with more lines at the end of its project file, which is within the table of the second epoch.
+fn survey_with(lines: &str) -> tempfile::TempDir {
+    let dir = copy_of(survey());
+    let path = dir.path().join("stonewise.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, format!("{text}\n{lines}")).unwrap();
+    dir
+}
+
+/// Changes the project file of a survey.
+fn edit(survey: &Path, from: &str, to: &str) {
+    let path = survey.join("stonewise.toml");
+    let text = fs::read_to_string(&path).unwrap();
+    assert!(text.contains(from), "{text}");
+    fs::write(&path, text.replace(from, to)).unwrap();
+}
+
+#[test]
+fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
+    // The simulated wall stands still; its points are moved by 5.4 cm.
+    let lines = "motion = { kind = \"translation\", d = [0.0, 0.02, 0.05] }\n\
+        [report]\noperator = \"Ruhr <River> Authority\"\n[thresholds]\nattention_mm = 5.0\nalarm_mm = 10.0\n";
+    let dir = survey_with(lines);
+    let out = tempfile::tempdir().unwrap();
+    let (code, log) = run(dir.path(), out.path(), &["--exit-on", "alarm"]);
+    assert_eq!(code, 4, "{log}");
+    let verdict = json(&out.path().join("verdict.json"));
+    let sentence = verdict["sentence"].as_str().unwrap();
+    assert!(
+        sentence.starts_with("Alarm: ") && sentence.contains("beyond the alarm threshold of 10 mm"),
+        "{sentence}"
+    );
+    assert!(log.contains(sentence), "{log}");
+    let record = json(&out.path().join("run.json"));
+    assert_eq!(
+        (&record["verdict"]["sentence"], &record["verdict"]["state"]),
+        (&verdict["sentence"], &verdict["state"])
+    );
+    assert_eq!(record["parameters"]["thresholds"]["alarm_mm"], 10.0);
+    let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
+    assert!(page.contains(sentence) && page.contains("Ruhr &lt;River&gt; Authority"));
+    let epoch = &verdict["epochs"][0];
+    let stones = fs::read_to_string(out.path().join("stones.csv")).unwrap();
+    assert_eq!(
+        epoch["stones"].as_array().unwrap().len(),
+        stones.lines().count() - 1
+    );
+    let largest = epoch["wall"]["largest"]["length_mm"].as_f64().unwrap();
+    assert!((largest - 53.9).abs() < 3.0, "{largest}");
+    // Nobody asked for an exit code; then the thresholds are out of reach.
+    assert_eq!(run(dir.path(), out.path(), &[]).0, 0);
+    edit(
+        dir.path(),
+        "attention_mm = 5.0\nalarm_mm = 10.0",
+        "attention_mm = 9000.0",
+    );
+    let (code, log) = run(dir.path(), out.path(), &["--exit-on", "attention"]);
+    assert!(code == 0 && log.contains("Fine: none of the "), "{code} {log}");
+}
+
+#[test]
+fn where_nothing_is_known_about_the_registration_the_results_cannot_tell() {
+    let dir = survey_with("[thresholds]\nattention_mm = 5.0\n");
+    edit(dir.path(), "name = \"epoch", "sources = \"none\"\nname = \"epoch");
+    let out = tempfile::tempdir().unwrap();
+    let (code, log) = run(dir.path(), out.path(), &["--exit-on", "alarm"]);
+    assert_eq!(code, 3, "{log}");
+    let sentence = "Cannot tell: the registration error between the surveys is unknown, so a motion of the wall as a whole would not show";
+    assert!(log.contains(sentence), "{log}");
+    assert_eq!(
+        json(&out.path().join("verdict.json"))["epochs"][0]["reasons"][0]["code"],
+        "datum_unknown"
+    );
+    // The same test can be made from the files alone: the common motion is in registration.json.
+    let common = &json(&out.path().join("registration.json"))["datum"]["common_motion"];
+    assert_eq!(common.as_array().unwrap().len(), 6);
+    assert_eq!(run(dir.path(), out.path(), &[]).0, 0);
+}
+
+#[test]
+fn impossible_thresholds_and_logos_are_named_with_their_line() {
+    for (lines, words) in [
+        (
+            "[thresholds]\nattention_mm = 10.0\nalarm_mm = 5.0",
+            "attention_mm = 10 in [thresholds] must be below alarm_mm = 5",
+        ),
+        (
+            "[thresholds]\nalarm_mm = -1.0",
+            "alarm_mm = -1 in [thresholds] is not possible",
+        ),
+        ("[thresholds]\nalarm = 1.0", "unknown field `alarm`"),
+        ("[report]\nlogo = \"none.png\"", "no such file or folder"),
+        ("[report]\nlogo = \"stonewise.toml\"", "is neither .png nor .jpg"),
+        ("[report]\nlanguage = \"fr\"", "unknown variant `fr`"),
+    ] {
+        let dir = survey_with(lines);
+        let out = tempfile::tempdir().unwrap();
+        let (code, log) = run(dir.path(), out.path(), &[]);
+        assert_eq!(code, 2, "{log}");
+        assert!(log.contains(words) && log.contains("stonewise.toml:"), "{log}");
+    }
+}

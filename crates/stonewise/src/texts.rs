@@ -1,0 +1,488 @@
+//! The texts of the verdict and of the report's first page, one table for each language.
+
+use crate::figure::{count, mm, number};
+use crate::report_params::Language;
+use crate::results::Status;
+use crate::results::records::State;
+
+/// A text for one and a text for several.
+type Number = [&'static str; 2];
+
+/// Texts of one language; words in braces are filled in.
+#[derive(Debug)]
+pub(crate) struct Texts {
+    /// What stands between the whole part of a number and its decimals.
+    pub decimal: &'static str,
+    pub states: States,
+    pub clauses: Clauses,
+    pub page: PageTexts,
+    /// What became of stones, in the order of [`Status::ALL`].
+    pub statuses: [&'static str; 9],
+}
+
+/// Words for the states.
+#[derive(Debug)]
+pub(crate) struct States {
+    pub fine: &'static str,
+    pub attention: &'static str,
+    pub alarm: &'static str,
+    pub cannot_tell: &'static str,
+}
+
+/// What the verdict's sentence is made of.
+#[derive(Debug)]
+pub(crate) struct Clauses {
+    pub not_converged: &'static str,
+    pub in_doubt: &'static str,
+    pub apparent: Number,
+    pub moved_alarm: Number,
+    pub moved_attention: Number,
+    pub neighbours_alarm: Number,
+    pub neighbours_attention: Number,
+    pub joints_alarm: Number,
+    pub joints_attention: Number,
+    pub moved: Number,
+    pub loose: Number,
+    pub lost: Number,
+    pub largest: &'static str,
+    pub largest_common: &'static str,
+    pub nothing_measured: &'static str,
+    pub few_measured: Number,
+    pub datum_unknown: &'static str,
+    pub none_against_common: &'static str,
+    pub reaches: Number,
+    pub below: Number,
+    pub none_shown: &'static str,
+    pub limit: &'static str,
+    pub or: &'static str,
+}
+
+/// The report's first page.
+#[derive(Debug)]
+pub(crate) struct PageTexts {
+    pub kind: &'static str,
+    pub epochs: &'static str,
+    pub date: &'static str,
+    pub conditions: &'static str,
+    pub reference: &'static str,
+    pub operator: &'static str,
+    pub instruments: &'static str,
+    pub reference_number: &'static str,
+    pub not_measured: &'static str,
+    pub all_measured: &'static str,
+    pub of_not_measured: Number,
+    pub look_first: &'static str,
+    pub nothing_first: &'static str,
+    pub stone: &'static str,
+    pub along_up: &'static str,
+    pub lost_stone: &'static str,
+    pub moved_stone: &'static str,
+    pub loose_stone: &'static str,
+    pub zones: &'static str,
+    pub zone: &'static str,
+    pub state: &'static str,
+    pub stones: &'static str,
+    pub measured: &'static str,
+    pub moved: &'static str,
+    pub largest: &'static str,
+    pub assessor: &'static str,
+    pub signature: &'static str,
+    pub place_date: &'static str,
+    pub tile_measured: &'static str,
+    pub tile_moved: &'static str,
+    pub tile_above: &'static str,
+    pub tile_loose: &'static str,
+    pub tile_limit: &'static str,
+    pub tile_largest: &'static str,
+    pub tile_no_motion: &'static str,
+    pub registration_included: &'static str,
+    pub registration_unknown: &'static str,
+    pub chance: &'static str,
+    pub doubts: &'static str,
+    pub in_numbers: &'static str,
+    pub summary: &'static str,
+    pub rest_in_english: &'static str,
+    pub no_registration: &'static str,
+}
+
+static ENGLISH: Texts = Texts {
+    decimal: ".",
+    states: States {
+        fine: "Fine",
+        attention: "Attention",
+        alarm: "Alarm",
+        cannot_tell: "Cannot tell",
+    },
+    clauses: Clauses {
+        not_converged: "the adjustment did not converge, so its motions and intervals must not be relied on",
+        in_doubt: "the results as a whole are in doubt and must not be relied on",
+        apparent: [
+            "as computed, {n} stone would lie beyond the alarm threshold",
+            "as computed, {n} stones would lie beyond the alarm threshold",
+        ],
+        moved_alarm: [
+            "{n} stone moved beyond the alarm threshold of {t} mm",
+            "{n} stones moved beyond the alarm threshold of {t} mm",
+        ],
+        moved_attention: [
+            "{n} stone moved beyond the attention threshold of {t} mm",
+            "{n} stones moved beyond the attention threshold of {t} mm",
+        ],
+        neighbours_alarm: [
+            "{n} stone moved against its neighbours beyond the alarm threshold of {t} mm",
+            "{n} stones moved against their neighbours beyond the alarm threshold of {t} mm",
+        ],
+        neighbours_attention: [
+            "{n} stone moved against its neighbours beyond the attention threshold of {t} mm",
+            "{n} stones moved against their neighbours beyond the attention threshold of {t} mm",
+        ],
+        joints_alarm: [
+            "{n} joint opened beyond the alarm threshold of {t} mm",
+            "{n} joints opened beyond the alarm threshold of {t} mm",
+        ],
+        joints_attention: [
+            "{n} joint opened beyond the attention threshold of {t} mm",
+            "{n} joints opened beyond the attention threshold of {t} mm",
+        ],
+        moved: [
+            "{n} of {m} measured stones moved",
+            "{n} of {m} measured stones moved",
+        ],
+        loose: [
+            "{n} stone is loose: it moved unlike its neighbours",
+            "{n} stones are loose: they moved unlike their neighbours",
+        ],
+        lost: [
+            "{n} stone is lost: the later epoch shows its place without it",
+            "{n} stones are lost: the later epoch shows their places without them",
+        ],
+        largest: "the largest motion is {length} mm (95 % interval {low} to {high} mm), stone {id}",
+        largest_common: "the largest motion against the common motion of the wall is {length} mm (95 % interval {low} to {high} mm), stone {id}",
+        nothing_measured: "no stone was measured",
+        few_measured: [
+            "only {n} of {m} stones was measured",
+            "only {n} of {m} stones were measured",
+        ],
+        datum_unknown: "the registration error between the surveys is unknown, so a motion of the wall as a whole would not show",
+        none_against_common: "no stone moved against the common motion of the wall",
+        reaches: [
+            "{n} stone or joint may have moved by the attention threshold of {t} mm: its interval reaches it",
+            "{n} stones or joints may have moved by the attention threshold of {t} mm: their intervals reach it",
+        ],
+        below: [
+            "the {n} measured stone did not reach the attention threshold of {t} mm",
+            "none of the {n} measured stones reaches the attention threshold of {t} mm",
+        ],
+        none_shown: "no motion is shown",
+        limit: "detection limit: {median} mm (median), {high} mm (90th percentile)",
+        or: "or",
+    },
+    page: PageTexts {
+        kind: "Deformation report, stone by stone",
+        epochs: "Epochs",
+        date: "Date",
+        conditions: "Conditions",
+        reference: "reference",
+        operator: "Operator",
+        instruments: "Instruments",
+        reference_number: "Reference number",
+        not_measured: "What was not measured",
+        all_measured: "Every stone of the first epoch was measured.",
+        of_not_measured: [
+            "{n} of {m} stones was not measured: its motion is unknown, not zero.",
+            "{n} of {m} stones were not measured: their motions are unknown, not zero.",
+        ],
+        look_first: "What to look at first",
+        nothing_first: "No stone calls for a closer look.",
+        stone: "Stone",
+        along_up: "{along} m along, {up} m up",
+        lost_stone: "lost",
+        moved_stone: "moved {length} mm (95 %: {low} to {high} mm)",
+        loose_stone: "loose: {length} mm against its neighbours (95 %: {low} to {high} mm)",
+        zones: "Zones",
+        zone: "Zone",
+        state: "State",
+        stones: "Stones",
+        measured: "Measured",
+        moved: "Moved",
+        largest: "Largest motion mm",
+        assessor: "Assessed by",
+        signature: "Signature",
+        place_date: "Place and date",
+        tile_measured: "of {m} stones measured",
+        tile_moved: "moved (false discovery rate 5 %)",
+        tile_above: "above their own 95 % limit",
+        tile_loose: "loose: move unlike their neighbours",
+        tile_limit: "detection limit (95 %, median)",
+        tile_largest: "largest motion of a stone that moved",
+        tile_no_motion: "no stone moved",
+        registration_included: "Registration error between the surveys is included in the limits: {note}.",
+        registration_unknown: "Registration error between the surveys is unknown and is <b>not</b> included in the limits below: limits, \
+            intervals and significance hold for motions against the common rigid motion of the measured stones. A motion of the wall \
+            as a whole cannot be told from an error of the registration; stable areas outside the wall would show it.",
+        chance: "{above} stones are above their own 95 % limit; on a still wall chance alone gives about {chance}. Moved is said only of stones \
+            that remain when the false discovery rate over all stones is held at 5 %: {n}.",
+        doubts: "These results must not be relied on as they stand.",
+        in_numbers: "In numbers",
+        summary: "Summary",
+        rest_in_english: "",
+        no_registration: "Nothing is recorded about the registration of the epochs.",
+    },
+    statuses: [
+        "measured",
+        "the later epoch has no points, or no photo of them, at this place",
+        "the later epoch shows the place but no stone there",
+        "several stones of the later epoch fit equally well",
+        "the best candidate's face is much larger or smaller: masks merged or split",
+        "too few points for an estimate",
+        "the estimate did not settle",
+        "the two epochs do not show the same surface: probably a wrong mask",
+        "the surface is too flat to show the motion",
+    ],
+};
+
+static GERMAN: Texts = Texts {
+    decimal: ",",
+    states: States {
+        fine: "In Ordnung",
+        attention: "Achtung",
+        alarm: "Alarm",
+        cannot_tell: "Keine Aussage m\u{f6}glich",
+    },
+    clauses: Clauses {
+        not_converged: "die Ausgleichung ist nicht konvergiert, auf ihre Bewegungen und Intervalle ist kein Verlass",
+        in_doubt: "die Ergebnisse als Ganzes sind zweifelhaft, auf sie ist kein Verlass",
+        apparent: [
+            "wie berechnet l\u{e4}ge {n} Stein \u{fc}ber der Alarmschwelle",
+            "wie berechnet l\u{e4}gen {n} Steine \u{fc}ber der Alarmschwelle",
+        ],
+        moved_alarm: [
+            "{n} Stein hat sich \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+            "{n} Steine haben sich \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+        ],
+        moved_attention: [
+            "{n} Stein hat sich \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+            "{n} Steine haben sich \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+        ],
+        neighbours_alarm: [
+            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+        ],
+        neighbours_attention: [
+            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+        ],
+        joints_alarm: [
+            "{n} Fuge hat sich \u{fc}ber die Alarmschwelle von {t} mm hinaus ge\u{f6}ffnet",
+            "{n} Fugen haben sich \u{fc}ber die Alarmschwelle von {t} mm hinaus ge\u{f6}ffnet",
+        ],
+        joints_attention: [
+            "{n} Fuge hat sich \u{fc}ber die Warnschwelle von {t} mm hinaus ge\u{f6}ffnet",
+            "{n} Fugen haben sich \u{fc}ber die Warnschwelle von {t} mm hinaus ge\u{f6}ffnet",
+        ],
+        moved: [
+            "{n} von {m} gemessenen Steinen hat sich bewegt",
+            "{n} von {m} gemessenen Steinen haben sich bewegt",
+        ],
+        loose: [
+            "{n} Stein ist lose: er hat sich anders bewegt als seine Nachbarn",
+            "{n} Steine sind lose: sie haben sich anders bewegt als ihre Nachbarn",
+        ],
+        lost: [
+            "{n} Stein fehlt: die sp\u{e4}tere Epoche zeigt seinen Platz ohne ihn",
+            "{n} Steine fehlen: die sp\u{e4}tere Epoche zeigt ihre Pl\u{e4}tze ohne sie",
+        ],
+        largest: "die gr\u{f6}\u{df}te Bewegung ist {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        largest_common: "die gr\u{f6}\u{df}te Bewegung gegen die gemeinsame Bewegung der Mauer ist {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        nothing_measured: "kein Stein wurde gemessen",
+        few_measured: [
+            "nur {n} von {m} Steinen wurde gemessen",
+            "nur {n} von {m} Steinen wurden gemessen",
+        ],
+        datum_unknown: "der Registrierungsfehler zwischen den Aufnahmen ist unbekannt, eine Bewegung der Mauer als Ganzes w\u{e4}re nicht zu sehen",
+        none_against_common: "kein Stein hat sich gegen die gemeinsame Bewegung der Mauer bewegt",
+        reaches: [
+            "{n} Stein oder Fuge kann sich um die Warnschwelle von {t} mm bewegt haben: das Intervall erreicht sie",
+            "{n} Steine oder Fugen k\u{f6}nnen sich um die Warnschwelle von {t} mm bewegt haben: ihre Intervalle erreichen sie",
+        ],
+        below: [
+            "der {n} gemessene Stein erreicht die Warnschwelle von {t} mm nicht",
+            "keiner der {n} gemessenen Steine erreicht die Warnschwelle von {t} mm",
+        ],
+        none_shown: "keine Bewegung ist nachweisbar",
+        limit: "Nachweisgrenze: {median} mm (Median), {high} mm (90. Perzentil)",
+        or: "oder",
+    },
+    page: PageTexts {
+        kind: "Verformungsbericht, Stein f\u{fc}r Stein",
+        epochs: "Epochen",
+        date: "Datum",
+        conditions: "Bedingungen",
+        reference: "Bezug",
+        operator: "Ausf\u{fc}hrende Stelle",
+        instruments: "Instrumente",
+        reference_number: "Aktenzeichen",
+        not_measured: "Was nicht gemessen wurde",
+        all_measured: "Alle Steine der ersten Epoche wurden gemessen.",
+        of_not_measured: [
+            "{n} von {m} Steinen wurde nicht gemessen: seine Bewegung ist unbekannt, nicht null.",
+            "{n} von {m} Steinen wurden nicht gemessen: ihre Bewegungen sind unbekannt, nicht null.",
+        ],
+        look_first: "Was zuerst anzusehen ist",
+        nothing_first: "Kein Stein verlangt einen genaueren Blick.",
+        stone: "Stein",
+        along_up: "{along} m entlang, {up} m hoch",
+        lost_stone: "fehlt",
+        moved_stone: "hat sich um {length} mm bewegt (95 %: {low} bis {high} mm)",
+        loose_stone: "lose: {length} mm gegen seine Nachbarn (95 %: {low} bis {high} mm)",
+        zones: "Zonen",
+        zone: "Zone",
+        state: "Zustand",
+        stones: "Steine",
+        measured: "Gemessen",
+        moved: "Bewegt",
+        largest: "Gr\u{f6}\u{df}te Bewegung mm",
+        assessor: "Beurteilt durch",
+        signature: "Unterschrift",
+        place_date: "Ort und Datum",
+        tile_measured: "von {m} Steinen gemessen",
+        tile_moved: "haben sich bewegt (Falscherkennungsrate 5 %)",
+        tile_above: "\u{fc}ber ihrer eigenen 95-%-Grenze",
+        tile_loose: "lose: bewegen sich anders als ihre Nachbarn",
+        tile_limit: "Nachweisgrenze (95 %, Median)",
+        tile_largest: "gr\u{f6}\u{df}te Bewegung eines bewegten Steins",
+        tile_no_motion: "kein Stein hat sich bewegt",
+        registration_included: "Der Registrierungsfehler zwischen den Aufnahmen ist in den Grenzen enthalten: {note}.",
+        registration_unknown: "Der Registrierungsfehler zwischen den Aufnahmen ist unbekannt und in den Grenzen unten <b>nicht</b> enthalten: \
+            Grenzen, Intervalle und Signifikanz gelten f\u{fc}r Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine. Eine Bewegung \
+            der Mauer als Ganzes ist von einem Registrierungsfehler nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
+        chance: "{above} Steine liegen \u{fc}ber ihrer eigenen 95-%-Grenze; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Als bewegt \
+            gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
+        doubts: "Auf diese Ergebnisse ist so kein Verlass.",
+        in_numbers: "In Zahlen",
+        summary: "Zusammenfassung",
+        rest_in_english: "Karten, Tabellen und Anh\u{e4}nge sind auf Englisch.",
+        no_registration: "\u{dc}ber die Registrierung der Epochen ist nichts festgehalten.",
+    },
+    statuses: [
+        "gemessen",
+        "die sp\u{e4}tere Epoche hat an dieser Stelle keine Punkte oder kein Foto von ihnen",
+        "die sp\u{e4}tere Epoche zeigt die Stelle, aber keinen Stein",
+        "mehrere Steine der sp\u{e4}teren Epoche passen gleich gut",
+        "die Fl\u{e4}che des besten Kandidaten ist viel gr\u{f6}\u{df}er oder kleiner: Masken verschmolzen oder geteilt",
+        "zu wenige Punkte f\u{fc}r eine Sch\u{e4}tzung",
+        "die Sch\u{e4}tzung ist nicht zur Ruhe gekommen",
+        "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che: wahrscheinlich eine falsche Maske",
+        "die Oberfl\u{e4}che ist zu eben, um die Bewegung zu zeigen",
+    ],
+};
+
+impl Language {
+    /// The texts of the language.
+    pub(crate) fn texts(self) -> &'static Texts {
+        match self {
+            Self::English => &ENGLISH,
+            Self::German => &GERMAN,
+        }
+    }
+}
+
+impl Texts {
+    /// The word for a state.
+    pub(crate) fn state(&self, state: State) -> &'static str {
+        match state {
+            State::Fine => self.states.fine,
+            State::Attention => self.states.attention,
+            State::Alarm => self.states.alarm,
+            State::CannotTell => self.states.cannot_tell,
+        }
+    }
+
+    /// What became of a stone.
+    pub(crate) fn status(&self, status: Status) -> &'static str {
+        self.statuses[status as usize]
+    }
+
+    /// A number with so many decimals.
+    pub(crate) fn number(&self, value: f64, decimals: usize) -> String {
+        number(value, decimals).replace('.', self.decimal)
+    }
+
+    /// Metres as millimetres with the digits that mean something.
+    pub(crate) fn mm(&self, metres: f64) -> String {
+        mm(metres).replace('.', self.decimal)
+    }
+
+    /// A threshold in millimetres, as short as it can be.
+    pub(crate) fn threshold(&self, millimetres: f64) -> String {
+        let rounded = (millimetres * 1e3).round() / 1e3;
+        rounded.to_string().replace('.', self.decimal)
+    }
+}
+
+/// A text with its braces filled in.
+pub(crate) fn fill(text: &str, values: &[(&str, &str)]) -> String {
+    values.iter().fold(text.to_owned(), |text, (name, value)| {
+        text.replace(&format!("{{{name}}}"), value)
+    })
+}
+
+/// The text for so many, with `{n}` filled in.
+pub(crate) fn counted(texts: Number, n: usize, values: &[(&str, &str)]) -> String {
+    let text = fill(texts[usize::from(n != 1)], &[("n", &count(n))]);
+    fill(&text, values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every brace of a text, in order.
+    fn braces(text: &str) -> Vec<String> {
+        let mut all: Vec<String> = text
+            .split('{')
+            .skip(1)
+            .filter_map(|t| Some(t.split_once('}')?.0.to_owned()))
+            .collect();
+        all.sort();
+        all
+    }
+
+    #[test]
+    fn both_languages_fill_in_the_same_values() {
+        // The same places of both tables, as they are printed for debugging.
+        let strings = |texts: &Texts| {
+            let text = format!("{texts:?}");
+            text.split('"')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        let (english, german) = (strings(&ENGLISH), strings(&GERMAN));
+        assert_eq!(english.len(), german.len());
+        for (e, g) in english.iter().zip(&german) {
+            assert_eq!(braces(e), braces(g), "{e} / {g}");
+        }
+    }
+
+    #[test]
+    fn outcomes_are_those_of_the_tables() {
+        for (i, status) in Status::ALL.into_iter().enumerate() {
+            assert_eq!((status as usize, ENGLISH.status(status)), (i, status.meaning()));
+        }
+    }
+
+    #[test]
+    fn one_and_many_are_told_apart() {
+        let clauses = &Language::English.texts().clauses;
+        assert_eq!(
+            counted(clauses.joints_alarm, 1, &[("t", "5")]),
+            "1 joint opened beyond the alarm threshold of 5 mm"
+        );
+        assert!(counted(clauses.lost, 2, &[]).starts_with("2 stones are lost"));
+        assert_eq!(Language::German.texts().mm(0.000_24), "0,24");
+        assert_eq!(Language::German.texts().threshold(2.5), "2,5");
+        assert_eq!(ENGLISH.threshold(10.0), "10");
+    }
+}
