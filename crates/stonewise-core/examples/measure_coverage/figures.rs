@@ -4,8 +4,8 @@ use crate::survey::Survey;
 use nalgebra::{Matrix3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use stonewise_core::geometry::{DisplacementSample, FaceFrame, SmallMotion};
+use stonewise_core::registration::moved_stones;
 use stonewise_core::registration::observers::{Datum, EpochErrors};
 
 /// 95 % quantile of chi-square with three degrees of freedom, and of the normal law (two-sided).
@@ -44,7 +44,7 @@ impl Wall {
             ..Self::default()
         };
         let n = survey.stones.len() as f64;
-        let mut p_values = Vec::new();
+        let mut motions = Vec::new();
         for (k, (stone, measured)) in stones() {
             let (rest, covariance) = match (&common, is_known) {
                 (Some(common), false) => (
@@ -65,9 +65,10 @@ impl Wall {
             wall.square[0] += 1e6 * measured.norm_squared() / n;
             wall.square[1] += 1e6 * rest.norm_squared() / n;
             wall.square[2] += 1e6 * covariance.trace() / n;
-            p_values.push(ChiSquared::new(3.0).unwrap().sf(chi));
+            wall.called[0] |= chi > CHI2_3_95;
+            motions.push(Some((rest, covariance)));
         }
-        wall.called = [p_values.iter().any(|p| *p < 0.05), has_discovery(&mut p_values, 0.05)];
+        wall.called[1] = moved_stones(&motions, 0.05).contains(&true);
         let mean = survey.seeming.iter().sum::<Vector3<f64>>() / n;
         let claimed = found.rigid.covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let off = mean - found.rigid.error.fixed_rows::<3>(0);
@@ -78,14 +79,6 @@ impl Wall {
 
 fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance.cholesky().map_or(f64::INFINITY, |c| v.dot(&c.solve(v)))
-}
-
-/// Whether any test is significant with the false discovery rate controlled (Benjamini & Hochberg 1995).
-fn has_discovery(p_values: &mut [f64], rate: f64) -> bool {
-    p_values.sort_by(f64::total_cmp);
-    let n = p_values.len() as f64;
-    let mut ranked = p_values.iter().enumerate();
-    ranked.any(|(k, p)| *p <= rate * (k + 1) as f64 / n)
 }
 
 pub fn print_head(walls: u64) {

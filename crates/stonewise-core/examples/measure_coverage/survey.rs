@@ -41,9 +41,9 @@ pub struct Survey {
 }
 
 /// Stones along and up.
-const GRID: [usize; 2] = [8, 5];
+const GRID: [usize; 2] = [7, 4];
 /// Points of a source on a stone; fewer than a scan has, with less noise.
-const POINTS: usize = 150;
+const POINTS: usize = 120;
 
 struct Instrument {
     sigma_m: f64,
@@ -64,14 +64,14 @@ fn instrument(sensor: Sensor) -> Instrument {
             thinned_m: 0.0005,
             stone_m: [0.08e-3, 0.03e-3],
             nugget_m: [0.05e-3, 0.02e-3],
-            density: 4000.0,
+            density: 2000.0,
         },
         Sensor::Uav => Instrument {
             sigma_m: 0.011,
             thinned_m: 0.006,
             stone_m: [0.5e-3, 0.2e-3],
             nugget_m: [0.5e-3, 0.2e-3],
-            density: 4000.0,
+            density: 2000.0,
         },
     }
 }
