@@ -104,7 +104,9 @@ impl SourceError {
     pub fn at(&self, target: &Target) -> Vector3<f64> {
         let beam = target.place - self.sensor_for(&target.place);
         let cosine = (-beam.dot(&target.normal) / beam.norm()).clamp(0.0, 1.0);
-        let range = self.scale * beam.norm() + self.incidence_m * (1.0 - cosine) + self.brightness_m * target.brightness;
+        let range = self.scale * beam.norm()
+            + self.incidence_m * (1.0 - cosine)
+            + self.brightness_m * target.brightness;
         let drift = self.drift.as_ref();
         self.shift
             + self.turn.cross(&(target.place - MIDDLE))
@@ -124,7 +126,14 @@ pub fn size_m(sensor: Sensor, rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The sources of one epoch. `shared_m`: what is assumed of the error that they share; `size_m`: of a source's own.
-pub fn draw(sensor: Sensor, count: u32, kind: Kind, size_m: f64, shared_m: f64, seed: u64) -> Vec<SourceError> {
+pub fn draw(
+    sensor: Sensor,
+    count: u32,
+    kind: Kind,
+    size_m: f64,
+    shared_m: f64,
+    seed: u64,
+) -> Vec<SourceError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut vector = |sd: f64| Vector3::from_fn(|_, _| sd * normal(&mut rng));
     let shared_m = match kind {
@@ -141,7 +150,9 @@ pub fn draw(sensor: Sensor, count: u32, kind: Kind, size_m: f64, shared_m: f64, 
         shifts.fill(mean);
     }
     if kind == Kind::Uneven {
-        shifts.iter_mut().for_each(|s| *s = s.component_mul(&Vector3::new(2.0, 0.5, 1.0)));
+        shifts
+            .iter_mut()
+            .for_each(|s| *s = s.component_mul(&Vector3::new(2.0, 0.5, 1.0)));
     }
     let (scale, own) = (vector(1e-5), vector(1.0));
     let jitter: Vec<Vector3<f64>> = (0..count).map(|_| vector(0.3)).collect();
@@ -181,10 +192,26 @@ pub fn draw(sensor: Sensor, count: u32, kind: Kind, size_m: f64, shared_m: f64, 
                 place,
                 squint,
                 shift: shared + shifts[k as usize] * rest,
-                turn: if sensor == Sensor::Tls { turns[k as usize] } else { Vector3::zeros() },
-                scale: if kind == Kind::Scale { 5.0 * scale[k as usize % 3] } else { 0.0 },
-                incidence_m: if kind == Kind::Incidence { 4.0 * size_m } else { 0.0 },
-                brightness_m: if kind == Kind::Brightness { size_m * own[k as usize % 3].abs() } else { 0.0 },
+                turn: if sensor == Sensor::Tls {
+                    turns[k as usize]
+                } else {
+                    Vector3::zeros()
+                },
+                scale: if kind == Kind::Scale {
+                    5.0 * scale[k as usize % 3]
+                } else {
+                    0.0
+                },
+                incidence_m: if kind == Kind::Incidence {
+                    4.0 * size_m
+                } else {
+                    0.0
+                },
+                brightness_m: if kind == Kind::Brightness {
+                    size_m * own[k as usize % 3].abs()
+                } else {
+                    0.0
+                },
                 drift: (sensor == Sensor::Uav).then(|| (flight.clone(), k)),
             }
         })

@@ -78,7 +78,9 @@ impl Wall {
 }
 
 fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
-    covariance.cholesky().map_or(f64::INFINITY, |c| v.dot(&c.solve(v)))
+    covariance
+        .cholesky()
+        .map_or(f64::INFINITY, |c| v.dot(&c.solve(v)))
 }
 
 pub fn print_head(walls: u64) {
@@ -87,15 +89,25 @@ pub fn print_head(walls: u64) {
         .map(|_| (0..walls).filter(|_| rng.random_bool(0.95)).count() as f64 / walls as f64)
         .collect();
     shares.sort_by(f64::total_cmp);
-    println!("a perfect method, all stones of a wall sharing one error: {:.3} to {:.3}", shares[100], shares[3900]);
-    println!("survey | unknown | along up out joint (95 % range of the mean of the axes) | chi-square | rms before after claimed mm | common error / claim | called stone by stone, FDR");
+    println!(
+        "a perfect method, all stones of a wall sharing one error: {:.3} to {:.3}",
+        shares[100], shares[3900]
+    );
+    println!(
+        "survey | unknown | along up out joint (95 % range of the mean of the axes) | chi-square | rms before after claimed mm | common error / claim | called stone by stone, FDR"
+    );
 }
 
 pub fn print(label: &str, walls: &[Wall], seconds: f64) {
-    let known: Vec<Wall> = walls.iter().copied().filter(|w| w.datum != Some(Datum::Unknown)).collect();
+    let known: Vec<Wall> = walls
+        .iter()
+        .copied()
+        .filter(|w| w.datum != Some(Datum::Unknown))
+        .collect();
     let unknown = (walls.len() - known.len()) as f64 / walls.len() as f64;
     let mean = |of: &dyn Fn(&Wall) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
-    let share = |of: &dyn Fn(&Wall) -> bool| walls.iter().filter(|w| of(w)).count() as f64 / walls.len() as f64;
+    let share =
+        |of: &dyn Fn(&Wall) -> bool| walls.iter().filter(|w| of(w)).count() as f64 / walls.len() as f64;
     let inside: Vec<f64> = (0..4).map(|k| mean(&|w| w.inside[k])).collect();
     let [low, high] = bootstrap(&known);
     let rms: Vec<f64> = (0..3).map(|k| (mean(&|w| w.square[k]) / 3.0).sqrt()).collect();
@@ -121,10 +133,18 @@ fn bootstrap(walls: &[Wall]) -> [f64; 2] {
     if walls.is_empty() {
         return [f64::NAN; 2];
     }
-    let of: Vec<f64> = walls.iter().map(|w| w.inside[..3].iter().sum::<f64>() / 3.0).collect();
+    let of: Vec<f64> = walls
+        .iter()
+        .map(|w| w.inside[..3].iter().sum::<f64>() / 3.0)
+        .collect();
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let mut means: Vec<f64> = (0..2000)
-        .map(|_| (0..of.len()).map(|_| of[rng.random_range(0..of.len())]).sum::<f64>() / of.len() as f64)
+        .map(|_| {
+            (0..of.len())
+                .map(|_| of[rng.random_range(0..of.len())])
+                .sum::<f64>()
+                / of.len() as f64
+        })
         .collect();
     means.sort_by(f64::total_cmp);
     [means[50], means[1950]]

@@ -103,7 +103,11 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
     }
     let [inside, across] = what.stone_m;
     let measured = seeming.iter().map(|e| {
-        let own = Vector3::new(across * normal(&mut rng), inside * normal(&mut rng), inside * normal(&mut rng));
+        let own = Vector3::new(
+            across * normal(&mut rng),
+            inside * normal(&mut rng),
+            inside * normal(&mut rng),
+        );
         e + own
     });
     Survey {
@@ -123,7 +127,12 @@ fn time_s(source: usize, place: &Point3<f64>) -> f64 {
 }
 
 /// A stone and the error of the later epoch against the reference there.
-fn stone(k: usize, errors: &[SourceError], what: &Instrument, rng: &mut ChaCha8Rng) -> (SeenStone, Vector3<f64>) {
+fn stone(
+    k: usize,
+    errors: &[SourceError],
+    what: &Instrument,
+    rng: &mut ChaCha8Rng,
+) -> (SeenStone, Vector3<f64>) {
     let [columns, rows] = GRID;
     let (i, j) = ((k % columns) as f64, (k / columns) as f64);
     let up = (j + 0.5) * 3.0 / rows as f64;
@@ -212,7 +221,12 @@ fn patches(stable: Stable) -> Vec<Patch> {
     }
 }
 
-fn stable(kind: Stable, errors: &[SourceError], what: &Instrument, rng: &mut ChaCha8Rng) -> Vec<StablePoints> {
+fn stable(
+    kind: Stable,
+    errors: &[SourceError],
+    what: &Instrument,
+    rng: &mut ChaCha8Rng,
+) -> Vec<StablePoints> {
     let half = errors.len() / 2;
     let patches = patches(kind);
     let mut list = Vec::new();
@@ -244,7 +258,9 @@ fn on_patch(
     let view = error.sensor_for(&middle) - middle;
     let cosine = (normal_of_patch.dot(&view) / view.norm()).abs();
     // Faces turned away show nothing: the one of the two sides of the building that looks at the sensor.
-    let outward = (middle - Point3::new(1.1, 0.0, 0.6)).dot(&normal_of_patch).signum();
+    let outward = (middle - Point3::new(1.1, 0.0, 0.6))
+        .dot(&normal_of_patch)
+        .signum();
     let is_side = patch.area == 1 && normal_of_patch.y.abs() > 0.5;
     if is_side && outward * normal_of_patch.dot(&view) <= 0.0 {
         return Vec::new();

@@ -1,7 +1,7 @@
 //! The error of a later epoch against the reference, at every stone.
 
-use super::component_estimate::estimate;
 use super::assumptions::{Model, whole_m};
+use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
 use super::congruence::standing;
 use super::contrast::{ContrastParams, contrasts};
@@ -151,7 +151,12 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         },
         whole_m: match is_one_survey(pair) {
             true => 0.0,
-            false => whole_m(params.shared_error_m, class, overlaps.then_some(&components), counts(pair)),
+            false => whole_m(
+                params.shared_error_m,
+                class,
+                overlaps.then_some(&components),
+                counts(pair),
+            ),
         },
         plane_m: PLANE_SHARE * params.stable.systematic_share * pair.sigma_m,
         class,

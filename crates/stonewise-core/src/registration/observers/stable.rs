@@ -75,7 +75,9 @@ pub(super) fn stable_observations(
     params: &StableParams,
 ) -> Vec<Observation> {
     let systematic_m = params.systematic_share * sigma_m;
-    let max_scatter_m = (NOISE_SLACK * sigma_m).hypot(ROUGHNESS_M).min(params.max_scatter_m);
+    let max_scatter_m = (NOISE_SLACK * sigma_m)
+        .hypot(ROUGHNESS_M)
+        .min(params.max_scatter_m);
     let cells = columns(list, params.cell_m);
     let planes: Vec<(usize, CellPlane)> = cells
         .par_iter()
@@ -99,9 +101,7 @@ fn plane_numbers(cells: &[(usize, CellPlane)], params: &StableParams) -> Vec<usi
     let is_part = |head: usize, k: usize| {
         let ((area_of_head, head), (area, cell)) = (&cells[head], &cells[k]);
         let off = (cell.centre - head.centre).dot(&head.normal).abs();
-        area_of_head == area
-            && head.normal.dot(&cell.normal).abs() > SAME_PLANE_COSINE
-            && off < params.cell_m
+        area_of_head == area && head.normal.dot(&cell.normal).abs() > SAME_PLANE_COSINE && off < params.cell_m
     };
     let number = |k: usize| {
         let found = heads.iter().position(|&head| is_part(head, k));

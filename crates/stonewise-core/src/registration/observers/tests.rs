@@ -312,7 +312,10 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     let weighted = total.try_inverse().unwrap() * &motion;
     let (expected, of_values) = (motion.transpose() * &weighted, weighted.transpose() * values);
     assert!(expected.norm() > 1e4);
-    assert!((information - &expected).norm() < 1e-6 * expected.norm(), "{information} {expected}");
+    assert!(
+        (information - &expected).norm() < 1e-6 * expected.norm(),
+        "{information} {expected}"
+    );
     assert!((vector - &of_values).norm() < 1e-6 * of_values.norm());
 }
 
