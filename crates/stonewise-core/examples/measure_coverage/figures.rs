@@ -32,10 +32,10 @@ impl Wall {
         let is_known = found.datum != Datum::Unknown;
         let stones = || survey.stones.iter().zip(&survey.measured).enumerate();
         let samples: Vec<DisplacementSample> = stones()
-            .map(|(_, (stone, measured))| DisplacementSample {
+            .map(|(k, (stone, measured))| DisplacementSample {
                 place: stone.centroid,
                 displacement: *measured,
-                covariance: survey.noise,
+                covariance: survey.noise[k],
             })
             .collect();
         let common = SmallMotion::fit(&samples);
@@ -49,9 +49,12 @@ impl Wall {
             let (rest, covariance) = match (&common, is_known) {
                 (Some(common), false) => (
                     measured - common.at(&stone.centroid),
-                    survey.noise + common.covariance_at(&stone.centroid),
+                    survey.noise[k] + common.covariance_at(&stone.centroid),
                 ),
-                _ => (measured - found.at[k].mean, survey.noise + found.at[k].covariance),
+                _ => (
+                    measured - found.at[k].mean,
+                    survey.noise[k] + found.at[k].covariance,
+                ),
             };
             let face = FaceFrame::from_normal(&stone.normal).face_from_world();
             let (error, spread) = (face * rest, face * covariance * face.transpose());

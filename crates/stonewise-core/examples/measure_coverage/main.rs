@@ -3,7 +3,8 @@
 //!
 //! `cargo run --release -p stonewise-core --example measure_coverage [WORD ...]`. Words: sensors `tls uav` (default both), kinds of
 //! error by their names (`usual walk jump ...`, see [`errors::Kind`]; default all), `sources=2,3` (numbers of stations or strips of an
-//! epoch), `stable=none,ground,building,moved` (default none), `walls=N` (of a row, default 200), `first=N` (seed of the first wall).
+//! epoch), `stable=none,ground,building,moved` (default none), `walls=N` (of a row, default 200), `first=N` (seed of the first wall),
+//! `full` (walls of 3 x 2 m with a bulge, scanned and adjusted; minutes for a few walls; no stable areas).
 //!
 //! A row pools the stones of its walls. Errors are shared by all stones of a wall, so ranges are those of walls drawn anew (percentile
 //! bootstrap, Efron 1979); the first row says between which figures the coverage of a perfect method would lie.
@@ -11,6 +12,7 @@
 
 mod errors;
 mod figures;
+mod full;
 mod survey;
 
 use errors::{Kind, Sensor};
@@ -48,7 +50,7 @@ fn main() {
                     let started = std::time::Instant::now();
                     let found: Vec<Wall> = (first..first + walls)
                         .into_par_iter()
-                        .map(|seed| measure(&case, seed))
+                        .map(|seed| measure(&case, seed, has("full")))
                         .collect();
                     let label = format!("{sensor_name} {sources} {stable} {kind_name}");
                     print(&label, &found, started.elapsed().as_secs_f64());
@@ -67,8 +69,11 @@ fn stable_of(word: &str) -> Stable {
     }
 }
 
-fn measure(case: &Case, seed: u64) -> Wall {
-    let survey = simulate(case, seed);
+fn measure(case: &Case, seed: u64, is_full: bool) -> Wall {
+    let survey = match is_full {
+        true => full::simulate(case, seed),
+        false => simulate(case, seed),
+    };
     let same: Vec<usize> = (0..survey.sources.len()).collect();
     let pair = EpochPair {
         sources: &survey.sources,

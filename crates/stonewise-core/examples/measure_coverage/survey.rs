@@ -35,9 +35,9 @@ pub struct Survey {
     pub sigma_m: f64,
     /// Error of the later epoch against the reference at each stone: what a still stone seems to move.
     pub seeming: Vec<Vector3<f64>>,
-    /// The same with the noise that the adjustment leaves, and its covariance.
+    /// The same with the noise that the adjustment leaves, and its covariances.
     pub measured: Vec<Vector3<f64>>,
-    pub noise: Matrix3<f64>,
+    pub noise: Vec<Matrix3<f64>>,
 }
 
 /// Stones along and up.
@@ -112,7 +112,10 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
     });
     Survey {
         measured: measured.collect(),
-        noise: Matrix3::from_diagonal(&Vector3::new(across, inside, inside).map(|s| s * s)),
+        noise: vec![
+            Matrix3::from_diagonal(&Vector3::new(across, inside, inside).map(|s| s * s));
+            seeming.len()
+        ],
         stable: stable(case.stable, &errors, &what, &mut rng),
         sources,
         stones,

@@ -1,7 +1,13 @@
 //! What is held while the errors of the epochs are solved for.
 
 use super::components::{ObserverComponents, SensorClass};
-use super::model::Prior;
+use super::model::{Prior, Problem, Unknowns};
+use super::observation::Observation;
+
+/// Factor on the error of the whole epoch where areas are to speak for themselves.
+pub(super) const OPEN: f64 = 5.0;
+/// An error of the whole epoch this many times as large as assumed shows that the assumption does not hold.
+const SURPRISING: f64 = 2.0;
 
 /// Standard deviations of all errors.
 #[derive(Clone, Copy)]
@@ -26,6 +32,21 @@ impl Model {
     pub fn with_whole(&self, factor: f64) -> (Prior, ObserverComponents) {
         let prior = Prior::with_planes(&self.components, factor * self.whole_m, self.plane_m);
         (prior, self.components)
+    }
+
+    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is assumed: an assumption that does
+    /// not hold would pull the error towards none.
+    pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
+        let (prior, components) = self.with_whole(OPEN);
+        let solution = Problem::new(unknowns, observations).solve(&prior, &components);
+        let shown_m = solution.map_or(0.0, |s| s.mean.fixed_rows::<3>(unknowns.whole()).amax());
+        match shown_m > SURPRISING * self.whole_m && self.whole_m > 0.0 {
+            true => Self {
+                whole_m: OPEN.max(shown_m / self.whole_m) * self.whole_m,
+                ..self
+            },
+            false => self,
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which stable areas stood still.
 
-use super::assumptions::Model;
+use super::assumptions::{Model, OPEN};
 use super::model::{Problem, Solution, Unknowns};
 use super::observation::Observation;
 use super::sight::StablePlane;
@@ -11,15 +11,13 @@ use std::collections::BTreeSet;
 /// Probability at which something is left out that stood still, divided by the number of things tested: the first step of Benjamini &
 /// Hochberg (1995).
 const RATE: f64 = 0.01;
-/// Factor on the error of the whole epoch in the comparison: areas are judged by each other, not by what the epochs may be off.
-const OPEN: f64 = 5.0;
 /// A direction is seen where the motion along it is known to this, metres.
 const SEEN_M: f64 = 0.05;
 
 /// The observations of what stood still, and the areas that moved.
 ///
 /// One after the other, the area that moved most significantly against all others is left out (data snooping, Baarda 1968); the last one
-/// stays, because nothing is there to doubt it. Then the same with single planes, among which are edges, plants and things that somebody
+/// stays, because nothing is there to doubt it. Areas are judged by each other, not by what the epochs may be off. Then the same with single planes, among which are edges, plants and things that somebody
 /// put there.
 pub(super) fn standing(
     unknowns: &Unknowns,

@@ -177,6 +177,10 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         moved_areas.clear();
     }
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
+    let model = match datum {
+        Datum::Stable => model.widened(&unknowns, &all),
+        _ => model,
+    };
     let weights = weights(&unknowns, &all, &model);
     let reweighted: Vec<Observation> = all
         .iter()

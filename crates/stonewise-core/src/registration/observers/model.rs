@@ -122,6 +122,11 @@ impl Unknowns {
         self.blocks[self.of_source[source]].first
     }
 
+    /// First unknown of the later epoch's error as a whole.
+    pub fn whole(&self) -> usize {
+        self.whole
+    }
+
     /// How a sight's error depends on the unknowns.
     pub fn row(&self, sight: &Sight) -> Row {
         let block = &self.blocks[self.of_source[sight.source]];

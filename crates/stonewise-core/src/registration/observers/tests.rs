@@ -355,6 +355,32 @@ fn an_area_that_moved_is_named_and_left_out() {
 }
 
 #[test]
+fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
+    // A scanner's epochs that are off by 30 mm, where half a millimetre is assumed.
+    let off = Vector3::new(0.02, -0.015, 0.015);
+    let errors = [
+        Vector3::new(0.0002, 0.0, -0.0003),
+        Vector3::new(-0.0002, 0.0003, 0.0),
+        off + Vector3::new(0.0003, 0.0, 0.0),
+        off + Vector3::new(-0.0003, 0.0002, 0.0),
+    ];
+    let (stones, sources) = (wall(&errors, 0.002, 1), sources(2));
+    let pair = EpochPair {
+        sources: &sources,
+        same_as: &[0, 1, 2, 3],
+        stones: &stones,
+        stable: &stable_points(&errors, 0.002),
+        sigma_m: 0.002,
+    };
+    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
+    for at in &found.at {
+        let rest = at.mean - truth;
+        assert!(rest.norm() < 3e-4, "{rest}");
+    }
+}
+
+#[test]
 fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     let errors = [
         Vector3::new(0.001, 0.0, -0.001),
