@@ -39,6 +39,26 @@ pub(super) fn standing(
     (kept, moved)
 }
 
+/// The observations with their weights, the error of the whole epoch left open.
+pub(super) fn reweighted(
+    unknowns: &Unknowns,
+    observations: &[&Observation],
+    model: &Model,
+) -> Vec<Observation> {
+    let problem = Problem::new(unknowns, observations);
+    let (prior, components) = model.with_whole(OPEN);
+    let solution = problem.solve(&prior, &components);
+    let weights = solution.map_or_else(
+        || vec![1.0; observations.len()],
+        |s| problem.weights(&s.mean, &components),
+    );
+    let weighted = observations.iter().zip(weights).map(|(o, weight)| Observation {
+        weight,
+        ..(*o).clone()
+    });
+    weighted.collect()
+}
+
 /// Of the groups of cells, the one that moved most significantly, if any did; the only one there is never.
 fn most_moved<G: Ord + Copy>(
     unknowns: &Unknowns,
@@ -53,8 +73,9 @@ fn most_moved<G: Ord + Copy>(
         return None;
     }
     let all: Vec<&Observation> = within.iter().copied().chain(stable).collect();
+    let all = reweighted(unknowns, &all, model);
     let (prior, components) = model.with_whole(OPEN);
-    let problem = Problem::new(unknowns, &all);
+    let problem = Problem::new(unknowns, &all.iter().collect::<Vec<_>>());
     let solution: Solution = problem.solve(&prior, &components)?;
     let p_still = |g: G| {
         let (information, vector) = problem.motion_of(&solution, &components, |o| of(o) == Some(g));

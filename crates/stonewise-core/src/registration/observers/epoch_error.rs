@@ -3,7 +3,7 @@
 use super::assumptions::{Model, whole_m};
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
-use super::congruence::standing;
+use super::congruence::{reweighted, standing};
 use super::contrast::{ContrastParams, contrasts};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
@@ -116,10 +116,6 @@ pub struct EpochPair<'a> {
 /// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one degree of freedom,
 /// half of whose weight is at zero (Self & Liang 1987).
 const SIGNIFICANT: f64 = 2.71;
-/// An observation whose squared residual per difference exceeds this loses weight.
-const MISFIT: f64 = 9.0;
-/// The same for a cell of a stable area: an edge of a building is worth less than a stone.
-const CELL_MISFIT: f64 = 4.0;
 /// Factors on the sources' errors over which their uncertainty is averaged, logarithms.
 const FACTORS: [f64; 9] = [-1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2];
 /// Factors whose posterior weight is a smaller share of the best one's are left out.
@@ -181,15 +177,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         Datum::Stable => model.widened(&unknowns, &all),
         _ => model,
     };
-    let weights = weights(&unknowns, &all, &model);
-    let reweighted: Vec<Observation> = all
-        .iter()
-        .zip(&weights)
-        .map(|(o, w)| Observation {
-            weight: *w,
-            ..(*o).clone()
-        })
-        .collect();
+    let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
     EpochErrors {
         datum,
@@ -255,11 +243,7 @@ fn estimated(
         if round == 0
             && let Some(solution) = problem.solve(&prior, &components)
         {
-            let weights: Vec<f64> = problem
-                .misfits(&solution.mean, &components)
-                .iter()
-                .map(|m| weight(*m, MISFIT))
-                .collect();
+            let weights = problem.weights(&solution.mean, &components);
             within
                 .iter_mut()
                 .flatten()
@@ -274,29 +258,6 @@ fn estimated(
         .zip(deviance(&components))
         .map_or(0.0, |(without, with)| without - with);
     (components, gain)
-}
-
-/// Share of its weight that an observation keeps.
-fn weight(misfit: f64, limit: f64) -> f64 {
-    if misfit > limit { limit / misfit } else { 1.0 }
-}
-
-/// Weights of the observations: stones and cells that do not fit the rest are disturbed.
-fn weights(unknowns: &Unknowns, observations: &[&Observation], model: &Model) -> Vec<f64> {
-    let problem = Problem::new(unknowns, observations);
-    let (prior, components) = model.scaled(1.0);
-    let Some(solution) = problem.solve(&prior, &components) else {
-        return vec![1.0; observations.len()];
-    };
-    let misfits = problem.misfits(&solution.mean, &components);
-    observations
-        .iter()
-        .zip(misfits)
-        .map(|(o, misfit)| match o.plane() {
-            Some(_) => weight(misfit, CELL_MISFIT),
-            None => weight(misfit, MISFIT),
-        })
-        .collect()
 }
 
 /// Components of sources whose errors only stable areas show.

@@ -11,6 +11,10 @@ const SIGHTS_PER_KNOT: usize = 8;
 const KNOTS: [usize; 2] = [4, 20];
 /// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix invertible.
 const KNOT_NUGGET: f64 = 1e-6;
+/// An observation whose squared residual per difference exceeds this loses weight; cells of stable areas lose it earlier, because an edge of a
+/// building is worth less than a stone.
+const MISFIT: f64 = 9.0;
+const CELL_MISFIT: f64 = 4.0;
 /// Standard deviation that stands for none, metres.
 const LEAST_M: f64 = 1e-7;
 
@@ -390,8 +394,18 @@ impl<'a> Problem<'a> {
         (information - explained.fixed_view::<3, 3>(0, 0), vector)
     }
 
+    /// Weight that each observation keeps: stones and cells that do not fit the rest are disturbed.
+    pub fn weights(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+        let weight = |(misfit, (o, _, _)): (f64, &(&Observation, _, _))| {
+            let limit = if o.plane().is_some() { CELL_MISFIT } else { MISFIT };
+            if misfit > limit { limit / misfit } else { 1.0 }
+        };
+        let misfits = self.misfits(mean, components);
+        misfits.into_iter().zip(&self.designs).map(weight).collect()
+    }
+
     /// Squared standardised residual of each observation per difference, at `mean`.
-    pub fn misfits(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+    fn misfits(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
         let misfit = |(observation, indices, design): &(&Observation, Vec<usize>, DMatrix<f64>)| {
             let part = DVector::from_iterator(indices.len(), indices.iter().map(|&i| mean[i]));
             let residual = &observation.values - design * part;

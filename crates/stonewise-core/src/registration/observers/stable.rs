@@ -75,9 +75,7 @@ pub(super) fn stable_observations(
     params: &StableParams,
 ) -> Vec<Observation> {
     let systematic_m = params.systematic_share * sigma_m;
-    let max_scatter_m = (NOISE_SLACK * sigma_m)
-        .hypot(ROUGHNESS_M)
-        .min(params.max_scatter_m);
+    let max_scatter_m = (NOISE_SLACK * sigma_m).hypot(ROUGHNESS_M);
     let cells = columns(list, params.cell_m);
     let planes: Vec<(usize, CellPlane)> = cells
         .par_iter()
@@ -213,7 +211,8 @@ impl CellPlane {
         counts.retain(|source, n| *n >= params.min_points && shows_plane(&kept, *source, &plane.1, params));
         kept.retain(|p| counts.contains_key(&p.source));
         let (centre, normal, spread) = plane_of(&kept)?;
-        let is_plane = spread[0].sqrt() <= max_scatter_m
+        let is_plane = spread[0].sqrt() <= params.max_scatter_m
+            && scatter(&kept, &normal) <= max_scatter_m
             && spread[1].sqrt() >= LEAST_EXTENT * params.cell_m
             && spread[0] < 0.25 * spread[1];
         kept.sort_by_key(|p| p.source);
@@ -293,6 +292,18 @@ impl CellPlane {
             plane: Some(of),
         }
     }
+}
+
+/// Scatter of the points along a normal, each source about its own mean, metres.
+fn scatter(points: &[CellPoint], normal: &Vector3<f64>) -> f64 {
+    let mut sums: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
+    for p in points {
+        let height = (p.place - points[0].place).dot(normal);
+        let sum = sums.entry(p.source).or_default();
+        *sum = [sum[0] + 1.0, sum[1] + height, sum[2] + height * height];
+    }
+    let squares: f64 = sums.values().map(|[n, h, hh]| hh - h * h / n).sum();
+    (squares.max(0.0) / points.len().max(1) as f64).sqrt()
 }
 
 /// Whether the points of a source extend over a plane of that normal by themselves: those at an edge, or on another thing, show another.

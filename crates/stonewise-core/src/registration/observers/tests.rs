@@ -311,7 +311,7 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     }
     let weighted = total.try_inverse().unwrap() * &motion;
     let (expected, of_values) = (motion.transpose() * &weighted, weighted.transpose() * values);
-    assert!(expected.norm() > 1e4);
+    assert!(expected.norm() > 1e2, "{expected}");
     assert!(
         (information - &expected).norm() < 1e-6 * expected.norm(),
         "{information} {expected}"
@@ -393,6 +393,14 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     let mut alone = stones[7].clone();
     alone.sights.retain(|s| s.source % 2 == 0);
     stones.push(alone);
+    // The halves of a source are measured at the same times.
+    for s in stones
+        .iter_mut()
+        .flat_map(|s| &mut s.sights)
+        .filter(|s| s.source >= 2)
+    {
+        s.time_s -= 20.0;
+    }
     let sources = sources(2);
     let pair = EpochPair {
         sources: &sources,
