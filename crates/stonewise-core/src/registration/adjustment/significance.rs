@@ -66,7 +66,7 @@ fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
 
 /// Tests that are significant when the share of false ones among them is to be at most `rate` (Benjamini &
 /// Hochberg 1995).
-fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
+pub(crate) fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
     let mut sorted: Vec<(f64, usize)> = p_values
         .iter()
         .enumerate()

@@ -202,6 +202,16 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
         .epoch_errors
         .as_ref()
         .is_some_and(|e| e.datum == observers::Datum::Stable);
+    if let Some(errors) = &registered.epoch_errors
+        && !errors.moved_areas.is_empty()
+    {
+        let numbers: Vec<String> = errors.moved_areas.iter().map(|a| (a + 1).to_string()).collect();
+        let message = format!(
+            "[[registration.stable]] number {} moved against the other stable areas and is left out",
+            numbers.join(", ")
+        );
+        context.warnings.skipped(STEP, epoch, message);
+    }
     if named > 0 && !is_stable {
         let message = format!(
             "[[registration.stable]] does not show the epochs' registration: {cells} plane cells seen in both epochs are too few; it is \
