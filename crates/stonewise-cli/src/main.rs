@@ -1,74 +1,7 @@
-//! The `stonewise` command: reads arguments, calls the library, prints.
-
-mod args;
-mod commands;
-mod printer;
+//! The `stonewise` command, see the library of this crate.
 
 use std::process::ExitCode;
 
-/// Everything that was asked for was done.
-const DONE: u8 = 0;
-/// Something failed.
-const FAILED: u8 = 1;
-/// Wrong arguments, or a wrong project file.
-const WRONG_USAGE: u8 = 2;
-/// Finished, but some inputs were left out, or the results as a whole are in doubt.
-const IN_DOUBT: u8 = 3;
-
 fn main() -> ExitCode {
-    let args = <args::Args as clap::Parser>::parse();
-    let printer = printer::Printer::new(args.quiet);
-    let outcome = commands::dispatch(args, &printer);
-    printer.finish();
-    match outcome {
-        Ok(commands::Outcome::Done) => ExitCode::from(DONE),
-        Ok(commands::Outcome::InDoubt) => ExitCode::from(IN_DOUBT),
-        Err(error) => {
-            printer::note(&format!("error: {}", explain(&error)));
-            ExitCode::from(if is_wrong_usage(&error) {
-                WRONG_USAGE
-            } else {
-                FAILED
-            })
-        }
-    }
-}
-
-/// Whether the command was given something that cannot be.
-fn is_wrong_usage(error: &anyhow::Error) -> bool {
-    let known = |cause: &(dyn std::error::Error + 'static)| {
-        cause.downcast_ref().is_some_and(stonewise::Error::is_wrong_usage)
-    };
-    error.chain().any(known)
-}
-
-/// The error and its causes in one line; a cause that is part of the text already is not said twice.
-fn explain(error: &anyhow::Error) -> String {
-    error.chain().fold(String::new(), |text, cause| {
-        let cause = cause.to_string();
-        match text.as_str() {
-            "" => cause,
-            said if said.contains(&cause) => text,
-            said => format!("{said}: {cause}"),
-        }
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use anyhow::Context;
-
-    #[test]
-    fn no_cause_is_said_twice() {
-        let io = std::io::Error::other("disk on fire");
-        let error = Err::<(), _>(io)
-            .context("writing failed: disk on fire: a.csv")
-            .context("the run is not finished");
-        let text = explain(&error.unwrap_err());
-        assert_eq!(
-            text,
-            "the run is not finished: writing failed: disk on fire: a.csv"
-        );
-    }
+    ExitCode::from(stonewise_cli::main_with_args(std::env::args_os()))
 }

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::results::{Status, StoneRow};
 use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
+use stonewise_core::progress::Progress;
 
 /// Runs a project as far as asked.
 pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -17,20 +18,29 @@ pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> 
 
 /// The same in a folder that is claimed already.
 pub fn run_in(folder: &OutputFolder, project: &Project, until: Until, printer: &Printer) -> Result<Outcome> {
-    let out = folder.path();
-    let summary = stonewise::run(project, folder, until, printer)
-        .with_context(|| unfinished(out))
-        .with_context(|| format!("{} is not finished", project.name))?;
+    let summary = measure(folder, project, until, printer)?;
     printer.finish();
     tell(project, &summary, printer);
     if until == Until::Reported {
-        printer.log(&format!("results: {}", out.display()));
+        printer.log(&format!("results: {}", folder.path().display()));
     }
     Ok(if summary.skipped_inputs() || summary.doubts().next().is_some() {
         Outcome::InDoubt
     } else {
         Outcome::Done
     })
+}
+
+/// Runs a project as far as asked; an error says where the results of the last finished run are.
+pub fn measure(
+    folder: &OutputFolder,
+    project: &Project,
+    until: Until,
+    progress: &dyn Progress,
+) -> Result<Summary> {
+    stonewise::run(project, folder, until, progress)
+        .with_context(|| unfinished(folder.path()))
+        .with_context(|| format!("{} is not finished", project.name))
 }
 
 /// Where results of an earlier run are now.
