@@ -36,7 +36,11 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(commands::Outcome::InDoubt) => IN_DOUBT,
         Err(error) => {
             printer::note(&format!("error: {}", explain(&error)));
-            if is_wrong_usage(&error) { WRONG_USAGE } else { FAILED }
+            if is_wrong_usage(&error) {
+                WRONG_USAGE
+            } else {
+                FAILED
+            }
         }
     }
 }

@@ -14,9 +14,7 @@ use std::sync::Arc;
 use stonewise::Settings;
 use stonewise::results::{Reference, StoneRow, stone_table};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{
-    Bounds, Camera, DisplacementSample, Plane, SmallMotion, View, cell_of,
-};
+use stonewise_core::geometry::{Bounds, Camera, DisplacementSample, Plane, SmallMotion, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::Progress;
@@ -94,13 +92,20 @@ fn measure(
     let matched = first.matched(&second, settings);
     let pairs = gather(&first, &second, &matched, settings.registration.border_noises);
     progress.check()?;
-    let adjusted = adjust_pairs(&MemoryPairs::new(pairs), &settings.registration.adjustment, progress);
+    let adjusted = adjust_pairs(
+        &MemoryPairs::new(pairs),
+        &settings.registration.adjustment,
+        progress,
+    );
     let mut report = adjusted.map_err(|e| match e {
         stonewise_core::registration::AdjustError::Interrupted(_) => stonewise::Error::Interrupted,
         e => stonewise::Error::Registration(e.to_string()),
     })?;
     report.results.sort_by_key(|r| r.first);
-    Ok((stone_table(&rows(&first, &second, &matched, &report.results))?, report))
+    Ok((
+        stone_table(&rows(&first, &second, &matched, &report.results))?,
+        report,
+    ))
 }
 
 impl Epoch {
@@ -137,7 +142,9 @@ impl Epoch {
         (0..tiles.tile_count()).flat_map(move |tile| {
             let Ok(cloud) = tiles.load(tile);
             let labels = &self.labels.tiles[tile].stone;
-            (0..cloud.len()).map(move |i| (cloud.world(i), labels[i])).collect::<Vec<_>>()
+            (0..cloud.len())
+                .map(move |i| (cloud.world(i), labels[i]))
+                .collect::<Vec<_>>()
         })
     }
 
@@ -171,7 +178,10 @@ impl Epoch {
     fn extents(&self) -> BTreeMap<u32, Bounds> {
         let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
         for (place, stone) in self.points().filter(|p| p.1 != 0) {
-            let point = Bounds { min: place, max: place };
+            let point = Bounds {
+                min: place,
+                max: place,
+            };
             let extent = extents.entry(stone).or_insert(point);
             *extent = extent.union(&point);
         }
@@ -218,7 +228,12 @@ fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f
 }
 
 fn pairs(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f64) -> Vec<Pair> {
-    let by_id = |stones: &[Stone]| stones.iter().map(|s| (s.id, s.clone())).collect::<BTreeMap<_, _>>();
+    let by_id = |stones: &[Stone]| {
+        stones
+            .iter()
+            .map(|s| (s.id, s.clone()))
+            .collect::<BTreeMap<_, _>>()
+    };
     let (ones, twos) = (by_id(&first.stones), by_id(&second.stones));
     let partners = matched.outcomes.iter().filter_map(|(id, outcome)| match outcome {
         MatchOutcome::Matched { second } => Some((ones.get(id)?.clone(), twos.get(second)?.clone())),
@@ -299,12 +314,21 @@ fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairRes
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
-        let reference = common.as_ref().map_or_else(Reference::default, |common| Reference {
-            motion: common.at(&stone.centroid),
-            covariance: common.covariance_at(&stone.centroid),
-        });
+        let reference = common
+            .as_ref()
+            .map_or_else(Reference::default, |common| Reference {
+                motion: common.at(&stone.centroid),
+                covariance: common.covariance_at(&stone.centroid),
+            });
         let pair = motions.get(&stone.id).copied();
-        Some(StoneRow::new(stone, outcome, partner, pair, &reference, &Point2::origin()))
+        Some(StoneRow::new(
+            stone,
+            outcome,
+            partner,
+            pair,
+            &reference,
+            &Point2::origin(),
+        ))
     };
     first.stones.iter().filter_map(row).collect()
 }
@@ -312,7 +336,12 @@ fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairRes
 /// The common rigid motion of the measured stones that are not loose.
 fn common_motion(stones: &[Stone], motions: &BTreeMap<StoneId, &PairResult>) -> Option<SmallMotion> {
     let sample = |stone: &Stone| {
-        let motion = motions.get(&stone.id)?.motion.as_ref().ok().filter(|m| !m.loose)?;
+        let motion = motions
+            .get(&stone.id)?
+            .motion
+            .as_ref()
+            .ok()
+            .filter(|m| !m.loose)?;
         Some(DisplacementSample {
             place: stone.centroid,
             displacement: motion.displacement,
@@ -336,7 +365,8 @@ fn view_from(place: &Point3<f64>, number: u32) -> View {
 fn in_front(points: &[Point3<f64>], labels: &[u32]) -> Vec<Point3<f64>> {
     let labelled = || {
         let all = points.iter().zip(labels);
-        all.filter(|(p, l)| **l != 0 && p.iter().all(|c| c.is_finite())).map(|(p, _)| *p)
+        all.filter(|(p, l)| **l != 0 && p.iter().all(|c| c.is_finite()))
+            .map(|(p, _)| *p)
     };
     let stride = (labelled().count() / PLANE_POINTS).max(1);
     let sample: Vec<Point3<f64>> = labelled().step_by(stride).collect();

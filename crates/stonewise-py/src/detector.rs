@@ -27,11 +27,15 @@ impl Detector {
     fn new(py: Python<'_>, model: PathBuf, tiling: &str) -> PyResult<Self> {
         let tiling = parameters_of(tiling)?;
         let parameters = Map::from_iter([("segment".to_owned(), json!({ "tiling": Value::Object(tiling) }))]);
-        let settings = Settings::default().with_parameters(&parameters).map_err(explained)?;
+        let settings = Settings::default()
+            .with_parameters(&parameters)
+            .map_err(explained)?;
         let tiling = settings.segment.tiling;
         let weights = Weights::named(&model);
         let min_score = tiling.min_score as f32;
-        let finder = py.detach(|| StoneFinder::open(&weights, min_score)).map_err(explained)?;
+        let finder = py
+            .detach(|| StoneFinder::open(&weights, min_score))
+            .map_err(explained)?;
         Ok(Self { finder, tiling })
     }
 

@@ -3,8 +3,8 @@
 use crate::arrays::{from_vectors, points, vectors};
 use crate::attended::{Listeners, attended};
 use crate::error::{error, explained};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use nalgebra::{Point3, Vector3};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use stonewise_core::change::{
     ChangePoint, M3c2Params, OutwardReference, estimate_normals, m3c2 as compare, thin_to_voxels,
@@ -109,14 +109,17 @@ fn measure(
         let normals: Vec<Option<Vector3<f64>>> = match given {
             Some(normals) => {
                 let start = number * BATCH;
-                let unit = |n: &Vector3<f64>| n.try_normalize(0.0).filter(|n| n.iter().all(|c| c.is_finite()));
+                let unit =
+                    |n: &Vector3<f64>| n.try_normalize(0.0).filter(|n| n.iter().all(|c| c.is_finite()));
                 normals[start..start + batch.len()].iter().map(unit).collect()
             }
             None => estimate_normals(&first, batch, params.normal_radius_m, outward),
         };
         let usable = batch.iter().zip(&normals).filter_map(|(p, n)| Some((*p, (*n)?)));
         let (places, directions): (Vec<Point3<f64>>, Vec<Vector3<f64>>) = usable.unzip();
-        let mut measured = compare(&first, &second, &places, &directions, params).points.into_iter();
+        let mut measured = compare(&first, &second, &places, &directions, params)
+            .points
+            .into_iter();
         found.extend(batch.iter().zip(&normals).map(|(position, normal)| {
             let of_normal = normal.and_then(|_| measured.next());
             of_normal.unwrap_or_else(|| without_normal(*position))
@@ -146,7 +149,9 @@ pub fn thin<'py>(
     spacing: f64,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     if !(spacing.is_finite() && spacing > 0.0) {
-        return Err(error(format!("core_spacing is {spacing}, it must be a positive length in metres")));
+        return Err(error(format!(
+            "core_spacing is {spacing}, it must be a positive length in metres"
+        )));
     }
     let cloud = points(&points_1)?;
     let kept = py.detach(|| thin_to_voxels(&cloud, spacing));

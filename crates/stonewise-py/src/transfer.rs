@@ -45,9 +45,8 @@ pub fn transfer<'py>(
     let found = attended(py, &Listeners::progress(progress), |progress| {
         let tiled = Tiled::new(&cloud, settings.ingest.size_m);
         let mut store = MemoryLabels::default();
-        let mask = |image: ImageId| {
-            Ok::<_, Infallible>(images.get_mut(image.0 as usize).and_then(Option::take))
-        };
+        let mask =
+            |image: ImageId| Ok::<_, Infallible>(images.get_mut(image.0 as usize).and_then(Option::take));
         let (tiles, params) = (&tiled.tiles, &settings.label);
         transfer_labels(tiles, &views, mask, &mut store, params, progress).map_err(stonewise::Error::from)?;
         let (mut stones, mut shares) = (vec![0i32; cloud.len()], vec![0f32; cloud.len()]);

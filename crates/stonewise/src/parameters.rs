@@ -136,10 +136,17 @@ mod tests {
     fn errors_name_table_and_key() {
         let error = |parameters| with(parameters).unwrap_err().to_string();
         let unknown = error(json!({"match": {"max_ration": 0.5}}));
-        assert!(unknown.starts_with("match: unknown field `max_ration`"), "{unknown}");
+        assert!(
+            unknown.starts_with("match: unknown field `max_ration`"),
+            "{unknown}"
+        );
         assert!(error(json!({"matches": {}})).contains("unknown field `matches`"));
         assert!(error(json!({"match": {"max_ratio": "much"}})).contains("match: invalid type"));
         assert!(error(json!({"match": {"min_area_ratio": 1.5}})).contains("share"));
-        assert!(with(json!({"match": {"max_ratio": -1.0}})).unwrap_err().is_wrong_usage());
+        assert!(
+            with(json!({"match": {"max_ratio": -1.0}}))
+                .unwrap_err()
+                .is_wrong_usage()
+        );
     }
 }
