@@ -201,7 +201,7 @@ class Results(Pair):
         """The folder."""
 
     def __repr__(self) -> str:
-        return f"Results({str(self.path)!r}: {self.stones_arrow.num_rows} stones, {len(self.pairs)} later epochs)"
+        return f"Results({str(self.path)!r}: {self.stones_arrow.num_rows} stones, {len(self.pairs) + 1} epochs)"
 
     @functools.cached_property
     def record(self) -> dict[str, Any]:

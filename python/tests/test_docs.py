@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import json
 import os
 import pkgutil
 import re
@@ -41,3 +42,16 @@ def test_the_page(survey, tmp_path, monkeypatch):
         exec(compile(example, str(PAGE), "exec"), names)
     assert os.path.isfile("results/stones.parquet")
     assert (names["stones"][0] > 0).any()
+
+
+def test_the_notebook(tmp_path, monkeypatch):
+    """All cells of the notebook, in its order."""
+    pytest.importorskip("geopandas")
+    pytest.importorskip("matplotlib").use("agg")
+    monkeypatch.chdir(tmp_path)
+    notebook = json.loads((PAGE.parent / "two-clouds-to-a-map.ipynb").read_text())
+    names: dict[str, object] = {}
+    for number, cell in enumerate(notebook["cells"]):
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), f"cell {number}", "exec"), names)
+    assert os.path.getsize("map.png") > 10_000
