@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 
@@ -13,4 +12,4 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from ._native import command
 
-    sys.exit(command([os.fspath(sys.argv[0]), *sys.argv[1:]]))
+    sys.exit(command(["stonewise", *sys.argv[1:]]))

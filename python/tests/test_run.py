@@ -104,7 +104,7 @@ def test_progress_is_told_and_other_threads_go_on(survey, tmp_path):
         ticking.join()
     assert {"masks", "labels", "adjust", "M3C2"} <= {what for what, _, _ in told}
     assert all(0 <= done <= total for _, done, total in told)
-    assert ticks > 100 * (time.monotonic() - started)
+    assert ticks > 10 * (time.monotonic() - started)
 
 
 def test_an_exception_of_the_callback_stops_the_run(survey, results, tmp_path):
