@@ -74,7 +74,7 @@ class Pair:
     @functools.cached_property
     def stones_arrow(self) -> pa.Table:
         """``stones.parquet`` as an Arrow table; unit and meaning of the columns are in ``schema.metadata``."""
-        return pa.parquet.read_table(self._file("stones", "parquet"))
+        return _read_parquet(self._file("stones", "parquet"))
 
     @property
     def displacement(self) -> NDArray[np.float64]:
@@ -231,7 +231,7 @@ class Results(Pair):
         """The same as an Arrow table."""
         path = self.path / "series.parquet"
         if path.is_file():
-            return pa.parquet.read_table(path)
+            return _read_parquet(path)
         names = self.epochs[1:2] or [""]
         epoch = pa.array(names * self.stones_arrow.num_rows, type=pa.string())
         return self.stones_arrow.add_column(0, "epoch", epoch)
@@ -265,6 +265,14 @@ class Results(Pair):
     def report(self) -> Path:
         """The report: one file for a browser."""
         return self.path / "report" / "index.html"
+
+
+def _read_parquet(path: Path) -> pa.Table:
+    try:
+        with pa.parquet.ParquetFile(path) as file:
+            return file.read()
+    except (OSError, pa.ArrowException) as error:
+        raise Error(f"{error}; make it anew with `stonewise run`: {path}") from error
 
 
 def _read_json(path: Path) -> Any:

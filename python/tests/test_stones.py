@@ -68,7 +68,7 @@ def test_adjust_is_a_run_whose_motions_are_not_corrected(survey, results, epochs
         assert motion.stones_arrow[column].to_pylist() == stated.stones_arrow[column].to_pylist(), column
     measured = np.isfinite(stated.displacement[:, 0])
     assert measured.sum() > 10
-    np.testing.assert_allclose(motion.displacement, stated.displacement, atol=1e-9)
+    np.testing.assert_array_equal(motion.displacement, stated.displacement)
     assert np.isfinite(motion.covariance[measured]).all()
     # Which side of the wall is outside hardly matters to the motion in world axes.
     alone = stonewise.adjust(first, labels_1, second, labels_2)
@@ -86,7 +86,7 @@ def test_adjust_checks_what_it_is_given():
 def test_views_project():
     turn = [[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]  # looks along -x, z is up
     view = stonewise.View(800, 600, 1000.0, turn, [5.0, 0.0, 1.0], name="a")
-    np.testing.assert_allclose(view.centre, [5.0, 0.0, 1.0])
+    np.testing.assert_allclose(view.centre, [5.0, 0.0, 1.0], atol=1e-12)
     pixels = view.project(np.array([[0.0, 0.0, 1.0], [0.0, 0.5, 1.0], [0.0, 0.0, 1.5], [9.0, 0.0, 1.0]]))
     np.testing.assert_allclose(pixels[:3], [[400.0, 300.0], [500.0, 300.0], [400.0, 200.0]], atol=1e-9)
     assert np.isnan(pixels[3]).all()

@@ -132,7 +132,7 @@ impl Epoch {
         Ok(Self {
             tiled,
             labels: store,
-            stones,
+            stones: handed_over(&stones)?,
         })
     }
 
@@ -187,6 +187,13 @@ impl Epoch {
         }
         extents
     }
+}
+
+/// The stones as the steps of a run hand them over, in a file: reading its numbers changes some in the last bit, and one bit can decide
+/// whether a point at the border of a stone counts.
+fn handed_over(stones: &[Stone]) -> Result<Vec<Stone>, stonewise::Error> {
+    let failed = |e: serde_json::Error| stonewise::Error::Registration(e.to_string());
+    serde_json::from_slice(&serde_json::to_vec(stones).map_err(failed)?).map_err(failed)
 }
 
 /// A matched stone in both epochs.
