@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -94,6 +95,25 @@ def test_series_has_the_rows_of_all_epochs(results):
     assert set(series["epoch"].to_pylist()) == {results.epochs[1]}
     assert series.drop_columns("epoch").equals(results.stones_arrow)
     assert len(results.pairs) == 1
+
+
+def test_a_third_epoch(survey, tmp_path):
+    """The files of the second epoch once more: the same motions."""
+    shutil.copytree(survey, tmp_path / "survey")
+    shutil.copytree(survey / "epoch2", tmp_path / "survey" / "epoch3")
+    project = tmp_path / "survey" / "stonewise.toml"
+    text = project.read_text()
+    third = text[text.rindex("[[epochs]]") :].replace("epoch 2", "epoch 3").replace("epoch2/", "epoch3/")
+    project.write_text(text + "\n" + third)
+    r = stonewise.run(project, out=tmp_path / "out", force=True)
+    assert r.epochs == ["epoch 1", "epoch 2", "epoch 3"]
+    second, last = r.pairs
+    assert second is r and last.number == 2
+    np.testing.assert_array_equal(last.displacement, second.displacement)
+    assert len(last.joints) == len(second.joints) and len(last.matches) == len(second.matches)
+    assert last.registration["converged"]
+    assert len(last.stones) == len(r.stones)
+    assert r.series_arrow["epoch"].to_pylist() == ["epoch 2"] * len(r.stones) + ["epoch 3"] * len(r.stones)
 
 
 def test_the_record_of_the_run(results):

@@ -72,7 +72,7 @@ def test_adjust_is_a_run_whose_motions_are_not_corrected(survey, results, epochs
     assert np.isfinite(motion.covariance[measured]).all()
     # Which side of the wall is outside hardly matters to the motion in world axes.
     alone = stonewise.adjust(first, labels_1, second, labels_2)
-    np.testing.assert_allclose(alone.displacement[measured], motion.displacement[measured], atol=2e-4)
+    np.testing.assert_allclose(alone.displacement[measured], motion.displacement[measured], atol=5e-4)
 
 
 def test_adjust_checks_what_it_is_given():
