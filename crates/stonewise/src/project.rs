@@ -135,7 +135,7 @@ pub struct Settings {
 }
 
 /// Tables of the project file by the names that they had, with the names of today; both are read.
-const RENAMED: [(&str, &str); 5] = [
+pub(crate) const RENAMED: [(&str, &str); 5] = [
     ("tiles", "ingest"),
     ("transfer", "label"),
     ("matching", "match"),
