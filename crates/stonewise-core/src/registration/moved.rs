@@ -1,6 +1,6 @@
 //! Which stones moved, when many are tested and share the error of the epochs.
 
-use super::adjustment::discoveries;
+use crate::statistics::discoveries;
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

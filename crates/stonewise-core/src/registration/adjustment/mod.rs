@@ -26,4 +26,3 @@ pub use adjust::adjust;
 pub use error::AdjustError;
 pub use field::VarianceComponents;
 pub use params::{AdjustmentParams, AdjustmentReport, Break};
-pub(crate) use significance::discoveries;
