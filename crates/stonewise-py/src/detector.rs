@@ -13,6 +13,9 @@ use stonewise_core::raster::RgbImage;
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{StoneFinder, Weights};
 
+/// Stone of every pixel, and the score of each stone.
+type Found<'py> = (Bound<'py, PyArray2<i32>>, Vec<(u32, f32)>);
+
 /// The detector of stones, ready to run.
 #[pyclass(frozen, module = "stonewise._native")]
 pub struct Detector {
@@ -45,7 +48,7 @@ impl Detector {
         py: Python<'py>,
         image: PyReadonlyArray3<'py, u8>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray2<i32>>, Vec<(u32, f32)>)> {
+    ) -> PyResult<Found<'py>> {
         let photo = photo(&image).ok_or_else(|| error("an image of shape (height, width, 3) is needed"))?;
         let found = attended(py, &Listeners::progress(progress), |progress| {
             progress.begin("stones", self.tiling.tile_count(photo.width(), photo.height()));

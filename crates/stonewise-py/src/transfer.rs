@@ -15,6 +15,9 @@ use stonewise_core::id::ImageId;
 use stonewise_core::raster::LabelImage;
 use stonewise_core::transfer::{MemoryLabels, transfer_labels};
 
+/// Stone of every point, and the share of the votes that the outcome got.
+type Labels<'py> = (Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f32>>);
+
 /// Stone of every point, 0 for none, and the share of the votes that the outcome got.
 #[pyfunction]
 pub fn transfer<'py>(
@@ -24,7 +27,7 @@ pub fn transfer<'py>(
     labels: Vec<Option<PyReadonlyArray2<'py, u32>>>,
     parameters: &str,
     progress: Option<Py<PyAny>>,
-) -> PyResult<(Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<f32>>)> {
+) -> PyResult<Labels<'py>> {
     if views.len() != labels.len() {
         let message = format!("{} views and {} label images", views.len(), labels.len());
         return Err(error(message));
