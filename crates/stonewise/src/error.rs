@@ -22,6 +22,9 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// Parameters that were given beside the project file cannot be.
+    #[error("{0}")]
+    Parameters(String),
     /// A file could not be read or written.
     #[error("{action} failed: {source}: {path}", path = .path.display())]
     Io {
@@ -173,9 +176,13 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: an invalid project file, or an output folder that belongs to something else.
+    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder that belongs to
+    /// something else.
     pub fn is_wrong_usage(&self) -> bool {
-        matches!(self, Self::Project { .. } | Self::Output { .. })
+        matches!(
+            self,
+            Self::Project { .. } | Self::Parameters(_) | Self::Output { .. }
+        )
     }
 
     /// Turns a system error into one that names the file.

@@ -10,6 +10,7 @@ mod init;
 mod kept;
 mod limits;
 mod output;
+mod parameters;
 mod part;
 mod pipeline;
 mod project;

@@ -135,7 +135,7 @@ pub struct Settings {
 }
 
 /// Tables of the project file by the names that they had, with the names of today; both are read.
-const RENAMED: [(&str, &str); 5] = [
+pub(crate) const RENAMED: [(&str, &str); 5] = [
     ("tiles", "ingest"),
     ("transfer", "label"),
     ("matching", "match"),
@@ -183,6 +183,8 @@ pub struct RegistrationParams {
     /// It is reported apart and enters absolute uncertainty. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable: Vec<StableArea>,
+    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false: only a person knows what did not move.
+    pub auto_stable: bool,
     /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its place and not by
     /// its label. 3: farther inside, noise does not change a label; with 0 (labels alone) the whole wall of a UAV survey
     /// seems to move by 1 to 2 mm.
@@ -202,6 +204,7 @@ impl Default for RegistrationParams {
             estimator: Estimator::default(),
             epoch_error_m: None,
             stable: Vec::new(),
+            auto_stable: false,
             border_noises: 3.0,
             adjustment: AdjustmentParams::default(),
             gicp: GicpParams::default(),

@@ -101,6 +101,9 @@ pub(crate) struct PageTexts {
     pub doubts: &'static str,
     pub in_numbers: &'static str,
     pub summary: &'static str,
+    pub finished: &'static str,
+    pub map_title: &'static str,
+    pub map_note: &'static str,
     pub rest_in_english: &'static str,
     pub no_registration: &'static str,
 }
@@ -225,6 +228,10 @@ static ENGLISH: Texts = Texts {
         doubts: "These results must not be relied on as they stand.",
         in_numbers: "In numbers",
         summary: "Summary",
+        finished: "finished",
+        map_title: "Length of the motion, with in-plane arrows",
+        map_note: "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
+            not measured.",
         rest_in_english: "",
         no_registration: "Nothing is recorded about the registration of the epochs.",
     },
@@ -361,6 +368,10 @@ static GERMAN: Texts = Texts {
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
         in_numbers: "In Zahlen",
         summary: "Zusammenfassung",
+        finished: "berechnet",
+        map_title: "Betrag der Bewegung, mit Pfeilen in der Ebene der Mauer",
+        map_note: "Pfeile: Anteil in der Ebene von Bewegungen \u{fc}ber der eigenen Grenze des Steins, ausged\u{fc}nnt, wo sie sich ber\u{fc}hren \
+            w\u{fc}rden. Blass: unter der Grenze; schraffiert: nicht gemessen.",
         rest_in_english: "Karten, Tabellen und Anh\u{e4}nge sind auf Englisch.",
         no_registration: "\u{dc}ber die Registrierung der Epochen ist nichts festgehalten.",
     },

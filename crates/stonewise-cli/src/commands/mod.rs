@@ -18,6 +18,7 @@ mod tune;
 use crate::args::{Args, Command};
 use crate::printer::Printer;
 use anyhow::Result;
+pub use run::measure;
 use stonewise::Until;
 
 /// How a command ended.

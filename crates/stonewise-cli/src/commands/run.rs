@@ -8,6 +8,7 @@ use std::path::Path;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
 use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
+use stonewise_core::progress::Progress;
 
 /// Runs a whole project; the verdict decides the exit code where that is asked for.
 pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -40,20 +41,29 @@ fn run_to(
     until: Until,
     printer: &Printer,
 ) -> Result<(Outcome, Summary)> {
-    let out = folder.path();
-    let summary = stonewise::run(project, folder, until, printer)
-        .with_context(|| unfinished(out))
-        .with_context(|| format!("{} is not finished", project.name))?;
+    let summary = measure(folder, project, until, printer)?;
     printer.finish();
     tell(project, &summary, printer);
     if until == Until::Reported {
-        printer.log(&format!("results: {}", out.display()));
+        printer.log(&format!("results: {}", folder.path().display()));
     }
     let outcome = match summary.skipped_inputs() || summary.doubts().next().is_some() {
         true => Outcome::InDoubt,
         false => Outcome::Done,
     };
     Ok((outcome, summary))
+}
+
+/// Runs a project as far as asked; an error says where the results of the last finished run are.
+pub fn measure(
+    folder: &OutputFolder,
+    project: &Project,
+    until: Until,
+    progress: &dyn Progress,
+) -> Result<Summary> {
+    stonewise::run(project, folder, until, progress)
+        .with_context(|| unfinished(folder.path()))
+        .with_context(|| format!("{} is not finished", project.name))
 }
 
 /// Where results of an earlier run are now.

@@ -5,11 +5,13 @@
 
 pub(crate) mod adjustment;
 mod gicp;
+mod moved;
 pub mod observers;
 pub(crate) mod points;
 
 pub use adjustment::{AdjustError, AdjustmentParams, AdjustmentReport, Break, VarianceComponents, adjust};
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
+pub use moved::moved_stones;
 pub use points::{
     MemoryPairs, NearPoint, PairPoints, PairSource, StonePoints, Window, local_shifts, stone_points,
 };

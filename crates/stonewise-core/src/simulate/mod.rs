@@ -33,7 +33,7 @@ pub use photo::{Photo, PhotoParams, Studio, disturb_views, plan_views, shown_par
 pub use props::{Material, Prop, SurroundingsParams, surroundings};
 pub use scan::{BeamParams, Scan};
 pub use scene::{Hit, Scene, Target};
-pub use strip_error::StripDrift;
+pub use strip_error::{FlightErrorParams, StripDrift, StripErrors};
 pub use surface::{HeightGrid, SampledFaces, Surface};
 pub use survey::{EpochScans, SceneParams, Sensor, World, scan_window, simulate_scans};
 pub use tls::{TlsParams, scan_terrestrial};

@@ -24,7 +24,7 @@ pub enum StripDrift {
 
 /// How large the errors of a flight are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct FlightErrorParams {
+pub struct FlightErrorParams {
     /// Number of strips.
     pub strips: u32,
     /// Where strips begin and end, metres along the face.
@@ -42,7 +42,7 @@ pub(super) struct FlightErrorParams {
 }
 
 /// Errors of all strips of a flight.
-pub(super) struct StripErrors {
+pub struct StripErrors {
     /// The same for all strips, metres.
     datum: Vector3<f64>,
     strips: Vec<StripError>,
@@ -54,6 +54,7 @@ pub(super) struct StripErrors {
 const STEP_M: f64 = 0.1;
 
 impl StripErrors {
+    /// Draws them.
     pub fn new(params: &FlightErrorParams, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let datum = Vector3::from_fn(|_, _| params.datum_m * normal(&mut rng));

@@ -80,20 +80,30 @@ impl Overlay {
         })
     }
 
-    /// The shift of the cloud's edges that fits the photo best, of all within the reach.
+    /// The shift of the cloud's edges that fits the photo best: of every second within the reach, then of the best one's
+    /// neighbours. Edges are smoothed over more than that.
     pub fn shift(&self) -> Shift {
         let photo = Edges::of(&self.grey);
-        let side = 2 * REACH + 1;
+        let side = REACH + 1;
         let scores: Vec<f64> = (0..side * side)
             .into_par_iter()
-            .map(|k| self.score(&photo, [k % side - REACH, k / side - REACH]))
+            .map(|k| self.score(&photo, [2 * (k % side) - REACH, 2 * (k / side) - REACH]))
             .collect();
         let mean = scores.iter().sum::<f64>() / scores.len() as f64;
         let variance = scores.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / scores.len() as f64;
         let best = scores.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
         let (at, score) = best.map_or((0, mean), |(i, s)| (i as i64, *s));
+        let near = (0..9).map(|k| {
+            [
+                2 * (at % side) - REACH + k % 3 - 1,
+                2 * (at / side) - REACH + k / 3 - 1,
+            ]
+        });
+        let near = near.map(|shift| (shift, self.score(&photo, shift)));
+        let best = near.max_by(|a, b| a.1.total_cmp(&b.1));
+        let (shift, score) = best.unwrap_or(([0; 2], score));
         Shift {
-            map_px: [(at % side - REACH) as f64, (at / side - REACH) as f64],
+            map_px: shift.map(|pixels| pixels as f64),
             clearness: (score - mean) / variance.sqrt().max(1e-12),
         }
     }

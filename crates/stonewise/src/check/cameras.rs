@@ -129,20 +129,16 @@ fn judge(compared: &[Compared], best: &Compared) -> (Verdict, String) {
     let shift = |c: &Compared| c.shift.length();
     let is_off = |c: &&Compared, limit: f64| shift(c) > limit && shift(c) * c.pixel_m > HARMLESS_M;
     let of = |limit: f64| clear.iter().filter(|c| is_off(c, limit)).count();
-    let text = {
-        let px = best.shift.length() * best.overlay.reduction;
-        let mm = 1e3 * best.shift.length() * best.pixel_m;
-        format!(
-            "the cloud's edges lie {px:.0} px ({mm:.0} mm) off those of photo {}",
-            best.name
-        )
-    };
+    let px = best.shift.length() * best.overlay.reduction;
+    let mm = 1e3 * best.shift.length() * best.pixel_m;
+    let place = format!("{px:.0} px ({mm:.0} mm) off those of photo {}", best.name);
     // Sound surveys of small walls were seen with shifts of metres: the comparison informs and decides nothing.
     if 2 * of(DOUBTFUL_PX) <= clear.len() {
+        let text = format!("the cloud's edges fit best {place}, which light and shade can do");
         return (Verdict::Fine, text);
     }
     let advice = "cameras and clouds are not in one frame, or of different surveys; look at the picture";
-    (Verdict::Note, format!("{text}: {advice}"))
+    (Verdict::Note, format!("the cloud's edges lie {place}: {advice}"))
 }
 
 fn picture(epoch: &Epoch, compared: &Compared) -> Option<Picture> {

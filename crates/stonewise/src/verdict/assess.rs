@@ -1,13 +1,13 @@
 //! From what was measured to the verdict.
 
 use super::area::{Judged, area};
-use super::discovery::q_values;
 use super::interval::{Estimate, QUANTILE};
 use super::sentence::{reasons, sentence};
 use crate::report_params::Language;
 use crate::results::records::{DatumState, EpochVerdict, JointVerdict, State, StoneVerdict, ZoneVerdict};
 use crate::thresholds::{Levels, Measures, Thresholds};
 use nalgebra::Point2;
+use stonewise_core::statistics::q_values;
 
 /// Share of false ones that is accepted among the stones said to have moved.
 const FALSE_DISCOVERY_RATE: f64 = 0.05;

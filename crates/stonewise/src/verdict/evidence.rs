@@ -90,7 +90,7 @@ enum Tested<'a> {
     /// The common motion of the wall, from registration.json.
     Recorded(&'a ResultSet),
     /// The same from the stones, where the record of an earlier version does not have it.
-    Fitted(SmallMotion),
+    Fitted(Box<SmallMotion>),
 }
 
 impl<'a> Tested<'a> {
@@ -109,7 +109,7 @@ impl<'a> Tested<'a> {
             })
         };
         let samples: Vec<_> = results.measured().into_iter().filter_map(sample).collect();
-        SmallMotion::fit(&samples).map_or(Self::Absolute, Self::Fitted)
+        SmallMotion::fit(&samples).map_or(Self::Absolute, |common| Self::Fitted(Box::new(common)))
     }
 
     fn motion(&self, stone: &StoneRow, motion: &RowMotion) -> Vector3<f64> {
@@ -119,5 +119,77 @@ impl<'a> Tested<'a> {
             Self::Fitted(common) => Some(common.at(&stone.centroid)),
         };
         motion.displacement - common.unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::write_json;
+    use crate::results::records::{Datum, RegistrationRecord};
+    use crate::results::testing::{folder, registration_record, rows};
+    use nalgebra::Vector6;
+    use stonewise_core::geometry::lever;
+
+    fn judged(results: &ResultSet) -> EpochVerdict {
+        let epochs = ["A".to_owned(), "B".to_owned()];
+        verdict_on(results, epochs, false, &Thresholds::default(), Language::English)
+    }
+
+    #[test]
+    fn a_stone_is_lost_only_where_it_was_well_seen_and_its_surface_is_gone() {
+        let mut lost = StoneRow {
+            status: Status::UnmatchedLost,
+            photos: 3,
+            points_1: 500,
+            confidence: 0.9,
+            ..StoneRow::default()
+        };
+        assert!(is_lost(&lost, None) && is_lost(&lost, Some(-0.12)));
+        assert!(!is_lost(&lost, Some(0.004)));
+        lost.photos = 1;
+        assert!(!is_lost(&lost, None));
+        (lost.photos, lost.status) = (3, Status::UnmatchedUnseen);
+        assert!(!is_lost(&lost, None));
+    }
+
+    /// Results whose stones all made one more rigid motion, which the record tells or does not.
+    fn swept(recorded: bool) -> EpochVerdict {
+        let common = Vector6::new(0.01, -0.02, 0.005, 1e-4, 2e-4, -1e-4);
+        let mut stones = rows();
+        let centre = stones[0].centroid;
+        for stone in &mut stones {
+            let motion = lever(&(stone.centroid - centre)) * common;
+            if let Some(own) = &mut stone.motion {
+                own.displacement += motion;
+            }
+        }
+        let folder = folder(&stones);
+        let mut datum = Datum::unknown(&centre, "unknown".to_owned());
+        datum.common_motion = recorded.then(|| common.into());
+        let record = RegistrationRecord {
+            datum,
+            ..registration_record()
+        };
+        write_json(&folder.path().join("registration.json"), &record).unwrap();
+        judged(&ResultSet::read_measured(folder.path(), 1).unwrap())
+    }
+
+    #[test]
+    fn where_the_datum_is_unknown_motions_are_those_against_the_common_motion() {
+        let folder = folder(&rows());
+        let still = judged(&ResultSet::read_measured(folder.path(), 1).unwrap());
+        let moved = |v: &EpochVerdict| -> Vec<u32> {
+            v.stones.iter().filter(|s| s.moved).map(|s| s.stone_id).collect()
+        };
+        assert_eq!(moved(&still), [8, 15]);
+        let recorded = swept(true);
+        for (a, b) in still.stones.iter().zip(&recorded.stones) {
+            let difference = a.length_mm.unwrap_or(0.0) - b.length_mm.unwrap_or(0.0);
+            assert!(difference.abs() < 0.002, "{a:?} {b:?}");
+        }
+        assert_eq!(moved(&recorded), [8, 15]);
+        // Records of earlier versions: the common motion is fitted to all stones but the loose one.
+        assert!(moved(&swept(false)).contains(&8));
     }
 }

@@ -5,7 +5,6 @@
 
 mod area;
 mod assess;
-mod discovery;
 mod evidence;
 mod interval;
 mod sentence;

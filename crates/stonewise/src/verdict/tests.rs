@@ -8,6 +8,7 @@ use crate::results::detection_limit_m;
 use crate::results::records::{DatumState, EpochVerdict, ReasonCode, State};
 use crate::thresholds::Thresholds;
 use nalgebra::{Matrix3, Point2, Vector3};
+use stonewise_core::statistics::q_values;
 
 const SD_M: f64 = 0.0005;
 
@@ -298,4 +299,33 @@ fn the_sentence_speaks_german_too() {
         verdict.sentence
     );
     assert!(verdict.sentence.contains(','), "{}", verdict.sentence);
+}
+
+#[test]
+fn at_most_five_percent_of_the_stones_said_to_move_stand_still() {
+    let (mut normal, mut shares) = (Normal::new(9), Vec::new());
+    for _ in 0..300 {
+        // A tenth of 200 stones moves by four standard deviations.
+        let p: Vec<f64> = (0..200)
+            .map(|i| {
+                let moved = Vector3::x() * if i < 20 { 4.0 } else { 0.0 };
+                Estimate {
+                    vector: moved + normal.vector(),
+                    covariance: Matrix3::identity(),
+                }
+                .p_value()
+            })
+            .collect();
+        let found: Vec<usize> = (0..200)
+            .zip(q_values(&p))
+            .filter(|(_, q)| *q <= 0.05)
+            .map(|(i, _)| i)
+            .collect();
+        let false_ones = found.iter().filter(|i| **i >= 20).count();
+        shares.push(false_ones as f64 / found.len().max(1) as f64);
+    }
+    let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+    // 5 % times the share that stands still, with four standard errors of 300 walls.
+    assert!(mean < 0.045 + 0.015, "{mean}");
+    assert!(mean > 0.02, "{mean}: nothing was tested");
 }

@@ -3,6 +3,7 @@
 use super::field::posterior;
 use super::solution::Solution;
 use super::state::Adjustment;
+use crate::statistics::discoveries;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Factor by which the bending's variance is raised in the test for loose stones: a bent face is not a loose
@@ -64,24 +65,6 @@ fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// Tests that are significant when the share of false ones among them is to be at most `rate` (Benjamini &
-/// Hochberg 1995).
-fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
-    let mut sorted: Vec<(f64, usize)> = p_values
-        .iter()
-        .enumerate()
-        .filter_map(|(i, p)| Some(((*p)?, i)))
-        .collect();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let tests = sorted.len() as f64;
-    let last = sorted
-        .iter()
-        .enumerate()
-        .rposition(|(k, p)| p.0 <= rate * (k + 1) as f64 / tests);
-    sorted.truncate(last.map_or(0, |k| k + 1));
-    sorted.into_iter().map(|(_, i)| i).collect()
-}
-
 /// As many stones, in the order of their probability of an error, as keep the mean of that probability within
 /// `rate` (Newton et al. 2004). `None`: not a candidate.
 fn within_error_rate(p_error: &[Option<f64>], rate: f64) -> Vec<bool> {
@@ -106,22 +89,6 @@ fn within_error_rate(p_error: &[Option<f64>], rate: f64) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn discoveries_follow_the_published_example() {
-        // Benjamini & Hochberg 1995, section 3: fifteen ordered p values, of which the first four are
-        // rejected at 5 %.
-        let published = [
-            0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262, 0.5719,
-            0.6528, 0.7590, 1.0,
-        ];
-        let mut p_values: Vec<Option<f64>> = published.into_iter().rev().map(Some).collect();
-        p_values.insert(3, None);
-        let mut found = discoveries(&p_values, 0.05);
-        found.sort_unstable();
-        assert_eq!(found, [12, 13, 14, 15]);
-        assert!(discoveries(&[None, Some(0.2)], 0.05).is_empty());
-    }
 
     #[test]
     fn the_mean_probability_of_an_error_stays_within_the_rate() {

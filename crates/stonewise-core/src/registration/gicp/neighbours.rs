@@ -2,7 +2,7 @@
 
 use super::params::GicpParams;
 use crate::cloud::GridIndex;
-use crate::statistics::median;
+use crate::statistics::{discoveries, median};
 use crate::stone::{PairResult, StoneMotion};
 use nalgebra::{Matrix3, Point3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -37,16 +37,16 @@ pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>
             Some(relative(motion(m)?, &others))
         })
         .collect();
-    let mut tests = Vec::new();
+    let mut tests = vec![None; results.len()];
     for (&i, found) in measured.iter().zip(relatives) {
         if let (Ok(motion), Some((difference, covariance))) = (&mut results[i].motion, found) {
             motion.relative = difference;
             motion.relative_covariance = covariance;
             motion.own_motion_p = p_value(&difference, &covariance);
-            tests.push((motion.own_motion_p, i));
+            tests[i] = Some(motion.own_motion_p);
         }
     }
-    for i in discoveries(tests, params.false_discovery_rate) {
+    for i in discoveries(&tests, params.false_discovery_rate) {
         if let Ok(motion) = &mut results[i].motion {
             motion.loose = true;
         }
@@ -85,16 +85,4 @@ fn p_value(difference: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
         return 1.0;
     };
     law.sf(difference.dot(&factor.solve(difference)))
-}
-
-/// Tests that stay significant when the share of false ones among them is to be at most `rate`.
-fn discoveries(mut tests: Vec<(f64, usize)>, rate: f64) -> Vec<usize> {
-    tests.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let n = tests.len() as f64;
-    let last = tests
-        .iter()
-        .enumerate()
-        .rposition(|(k, t)| t.0 <= rate * (k + 1) as f64 / n);
-    tests.truncate(last.map_or(0, |k| k + 1));
-    tests.into_iter().map(|t| t.1).collect()
 }

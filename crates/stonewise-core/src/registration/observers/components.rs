@@ -53,6 +53,12 @@ impl SensorClass {
         }
     }
 
+    /// Error that a source has at least, per axis, metres, where it was registered by itself: sources that agree better were fitted to each
+    /// other, by strip adjustment or cloud to cloud, and hide the rest in their mean.
+    pub(super) fn least_m(self) -> f64 {
+        0.6 * self.typical_m()
+    }
+
     /// Median of the prior of a source's translation, metres: registration by targets; direct georeferencing after strip adjustment.
     fn typical_m(self) -> f64 {
         match self {

@@ -132,6 +132,7 @@ impl Comparison {
                 source: s.source,
                 time_s: s.time_s,
                 place: stone.centroid,
+                plane: None,
             };
             (sight, s.points.len().min(params.max_points) as u64)
         };

@@ -1,11 +1,13 @@
 //! The error of a later epoch against the reference, at every stone.
 
+use super::assumptions::{Model, whole_m};
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
+use super::congruence::{reweighted, standing};
 use super::contrast::{ContrastParams, contrasts};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
-use super::observation::Observation;
-use super::sight::{SeenStone, Sight, Source};
+use super::observation::{Observation, in_face};
+use super::sight::{SeenStone, Sight, Source, SourcePoints};
 use super::stable::{StableParams, StablePoints, stable_observations};
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
@@ -84,8 +86,11 @@ pub struct EpochErrors {
     pub components: Option<ObserverComponents>,
     /// Twice the log likelihood that errors of the sources gain over none.
     pub significance: f64,
-    /// Comparisons of sources per epoch, and cells of stable areas.
+    /// Comparisons of sources per epoch, and cells of stable areas that stood still.
     pub observations: [usize; 3],
+    /// Stable areas that moved against the others; they are left out.
+    #[serde(default)]
+    pub moved_areas: Vec<usize>,
     /// Per source, in their order.
     pub sources: Vec<SourceError>,
     /// The rigid part of the error over all stones.
@@ -111,10 +116,12 @@ pub struct EpochPair<'a> {
 /// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one degree of freedom,
 /// half of whose weight is at zero (Self & Liang 1987).
 const SIGNIFICANT: f64 = 2.71;
-/// An observation whose squared residual per difference exceeds this loses weight.
-const MISFIT: f64 = 9.0;
 /// Factors on the sources' errors over which their uncertainty is averaged, logarithms.
 const FACTORS: [f64; 9] = [-1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2];
+/// Factors whose posterior weight is a smaller share of the best one's are left out.
+const LEAST_WEIGHT: f64 = 1e-3;
+/// Error of a source on a plane as a whole, as a share of that of a single cell: most of it differs with incidence and surface.
+const PLANE_SHARE: f64 = 0.5;
 /// Most stones by which the rigid part of the error is found.
 const RIGID_STONES: usize = 500;
 /// Prior of a source's error where nothing but stable areas shows it, metres.
@@ -126,61 +133,74 @@ const OPEN_M: f64 = 0.03;
 pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     let class = SensorClass::of_noise(pair.sigma_m);
     let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());
-    let is_one_survey = pair.same_as.iter().enumerate().any(|(s, &same)| s != same);
-    let whole_m = if is_one_survey {
-        0.0
-    } else {
-        2f64.sqrt() * shared_error_m
-    };
     let mut within: [Vec<Observation>; 2] =
         [0, 1].map(|e| contrasts(pair.sources, pair.stones, e, &params.contrasts));
-    let mut stable: Vec<Observation> = stable_observations(pair.stable, pair.sigma_m, &params.stable)
-        .into_iter()
-        .map(|(_, o)| o)
-        .collect();
+    let stable = stable_observations(pair.stable, pair.sigma_m, &params.stable);
     let unknowns = Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &stable));
     let (components, significance) = estimated(&unknowns, &mut within, class);
-    let counts = [within[0].len(), within[1].len(), stable.len()];
     let overlaps = within.iter().all(|w| !w.is_empty());
+    let is_significant = overlaps && significance > SIGNIFICANT;
+    let model = Model {
+        components: match is_significant {
+            true => components,
+            false => opened(components),
+        },
+        whole_m: match is_one_survey(pair) {
+            true => 0.0,
+            false => whole_m(
+                params.shared_error_m,
+                class,
+                overlaps.then_some(&components),
+                counts(pair),
+            ),
+        },
+        plane_m: PLANE_SHARE * params.stable.systematic_share * pair.sigma_m,
+        class,
+    };
+    let sights: Vec<Sight> = stable.iter().flat_map(|o| o.sights.clone()).collect();
+    let unknowns = unknowns.with_planes(&sights);
+    let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &model);
+    let observations = [within[0].len(), within[1].len(), stable.len()];
     let datum = if stable.len() >= params.stable.min_cells {
         Datum::Stable
-    } else if overlaps && significance > SIGNIFICANT {
+    } else if is_significant {
         Datum::Sources
     } else {
         Datum::Unknown
     };
     if datum != Datum::Stable {
         stable.clear();
+        moved_areas.clear();
     }
-    let assumed = match overlaps && significance > SIGNIFICANT {
-        true => components,
-        false => opened(components),
+    let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
+    let model = match datum {
+        Datum::Stable => model.widened(&unknowns, &all),
+        _ => model,
     };
-    let mut all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
-    let found = Averaged::new(&unknowns, &all, &assumed, whole_m, class);
-    // Planes that do not fit the rest moved, or are none.
-    let weights = found.weights(&unknowns, &all, &assumed);
-    let reweighted: Vec<Observation> = all
-        .iter()
-        .zip(&weights)
-        .map(|(o, w)| Observation {
-            weight: *w,
-            ..(*o).clone()
-        })
-        .collect();
-    all = reweighted.iter().collect();
-    let found = Averaged::new(&unknowns, &all, &assumed, whole_m, class);
+    let reweighted = reweighted(&unknowns, &all, &model);
+    let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
     EpochErrors {
         datum,
         class,
         shared_error_m,
         components: overlaps.then_some(components),
         significance,
-        observations: counts,
+        observations,
+        moved_areas,
         sources: found.sources(pair, &unknowns),
         rigid: found.rigid(pair, &unknowns),
-        at: found.at_stones(pair, &unknowns),
+        at: found.at_stones(pair, &unknowns, model.components.nugget_m),
     }
+}
+
+/// Whether sources of the later epoch have the error of sources of the reference.
+fn is_one_survey(pair: &EpochPair) -> bool {
+    pair.same_as.iter().enumerate().any(|(s, &same)| s != same)
+}
+
+/// Number of sources of each epoch.
+fn counts(pair: &EpochPair) -> [usize; 2] {
+    [0, 1].map(|e| pair.sources.iter().filter(|s| s.epoch == e).count())
 }
 
 /// All sights, by which the blocks of the unknowns are laid out.
@@ -194,6 +214,7 @@ fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
                 source: s.source,
                 time_s: s.time_s,
                 place: centroid,
+                plane: None,
             })
             .collect::<Vec<_>>()
     };
@@ -222,11 +243,7 @@ fn estimated(
         if round == 0
             && let Some(solution) = problem.solve(&prior, &components)
         {
-            let weights: Vec<f64> = problem
-                .misfits(&solution.mean, &components)
-                .iter()
-                .map(|m| weight(*m))
-                .collect();
+            let weights = problem.weights(&solution.mean, &components);
             within
                 .iter_mut()
                 .flatten()
@@ -241,11 +258,6 @@ fn estimated(
         .zip(deviance(&components))
         .map_or(0.0, |(without, with)| without - with);
     (components, gain)
-}
-
-/// Share of its weight that an observation keeps.
-fn weight(misfit: f64) -> f64 {
-    if misfit > MISFIT { MISFIT / misfit } else { 1.0 }
 }
 
 /// Components of sources whose errors only stable areas show.
@@ -263,46 +275,29 @@ struct Averaged {
 }
 
 impl Averaged {
-    fn new(
-        unknowns: &Unknowns,
-        observations: &[&Observation],
-        components: &ObserverComponents,
-        whole_m: f64,
-        class: SensorClass,
-    ) -> Self {
+    fn new(unknowns: &Unknowns, observations: &[&Observation], model: &Model) -> Self {
         let problem = Problem::new(unknowns, observations);
-        let solved: Vec<(f64, Solution)> = FACTORS
+        let deviances: Vec<(f64, f64)> = FACTORS
             .par_iter()
             .filter_map(|log| {
-                let scaled = components.scaled(log.exp());
-                let solution = problem.solve(&Prior::new(&scaled, whole_m), &scaled)?;
-                Some((solution.deviance + scaled.penalty(class), solution))
+                let (prior, components) = model.scaled(log.exp());
+                let deviance = problem.deviance(&prior, &components)?;
+                Some((*log, deviance + components.penalty(model.class)))
             })
             .collect();
-        let best = solved.iter().map(|s| s.0).fold(f64::INFINITY, f64::min);
-        let weights: Vec<f64> = solved.iter().map(|s| (-0.5 * (s.0 - best)).exp()).collect();
-        let sum: f64 = weights.iter().sum();
-        let solutions = solved.into_iter().zip(weights);
+        let best = deviances.iter().map(|d| d.1).fold(f64::INFINITY, f64::min);
+        let solved: Vec<(f64, Solution)> = deviances
+            .into_par_iter()
+            .map(|(log, deviance)| (log, (-0.5 * (deviance - best)).exp()))
+            .filter(|(_, weight)| *weight > LEAST_WEIGHT)
+            .filter_map(|(log, weight)| {
+                let (prior, components) = model.scaled(log.exp());
+                Some((weight, problem.solve(&prior, &components)?))
+            })
+            .collect();
+        let sum: f64 = solved.iter().map(|s| s.0).sum();
         Self {
-            solutions: solutions.map(|((_, s), w)| (w / sum, s)).collect(),
-        }
-    }
-
-    fn weights(
-        &self,
-        unknowns: &Unknowns,
-        observations: &[&Observation],
-        components: &ObserverComponents,
-    ) -> Vec<f64> {
-        let problem = Problem::new(unknowns, observations);
-        let best = self.solutions.iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        match best {
-            Some((_, solution)) => problem
-                .misfits(&solution.mean, components)
-                .into_iter()
-                .map(weight)
-                .collect(),
-            None => vec![1.0; observations.len()],
+            solutions: solved.into_iter().map(|(w, s)| (w / sum, s)).collect(),
         }
     }
 
@@ -328,11 +323,15 @@ impl Averaged {
         }
     }
 
-    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<ErrorAt> {
-        pair.stones
-            .par_iter()
-            .map(|stone| self.function(&difference_row(stone, pair.sources, unknowns)))
-            .collect()
+    /// `nugget_m`: independent error of each source at each stone, in the face and across it.
+    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
+        let at = |stone: &SeenStone| {
+            let mut error = self.function(&difference_row(stone, pair.sources, unknowns));
+            let squares: f64 = shares(stone, pair.sources).iter().map(|s| s * s).sum();
+            error.covariance += in_face(&stone.normal, nugget_m) * squares;
+            error
+        };
+        pair.stones.par_iter().map(at).collect()
     }
 
     /// The rigid motion closest to the error at the stones, which is linear in the unknowns.
@@ -402,20 +401,29 @@ impl Averaged {
     }
 }
 
-/// The later epoch's error less that of the reference at a stone: each source counts by its share of the stone's points.
-fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &Unknowns) -> Row {
+/// How much each sight of a stone counts in its motion: each source by its share of its epoch's points, the reference with the other
+/// sign.
+fn shares(stone: &SeenStone, sources: &[Source]) -> Vec<f64> {
     let total = [0, 1].map(|e| {
         let own = stone.sights.iter().filter(|s| sources[s.source].epoch == e);
         own.map(|s| s.count as f64).sum::<f64>().max(1.0)
     });
-    let mut row = Row::new();
-    for s in &stone.sights {
+    let share = |s: &SourcePoints| {
         let epoch = sources[s.source].epoch;
-        let share = [-1.0, 1.0][epoch] * s.count as f64 / total[epoch];
+        [-1.0, 1.0][epoch] * s.count as f64 / total[epoch]
+    };
+    stone.sights.iter().map(share).collect()
+}
+
+/// The later epoch's error less that of the reference at a stone.
+fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &Unknowns) -> Row {
+    let mut row = Row::new();
+    for (s, share) in stone.sights.iter().zip(shares(stone, sources)) {
         let sight = Sight {
             source: s.source,
             time_s: s.time_s,
             place: stone.centroid,
+            plane: None,
         };
         row.extend(unknowns.row(&sight).into_iter().map(|(k, m)| (k, m * share)));
     }

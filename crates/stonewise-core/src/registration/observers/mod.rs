@@ -17,8 +17,10 @@
 //!
 //! Frame: world; metres, seconds, radians.
 
+mod assumptions;
 mod component_estimate;
 mod components;
+mod congruence;
 mod contrast;
 mod epoch_error;
 mod model;

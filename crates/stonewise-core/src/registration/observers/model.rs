@@ -2,14 +2,21 @@
 
 use super::components::ObserverComponents;
 use super::observation::Observation;
-use super::sight::{Sight, Source};
+use super::sight::{Sight, Source, StablePlane};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
+use std::collections::BTreeMap;
 
 /// Sights for each knot of a source's drift, and the least and most knots.
 const SIGHTS_PER_KNOT: usize = 8;
-const KNOTS: [usize; 2] = [4, 32];
+const KNOTS: [usize; 2] = [4, 20];
 /// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix invertible.
 const KNOT_NUGGET: f64 = 1e-6;
+/// An observation whose squared residual per difference exceeds this loses weight; cells of stable areas lose it earlier, because an edge of a
+/// building is worth less than a stone.
+const MISFIT: f64 = 9.0;
+const CELL_MISFIT: f64 = 4.0;
+/// Standard deviation that stands for none, metres.
+const LEAST_M: f64 = 1e-7;
 
 /// Where the unknowns of a source stand, and how its sights depend on them.
 ///
@@ -25,7 +32,8 @@ struct Block {
     knots: Vec<f64>,
 }
 
-/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3).
+/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3), then what each source gets wrong on each
+/// plane of the stable areas (3 each).
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
     /// Block of each source; sources of one survey share theirs.
@@ -33,6 +41,8 @@ pub(super) struct Unknowns {
     of_source: Vec<usize>,
     epochs: Vec<usize>,
     whole: usize,
+    /// First unknown of each plane and block.
+    planes: BTreeMap<(StablePlane, usize), usize>,
 }
 
 /// Standard deviations of the prior, metres.
@@ -44,16 +54,24 @@ pub(super) struct Prior {
     pub drift_length: f64,
     /// Of the later epoch against the reference, as a whole; 0: none.
     pub whole_m: f64,
+    /// Of a source on a plane of the stable areas.
+    pub plane_m: f64,
 }
 
 impl Prior {
+    /// Where no planes are looked at.
     pub fn new(components: &ObserverComponents, whole_m: f64) -> Self {
+        Self::with_planes(components, whole_m, LEAST_M)
+    }
+
+    pub fn with_planes(components: &ObserverComponents, whole_m: f64, plane_m: f64) -> Self {
         Self {
             translation_m: components.translation_m,
             rotation_m: components.rotation_m,
             drift_m: components.drift_m,
             drift_length: components.drift_length,
             whole_m,
+            plane_m,
         }
     }
 }
@@ -83,16 +101,34 @@ impl Unknowns {
             of_source,
             epochs: sources.iter().map(|s| s.epoch).collect(),
             whole: first,
+            planes: BTreeMap::new(),
         }
     }
 
+    /// The same with the errors of the sources on these planes.
+    pub fn with_planes(mut self, sights: &[Sight]) -> Self {
+        for sight in sights {
+            let next = self.count();
+            if let Some(plane) = sight.plane {
+                let key = (plane, self.of_source[sight.source]);
+                self.planes.entry(key).or_insert(next);
+            }
+        }
+        self
+    }
+
     pub fn count(&self) -> usize {
-        self.whole + 3
+        self.whole + 3 + 3 * self.planes.len()
     }
 
     /// First unknown of a source's translation.
     pub fn translation(&self, source: usize) -> usize {
         self.blocks[self.of_source[source]].first
+    }
+
+    /// First unknown of the later epoch's error as a whole.
+    pub fn whole(&self) -> usize {
+        self.whole
     }
 
     /// How a sight's error depends on the unknowns.
@@ -108,6 +144,10 @@ impl Unknowns {
         }
         if self.epochs[sight.source] == 1 {
             row.push((self.whole, Matrix3::identity()));
+        }
+        let Some(plane) = sight.plane else { return row };
+        if let Some(first) = self.planes.get(&(plane, self.of_source[sight.source])) {
+            row.push((*first, Matrix3::identity()));
         }
         row
     }
@@ -137,6 +177,16 @@ impl Unknowns {
         (indices, matrix)
     }
 
+    /// How an observation's differences depend on a motion of its place between the epochs.
+    fn motion_design(&self, observation: &Observation) -> DMatrix<f64> {
+        let m = observation.directions.len();
+        let is_later = |k: usize| self.epochs[observation.sights[k].source] as f64;
+        DMatrix::from_fn(observation.len(), 3, |row, axis| {
+            let sign = is_later(1 + row / m) - is_later(0);
+            sign * observation.directions[row % m][axis]
+        })
+    }
+
     /// Information of the prior, and the logarithm of its determinant.
     pub fn prior(&self, prior: &Prior) -> (DMatrix<f64>, f64) {
         let mut matrix = DMatrix::zeros(self.count(), self.count());
@@ -151,7 +201,10 @@ impl Unknowns {
             diagonal(&mut matrix, block.first, prior.translation_m);
             diagonal(&mut matrix, block.first + 3, prior.rotation_m);
         }
-        diagonal(&mut matrix, self.whole, prior.whole_m.max(1e-7));
+        diagonal(&mut matrix, self.whole, prior.whole_m.max(LEAST_M));
+        for first in self.planes.values() {
+            diagonal(&mut matrix, *first, prior.plane_m.max(LEAST_M));
+        }
         for block in &self.blocks {
             let (inverse, knots_log_det) = knot_information(&block.knots, prior);
             log_det += 3.0 * knots_log_det;
@@ -247,8 +300,6 @@ pub(super) struct Solution {
     pub mean: DVector<f64>,
     /// Covariance of the unknowns.
     pub covariance: DMatrix<f64>,
-    /// Minus twice the log marginal likelihood, up to a constant.
-    pub deviance: f64,
 }
 
 /// Observations with the unknowns that they touch.
@@ -306,18 +357,55 @@ impl<'a> Problem<'a> {
 
     /// The unknowns; `None` where the numbers fail.
     pub fn solve(&self, prior: &Prior, components: &ObserverComponents) -> Option<Solution> {
-        let (factor, vector, deviance) = self.normal(prior, components)?;
-        let mean = factor.solve(&vector);
-        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
+        let (factor, vector, _) = self.normal(prior, components)?;
         Some(Solution {
-            deviance: deviance + log_det - vector.dot(&mean),
-            mean,
+            mean: factor.solve(&vector),
             covariance: factor.inverse(),
         })
     }
 
+    /// Information and vector of a motion, between the epochs, of the places of some observations, all else as in `solution` (data
+    /// snooping; Baarda 1968).
+    pub fn motion_of(
+        &self,
+        solution: &Solution,
+        components: &ObserverComponents,
+        is_doubted: impl Fn(&Observation) -> bool,
+    ) -> (Matrix3<f64>, Vector3<f64>) {
+        let (mut information, mut vector) = (Matrix3::zeros(), Vector3::zeros());
+        let mut cross = DMatrix::zeros(self.unknowns.count(), 3);
+        for (observation, indices, design) in self.designs.iter().filter(|d| is_doubted(d.0)) {
+            let covariance = observation.covariance(components.noise_scale, components.nugget_m);
+            let Some(factor) = Cholesky::new(covariance) else {
+                continue;
+            };
+            let motion = self.unknowns.motion_design(observation);
+            let part = DVector::from_iterator(indices.len(), indices.iter().map(|&i| solution.mean[i]));
+            let scaled = factor.solve(&motion);
+            information += motion.transpose() * &scaled;
+            vector += scaled.transpose() * (&observation.values - design * part);
+            let block = design.transpose() * scaled;
+            for (r, &row) in indices.iter().enumerate() {
+                let mut target = cross.row_mut(row);
+                target += block.row(r);
+            }
+        }
+        let explained = cross.transpose() * &solution.covariance * &cross;
+        (information - explained.fixed_view::<3, 3>(0, 0), vector)
+    }
+
+    /// Weight that each observation keeps: stones and cells that do not fit the rest are disturbed.
+    pub fn weights(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+        let weight = |(misfit, (o, _, _)): (f64, &(&Observation, _, _))| {
+            let limit = if o.plane().is_some() { CELL_MISFIT } else { MISFIT };
+            if misfit > limit { limit / misfit } else { 1.0 }
+        };
+        let misfits = self.misfits(mean, components);
+        misfits.into_iter().zip(&self.designs).map(weight).collect()
+    }
+
     /// Squared standardised residual of each observation per difference, at `mean`.
-    pub fn misfits(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
+    fn misfits(&self, mean: &DVector<f64>, components: &ObserverComponents) -> Vec<f64> {
         let misfit = |(observation, indices, design): &(&Observation, Vec<usize>, DMatrix<f64>)| {
             let part = DVector::from_iterator(indices.len(), indices.iter().map(|&i| mean[i]));
             let residual = &observation.values - design * part;

@@ -1,6 +1,7 @@
 //! Differences between what several sources show of one unmoved place.
 
-use super::sight::Sight;
+use super::sight::{Sight, StablePlane};
+use crate::geometry::FaceFrame;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// What a small part of the wall, or of a stable area, says about the errors of the sources that see it.
@@ -23,6 +24,11 @@ pub(super) struct Observation {
 }
 
 impl Observation {
+    /// The plane of a stable area that it is part of; `None` for a stone.
+    pub fn plane(&self) -> Option<StablePlane> {
+        self.sights[0].plane
+    }
+
     /// Number of differences.
     pub fn len(&self) -> usize {
         self.values.len()
@@ -48,4 +54,12 @@ impl Observation {
         }
         sum / self.weight
     }
+}
+
+/// Covariance in the world of independent errors with these standard deviations in the face and across it, metres.
+pub(super) fn in_face(normal: &Vector3<f64>, sd_m: [f64; 2]) -> Matrix3<f64> {
+    let face_from_world = FaceFrame::from_normal(normal).face_from_world();
+    let [inside, across] = sd_m.map(|s| s * s);
+    let variances = Matrix3::from_diagonal(&Vector3::new(inside, inside, across));
+    face_from_world.transpose() * variances * face_from_world
 }

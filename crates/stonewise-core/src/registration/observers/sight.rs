@@ -44,4 +44,15 @@ pub(super) struct Sight {
     pub source: usize,
     pub time_s: f64,
     pub place: Point3<f64>,
+    /// The stable area and the plane in it where the sight is of one.
+    pub plane: Option<StablePlane>,
+}
+
+/// A plane of a stable area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct StablePlane {
+    /// Which of the project's areas.
+    pub area: usize,
+    /// Number of the plane, over all areas.
+    pub number: usize,
 }

@@ -1,7 +1,7 @@
 //! Differences between sources, of one epoch and of both, on planes that did not move.
 
 use super::observation::Observation;
-use super::sight::Sight;
+use super::sight::{Sight, StablePlane};
 use crate::cloud::Cloud;
 use crate::geometry::FaceFrame;
 use crate::statistics::upper_median;
@@ -18,7 +18,8 @@ pub struct StableParams {
     pub cell_m: f64,
     /// Points that a source needs in a cell.
     pub min_points: usize,
-    /// A cell whose points scatter more about their plane is no plane, metres.
+    /// A cell whose points scatter more about their plane is no plane, metres; nor is one whose points scatter much more than their
+    /// noise.
     pub max_scatter_m: f64,
     /// Cells that the areas must have in all.
     pub min_cells: usize,
@@ -51,6 +52,10 @@ pub struct StablePoints {
     pub times_s: Vec<f64>,
 }
 
+/// Factor by which noise along the normal may exceed that of the wall's points, and roughness of a plane, metres. What scatters more is a
+/// shrub or an edge, and its mean plane depends on who looks at it.
+const NOISE_SLACK: f64 = 1.5;
+const ROUGHNESS_M: f64 = 0.01;
 /// Points farther from their plane than this many median absolute deviations are left out.
 const OUTLIER_MADS: f64 = 4.5;
 /// Least extent of a cell's points in its plane, as a standard deviation and a share of the cell's edge.
@@ -61,27 +66,49 @@ const SAME_PLANE_COSINE: f64 = 0.97;
 /// Surfaces farther apart than this share of a cell's edge are two.
 const GAP: f64 = 0.3;
 
-/// The observations of all cells, with the area of each.
+/// The observations of all cells.
 ///
 /// `sigma_m`: noise of single points.
 pub(super) fn stable_observations(
     list: &[StablePoints],
     sigma_m: f64,
     params: &StableParams,
-) -> Vec<(usize, Observation)> {
+) -> Vec<Observation> {
     let systematic_m = params.systematic_share * sigma_m;
+    let max_scatter_m = (NOISE_SLACK * sigma_m).hypot(ROUGHNESS_M);
     let cells = columns(list, params.cell_m);
     let planes: Vec<(usize, CellPlane)> = cells
         .par_iter()
-        .filter_map(|(area, points)| Some((*area, CellPlane::fit(points, params)?)))
+        .filter_map(|(area, points)| Some((*area, CellPlane::fit(points, max_scatter_m, params)?)))
         .collect();
+    let numbers = plane_numbers(&planes, params);
     planes
         .par_iter()
-        .filter_map(|(area, plane)| {
+        .zip(numbers)
+        .filter_map(|((area, plane), number)| {
             let normal = mean_normal(plane, &planes, params);
-            Some((*area, plane.observe(&normal, systematic_m)?))
+            let of = StablePlane { area: *area, number };
+            plane.observe(&normal, systematic_m, of)
         })
         .collect()
+}
+
+/// For each cell the number of the plane that it is part of: the first in its area that has its direction and holds its centre.
+fn plane_numbers(cells: &[(usize, CellPlane)], params: &StableParams) -> Vec<usize> {
+    let mut heads: Vec<usize> = Vec::new();
+    let is_part = |head: usize, k: usize| {
+        let ((area_of_head, head), (area, cell)) = (&cells[head], &cells[k]);
+        let off = (cell.centre - head.centre).dot(&head.normal).abs();
+        area_of_head == area && head.normal.dot(&cell.normal).abs() > SAME_PLANE_COSINE && off < params.cell_m
+    };
+    let number = |k: usize| {
+        let found = heads.iter().position(|&head| is_part(head, k));
+        found.unwrap_or_else(|| {
+            heads.push(k);
+            heads.len() - 1
+        })
+    };
+    (0..cells.len()).map(number).collect()
 }
 
 /// Cuts the areas into pieces of surface, with the area of each.
@@ -162,7 +189,7 @@ struct CellPlane {
 
 impl CellPlane {
     /// `None` where fewer than two sources have points, or the points are no plane.
-    fn fit(points: &[CellPoint], params: &StableParams) -> Option<Self> {
+    fn fit(points: &[CellPoint], max_scatter_m: f64, params: &StableParams) -> Option<Self> {
         let mut kept = points.to_vec();
         let mut plane = plane_of(&kept)?;
         for _ in 0..3 {
@@ -181,10 +208,11 @@ impl CellPlane {
         for p in &kept {
             *counts.entry(p.source).or_default() += 1;
         }
-        kept.retain(|p| counts[&p.source] >= params.min_points);
-        counts.retain(|_, n| *n >= params.min_points);
+        counts.retain(|source, n| *n >= params.min_points && shows_plane(&kept, *source, &plane.1, params));
+        kept.retain(|p| counts.contains_key(&p.source));
         let (centre, normal, spread) = plane_of(&kept)?;
         let is_plane = spread[0].sqrt() <= params.max_scatter_m
+            && scatter(&kept, &normal) <= max_scatter_m
             && spread[1].sqrt() >= LEAST_EXTENT * params.cell_m
             && spread[0] < 0.25 * spread[1];
         kept.sort_by_key(|p| p.source);
@@ -196,7 +224,7 @@ impl CellPlane {
     }
 
     /// Offsets of the further sources against the first along the normal, with the plane's height and tilt eliminated.
-    fn observe(&self, normal: &Vector3<f64>, systematic_m: f64) -> Option<Observation> {
+    fn observe(&self, normal: &Vector3<f64>, systematic_m: f64, of: StablePlane) -> Option<Observation> {
         let frame = FaceFrame::from_normal(normal);
         let mut sources: Vec<usize> = self.points.iter().map(|p| p.source).collect();
         sources.dedup();
@@ -241,7 +269,7 @@ impl CellPlane {
         });
         let covariance = noise + systematic;
         Some(Observation {
-            sights: sources.iter().map(|&s| self.sight(s)).collect(),
+            sights: sources.iter().map(|&s| self.sight(s, of)).collect(),
             directions: vec![*normal],
             values: solution.rows(3, others).into_owned(),
             covariance,
@@ -250,7 +278,7 @@ impl CellPlane {
         })
     }
 
-    fn sight(&self, source: usize) -> Sight {
+    fn sight(&self, source: usize, of: StablePlane) -> Sight {
         let own: Vec<f64> = self
             .points
             .iter()
@@ -261,8 +289,29 @@ impl CellPlane {
             source,
             time_s: own.iter().sum::<f64>() / own.len().max(1) as f64,
             place: self.centre,
+            plane: Some(of),
         }
     }
+}
+
+/// Scatter of the points along a normal, each source about its own mean, metres.
+fn scatter(points: &[CellPoint], normal: &Vector3<f64>) -> f64 {
+    let mut sums: BTreeMap<usize, [f64; 3]> = BTreeMap::new();
+    for p in points {
+        let height = (p.place - points[0].place).dot(normal);
+        let sum = sums.entry(p.source).or_default();
+        *sum = [sum[0] + 1.0, sum[1] + height, sum[2] + height * height];
+    }
+    let squares: f64 = sums.values().map(|[n, h, hh]| hh - h * h / n).sum();
+    (squares.max(0.0) / points.len().max(1) as f64).sqrt()
+}
+
+/// Whether the points of a source extend over a plane of that normal by themselves: those at an edge, or on another thing, show another.
+fn shows_plane(points: &[CellPoint], source: usize, normal: &Vector3<f64>, params: &StableParams) -> bool {
+    let own: Vec<CellPoint> = points.iter().copied().filter(|p| p.source == source).collect();
+    plane_of(&own).is_some_and(|(_, direction, spread)| {
+        direction.dot(normal).abs() > SAME_PLANE_COSINE && spread[1].sqrt() >= LEAST_EXTENT * params.cell_m
+    })
 }
 
 /// Mean normal of the cells around that lie in the same plane: a single cell's tilts with the noise of its points, and would then show

@@ -31,6 +31,7 @@ fn sight(source: usize, place: Point3<f64>) -> Sight {
         source,
         time_s: 10.0 * source as f64 + place.y,
         place,
+        plane: None,
     }
 }
 
@@ -84,6 +85,37 @@ fn the_size_of_the_sources_errors_is_found_within_its_sampling_range() {
     assert!(found.drift_m < 0.001 && found.noise_scale < 1.5, "{found:?}");
 }
 
+/// Covariance of all differences, unknowns included, and their values.
+fn dense(
+    unknowns: &Unknowns,
+    all: &[&Observation],
+    prior: &Prior,
+    c: &ObserverComponents,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let covariance_of_unknowns = unknowns.prior(prior).0.try_inverse().unwrap();
+    let rows: usize = all.iter().map(|o| o.len()).sum();
+    let mut design = DMatrix::zeros(rows, unknowns.count());
+    let mut values = DVector::zeros(rows);
+    let mut noise = DMatrix::zeros(rows, rows);
+    let mut at = 0;
+    for o in all {
+        let (indices, matrix) = unknowns.design(o);
+        for (k, &i) in indices.iter().enumerate() {
+            design
+                .view_mut((at, i), (o.len(), 1))
+                .copy_from(&matrix.column(k));
+        }
+        values.rows_mut(at, o.len()).copy_from(&o.values);
+        let own = o.covariance(c.noise_scale, c.nugget_m);
+        noise.view_mut((at, at), (o.len(), o.len())).copy_from(&own);
+        at += o.len();
+    }
+    (
+        &design * covariance_of_unknowns * design.transpose() + noise,
+        values,
+    )
+}
+
 #[test]
 fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
     let errors = [
@@ -99,26 +131,7 @@ fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
     let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights);
     let problem = Problem::new(&unknowns, &all);
     let dense = |c: &ObserverComponents| {
-        let prior = Prior::new(c, 1e-3);
-        let covariance_of_unknowns = unknowns.prior(&prior).0.try_inverse().unwrap();
-        let rows: usize = all.iter().map(|o| o.len()).sum();
-        let mut design = DMatrix::zeros(rows, unknowns.count());
-        let mut values = DVector::zeros(rows);
-        let mut noise = DMatrix::zeros(rows, rows);
-        let mut at = 0;
-        for o in &all {
-            let (indices, matrix) = unknowns.design(o);
-            for (k, &i) in indices.iter().enumerate() {
-                design
-                    .view_mut((at, i), (o.len(), 1))
-                    .copy_from(&matrix.column(k));
-            }
-            values.rows_mut(at, o.len()).copy_from(&o.values);
-            let own = o.covariance(c.noise_scale, c.nugget_m);
-            noise.view_mut((at, at), (o.len(), o.len())).copy_from(&own);
-            at += o.len();
-        }
-        let total = &design * covariance_of_unknowns * design.transpose() + noise;
+        let (total, values) = dense(&unknowns, &all, &Prior::new(c, 1e-3), c);
         let log_det: f64 = total.clone().symmetric_eigenvalues().iter().map(|v| v.ln()).sum();
         log_det + values.dot(&(total.try_inverse().unwrap() * &values))
     };
@@ -134,7 +147,17 @@ fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
 
 /// A plane z = 0 with a wall y = 2, each source shifted as a whole.
 fn stable_points(errors: &[Vector3<f64>], noise_m: f64) -> Vec<StablePoints> {
-    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    stable_area(0, &Vector3::zeros(), errors, noise_m)
+}
+
+/// The same as one of several areas, at another place.
+fn stable_area(
+    area: usize,
+    place: &Vector3<f64>,
+    errors: &[Vector3<f64>],
+    noise_m: f64,
+) -> Vec<StablePoints> {
+    let mut rng = ChaCha8Rng::seed_from_u64(11 + area as u64);
     let mut part = |source: usize| {
         let points: Vec<Point3<f64>> = (0..9000)
             .map(|k| {
@@ -145,13 +168,13 @@ fn stable_points(errors: &[Vector3<f64>], noise_m: f64) -> Vec<StablePoints> {
                     1 => Point3::new(a, 2.0 + off, b),
                     _ => Point3::new(2.0 + off, a, b),
                 };
-                p + errors[source]
+                p + errors[source] + place
             })
             .collect();
         StablePoints {
-            area: 0,
+            area,
             source,
-            points: Cloud::from_world(Point3::new(1.0, 1.0, 1.0), points),
+            points: Cloud::from_world(Point3::new(1.0, 1.0, 1.0) + place, points),
             times_s: vec![10.0 * source as f64; 9000],
         }
     };
@@ -165,8 +188,8 @@ fn cells_of_a_plane_on_a_cell_boundary_show_its_whole_offset() {
     let cells = stable_observations(&stable_points(&errors, 0.01), 0.01, &StableParams::default());
     let ground: Vec<f64> = cells
         .iter()
-        .filter(|(_, o)| o.directions[0].z.abs() > 0.9)
-        .map(|(_, o)| o.values[0] * o.directions[0].z.signum())
+        .filter(|o| o.directions[0].z.abs() > 0.9)
+        .map(|o| o.values[0] * o.directions[0].z.signum())
         .collect();
     let mean = ground.iter().sum::<f64>() / ground.len() as f64;
     assert!(
@@ -246,6 +269,96 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     let sd = without.at[0].covariance[(0, 0)].sqrt();
     assert!((6e-4..4e-3).contains(&sd), "{sd}");
     assert!(without.at[0].mean.norm() < 5e-4, "{}", without.at[0].mean);
+}
+
+#[test]
+fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns_in_the_covariance() {
+    let errors = [
+        Vector3::zeros(),
+        Vector3::new(0.001, 0.0, 0.0),
+        Vector3::new(0.0, 0.002, 0.003),
+        Vector3::zeros(),
+    ];
+    let mut list = observations(0, &errors, 0.002, 4);
+    list.truncate(6);
+    let cells = stable_observations(&stable_points(&errors, 0.004), 0.004, &StableParams::default());
+    list.extend(cells.into_iter().step_by(12));
+    let all: Vec<&Observation> = list.iter().collect();
+    let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
+    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights).with_planes(&sights);
+    let c = ObserverComponents::expected(SensorClass::Airborne);
+    let prior = Prior::with_planes(&c, 0.01, 0.001);
+    let problem = Problem::new(&unknowns, &all);
+    let solution = problem.solve(&prior, &c).unwrap();
+    let number = |o: &Observation| o.plane().map(|p| p.number);
+    let doubted = list.iter().find_map(number);
+    let is_doubted = |o: &Observation| number(o).is_some() && number(o) == doubted;
+    let (information, vector) = problem.motion_of(&solution, &c, is_doubted);
+    // By hand: sources 2 and 3 are those of the later epoch.
+    let (total, values) = dense(&unknowns, &all, &prior, &c);
+    let mut motion = DMatrix::zeros(values.len(), 3);
+    let mut row = 0;
+    for o in &all {
+        for s in &o.sights[1..] {
+            let sign = (s.source / 2) as f64 - (o.sights[0].source / 2) as f64;
+            for d in &o.directions {
+                if is_doubted(o) {
+                    motion.row_mut(row).copy_from(&(d.transpose() * sign));
+                }
+                row += 1;
+            }
+        }
+    }
+    let weighted = total.try_inverse().unwrap() * &motion;
+    let (expected, of_values) = (motion.transpose() * &weighted, weighted.transpose() * values);
+    assert!(expected.norm() > 1e2, "{expected}");
+    assert!(
+        (information - &expected).norm() < 1e-6 * expected.norm(),
+        "{information} {expected}"
+    );
+    assert!((vector - &of_values).norm() < 1e-6 * of_values.norm());
+}
+
+#[test]
+fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
+    let errors = [
+        Vector3::new(0.001, 0.0, -0.001),
+        Vector3::new(-0.001, 0.001, 0.0),
+        Vector3::new(0.004, -0.003, 0.002),
+        Vector3::new(0.002, -0.002, 0.004),
+    ];
+    let mut stones = wall(&errors, 0.002, 1);
+    // A stone that only the first source of each epoch shows has all of its own error, the others half of the variance.
+    let mut alone = stones[7].clone();
+    alone.sights.retain(|s| s.source % 2 == 0);
+    stones.push(alone);
+    // The halves of a source are measured at the same times.
+    for s in stones
+        .iter_mut()
+        .flat_map(|s| &mut s.sights)
+        .filter(|s| s.source >= 2)
+    {
+        s.time_s -= 20.0;
+    }
+    let sources = sources(2);
+    let pair = EpochPair {
+        sources: &sources,
+        same_as: &[0, 1, 0, 1],
+        stones: &stones,
+        stable: &[],
+        sigma_m: 0.002,
+    };
+    // One survey: nothing else is uncertain where the same sources count alike.
+    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let [inside, across] = found.components.unwrap().nugget_m;
+    for (k, share) in [(3, 1.0), (20, 2.0)] {
+        let covariance = found.at[k].covariance;
+        let expected = [across, inside, inside].map(|s| share * s * s);
+        for a in 0..3 {
+            let excess = covariance[(a, a)] - expected[a];
+            assert!((-1e-12..1e-8).contains(&excess), "{k} {a}: {excess}");
+        }
+    }
 }
 
 #[test]

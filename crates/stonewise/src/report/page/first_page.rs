@@ -244,7 +244,7 @@ fn not_measured(facts: &Summary) -> String {
             format!(
                 "<li>{} ({}): {}</li>",
                 count(n),
-                percent(n, facts.stones),
+                percent(n, facts.stones).replace('.', texts.decimal),
                 escape(texts.status(*status))
             )
         })

@@ -90,7 +90,8 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let layout = MapLayout::new(results);
     let norm = |s: &StoneRow| s.motion.as_ref().map(|m| m.displacement.norm());
     let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
-    let title = "Length of the motion, with in-plane arrows";
+    let page = &facts.texts().page;
+    let title = page.map_title;
     let picture = MapPicture {
         title,
         value: &norm,
@@ -100,12 +101,10 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         arrows: true,
         loose: false,
     };
-    let note = "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
-                not measured.";
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
     format!(
         "<div class=\"{class}\">{}</div>",
-        figure(title, &stone_map(&layout, &picture), note)
+        figure(title, &stone_map(&layout, &picture), page.map_note)
     )
 }
 

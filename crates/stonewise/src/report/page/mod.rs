@@ -20,6 +20,7 @@ use crate::figure::escape;
 use crate::results::names::PairFile;
 use crate::results::records::RunRecord;
 use crate::results::{ResultSet, compare, joints};
+use crate::texts::Texts;
 
 #[cfg(test)]
 pub(super) use explorer::{SCRIPT, STYLE};
@@ -95,7 +96,7 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
         ),
         first_page::datum_warning(results.datum(), texts),
         first_page::cover(results, &facts),
-        cover(results)
+        cover(results, texts)
     );
     // Of all that the page holds, so that no input can guess it.
     let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
@@ -152,12 +153,16 @@ fn epochs(run: &RunRecord, pair: usize) -> Option<String> {
 }
 
 /// Epochs, version and time of the run, and the way to the reports on other epochs.
-fn cover(results: &ResultSet) -> String {
+fn cover(results: &ResultSet, texts: &Texts) -> String {
     let run = results.run.as_ref();
     let line = |pair: usize| run.and_then(|run| epochs(run, pair));
     let mut facts: Vec<String> = Vec::new();
     if let Some(run) = run {
-        facts.push(format!("finished <b>{}</b>", run.finished_at.minute()));
+        facts.push(format!(
+            "{} <b>{}</b>",
+            texts.page.finished,
+            run.finished_at.minute()
+        ));
         facts.push(format!("stonewise <b>{}</b>", escape(&run.version)));
     }
     let others = (1..=results.pairs).filter(|p| *p != results.pair);

@@ -1,6 +1,7 @@
 //! The motion of every matched stone.
 
 mod datum;
+mod off_wall;
 mod pairs;
 mod sights;
 mod windows;
@@ -14,6 +15,8 @@ use crate::pipeline::storage::step::Key;
 use crate::project::Estimator;
 use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord};
 pub use datum::datum;
+use nalgebra::Point3;
+use off_wall::OffWall;
 use pairs::DiskPairs;
 use serde::{Deserialize, Serialize};
 use sights::Sights;
@@ -40,6 +43,9 @@ pub struct Registered {
     pub epoch_errors: Option<EpochErrors>,
     /// The stones at which that error is given, in its order.
     pub error_stones: Vec<StoneId>,
+    /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty where nobody asked.
+    #[serde(default)]
+    pub off_wall: Vec<[Point3<f64>; 2]>,
 }
 
 /// Measures the motion of every matched stone.
@@ -89,11 +95,19 @@ pub fn register(
                 )?)
             }
         };
+        let is_one_survey = context.project.epochs[number - 1].same_survey_as == Some(0);
+        let is_known = params.epoch_error_m.is_some() || !params.stable.is_empty() || is_one_survey;
+        let off_wall = match params.auto_stable || !is_known {
+            true => OffWall::find([first, second], context.progress)?,
+            false => OffWall::default(),
+        };
+        registered.off_wall = off_wall.areas().to_vec();
         let sights = Sights::gather(
             context.project,
             [first, second],
             number,
             &matches,
+            params.auto_stable.then_some(&off_wall),
             params.observers.contrasts.max_stones,
             context.progress,
         )?;
@@ -114,6 +128,7 @@ pub fn register(
     })?;
     let registered: Registered = read_json(&step.file("motions.json"))?;
     report_datum(context, number, &registered);
+    report_off_wall(context, number, &registered);
     Ok(registered)
 }
 
@@ -138,6 +153,28 @@ impl Registered {
             }
         }
     }
+}
+
+/// Names surfaces off the wall that could show, or that showed, the registration of the epochs.
+fn report_off_wall(context: &Context, number: usize, registered: &Registered) {
+    let epoch = &context.project.epochs[number - 1].name;
+    let largest = registered.off_wall.iter().max_by(|a, b| {
+        let volume = |[low, high]: &[Point3<f64>; 2]| (high - low).product();
+        volume(a).total_cmp(&volume(b))
+    });
+    let Some([low, high]) = largest else { return };
+    let count = registered.off_wall.len();
+    let message = match context.project.settings.registration.auto_stable {
+        true => format!(
+            "auto_stable: {count} areas off the wall are taken for stable, as far as they agree with each other"
+        ),
+        false => format!(
+            "{count} areas off the wall are seen in both epochs and could show their registration: auto_stable = true uses them all, \
+             [[registration.stable]] those that you know did not move, such as corners = [[{:.1}, {:.1}, {:.1}], [{:.1}, {:.1}, {:.1}]]",
+            low.x, low.y, low.z, high.x, high.y, high.z
+        ),
+    };
+    context.warnings.notice(STEP, epoch, message);
 }
 
 /// Says how the stones moved in common, and what is known about the registration of the epochs.
@@ -165,6 +202,16 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
         .epoch_errors
         .as_ref()
         .is_some_and(|e| e.datum == observers::Datum::Stable);
+    if let Some(errors) = &registered.epoch_errors
+        && !errors.moved_areas.is_empty()
+    {
+        let numbers: Vec<String> = errors.moved_areas.iter().map(|a| (a + 1).to_string()).collect();
+        let message = format!(
+            "[[registration.stable]] number {} moved against the other stable areas and is left out",
+            numbers.join(", ")
+        );
+        context.warnings.skipped(STEP, epoch, message);
+    }
     if named > 0 && !is_stable {
         let message = format!(
             "[[registration.stable]] does not show the epochs' registration: {cells} plane cells seen in both epochs are too few; it is \
@@ -196,6 +243,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
         epoch_errors: None,
         error_stones: Vec::new(),
+        off_wall: Vec::new(),
     }
 }
 
@@ -211,5 +259,6 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
         estimator: EstimatorRecord::Gicp(gicp),
         epoch_errors: None,
         error_stones: Vec::new(),
+        off_wall: Vec::new(),
     }
 }

@@ -1,5 +1,6 @@
 //! What each station and strip shows of the matched stones and of the stable areas, gathered in one pass over the tiles.
 
+use super::off_wall::OffWall;
 use crate::error::Result;
 use crate::pipeline::sources::EpochSources;
 use crate::pipeline::steps::label::Labelled;
@@ -33,12 +34,13 @@ pub struct Sights {
 }
 
 impl Sights {
-    /// `number`: of the later epoch, from 1. At most `most_stones` keep their points, evenly chosen among the matches.
+    /// `number`: of the later epoch, from 1. `off_wall`: areas that count as stable beside those of the project. At most `most_stones` keep their points, evenly chosen among the matches.
     pub fn gather(
         project: &Project,
         epochs: [&Labelled; 2],
         number: usize,
         matches: &[(StoneId, StoneId)],
+        off_wall: Option<&OffWall>,
         most_stones: usize,
         progress: &dyn Progress,
     ) -> Result<Self> {
@@ -84,6 +86,9 @@ impl Sights {
             };
             pass.stones(&places, stride, &mut collected, progress)?;
             pass.stable(&mut sights.stable)?;
+            if let Some(off_wall) = off_wall {
+                pass.off_wall(off_wall, &mut sights.stable)?;
+            }
         }
         sights.seen = places
             .iter()
@@ -144,6 +149,43 @@ impl Collected {
     }
 }
 
+/// Points of stable areas, by area and source, as far as they are gathered.
+#[derive(Default)]
+struct StableParts {
+    parts: BTreeMap<(usize, usize), (Vec<Point3<f64>>, Vec<f64>)>,
+    /// Points by area, source and cell.
+    counts: BTreeMap<(usize, usize, [i64; 3]), u32>,
+}
+
+impl StableParts {
+    fn add(&mut self, area: usize, source: usize, place: Point3<f64>, time_s: f64) {
+        let cell = (area, source, cell_of(&place, STABLE_CELL_M));
+        let count = self.counts.entry(cell).or_default();
+        *count += 1;
+        if *count <= STABLE_POINTS {
+            let part = self.parts.entry((area, source)).or_default();
+            part.0.push(place);
+            part.1.push(time_s);
+        }
+    }
+
+    fn finish(self, list: &mut Vec<StablePoints>) {
+        let points = self
+            .parts
+            .into_iter()
+            .filter_map(|((area, source), (points, times_s))| {
+                let bounds = Bounds::of(points.iter().copied())?;
+                Some(StablePoints {
+                    area,
+                    source,
+                    points: Cloud::from_world(bounds.centre(), points),
+                    times_s,
+                })
+            });
+        list.extend(points);
+    }
+}
+
 /// One epoch's pass over its tiles.
 struct Pass<'a> {
     epoch: &'a Labelled,
@@ -189,38 +231,48 @@ impl Pass<'_> {
         Ok(())
     }
 
+    /// Points in the project's stable areas.
     fn stable(&self, list: &mut Vec<StablePoints>) -> Result<()> {
         let tiles = &self.epoch.ingested.tiles;
         for (number, area) in self.areas.iter().enumerate() {
             let Some(bounds) = area.bounds() else { continue };
-            let mut parts: BTreeMap<usize, (Vec<Point3<f64>>, Vec<f64>)> = BTreeMap::new();
-            let mut counts: BTreeMap<(usize, [i64; 3]), u32> = BTreeMap::new();
+            let mut parts = StableParts::default();
             for tile in (0..tiles.tile_count()).filter(|&t| tiles.bounds(t).intersects(&bounds)) {
-                let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
-                for i in 0..cloud.len() {
-                    let place = cloud.world(i);
-                    if !Self::is_in(area, &bounds, &place) {
-                        continue;
-                    }
-                    let (source, time_s) = self.sources.of(origins.source[i], origins.time_s[i]);
-                    let source = self.first_source + source;
-                    let count = counts
-                        .entry((source, cell_of(&place, STABLE_CELL_M)))
-                        .or_default();
-                    *count += 1;
-                    if *count <= STABLE_POINTS {
-                        let part = parts.entry(source).or_default();
-                        part.0.push(place);
-                        part.1.push(time_s);
-                    }
-                }
+                self.stable_in(
+                    tile,
+                    |p| Self::is_in(area, &bounds, p).then_some(number),
+                    &mut parts,
+                )?;
             }
-            list.extend(parts.into_iter().map(|(source, (points, times_s))| StablePoints {
-                area: number,
-                source,
-                points: Cloud::from_world(bounds.centre(), points),
-                times_s,
-            }));
+            parts.finish(list);
+        }
+        Ok(())
+    }
+
+    /// Points in areas off the wall, which are numbered after the project's.
+    fn off_wall(&self, off_wall: &OffWall, list: &mut Vec<StablePoints>) -> Result<()> {
+        let mut parts = StableParts::default();
+        let area = |p: &Point3<f64>| Some(self.areas.len() + off_wall.area(p)?);
+        for tile in 0..self.epoch.ingested.tiles.tile_count() {
+            self.stable_in(tile, area, &mut parts)?;
+        }
+        parts.finish(list);
+        Ok(())
+    }
+
+    fn stable_in(
+        &self,
+        tile: usize,
+        area: impl Fn(&Point3<f64>) -> Option<usize>,
+        parts: &mut StableParts,
+    ) -> Result<()> {
+        let tiles = &self.epoch.ingested.tiles;
+        let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
+        for i in 0..cloud.len() {
+            let place = cloud.world(i);
+            let Some(area) = area(&place) else { continue };
+            let (source, time_s) = self.sources.of(origins.source[i], origins.time_s[i]);
+            parts.add(area, self.first_source + source, place, time_s);
         }
         Ok(())
     }

@@ -1,0 +1,100 @@
+//! The `stonewise` command: reads arguments, calls the library, prints.
+//!
+//! A library, so that the Python module has the same command and says the same of what goes wrong.
+
+mod args;
+mod commands;
+mod printer;
+
+pub use commands::measure;
+use std::ffi::OsString;
+
+/// Everything that was asked for was done.
+const DONE: u8 = 0;
+/// Something failed.
+const FAILED: u8 = 1;
+/// Wrong arguments, or a wrong project file.
+const WRONG_USAGE: u8 = 2;
+/// Finished, but some inputs were left out, or the results as a whole are in doubt.
+const IN_DOUBT: u8 = 3;
+/// The verdict is one that `--exit-on` asks for.
+const VERDICT: u8 = 4;
+
+/// Does what the arguments ask for, the first of which is the program's name; the exit code.
+pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
+    say_panics_once();
+    let args = match <args::Args as clap::Parser>::try_parse_from(args) {
+        Ok(args) => args,
+        Err(error) => {
+            // A closed stream is no reason to fail.
+            let _ = error.print();
+            return if error.use_stderr() { WRONG_USAGE } else { DONE };
+        }
+    };
+    let printer = printer::Printer::new(args.quiet);
+    let outcome = commands::dispatch(args, &printer);
+    printer.finish();
+    match outcome {
+        Ok(commands::Outcome::Done) => DONE,
+        Ok(commands::Outcome::InDoubt) => IN_DOUBT,
+        Ok(commands::Outcome::Verdict) => VERDICT,
+        Err(error) => {
+            printer::note(&format!("error: {}", explain(&error)));
+            if is_wrong_usage(&error) {
+                WRONG_USAGE
+            } else {
+                FAILED
+            }
+        }
+    }
+}
+
+/// Panics of decoders become errors that name the file, so nothing is said of them; any other is a defect of this program.
+fn say_panics_once() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !stonewise_io::wall::is_behind_wall() {
+            usual(panic);
+            printer::note("error: this is a defect of stonewise; please report it with the lines above");
+        }
+    }));
+}
+
+/// Whether the command was given something that cannot be.
+fn is_wrong_usage(error: &anyhow::Error) -> bool {
+    let known = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref().is_some_and(stonewise::Error::is_wrong_usage)
+    };
+    error.chain().any(known)
+}
+
+/// The error and its causes in one line, as the command prints it; a cause that is part of the text already is not said twice.
+pub fn explain(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |text, cause| {
+        let cause = cause.to_string();
+        match text.as_str() {
+            "" => cause,
+            said if said.contains(&cause) => text,
+            said => format!("{said}: {cause}"),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn no_cause_is_said_twice() {
+        let io = std::io::Error::other("disk on fire");
+        let error = Err::<(), _>(io)
+            .context("writing failed: disk on fire: a.csv")
+            .context("the run is not finished");
+        let text = explain(&error.unwrap_err());
+        assert_eq!(
+            text,
+            "the run is not finished: writing failed: disk on fire: a.csv"
+        );
+    }
+}

@@ -1,0 +1,154 @@
+//! What a wall shows of the intervals, and rows of many walls.
+
+use crate::survey::Survey;
+use nalgebra::{Matrix3, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use stonewise_core::geometry::{DisplacementSample, FaceFrame, SmallMotion};
+use stonewise_core::registration::moved_stones;
+use stonewise_core::registration::observers::{Datum, EpochErrors};
+
+/// 95 % quantile of chi-square with three degrees of freedom, and of the normal law (two-sided).
+const CHI2_3_95: f64 = 7.814_727_903_251_179;
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
+/// Figures of one wall; shares are of its stones, axes (along, up, out).
+#[derive(Clone, Copy, Default)]
+pub struct Wall {
+    pub datum: Option<Datum>,
+    /// Stones whose interval holds the truth, along each axis and jointly.
+    inside: [f64; 4],
+    chi_square: f64,
+    /// Squared errors before and after the datum's correction, and claims, mm^2, summed over axes.
+    square: [f64; 3],
+    /// Squared error of the common motion over its claim, mean of the axes.
+    common: f64,
+    /// Whether a stone of the wall, which stands still, is called moved: stone by stone, and with the false discovery rate controlled.
+    called: [bool; 2],
+}
+
+impl Wall {
+    pub fn new(survey: &Survey, found: &EpochErrors) -> Self {
+        let is_known = found.datum != Datum::Unknown;
+        let stones = || survey.stones.iter().zip(&survey.measured).enumerate();
+        let samples: Vec<DisplacementSample> = stones()
+            .map(|(k, (stone, measured))| DisplacementSample {
+                place: stone.centroid,
+                displacement: *measured,
+                covariance: survey.noise[k],
+            })
+            .collect();
+        let common = SmallMotion::fit(&samples);
+        let mut wall = Self {
+            datum: Some(found.datum),
+            ..Self::default()
+        };
+        let n = survey.stones.len() as f64;
+        let mut motions = Vec::new();
+        for (k, (stone, measured)) in stones() {
+            let (rest, covariance) = match (&common, is_known) {
+                (Some(common), false) => (
+                    measured - common.at(&stone.centroid),
+                    survey.noise[k] + common.covariance_at(&stone.centroid),
+                ),
+                _ => (
+                    measured - found.at[k].mean,
+                    survey.noise[k] + found.at[k].covariance,
+                ),
+            };
+            let face = FaceFrame::from_normal(&stone.normal).face_from_world();
+            let (error, spread) = (face * rest, face * covariance * face.transpose());
+            for axis in 0..3 {
+                let holds = error[axis].abs() < NORMAL_95 * spread[(axis, axis)].sqrt();
+                wall.inside[axis] += f64::from(u8::from(holds)) / n;
+            }
+            let chi = chi_square(&rest, &covariance);
+            wall.inside[3] += f64::from(u8::from(chi < CHI2_3_95)) / n;
+            wall.chi_square += chi / n;
+            wall.square[0] += 1e6 * measured.norm_squared() / n;
+            wall.square[1] += 1e6 * rest.norm_squared() / n;
+            wall.square[2] += 1e6 * covariance.trace() / n;
+            wall.called[0] |= chi > CHI2_3_95;
+            motions.push(Some((rest, covariance)));
+        }
+        wall.called[1] = moved_stones(&motions, 0.05).contains(&true);
+        let mean = survey.seeming.iter().sum::<Vector3<f64>>() / n;
+        let claimed = found.rigid.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let off = mean - found.rigid.error.fixed_rows::<3>(0);
+        wall.common = (0..3).map(|a| off[a].powi(2) / claimed[(a, a)]).sum::<f64>() / 3.0;
+        wall
+    }
+}
+
+fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    covariance
+        .cholesky()
+        .map_or(f64::INFINITY, |c| v.dot(&c.solve(v)))
+}
+
+pub fn print_head(walls: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut shares: Vec<f64> = (0..4000)
+        .map(|_| (0..walls).filter(|_| rng.random_bool(0.95)).count() as f64 / walls as f64)
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    println!(
+        "a perfect method, all stones of a wall sharing one error: {:.3} to {:.3}",
+        shares[100], shares[3900]
+    );
+    println!(
+        "survey | unknown | along up out joint (95 % range of the mean of the axes) | chi-square | rms before after claimed mm | common error / claim | called stone by stone, FDR"
+    );
+}
+
+pub fn print(label: &str, walls: &[Wall], seconds: f64) {
+    let known: Vec<Wall> = walls
+        .iter()
+        .copied()
+        .filter(|w| w.datum != Some(Datum::Unknown))
+        .collect();
+    let unknown = (walls.len() - known.len()) as f64 / walls.len() as f64;
+    let mean = |of: &dyn Fn(&Wall) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
+    let share =
+        |of: &dyn Fn(&Wall) -> bool| walls.iter().filter(|w| of(w)).count() as f64 / walls.len() as f64;
+    let inside: Vec<f64> = (0..4).map(|k| mean(&|w| w.inside[k])).collect();
+    let [low, high] = bootstrap(&known);
+    let rms: Vec<f64> = (0..3).map(|k| (mean(&|w| w.square[k]) / 3.0).sqrt()).collect();
+    println!(
+        "{label} | {unknown:.2} | {:.3} {:.3} {:.3} {:.3} ({low:.3} to {high:.3}) | {:.2} | {:.2} {:.2} {:.2} | {:.2} | {:.3} {:.3} | {:.0} s",
+        inside[0],
+        inside[1],
+        inside[2],
+        inside[3],
+        mean(&|w| w.chi_square),
+        rms[0],
+        rms[1],
+        rms[2],
+        mean(&|w| w.common).sqrt(),
+        share(&|w| w.called[0]),
+        share(&|w| w.called[1]),
+        seconds
+    );
+}
+
+/// 95 % range of the coverage, mean of the axes, over walls drawn anew.
+fn bootstrap(walls: &[Wall]) -> [f64; 2] {
+    if walls.is_empty() {
+        return [f64::NAN; 2];
+    }
+    let of: Vec<f64> = walls
+        .iter()
+        .map(|w| w.inside[..3].iter().sum::<f64>() / 3.0)
+        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(2);
+    let mut means: Vec<f64> = (0..2000)
+        .map(|_| {
+            (0..of.len())
+                .map(|_| of[rng.random_range(0..of.len())])
+                .sum::<f64>()
+                / of.len() as f64
+        })
+        .collect();
+    means.sort_by(f64::total_cmp);
+    [means[50], means[1950]]
+}

@@ -1,0 +1,42 @@
+//! The command, and the run of a project.
+
+use crate::attended::{Listeners, attended};
+use crate::error::{error, explained};
+use pyo3::prelude::*;
+use serde_json::{Map, Value};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use stonewise::{OutputFolder, Project, Until};
+
+/// Does what the arguments of the command line ask for, the first of which is the program's name; the exit code.
+#[pyfunction]
+pub fn command(py: Python<'_>, args: Vec<OsString>) -> u8 {
+    py.detach(|| stonewise_cli::main_with_args(args))
+}
+
+/// Runs a project; `parameters`: JSON of what replaces parameters of the project file.
+#[pyfunction]
+pub fn run(
+    py: Python<'_>,
+    project: PathBuf,
+    out: PathBuf,
+    parameters: &str,
+    force: bool,
+    progress: Option<Py<PyAny>>,
+    note: Option<Py<PyAny>>,
+) -> PyResult<()> {
+    let parameters = parameters_of(parameters)?;
+    let listeners = Listeners { progress, note };
+    let outcome = attended(py, &listeners, |progress| -> anyhow::Result<()> {
+        let project = Project::read(&project)?.with_parameters(&parameters)?;
+        let folder = OutputFolder::of_project(&out, &project, force)?;
+        stonewise_cli::measure(&folder, &project, Until::Reported, progress)?;
+        Ok(())
+    })?;
+    outcome.map_err(explained)
+}
+
+/// Parameters from JSON.
+pub fn parameters_of(json: &str) -> PyResult<Map<String, Value>> {
+    serde_json::from_str(json).map_err(|e| error(format!("parameters: {e}")))
+}

@@ -1,0 +1,162 @@
+"""The whole method: the same bytes and words as the command line; it can be followed and stopped."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+import stonewise
+
+FILES = ["stones.parquet", "stones.csv", "matches.json", "m3c2.csv", "outlines.json"]
+
+
+def assert_same_bytes(one: Path, other: Path) -> None:
+    for name in FILES:
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def test_same_bytes_as_the_command(command, survey, results, tmp_path):
+    command("run", "--quiet", survey / "stonewise.toml", "--out", tmp_path / "out")
+    assert_same_bytes(results.path, tmp_path / "out")
+
+
+@pytest.mark.skipif("STONEWISE" not in os.environ, reason="STONEWISE names no command that cargo built")
+def test_same_bytes_as_the_command_that_cargo_builds(survey, results, tmp_path):
+    args = [os.environ["STONEWISE"], "run", "--quiet", str(survey / "stonewise.toml"), "--out", str(tmp_path / "out")]
+    subprocess.run(args, check=True)
+    assert_same_bytes(results.path, tmp_path / "out")
+
+
+def test_parameters_are_those_of_the_project_file(command, survey, results, tmp_path):
+    changed = stonewise.run(
+        survey / "stonewise.toml",
+        out=tmp_path / "python",
+        registration={"estimator": "gicp", "epoch_error_m": 0.001},
+        match={"max_ratio": 0.5},
+    )
+    assert changed.parameters["registration"]["estimator"] == "gicp"
+    assert changed.datum == {results.epochs[1]: "stated"}
+    project = survey / "changed.toml"
+    text = (survey / "stonewise.toml").read_text()
+    assert "[registration]" not in text and "[match]" not in text
+    project.write_text(text + '\n[registration]\nestimator = "gicp"\nepoch_error_m = 0.001\n[match]\nmax_ratio = 0.5\n')
+    command("run", "--quiet", project, "--out", tmp_path / "command")
+    assert_same_bytes(changed.path, tmp_path / "command")
+    assert changed.stones_arrow != results.stones_arrow
+
+
+def test_errors_have_the_words_of_the_command(command, survey, tmp_path):
+    wrong = survey / "wrong.toml"
+    wrong.write_text((survey / "stonewise.toml").read_text() + "\n[match]\nmax_ration = 0.5\n")
+    foreign = tmp_path / "foreign"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("mine")
+    for project, out, code in [
+        (wrong, tmp_path / "a", 2),
+        (survey / "missing.toml", tmp_path / "a", 1),
+        (survey / "stonewise.toml", foreign, 2),
+    ]:
+        said = command("run", project, "--out", out, expect=code).stderr.strip().splitlines()[-1]
+        with pytest.raises(stonewise.Error) as raised:
+            stonewise.run(project, out=out)
+        assert said == f"error: {raised.value}"
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        ({"match": {"max_ration": 0.5}}, "match: unknown field `max_ration`"),
+        ({"matches": {}}, "unknown field `matches`"),
+        ({"match": {"max_ratio": "much"}}, "match: invalid type"),
+        ({"match": {"min_area_ratio": 1.5}}, "it is a share, 0 to 1"),
+        ({"segment": {"model": "no.safetensors"}}, "no such file"),
+    ],
+)
+def test_wrong_parameters_are_named(survey, tmp_path, parameters, words):
+    with pytest.raises(stonewise.Error, match=words):
+        stonewise.run(survey, out=tmp_path / "out", **parameters)
+    assert not (tmp_path / "out").exists()
+
+
+def test_progress_is_told_and_other_threads_go_on(survey, tmp_path):
+    told, ticks, ended = [], 0, threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not ended.is_set():
+            ticks += 1
+            time.sleep(0.001)
+
+    ticking = threading.Thread(target=tick)
+    ticking.start()
+    started = time.monotonic()
+    try:
+        stonewise.run(survey, out=tmp_path / "out", progress=lambda *args: told.append(args))
+    finally:
+        ended.set()
+        ticking.join()
+    assert {"masks", "labels", "adjust", "M3C2"} <= {what for what, _, _ in told}
+    assert all(0 <= done <= total for _, done, total in told)
+    assert ticks > 10 * (time.monotonic() - started)
+
+
+def test_an_exception_of_the_callback_stops_the_run(survey, results, tmp_path):
+    class Enough(Exception):
+        pass
+
+    def stop(what: str, done: int, total: int) -> None:
+        if what == "labels":
+            raise Enough
+
+    with pytest.raises(Enough):
+        stonewise.run(survey / "stonewise.toml", out=tmp_path / "out", progress=stop)
+    with pytest.raises(stonewise.Error, match="no stones.parquet here"):
+        stonewise.open(tmp_path / "out")
+    resumed = stonewise.run(survey / "stonewise.toml", out=tmp_path / "out")
+    assert any(step["resumed"] for step in resumed.record["steps"])
+    assert_same_bytes(results.path, resumed.path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
+@pytest.mark.parametrize("program", ["module", "command"])
+def test_control_c(survey, results, tmp_path, program):
+    project, out = str(survey / "stonewise.toml"), str(tmp_path / "out")
+    script = f"import stonewise; stonewise.run({project!r}, out={out!r}, progress=lambda w, d, t: print(w, flush=True))"
+    args = {
+        "module": [sys.executable, "-c", script],
+        "command": [sys.executable, "-m", "stonewise", "run", project, "--out", out],
+    }[program]
+    stopped = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    lines = []
+    for line in stopped.stdout:
+        lines.append(line)
+        if "masks" in line:
+            stopped.send_signal(signal.SIGINT)
+            break
+    said = "".join(lines) + stopped.stdout.read()
+    assert stopped.wait(60) != 0
+    assert ("KeyboardInterrupt" if program == "module" else "interrupted") in said
+    resumed = stonewise.run(project, out=out)
+    assert_same_bytes(results.path, resumed.path)
+
+
+def test_doubts_are_warnings(survey, tmp_path):
+    project = survey / "doubtful.toml"
+    text = (survey / "stonewise.toml").read_text()
+    project.write_text(text + "\n[[registration.stable]]\ncorners = [[90.0, 90.0, 90.0], [91.0, 91.0, 91.0]]\n")
+    with pytest.warns(stonewise.Doubt, match="registration.stable"):
+        r = stonewise.run(project, out=tmp_path / "out")
+    assert any(w.skipped_input for w in r.warnings)
+
+
+def test_the_command_answers_as_commands_do(command):
+    assert command("--version").stdout.strip() == f"stonewise {stonewise.__version__}"
+    assert "Usage: stonewise run" in command("run", "--help").stdout
+    assert "unexpected argument" in command("run", "--nonsense", expect=2).stderr
