@@ -66,14 +66,14 @@ fn pictures_that_lie_about_their_sizes_are_refused_at_once() {
     let path = testdata("hostile/claim.png");
     assert_eq!(
         refusal(&path, read_label_png),
-        "the header claims 60000x60000 pixels, and the file has 69 bytes: write the label image again: FILE"
+        "the header claims 60000x60000 pixels, but the file has only 69 bytes: write the label image again: FILE"
     );
     let folder = tempfile::tempdir().unwrap();
     fs::copy(&path, folder.path().join("photo.png")).unwrap();
     let masks = LabelFolder::open(folder.path()).unwrap();
     let message = refusal(&path, |_| masks.labels_for("photo.jpg", 4000, 3000));
     assert!(
-        message.contains("are 60000x60000 px, its camera 4000x3000 px"),
+        message.contains("are 60000x60000 px, but its camera is 4000x3000 px"),
         "{message}"
     );
     assert!(refusal(&path, read_rgb).starts_with("cannot read the image: "));
@@ -92,7 +92,7 @@ fn a_label_image_of_another_size_is_refused_before_it_is_decoded() {
     let masks = LabelFolder::open(folder.path()).unwrap();
     let message = refusal(&path, |_| masks.labels_for("photo.jpg", 4000, 3000));
     assert!(
-        message.contains("are 400x300 px, its camera 4000x3000 px"),
+        message.contains("are 400x300 px, but its camera is 4000x3000 px"),
         "{message}"
     );
 }

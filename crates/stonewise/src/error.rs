@@ -32,7 +32,7 @@ pub enum Error {
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: std::io::Error,
     },
     /// An input cannot be used.
@@ -52,20 +52,20 @@ pub enum Error {
         message: String,
     },
     /// Another process writes into the output folder.
-    #[error("another run works in this folder; wait for its end, or give another --out: {path}", path = .path.display())]
+    #[error("another run works in this folder; wait until it ends, or give another --out: {path}", path = .path.display())]
     Busy {
         /// The folder.
         path: PathBuf,
     },
-    /// The inputs are fine one by one and impossible together.
+    /// Each input is valid, but together they are not.
     #[error("{0}")]
     Survey(String),
-    /// What a look at the survey found cannot be right.
+    /// The check of the survey found an error.
     #[error("{0}")]
     Check(String),
     /// Two epochs have no stone in common.
     #[error(
-        "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both epochs show the same wall, in one frame?",
+        "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both show the same wall, in the same coordinates?",
         .epochs[0], .epochs[1], .stones[0], .stones[1]
     )]
     NoMatch {
@@ -95,7 +95,7 @@ pub enum Error {
     /// A simulated survey could not be made.
     #[error(transparent)]
     Simulate(crate::simulate::SimulateError),
-    /// Labels could not be carried into a cloud.
+    /// Labels could not be transferred to a cloud.
     #[error(transparent)]
     Transfer(TransferError),
     /// Stones could not be measured.
@@ -108,7 +108,7 @@ pub enum Error {
     #[error(transparent)]
     Layers(#[from] stonewise_io::layers::LayerError),
     /// A result file does not hold what it should.
-    #[error("{message}; make it anew with `stonewise run`: {path}", path = .path.display())]
+    #[error("{message}; create it again with `stonewise run`: {path}", path = .path.display())]
     Results {
         /// The file.
         path: PathBuf,
@@ -176,7 +176,8 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: a project file or parameters that cannot be, or an output folder of something else.
+    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder that belongs to
+    /// something else.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,

@@ -11,7 +11,7 @@ pub enum CameraError {
     Read {
         /// File or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: std::io::Error,
     },
     /// The file system refused to write.
@@ -19,7 +19,7 @@ pub enum CameraError {
     Write {
         /// File or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: std::io::Error,
     },
     /// Not a camera file.
@@ -52,7 +52,7 @@ pub enum CameraError {
         /// Photos listed without a usable pose.
         skipped: usize,
     },
-    /// The lens model is none of ours.
+    /// The lens model is not supported.
     #[error(
         "camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame or fisheye \
          model: {}", path.display()
@@ -65,9 +65,9 @@ pub enum CameraError {
         /// First photo that uses it.
         photo: String,
     },
-    /// Poses that cannot be brought to the clouds.
+    /// Poses that cannot be transformed to the system of the clouds.
     #[error(
-        "cameras in {crs} cannot be brought to the clouds: {reason}; or set the chunk's reference to the clouds' system, or to \
+        "cameras in {crs} cannot be transformed to the system of the clouds: {reason}; or set the chunk's reference to the clouds' system, or to \
          local coordinates in their frame, and export the cameras again: {}", path.display()
     )]
     UnsupportedCrs {
@@ -84,8 +84,8 @@ pub enum CameraError {
         /// Folder of photos.
         folder: PathBuf,
     },
-    /// Two photos fit one camera equally well.
-    #[error("camera {camera} could be either of two photos, {} and {}: rename one or move it away", first.display(), second.display())]
+    /// Two photos match one camera equally well.
+    #[error("camera {camera} matches two photos, {} and {}: rename or remove one", first.display(), second.display())]
     AmbiguousPhoto {
         /// Name in the camera file.
         camera: String,

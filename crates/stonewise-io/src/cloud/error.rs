@@ -12,7 +12,7 @@ pub enum CloudError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: io::Error,
     },
     /// The operating system refused to write, for example because the disk is full.
@@ -20,13 +20,13 @@ pub enum CloudError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: io::Error,
     },
-    /// Neither the content nor the name tells the format.
+    /// Neither content nor name identifies the format.
     #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ply, and text as xyz, txt, csv, asc, pts)", .0.display())]
     UnknownFormat(PathBuf),
-    /// The file breaks the rules of its format, or is damaged.
+    /// The file violates its format, or is damaged.
     #[error("{}: {reason}", .path.display())]
     Malformed {
         /// The file.

@@ -12,7 +12,7 @@ pub enum MaskError {
     Read {
         /// File or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: std::io::Error,
     },
     /// The file system refused to write.
@@ -20,7 +20,7 @@ pub enum MaskError {
     Write {
         /// File.
         path: PathBuf,
-        /// What the system said.
+        /// Error from the system.
         source: std::io::Error,
     },
     /// Not COCO json.
@@ -39,7 +39,7 @@ pub enum MaskError {
         /// What and where.
         problem: String,
     },
-    /// Nothing in it.
+    /// There are no masks.
     #[error("no masks: {expected}: {}", path.display())]
     Empty {
         /// File or folder.
@@ -47,7 +47,7 @@ pub enum MaskError {
         /// What was expected there.
         expected: &'static str,
     },
-    /// An annotation cannot be understood.
+    /// An annotation cannot be read.
     #[error("annotation {annotation}: {problem}: {}", path.display())]
     BadAnnotation {
         /// File.
@@ -59,7 +59,7 @@ pub enum MaskError {
     },
     /// Made for another image size.
     #[error(
-        "masks of photo {photo} are {}x{} px, its camera {}x{} px: give masks of the original photo: {}",
+        "masks of photo {photo} are {}x{} px, but its camera is {}x{} px: give masks of the original photo: {}",
         found.0, found.1, expected.0, expected.1, path.display()
     )]
     WrongSize {
@@ -72,8 +72,8 @@ pub enum MaskError {
         /// Size of the photo's camera.
         expected: (u32, u32),
     },
-    /// Two entries fit one photo.
-    #[error("photo {photo} could be either of {first} and {second}: rename one, or give each epoch its own masks: {}", path.display())]
+    /// Two entries match one photo.
+    #[error("photo {photo} matches both {first} and {second}: rename one, or give each epoch its own masks: {}", path.display())]
     Ambiguous {
         /// File or folder.
         path: PathBuf,
@@ -85,7 +85,7 @@ pub enum MaskError {
         second: String,
     },
     /// A PNG that is not a label image.
-    #[error("a label image must be a greyscale PNG of 8 or 16 bits, this is {found}: {}", path.display())]
+    #[error("a label image must be a greyscale PNG of 8 or 16 bits, but this one is {found}: {}", path.display())]
     NotGrey {
         /// File.
         path: PathBuf,
@@ -94,7 +94,7 @@ pub enum MaskError {
     },
     /// More pixels than the file can hold.
     #[error(
-        "the header claims {}x{} pixels, and the file has {length} bytes: write the label image again: {}",
+        "the header claims {}x{} pixels, but the file has only {length} bytes: write the label image again: {}",
         claimed.0, claimed.1, path.display()
     )]
     TooManyPixels {

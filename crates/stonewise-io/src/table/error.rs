@@ -8,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum TableError {
     /// A column does not fit the others.
-    #[error("column {name:?} has {rows} rows, the table has {expected}")]
+    #[error("column {name:?} has {rows} rows, but the table has {expected}")]
     Rows {
         /// The column.
         name: String,
@@ -17,18 +17,18 @@ pub enum TableError {
         /// The length of the table.
         expected: usize,
     },
-    /// Two columns of one name.
-    #[error("column {0:?} is there twice")]
+    /// Two columns with the same name.
+    #[error("column {0:?} occurs twice")]
     Duplicate(String),
-    /// A column that was asked for is not there.
-    #[error("there is no column {name:?}; there are: {}", .present.join(", "))]
+    /// A required column is missing.
+    #[error("column {name:?} is missing; the table has: {}", .present.join(", "))]
     Missing {
         /// The column.
         name: String,
         /// The columns of the table.
         present: Vec<String>,
     },
-    /// A column has another type than asked for.
+    /// A column has the wrong type.
     #[error("column {name:?} holds {found}, not {expected}")]
     Type {
         /// The column.
@@ -41,7 +41,7 @@ pub enum TableError {
     /// A column has empty cells where none are allowed.
     #[error("column {0:?} has empty cells")]
     Empty(String),
-    /// The file is no Parquet file, is damaged, or holds what a table cannot.
+    /// Not a Parquet file, damaged, or with content that a table cannot hold.
     #[error("cannot read {}: {reason}", .path.display())]
     Read {
         /// The file.

@@ -1,4 +1,4 @@
-//! Errors of the LAS library in our words.
+//! Converts errors of the LAS library.
 
 use std::path::Path;
 
