@@ -5,9 +5,9 @@ use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
 
 /// Factor on the error of the whole epoch where areas are to speak for themselves.
-pub(super) const OPEN: f64 = 5.0;
+pub(super) const OPEN: f64 = 100.0;
 /// An error of the whole epoch this many times as large as assumed shows that the assumption does not hold.
-const SURPRISING: f64 = 2.0;
+const SURPRISING: f64 = 4.0;
 
 /// Standard deviations of all errors.
 #[derive(Clone, Copy)]
@@ -42,7 +42,7 @@ impl Model {
         let shown_m = solution.map_or(0.0, |s| s.mean.fixed_rows::<3>(unknowns.whole()).amax());
         match shown_m > SURPRISING * self.whole_m && self.whole_m > 0.0 {
             true => Self {
-                whole_m: OPEN.max(shown_m / self.whole_m) * self.whole_m,
+                whole_m: shown_m,
                 ..self
             },
             false => self,

@@ -320,6 +320,67 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
 }
 
 #[test]
+fn an_area_that_moved_is_named_and_left_out() {
+    let errors = [
+        Vector3::new(0.001, 0.0, -0.001),
+        Vector3::new(-0.001, 0.001, 0.0),
+        Vector3::new(0.004, -0.003, 0.002),
+        Vector3::new(0.002, -0.002, 0.004),
+    ];
+    let stones = wall(&errors, 0.002, 1);
+    let sources = sources(2);
+    let found = |motion: Vector3<f64>| {
+        let moved: Vec<Vector3<f64>> = (0..4)
+            .map(|s| errors[s] + if s < 2 { Vector3::zeros() } else { motion })
+            .collect();
+        let mut stable = stable_area(4, &Vector3::new(5.0, 0.0, 0.0), &moved, 0.002);
+        stable.extend(stable_area(1, &Vector3::new(0.0, 4.0, 0.0), &errors, 0.002));
+        stable.extend(stable_area(2, &Vector3::new(5.0, 4.0, 0.0), &errors, 0.002));
+        let pair = EpochPair {
+            sources: &sources,
+            same_as: &[0, 1, 2, 3],
+            stones: &stones,
+            stable: &stable,
+            sigma_m: 0.002,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default())
+    };
+    let still = found(Vector3::zeros());
+    assert_eq!(still.moved_areas, Vec::<usize>::new());
+    let moved = found(Vector3::new(0.0, 0.0, 0.01));
+    assert_eq!(moved.moved_areas, [4]);
+    assert!(moved.observations[2] < still.observations[2]);
+    let off = moved.at[0].mean - still.at[0].mean;
+    assert!(off.norm() < 3e-4, "{off}");
+}
+
+#[test]
+fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
+    // A scanner's epochs that are off by 30 mm, where half a millimetre is assumed.
+    let off = Vector3::new(0.02, -0.015, 0.015);
+    let errors = [
+        Vector3::new(0.0002, 0.0, -0.0003),
+        Vector3::new(-0.0002, 0.0003, 0.0),
+        off + Vector3::new(0.0003, 0.0, 0.0),
+        off + Vector3::new(-0.0003, 0.0002, 0.0),
+    ];
+    let (stones, sources) = (wall(&errors, 0.002, 1), sources(2));
+    let pair = EpochPair {
+        sources: &sources,
+        same_as: &[0, 1, 2, 3],
+        stones: &stones,
+        stable: &stable_points(&errors, 0.002),
+        sigma_m: 0.002,
+    };
+    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
+    for at in &found.at {
+        let rest = at.mean - truth;
+        assert!(rest.norm() < 3e-4, "{rest}");
+    }
+}
+
+#[test]
 fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     let errors = [
         Vector3::new(0.001, 0.0, -0.001),
