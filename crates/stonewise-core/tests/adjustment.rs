@@ -549,7 +549,7 @@ fn every_phase_stops_when_no_iterations_are_left() {
 #[test]
 fn a_stone_that_still_moves_has_no_motion() {
     let wall = Wall::default();
-    let own = |k: u32| Vector3::new(0.0, 0.0, if k % 2 == 0 { 0.004 } else { -0.004 });
+    let own = |k: u32| Vector3::new(0.0, 0.0, if k.is_multiple_of(2) { 0.004 } else { -0.004 });
     let source = MemoryPairs::new(wall.pairs(|k, _| (own(k), Vector3::zeros())));
     let after = |max_iterations: usize| {
         let params = AdjustmentParams {

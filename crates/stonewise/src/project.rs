@@ -485,10 +485,10 @@ impl Source<'_> {
         }
         epochs[..=at].rotate_right(1);
         // An epoch names an earlier one; the reference now comes before that one.
-        if let Some(same) = epochs[0].same_survey_as.take() {
-            if let Some(twin) = epochs.get_mut(same) {
-                twin.same_survey_as = Some(0);
-            }
+        if let Some(same) = epochs[0].same_survey_as.take()
+            && let Some(twin) = epochs.get_mut(same)
+        {
+            twin.same_survey_as = Some(0);
         }
         let note = || {
             let numbered = epochs.iter().zip(1..).map(|(e, n)| format!("{n} {}", e.name));

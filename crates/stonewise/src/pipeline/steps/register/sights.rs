@@ -149,10 +149,13 @@ impl Collected {
     }
 }
 
+/// Places, and seconds since the source began.
+type PlacesAndTimes = (Vec<Point3<f64>>, Vec<f64>);
+
 /// Points of stable areas, by area and source, as far as they are gathered.
 #[derive(Default)]
 struct StableParts {
-    parts: BTreeMap<(usize, usize), (Vec<Point3<f64>>, Vec<f64>)>,
+    parts: BTreeMap<(usize, usize), PlacesAndTimes>,
     /// Points by area, source and cell.
     counts: BTreeMap<(usize, usize, [i64; 3]), u32>,
 }
