@@ -4,10 +4,11 @@ use super::components::{ObserverComponents, SensorClass};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
 
-/// Factor on the error of the whole epoch where areas are to speak for themselves.
-pub(super) const OPEN: f64 = 100.0;
+/// Factor on the error of the whole epoch where areas are to speak for themselves. With it left open, directions that no area sees would
+/// seem to show anything.
+pub(super) const WIDE: f64 = 5.0;
 /// An error of the whole epoch this many times as large as assumed shows that the assumption does not hold.
-const SURPRISING: f64 = 4.0;
+const SURPRISING: f64 = 2.0;
 
 /// Standard deviations of all errors.
 #[derive(Clone, Copy)]
@@ -15,6 +16,8 @@ pub(super) struct Model {
     pub components: ObserverComponents,
     /// Of the later epoch against the reference as a whole, per axis, metres.
     pub whole_m: f64,
+    /// The same where areas are to speak for themselves.
+    pub open_m: f64,
     /// Of a source on a plane of a stable area, metres.
     pub plane_m: f64,
     pub class: SensorClass,
@@ -28,21 +31,27 @@ impl Model {
         (prior, components)
     }
 
-    /// With an error of the whole epoch `factor` times as large.
-    pub fn with_whole(&self, factor: f64) -> (Prior, ObserverComponents) {
-        let prior = Prior::with_planes(&self.components, factor * self.whole_m, self.plane_m);
+    /// With an error of the whole epoch that lets areas speak for themselves.
+    pub fn opened(&self) -> (Prior, ObserverComponents) {
+        self.with_whole(self.open_m)
+    }
+
+    /// With another error of the whole epoch, metres.
+    fn with_whole(&self, whole_m: f64) -> (Prior, ObserverComponents) {
+        let prior = Prior::with_planes(&self.components, whole_m, self.plane_m);
         (prior, self.components)
     }
 
     /// With the error of the whole epoch as large as stable areas show it, where that is far more than is assumed: an assumption that does
     /// not hold would pull the error towards none.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
-        let (prior, components) = self.with_whole(OPEN);
+        let (prior, components) = self.opened();
         let solution = Problem::new(unknowns, observations).solve(&prior, &components);
         let shown_m = solution.map_or(0.0, |s| s.mean.fixed_rows::<3>(unknowns.whole()).amax());
         match shown_m > SURPRISING * self.whole_m && self.whole_m > 0.0 {
             true => Self {
-                whole_m: shown_m,
+                whole_m: shown_m.max(self.open_m),
+                open_m: shown_m.max(self.open_m),
                 ..self
             },
             false => self,

@@ -1,6 +1,6 @@
 //! Which stable areas stood still.
 
-use super::assumptions::{Model, OPEN};
+use super::assumptions::Model;
 use super::model::{Problem, Solution, Unknowns};
 use super::observation::Observation;
 use super::sight::StablePlane;
@@ -49,7 +49,7 @@ pub(super) fn reweighted(
     model: &Model,
 ) -> Vec<Observation> {
     let problem = Problem::new(unknowns, observations);
-    let (prior, components) = model.with_whole(OPEN);
+    let (prior, components) = model.opened();
     let solution = problem.solve(&prior, &components);
     let weights = solution.map_or_else(
         || vec![1.0; observations.len()],
@@ -77,7 +77,7 @@ fn most_moved<G: Ord + Copy>(
     }
     let all: Vec<&Observation> = within.iter().copied().chain(stable).collect();
     let all = reweighted(unknowns, &all, model);
-    let (prior, components) = model.with_whole(OPEN);
+    let (prior, components) = model.opened();
     let problem = Problem::new(unknowns, &all.iter().collect::<Vec<_>>());
     let solution: Solution = problem.solve(&prior, &components)?;
     // Where epochs were compared on few stones, one still area in ten differs from the others by what its sources are off.

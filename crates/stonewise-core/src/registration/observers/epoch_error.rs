@@ -1,6 +1,6 @@
 //! The error of a later epoch against the reference, at every stone.
 
-use super::assumptions::{Model, whole_m};
+use super::assumptions::{Model, WIDE, whole_m};
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
 use super::congruence::{reweighted, standing};
@@ -140,26 +140,30 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     let (components, significance) = estimated(&unknowns, &mut within, class);
     let overlaps = within.iter().all(|w| !w.is_empty());
     let is_significant = overlaps && significance > SIGNIFICANT;
+    let whole_m = match is_one_survey(pair) {
+        true => 0.0,
+        false => whole_m(
+            params.shared_error_m,
+            class,
+            overlaps.then_some(&components),
+            counts(pair),
+        ),
+    };
     let model = Model {
         components: match is_significant {
             true => components,
             false => opened(components),
         },
-        whole_m: match is_one_survey(pair) {
-            true => 0.0,
-            false => whole_m(
-                params.shared_error_m,
-                class,
-                overlaps.then_some(&components),
-                counts(pair),
-            ),
-        },
+        whole_m,
+        open_m: WIDE * whole_m,
         plane_m: PLANE_SHARE * params.stable.systematic_share * pair.sigma_m,
         class,
     };
     let sights: Vec<Sight> = stable.iter().flat_map(|o| o.sights.clone()).collect();
     let unknowns = unknowns.with_planes(&sights);
-    let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &model);
+    let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
+    let judging = model.widened(&unknowns, &all);
+    let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);
     let observations = [within[0].len(), within[1].len(), stable.len()];
     let datum = if stable.len() >= params.stable.min_cells {
         Datum::Stable
