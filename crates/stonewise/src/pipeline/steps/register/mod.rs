@@ -202,15 +202,21 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
         .epoch_errors
         .as_ref()
         .is_some_and(|e| e.datum == observers::Datum::Stable);
-    if let Some(errors) = &registered.epoch_errors
-        && !errors.moved_areas.is_empty()
-    {
-        let numbers: Vec<String> = errors.moved_areas.iter().map(|a| (a + 1).to_string()).collect();
-        let message = format!(
-            "[[registration.stable]] number {} moved against the other stable areas and is left out",
-            numbers.join(", ")
-        );
-        context.warnings.skipped(STEP, epoch, message);
+    let moved = registered.epoch_errors.iter().flat_map(|e| &e.moved_areas);
+    for &area in moved {
+        let what = "moved against the other stable areas and is left out";
+        match area.checked_sub(named).and_then(|k| registered.off_wall.get(k)) {
+            None => {
+                let message = format!("[[registration.stable]] number {} {what}", area + 1);
+                context.warnings.skipped(STEP, epoch, message);
+            }
+            Some([low, high]) => {
+                let [x, y, z]: [f64; 3] = nalgebra::center(low, high).into();
+                let message =
+                    format!("auto_stable: the area off the wall around ({x:.1}, {y:.1}, {z:.1}) {what}");
+                context.warnings.notice(STEP, epoch, message);
+            }
+        }
     }
     if named > 0 && !is_stable {
         let message = format!(
@@ -218,6 +224,12 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
              taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m"
         );
         context.warnings.skipped(STEP, epoch, message);
+    }
+    if named == 0 && context.project.settings.registration.auto_stable && !is_stable {
+        let message = format!(
+            "auto_stable: surfaces off the wall do not show the epochs' registration: {cells} plane cells seen in both epochs are too few"
+        );
+        context.warnings.notice(STEP, epoch, message);
     }
 }
 
