@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::pipeline::steps::label::Labelled;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::{BTreeMap, HashMap};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::cell_of;
@@ -10,18 +10,23 @@ use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 
 /// Edge of the cells in which points are counted, metres.
-const CELL_M: f64 = 0.5;
+const CELL_M: f64 = 0.25;
 /// Edge of an area, metres: the smallest piece that is left out when it has moved.
 const AREA_M: f64 = 2.0;
 /// A cell whose middle lies closer to the face, or to its continuation, may hold points of the wall, metres: half its diagonal
 /// and 0.3 m.
-const LEAST_DISTANCE_M: f64 = 0.75;
-/// Points in a cell, in each epoch, that show a surface.
-const LEAST_POINTS: u32 = 40;
+const LEAST_DISTANCE_M: f64 = 0.52;
+/// Surfaces at most this many cells apart across their plane are one area: their layers touch.
+const SAME_AREA_CELLS: i64 = 2;
+/// Points in a cell, in each epoch, that show a surface: two sources with twelve each.
+const LEAST_POINTS: u32 = 24;
 /// Stones that stand for the face, at most; they are spread over the list.
 const FACE_STONES: usize = 400;
 
 /// Cells off the wall, and the area that each belongs to.
+///
+/// A cell's neighbours in front of and behind its surface belong to the same area. Without them, a surface that lies on the boundary of two
+/// cells would lose the noise of its points on one side, or be cut into two areas along it, and both pull its mean plane.
 #[derive(Clone, Debug, Default)]
 pub struct OffWall {
     cells: HashMap<[i64; 3], usize>,
@@ -33,7 +38,7 @@ impl OffWall {
     /// Finds them in one pass over the tiles of both epochs.
     pub fn find(epochs: [&Labelled; 2], progress: &dyn Progress) -> Result<Self> {
         let face = Face::new(&epochs[0].stones);
-        let mut counts: HashMap<[i64; 3], [u32; 2]> = HashMap::new();
+        let mut contents: HashMap<[i64; 3], CellPoints> = HashMap::new();
         for (number, epoch) in epochs.iter().enumerate() {
             let tiles = &epoch.ingested.tiles;
             progress.begin("look off the wall", tiles.tile_count() as u64);
@@ -42,35 +47,65 @@ impl OffWall {
                 let cloud = tiles.load(tile)?;
                 for i in 0..cloud.len() {
                     let cell = cell_of(&cloud.world(i), CELL_M);
-                    counts.entry(cell).or_default()[number] += 1;
+                    let place = cloud.world(i) - middle(&cell);
+                    contents.entry(cell).or_default().add(number, &place);
                 }
                 progress.advance(1);
             }
         }
-        let is_seen = |counts: &[u32; 2]| counts.iter().all(|n| *n >= LEAST_POINTS);
-        let seen = counts.iter().filter(|(_, n)| is_seen(n)).map(|(cell, _)| *cell);
-        Ok(Self::of_cells(
-            seen.filter(|cell| face.distance(&middle(cell)) > LEAST_DISTANCE_M),
-        ))
+        let surfaces = contents.iter().filter_map(|(cell, points)| {
+            let surface = Surface {
+                cell: *cell,
+                across: points.normal_axis()?,
+            };
+            let is_off = |cell: &[i64; 3]| face.distance(&middle(cell)) > LEAST_DISTANCE_M;
+            surface.layers().iter().all(is_off).then_some(surface)
+        });
+        Ok(Self::of_surfaces(surfaces))
     }
 
-    fn of_cells(cells: impl Iterator<Item = [i64; 3]>) -> Self {
-        let mut by_area: BTreeMap<[i64; 3], Vec<[i64; 3]>> = BTreeMap::new();
-        for cell in cells {
-            by_area
-                .entry(cell_of(&middle(&cell), AREA_M))
+    fn of_surfaces(surfaces: impl Iterator<Item = Surface>) -> Self {
+        let mut blocks: BTreeMap<(usize, [i64; 2]), BTreeMap<i64, Vec<Surface>>> = BTreeMap::new();
+        for surface in surfaces {
+            let heights = blocks.entry((surface.across, surface.block())).or_default();
+            heights
+                .entry(surface.cell[surface.across])
                 .or_default()
-                .push(cell);
+                .push(surface);
         }
         let mut found = Self::default();
-        for (number, cells) in by_area.into_values().enumerate() {
-            let corner = |cell: &[i64; 3], end: f64| Point3::from(cell.map(|k| (k as f64 + end) * CELL_M));
-            let low = cells.iter().map(|c| corner(c, 0.0)).reduce(|a, b| a.inf(&b));
-            let high = cells.iter().map(|c| corner(c, 1.0)).reduce(|a, b| a.sup(&b));
-            found.areas.extend(low.zip(high).map(|(low, high)| [low, high]));
-            found.cells.extend(cells.into_iter().map(|cell| (cell, number)));
+        let mut neighbours = Vec::new();
+        for heights in blocks.values() {
+            let mut last = None;
+            for (height, surfaces) in heights {
+                if last.is_none_or(|last| height - last > SAME_AREA_CELLS) {
+                    found
+                        .areas
+                        .push([Point3::from([f64::MAX; 3]), Point3::from([f64::MIN; 3])]);
+                }
+                last = Some(*height);
+                for surface in surfaces {
+                    found.insert(surface.cell);
+                    neighbours.extend(surface.layers().map(|cell| (cell, found.areas.len() - 1)));
+                }
+            }
+        }
+        neighbours.sort_unstable();
+        for (cell, area) in neighbours {
+            found.cells.entry(cell).or_insert(area);
         }
         found
+    }
+
+    /// Adds a cell to the newest area.
+    fn insert(&mut self, cell: [i64; 3]) {
+        let number = self.areas.len() - 1;
+        self.cells.insert(cell, number);
+        let corner = |end: f64| Point3::from(cell.map(|k| (k as f64 + end) * CELL_M));
+        if let Some([low, high]) = self.areas.last_mut() {
+            *low = low.inf(&corner(0.0));
+            *high = high.sup(&corner(1.0));
+        }
     }
 
     /// The area that a point lies in.
@@ -86,6 +121,56 @@ impl OffWall {
 
 fn middle(cell: &[i64; 3]) -> Point3<f64> {
     Point3::from(cell.map(|k| (k as f64 + 0.5) * CELL_M))
+}
+
+/// The points of a cell: how many of each epoch, and their sums of places and of products about the cell's middle.
+#[derive(Clone, Default)]
+struct CellPoints {
+    counts: [u32; 2],
+    sum: Vector3<f64>,
+    products: Matrix3<f64>,
+}
+
+impl CellPoints {
+    fn add(&mut self, epoch: usize, place: &Vector3<f64>) {
+        self.counts[epoch] += 1;
+        self.sum += place;
+        self.products += place * place.transpose();
+    }
+
+    /// The axis nearest to the normal of the cell's surface; `None` where an epoch has too few points.
+    fn normal_axis(&self) -> Option<usize> {
+        if self.counts.iter().any(|n| *n < LEAST_POINTS) {
+            return None;
+        }
+        let n = f64::from(self.counts.iter().sum::<u32>());
+        let covariance = self.products / n - (self.sum / n) * (self.sum / n).transpose();
+        let eigen = covariance.symmetric_eigen();
+        Some(eigen.eigenvectors.column(eigen.eigenvalues.imin()).iamax())
+    }
+}
+
+/// A cell that both epochs show, and the axis nearest to its normal.
+struct Surface {
+    cell: [i64; 3],
+    across: usize,
+}
+
+impl Surface {
+    /// The cell behind it, itself, and the cell in front.
+    fn layers(&self) -> [[i64; 3]; 3] {
+        [-1, 0, 1].map(|step| {
+            let mut cell = self.cell;
+            cell[self.across] += step;
+            cell
+        })
+    }
+
+    /// Its place along the surface, in areas.
+    fn block(&self) -> [i64; 2] {
+        let area = cell_of(&middle(&self.cell), AREA_M);
+        [1, 2].map(|k| area[(self.across + k) % 3])
+    }
 }
 
 /// The face of the wall and its continuation: the tangent planes of some stones.
@@ -141,15 +226,47 @@ mod tests {
     }
 
     #[test]
-    fn cells_make_areas_of_two_metres() {
-        let cells = (0..8).map(|i| [i, 0, -1]);
-        let found = OffWall::of_cells(cells);
+    fn surfaces_make_areas_of_two_metres() {
+        let surfaces = (0..16).map(|i| Surface {
+            cell: [i, 0, -1],
+            across: 2,
+        });
+        let found = OffWall::of_surfaces(surfaces);
         assert_eq!(found.areas().len(), 2);
         assert_eq!(
             found.areas()[0],
-            [Point3::new(0.0, 0.0, -0.5), Point3::new(2.0, 0.5, 0.0)]
+            [Point3::new(0.0, 0.0, -0.25), Point3::new(2.0, 0.25, 0.0)]
         );
         assert_eq!(found.area(&Point3::new(3.9, 0.2, -0.1)), Some(1));
-        assert_eq!(found.area(&Point3::new(3.9, 0.2, 0.1)), None);
+        assert_eq!(found.area(&Point3::new(3.9, 0.2, 0.1)), Some(1));
+        assert_eq!(found.area(&Point3::new(3.9, 0.2, 0.3)), None);
+        assert_eq!(found.area(&Point3::new(4.1, 0.2, -0.1)), None);
+    }
+
+    #[test]
+    fn a_surface_on_a_boundary_is_one_area_with_all_its_points() {
+        let level = |x: i64, z: i64| Surface {
+            cell: [x, 0, z],
+            across: 2,
+        };
+        let found = OffWall::of_surfaces([level(0, -1), level(0, 0), level(1, 0)].into_iter());
+        assert_eq!(found.areas().len(), 1);
+        for x in [0.2, 0.3] {
+            for z in [-0.02, 0.02] {
+                assert_eq!(found.area(&Point3::new(x, 0.2, z)), Some(0));
+            }
+        }
+    }
+
+    #[test]
+    fn the_axis_across_a_surface_is_that_of_its_least_scatter() {
+        let mut points = CellPoints::default();
+        for i in 0..100 {
+            let (u, v) = (0.02 * f64::from(i % 10), 0.02 * f64::from(i / 10));
+            points.add(i as usize % 2, &Vector3::new(0.3 * u, u, v));
+        }
+        assert_eq!(points.normal_axis(), Some(0));
+        points.counts[1] = LEAST_POINTS - 1;
+        assert_eq!(points.normal_axis(), None);
     }
 }
