@@ -237,6 +237,23 @@ fn a_failed_copy_leaves_the_earlier_file_and_no_other() {
 }
 
 #[test]
+fn points_without_room_for_labels_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let [long, copy] = ["long.las", "copy.laz"].map(|name| folder.path().join(name));
+    let mut bytes = std::fs::read(fixture("las10_format1.las")).unwrap();
+    // The length of a point, and the number of points (LAS 1.0, public header block).
+    bytes[105..107].copy_from_slice(&u16::MAX.to_le_bytes());
+    bytes[107..111].copy_from_slice(&0u32.to_le_bytes());
+    std::fs::write(&long, bytes).unwrap();
+    let message = write_labelled(&long, &copy, LabelColumns::Stone, no_labels)
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("its points take 65535 bytes"), "{message}");
+    assert!(message.contains("long.las"), "{message}");
+    assert!(!copy.exists());
+}
+
+#[test]
 fn points_that_cannot_be_written_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.laz");

@@ -62,6 +62,21 @@ fn clouds_that_lie_about_their_sizes_are_refused_at_once() {
 }
 
 #[test]
+fn layers_under_a_compressor_without_layers_are_refused_at_once() {
+    let mut bytes = std::fs::read(testdata("hostile/layer_sizes.laz")).unwrap();
+    // The compressor is the first number of the compression record, which follows the header of 375 bytes and its own of 54.
+    let compressor = 375 + 54;
+    assert_eq!(bytes[compressor..compressor + 2], [3, 0]);
+    bytes[compressor] = 2;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mixed.laz");
+    std::fs::write(&path, bytes).unwrap();
+    let expected =
+        "FILE: the compression record mixes layers with points that have none: write the file again";
+    assert_eq!(refusal(&path, measure_cloud), expected);
+}
+
+#[test]
 fn pictures_that_lie_about_their_sizes_are_refused_at_once() {
     let path = testdata("hostile/claim.png");
     assert_eq!(

@@ -142,7 +142,7 @@ pub fn targets() -> Vec<Target> {
             "cameras/colmap_bin/images.bin",
         ])),
         Target::of_text("opensfm", testdata(&["cameras/opensfm.json"]), cameras),
-        Target::of_text("coco", testdata(&["masks/masks.json"]), coco),
+        Target::of_text("coco", vec![text("masks.json", MASKS)], coco),
         Target::of_text("regions", vec![text("regions.json", REGIONS)], regions),
         Target::of_bytes("labels", label_images(), labels).repaired(repair::png),
         Target::of_bytes("photos", photos(), photo).repaired(repair::png),
@@ -158,6 +158,13 @@ fn folder_plans() -> Vec<Seed> {
         .map(|plan| text("folders.txt", plan))
         .into()
 }
+
+/// Polygons, and runs as numbers and as text: 40 pixels, then 20 of the mask, then 140.
+const MASKS: &str = r#"{"images": [{"id": 1, "file_name": "images/0001.jpg", "width": 20, "height": 10}],
+ "categories": [{"id": 1, "name": "stone"}], "annotations": [
+ {"id": 1, "image_id": 1, "category_id": 1, "segmentation": [[0, 0, 9, 0, 9, 8, 0, 8], [12, 1, 15, 1, 15, 4]]},
+ {"id": 2, "image_id": 1, "category_id": 1, "iscrowd": 1, "segmentation": {"size": [10, 20], "counts": [40, 20, 140]}},
+ {"id": 3, "image_id": 1, "category_id": 1, "segmentation": {"size": [10, 20], "counts": "X1d0\\4"}}]}"#;
 
 const REGIONS: &str = r#"{"images/0001.jpg": {"width": 64, "height": 48, "valid": [
  {"outer": [0, 0, 60, 0, 60, 40, 0, 40], "holes": [[2, 2, 9, 2, 9, 9]]}]}}"#;

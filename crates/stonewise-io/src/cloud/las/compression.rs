@@ -1,6 +1,6 @@
 //! How the points of a file are compressed.
 
-use laz::LazVlr;
+use laz::{LazItemType, LazVlr};
 
 use super::envelope::{Envelope, Records};
 use super::las_error::las_error;
@@ -48,6 +48,28 @@ impl Compression {
             [2, 0, ..] => Order::Chunks,
             _ => Order::Layers,
         };
+        // The decoder takes memory for layers that it has found no sizes of.
+        if vlr
+            .items()
+            .iter()
+            .any(|item| has_layers(item.item_type()) != (order == Order::Layers))
+        {
+            let reason =
+                "the compression record mixes layers with points that have none: write the file again";
+            return Err(CloudError::malformed(path, reason));
+        }
         Ok(Some(Self { vlr, order }))
     }
+}
+
+/// Whether this part of a point is stored in layers: that of the point formats 6 to 10.
+fn has_layers(kind: LazItemType) -> bool {
+    !matches!(
+        kind,
+        LazItemType::Byte(_)
+            | LazItemType::Point10
+            | LazItemType::GpsTime
+            | LazItemType::RGB12
+            | LazItemType::WavePacket13
+    )
 }

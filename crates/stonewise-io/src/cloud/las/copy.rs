@@ -23,7 +23,7 @@ pub fn copy_labelled<E: From<CloudError>>(
     fill: Fill<'_, E>,
 ) -> Result<ReadSummary, E> {
     let mut source = LasSource::open(input)?;
-    let record = RecordCopy::new(&source.layout, columns);
+    let record = RecordCopy::new(input, &source.layout, columns)?;
     let mut writer = LazWriter::create(partial, name, builder(&source.layout, &record))?;
     let mut chunk = PointChunk::default();
     let mut summary = ReadSummary::default();
@@ -49,7 +49,7 @@ struct RecordCopy {
 }
 
 impl RecordCopy {
-    fn new(layout: &Layout, columns: LabelColumns) -> Self {
+    fn new(input: &Path, layout: &Layout, columns: LabelColumns) -> Result<Self, CloudError> {
         let format = layout.header.point_format();
         let records = layout.header.vlrs().iter().chain(&layout.extended);
         let mut kept = extra_bytes::existing(records, format.extra_bytes);
@@ -64,12 +64,21 @@ impl RecordCopy {
             }
         }
         let old: usize = kept.iter().map(|d| d.bytes.len()).sum();
-        Self {
+        let extra_bytes = old + usize::from(columns.size());
+        let record_bytes = u16::try_from(base + extra_bytes).map_err(|_| {
+            let reason = format!(
+                "its points take {} bytes, and a LAS point has at most {}: no room is left for the label columns",
+                format.len(),
+                u16::MAX
+            );
+            CloudError::malformed(input, reason)
+        })?;
+        Ok(Self {
             columns,
             kept,
             copied,
-            extra_bytes: old as u16 + columns.size(),
-        }
+            extra_bytes: record_bytes - base as u16,
+        })
     }
 
     fn descriptors(&self) -> Vec<u8> {
