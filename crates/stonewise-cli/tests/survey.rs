@@ -1,91 +1,13 @@
 //! The command on a small simulated survey: results, resuming, threads, and every way an input can be bad.
 #![allow(clippy::unwrap_used)] // a test that cannot go on must stop
 
-use assert_cmd::Command;
+mod support;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 use stonewise_io::table::read_parquet;
-use tempfile::TempDir;
-
-/// A wall of a few dozen stones, small enough to be run many times.
-const SURVEY: &str = r#"
-name = "Test wall"
-[scene]
-seed = 3
-[scene.wall]
-width_m = 1.6
-height_m = 1.0
-seed = 3
-[scene.tls]
-spacing_m = 0.008
-[photos]
-columns = 2
-rows = 1
-width = 800
-height = 600
-focal_px = 1100.0
-distance_m = 5.0
-"#;
-
-fn stonewise() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_stonewise"))
-}
-
-/// The survey, made once for all tests.
-fn survey() -> &'static Path {
-    static SURVEY_DIR: OnceLock<TempDir> = OnceLock::new();
-    let dir = SURVEY_DIR.get_or_init(|| {
-        let dir = tempfile::tempdir().unwrap();
-        let params = dir.path().join("params.toml");
-        fs::write(&params, SURVEY).unwrap();
-        stonewise()
-            .args(["simulate", "--quiet", "--params"])
-            .arg(&params)
-            .arg("--out")
-            .arg(dir.path().join("survey"))
-            .assert()
-            .success();
-        dir
-    });
-    static PATH: OnceLock<PathBuf> = OnceLock::new();
-    PATH.get_or_init(|| dir.path().join("survey"))
-}
-
-/// A copy of the survey that a test may spoil.
-fn copy_of_survey() -> TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    copy_tree(survey(), dir.path());
-    dir
-}
-
-fn copy_tree(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy_tree(&entry.path(), &target);
-        } else {
-            fs::copy(entry.path(), target).unwrap();
-        }
-    }
-}
-
-/// Runs `run` on a survey; exit code and stderr.
-fn run(survey: &Path, out: &Path, extra: &[&str]) -> (i32, String) {
-    let output = stonewise()
-        .arg("run")
-        .arg(survey.join("stonewise.toml"))
-        .arg("--out")
-        .arg(out)
-        .args(extra)
-        .output()
-        .unwrap();
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(!text.contains("panicked"), "{text}");
-    (output.status.code().unwrap(), text)
-}
+use support::{copy_of, run, stonewise, survey};
 
 /// Cells of a column of stones.csv.
 fn column(out: &Path, name: &str) -> Vec<String> {
@@ -366,7 +288,7 @@ fn bad_inputs_are_named_and_nothing_half_written_stays() {
         ),
     ];
     for (what, spoil, expected, named) in cases {
-        let survey = copy_of_survey();
+        let survey = copy_of(survey());
         spoil(survey.path());
         let out = tempfile::tempdir().unwrap();
         let (code, log) = run(survey.path(), out.path(), &[]);
@@ -400,7 +322,7 @@ fn partial_files(dir: &Path) -> Vec<PathBuf> {
 
 #[test]
 fn init_writes_a_project_that_runs_need_no_change_in() {
-    let survey = copy_of_survey();
+    let survey = copy_of(survey());
     for folder in ["truth", "masks"] {
         fs::remove_dir_all(survey.path().join(folder)).unwrap();
     }

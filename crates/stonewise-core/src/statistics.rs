@@ -119,6 +119,18 @@ mod tests {
     }
 
     #[test]
+    fn mixed_bits_are_fair_and_neighbours_are_independent() {
+        let bit = |i: u64| split_mix(i) & 1;
+        let heads = (0..100_000u64).filter(|&i| bit(i) == 0).count();
+        let same = (0..100_000u64).filter(|&i| bit(i) == bit(i + 1)).count();
+        // Five standard deviations of a binomial count of 100,000.
+        assert!(
+            heads.abs_diff(50_000) < 800 && same.abs_diff(50_000) < 800,
+            "{heads} {same}"
+        );
+    }
+
+    #[test]
     fn the_published_example_has_four_discoveries() {
         // Benjamini & Hochberg 1995, section 3.
         let p = [

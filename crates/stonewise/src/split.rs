@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
+use stonewise_core::statistics::split_mix;
 use stonewise_io::cameras::find_photos;
 use stonewise_io::cloud::{claimed_records, select_points};
 
@@ -66,7 +67,7 @@ pub fn split(
             select_points(cloud, &out.join(&name), |index| {
                 progress.advance(1);
                 progress.check()?;
-                Ok::<bool, Error>((mix(index ^ mix(salt)) & 1) as usize == half)
+                Ok::<bool, Error>((split_mix(index ^ split_mix(salt)) & 1) as usize == half)
             })?;
             clouds.push(quoted(&name));
         }
@@ -103,7 +104,7 @@ fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PathBuf>> {
     let mut keyed: Vec<(u64, PathBuf)> = posed
         .into_iter()
         .enumerate()
-        .map(|(i, path)| (mix(i as u64 ^ mix(!seed)), path))
+        .map(|(i, path)| (split_mix(i as u64 ^ split_mix(!seed)), path))
         .collect();
     keyed.sort();
     Ok(keyed.into_iter().map(|(_, path)| path).collect())
@@ -112,28 +113,4 @@ fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PathBuf>> {
 fn absolute(path: &Path) -> Result<String> {
     let path = path.canonicalize().map_err(Error::io("finding", path))?;
     Ok(quoted(&path.to_string_lossy()))
-}
-
-/// SplitMix64 (Steele, Lea & Flood 2014): a well-mixed number from a counter.
-fn mix(counter: u64) -> u64 {
-    let mut z = counter.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::mix;
-
-    #[test]
-    fn a_coin_is_fair_and_neighbours_are_independent() {
-        let heads = (0..100_000u64).filter(|&i| mix(i) & 1 == 0).count();
-        let same = (0..100_000u64).filter(|&i| mix(i) & 1 == mix(i + 1) & 1).count();
-        // Five standard deviations of a binomial count of 100,000.
-        assert!(
-            heads.abs_diff(50_000) < 800 && same.abs_diff(50_000) < 800,
-            "{heads} {same}"
-        );
-    }
 }

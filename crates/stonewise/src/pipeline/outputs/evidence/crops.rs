@@ -15,6 +15,7 @@ use stonewise_core::evaluate::MotionField;
 use stonewise_core::geometry::View;
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::{LabelImage, Raster, RgbImage, label_outlines, ring_area};
+use stonewise_core::statistics::upper_median;
 use stonewise_io::image_io::read_rgb;
 
 /// Vertices of a mask's outline closer than this to a line are left out, pixels of the crop.
@@ -53,11 +54,9 @@ pub fn write_epoch_crops(
         .iter()
         .filter_map(|w| job(w, instances.get(&w.stone_id), &photos.views, motion))
         .collect();
-    let wanted = median(
-        jobs.iter()
-            .map(|j| natural_px(j.window, &photos.views[j.photo], motion)),
-    );
-    let side_px = crop_side_px(jobs.len(), wanted);
+    let natural = |j: &Job| natural_px(j.window, &photos.views[j.photo], motion);
+    let mut wanted: Vec<f64> = jobs.iter().map(natural).collect();
+    let side_px = crop_side_px(jobs.len(), upper_median(&mut wanted).unwrap_or(0.0));
     let mut by_photo: BTreeMap<usize, Vec<&Job>> =
         (0..photos.photos.len()).map(|p| (p, Vec::new())).collect();
     for job in &jobs {
@@ -189,12 +188,6 @@ fn area_px(window: &Window, view: &View, motion: Option<&MotionField>) -> Option
 /// Edge of a crop at the photo's own resolution, pixels.
 fn natural_px(window: &Window, view: &View, motion: Option<&MotionField>) -> f64 {
     area_px(window, view, motion).unwrap_or(0.0).sqrt()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Resamples a photo on the plane of a stone's face, and outlines its mask there.

@@ -6,6 +6,7 @@ use crate::pipeline::steps::label::Labelled;
 use crate::results::ThinPoint;
 use nalgebra::Point3;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::statistics::split_mix;
 
 /// Points kept of an epoch, about.
 const WANTED: u64 = 220_000;
@@ -31,7 +32,7 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
         context.progress.check()?;
         let (moved, surveyed, labels) = (tiles.load(tile)?, tiles.surveyed.load(tile)?, epoch.labels(tile)?);
         let chosen =
-            (0..moved.len()).filter(|&i| mixed((tile as u64) << 40 | i as u64).is_multiple_of(every));
+            (0..moved.len()).filter(|&i| split_mix((tile as u64) << 40 | i as u64).is_multiple_of(every));
         kept.extend(chosen.map(|i| Candidate {
             point: ThinPoint {
                 position: moved.world(i),
@@ -44,12 +45,4 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
         context.progress.advance(1);
     }
     Ok(kept)
-}
-
-/// A number that looks random (the finaliser of SplitMix64; Steele, Lea & Flood 2014).
-fn mixed(value: u64) -> u64 {
-    let v = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let v = (v ^ (v >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let v = (v ^ (v >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    v ^ (v >> 31)
 }
