@@ -9,10 +9,40 @@ use rayon::prelude::*;
 /// Unsigned, and never smaller than the reference's spacing allows: points that lie between reference points
 /// are some way off even without change. Cost: points x reference points within the distance found.
 pub fn c2c(reference: &GridIndex, points: &[Point3<f64>], max_m: f64) -> Vec<Option<f64>> {
-    points
+    let distance = |p: &Point3<f64>| reference.nearest(p, max_m).map(|(_, d2)| d2.sqrt());
+    if is_ordered(reference, points) {
+        return points.par_iter().map(distance).collect();
+    }
+    // Points in no order wait for memory at every search; sorted by their place they do not.
+    let mut order: Vec<(u32, u32)> = (0..)
+        .zip(points)
+        .map(|(i, p)| (reference.block_of(p), i))
+        .collect();
+    order.sort_unstable();
+    let found: Vec<Option<f64>> = order
         .par_iter()
-        .map(|p| reference.nearest(p, max_m).map(|(_, d2)| d2.sqrt()))
-        .collect()
+        .map(|(_, i)| distance(&points[*i as usize]))
+        .collect();
+    let mut distances = vec![None; points.len()];
+    for ((_, i), found) in order.iter().zip(found) {
+        distances[*i as usize] = found;
+    }
+    distances
+}
+
+/// Pairs of consecutive points that show whether points come in an order.
+const ORDER_SAMPLES: usize = 1000;
+
+/// Whether most points follow one in the same or a neighbouring block of the index, as scanners write them.
+fn is_ordered(reference: &GridIndex, points: &[Point3<f64>]) -> bool {
+    let pairs = points.windows(2).step_by(points.len() / ORDER_SAMPLES + 1);
+    let (mut near, mut all) = (0, 0);
+    for pair in pairs {
+        let [a, b] = [0, 1].map(|i| i64::from(reference.block_of(&pair[i])));
+        near += usize::from((a - b).abs() <= 1);
+        all += 1;
+    }
+    2 * near > all
 }
 
 #[cfg(test)]
@@ -32,5 +62,30 @@ mod tests {
         assert!((distances[0].unwrap() - 0.5).abs() < 1e-12);
         assert_eq!(distances[1..], [None, Some(0.0)]);
         assert_eq!(c2c(&index, &points, 5.0)[1], Some(5.0));
+    }
+    #[test]
+    fn the_order_of_the_points_does_not_matter() {
+        let wave = |i: usize, shift: f64| {
+            let (x, z) = (0.01 * (i / 100) as f64, 0.01 * (i % 100) as f64);
+            Point3::new(x, 0.1 * (7.0 * x).sin() + shift, z)
+        };
+        let reference: Vec<_> = (0..10_000).map(|i| wave(i, 0.0)).collect();
+        let points: Vec<_> = (0..10_000).map(|i| wave(i, 0.013)).collect();
+        let index = GridIndex::for_nearest(&reference);
+        let ordered = c2c(&index, &points, 0.1);
+        assert!(is_ordered(&index, &points));
+        let shuffle = |i: usize| 7919 * i % 10_000;
+        let shuffled: Vec<_> = (0..10_000).map(|i| points[shuffle(i)]).collect();
+        assert!(!is_ordered(&index, &shuffled));
+        for (i, distance) in c2c(&index, &shuffled, 0.1).into_iter().enumerate() {
+            assert_eq!(distance, ordered[shuffle(i)]);
+        }
+        for i in (0..10_000).step_by(501) {
+            let brute = reference
+                .iter()
+                .map(|r| (r - points[i]).norm())
+                .fold(f64::INFINITY, f64::min);
+            assert!((ordered[i].unwrap() - brute).abs() < 1e-15);
+        }
     }
 }

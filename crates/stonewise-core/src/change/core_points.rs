@@ -1,5 +1,6 @@
 //! Thinning a cloud to core points.
 
+use crate::geometry::{CellMap, floor};
 use nalgebra::Point3;
 
 /// Indices of the points that stay when every voxel keeps only the point nearest to its middle.
@@ -8,23 +9,27 @@ use nalgebra::Point3;
 /// go to the smaller coordinates; the result is sorted by voxel (z, then y, then x) and does not depend on the
 /// order of the points.
 pub fn thin_to_voxels(points: &[Point3<f64>], edge_m: f64) -> Vec<usize> {
-    let mut ranked: Vec<([i64; 3], f64, usize)> = points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| {
-            let cell = [2, 1, 0].map(|a| (p[a] / edge_m).floor());
-            let middle = Point3::new(cell[2] + 0.5, cell[1] + 0.5, cell[0] + 0.5) * edge_m;
-            (cell.map(|c| c as i64), (p - middle).norm_squared(), i)
-        })
-        .collect();
-    ranked.sort_unstable_by(|a, b| {
-        a.0.cmp(&b.0)
-            .then(a.1.total_cmp(&b.1))
-            .then_with(|| lexicographic(&points[a.2], &points[b.2]))
-            .then(a.2.cmp(&b.2))
-    });
-    ranked.dedup_by_key(|entry| entry.0);
-    ranked.into_iter().map(|(_, _, i)| i).collect()
+    let mut nearest: CellMap<[i64; 3], (f64, usize)> = CellMap::default();
+    for (i, p) in points.iter().enumerate() {
+        let cell = [2, 1, 0].map(|a| floor(p[a] / edge_m));
+        let [z, y, x] = cell.map(|c| c as f64 + 0.5);
+        let found = ((p - Point3::new(x, y, z) * edge_m).norm_squared(), i);
+        let kept = nearest.entry(cell).or_insert(found);
+        if is_before(&found, kept, points) {
+            *kept = found;
+        }
+    }
+    let mut kept: Vec<([i64; 3], usize)> = nearest.into_iter().map(|(cell, (_, i))| (cell, i)).collect();
+    kept.sort_unstable();
+    kept.into_iter().map(|(_, i)| i).collect()
+}
+
+/// Whether a point, with its squared distance to the middle, goes before another.
+fn is_before(a: &(f64, usize), b: &(f64, usize), points: &[Point3<f64>]) -> bool {
+    a.0.total_cmp(&b.0)
+        .then_with(|| lexicographic(&points[a.1], &points[b.1]))
+        .then(a.1.cmp(&b.1))
+        .is_lt()
 }
 
 fn lexicographic(a: &Point3<f64>, b: &Point3<f64>) -> std::cmp::Ordering {

@@ -1,6 +1,6 @@
 //! Normals of core points.
 
-use crate::cloud::GridIndex;
+use crate::cloud::{CellMoments, GridIndex};
 use crate::geometry::Plane;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -36,18 +36,19 @@ impl OutwardReference<'_> {
 /// Unit normals of the least-squares planes through all points within `radius_m`, pointing outside; `None`
 /// where under three points, or only a line of them, lie so near.
 ///
-/// Cost: positions x points within the radius.
+/// Cost: one pass over the cloud; positions x cells of the index in the sphere and points of the cells on its border,
+/// which is least where a cell is about a tenth of the radius.
 pub fn estimate_normals(
     cloud: &GridIndex,
     at: &[Point3<f64>],
     radius_m: f64,
     outward: &OutwardReference<'_>,
 ) -> Vec<Option<Vector3<f64>>> {
+    let sums = CellMoments::new(cloud);
     at.par_iter()
-        .map_init(Vec::new, |near, centre| {
-            near.clear();
-            cloud.positions_within(centre, radius_m, |_, p| near.push(*p));
-            Some(outward.orient(centre, Plane::fit(near)?.normal))
+        .map(|centre| {
+            let plane = Plane::of_moments(centre, &sums.within(centre, radius_m))?;
+            Some(outward.orient(centre, plane.normal))
         })
         .collect()
 }

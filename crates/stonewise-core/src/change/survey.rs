@@ -104,7 +104,7 @@ where
 {
     each_tile("C2C", compared, progress, |tile, points, bounds| {
         let near = points_around(reference, &bounds.grown(max_m), None)?;
-        let index = GridIndex::new(&near, nearest_cell(&near));
+        let index = GridIndex::for_nearest(&near);
         sink(tile, points, c2c(&index, points, max_m)).map_err(SurveyError::Sink)
     })
 }
@@ -171,15 +171,6 @@ where
         );
     }
     Ok(found)
-}
-
-/// Twice the spacing of points spread over the largest face of their box: a few points per cell on a wall.
-fn nearest_cell(points: &[Point3<f64>]) -> f64 {
-    Bounds::of(points.iter().copied()).map_or(1.0, |b| {
-        let e = b.max - b.min;
-        let face = (e.x * e.y).max(e.y * e.z).max(e.z * e.x);
-        (2.0 * (face / points.len() as f64).sqrt()).max(1e-3)
-    })
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ pub struct Cylinder {
 
 impl Cylinder {
     /// Where a point lies along the axis, metres from the middle; `None` outside the cylinder.
+    #[inline]
     fn along(&self, p: &Point3<f64>) -> Option<f64> {
         let q = p - self.centre;
         let along = q.dot(&self.axis);
@@ -58,9 +59,11 @@ impl GridIndex {
                 range.is_some()
             });
             if hit {
-                self.visit_cells(&cells, |slot| {
-                    if let Some(along) = cylinder.along(&self.points[slot]) {
-                        visit(self.order[slot] as usize, along);
+                self.blocks.for_each_run(&cells, |run| {
+                    for (p, &i) in self.points[run.clone()].iter().zip(&self.order[run]) {
+                        if let Some(along) = cylinder.along(p) {
+                            visit(i as usize, along);
+                        }
                     }
                 });
             }
@@ -73,17 +76,6 @@ impl GridIndex {
         let to = ((high - self.origin[axis]) / self.cell_m).floor();
         let last = self.dims[axis] - 1;
         (to >= 0.0 && from <= last as f64).then(|| (from.max(0.0) as usize, (to as usize).min(last)))
-    }
-
-    fn visit_cells(&self, cells: &[(usize, usize); 3], mut visit: impl FnMut(usize)) {
-        for k in cells[2].0..=cells[2].1 {
-            for j in cells[1].0..=cells[1].1 {
-                let row = (k * self.dims[1] + j) * self.dims[0];
-                let start = self.starts[row + cells[0].0] as usize;
-                let end = self.starts[row + cells[0].1 + 1] as usize;
-                (start..end).for_each(&mut visit);
-            }
-        }
     }
 }
 

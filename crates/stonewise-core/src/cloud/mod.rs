@@ -1,10 +1,13 @@
 //! Point clouds and searching in them.
 
+mod blocks;
+mod cell_moments;
 mod cloud_type;
 mod cylinder;
 mod grid_index;
 mod tiles;
 
+pub use cell_moments::CellMoments;
 pub use cloud_type::Cloud;
 pub use cylinder::Cylinder;
 pub use grid_index::GridIndex;

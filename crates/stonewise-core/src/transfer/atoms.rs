@@ -3,10 +3,8 @@
 use super::TransferError;
 use super::visibility::{Observer, Sighting};
 use crate::cloud::{Cloud, TileSource};
-use crate::geometry::cell_of;
+use crate::geometry::{CellMap, CellSet, cell_of};
 use crate::progress::Progress;
-use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
 
 /// All sampled points that have the same sightings: the photos that see them, and the instance in each.
 ///
@@ -31,7 +29,7 @@ pub(super) fn gather_atoms<T: TileSource>(
     sample_m: f64,
     progress: &dyn Progress,
 ) -> Result<Vec<Atom>, TransferError> {
-    let mut sums: HashMap<Signature, (u32, Vec<f64>)> = HashMap::new();
+    let mut sums: CellMap<Signature, (u32, Vec<f64>)> = CellMap::default();
     progress.begin("sightings", tiles.tile_count() as u64);
     for tile in 0..tiles.tile_count() {
         progress.check()?;
@@ -57,19 +55,15 @@ fn sample(
     candidates: &[u32],
     sample_m: f64,
 ) -> Vec<Vec<Sighting>> {
-    thin(cloud, sample_m)
-        .par_iter()
-        .map_init(Vec::new, |found, &i| {
-            observer.sight(tile, cloud, i as usize, candidates, found);
-            found.clone()
-        })
-        .filter(|found| found.iter().any(|s| s.instance != 0))
-        .collect()
+    let chosen = thin(cloud, sample_m);
+    let mut sightings = observer.sight_all(tile, cloud, &chosen, candidates, <[Sighting]>::to_vec);
+    sightings.retain(|found| found.iter().any(|s| s.instance != 0));
+    sightings
 }
 
 /// The first point of every voxel of a world-aligned grid.
 fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
-    let mut taken = HashSet::new();
+    let mut taken = CellSet::default();
     (0..cloud.len() as u32)
         .filter(|&i| {
             let p = cloud.world(i as usize);
@@ -78,7 +72,7 @@ fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
         .collect()
 }
 
-fn add(sums: &mut HashMap<Signature, (u32, Vec<f64>)>, sightings: &[Sighting]) {
+fn add(sums: &mut CellMap<Signature, (u32, Vec<f64>)>, sightings: &[Sighting]) {
     let signature = sightings.iter().map(|s| (s.photo, s.instance)).collect();
     let (area, weights) = sums
         .entry(signature)

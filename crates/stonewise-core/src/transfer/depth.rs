@@ -1,10 +1,10 @@
 //! Depth maps of photos by splatting.
 
 use super::frustum::Cone;
-use super::surface_cells::{SurfaceCells, limit_spacings};
+use super::surface_cells::{SurfaceCells, SurfaceGroup, limit_spacings};
 use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, TileSource};
-use crate::geometry::View;
+use crate::geometry::{View, floor};
 use crate::progress::Progress;
 use crate::raster::DepthMap;
 use rayon::prelude::*;
@@ -35,8 +35,8 @@ impl SplatDepth {
         let width = i64::from(self.map.width());
         let height = i64::from(self.map.height());
         let range = |centre: f64, size: i64| {
-            let low = ((centre - radius).floor() as i64).max(0);
-            let high = ((centre + radius).floor() as i64).min(size - 1);
+            let low = floor(centre - radius).max(0);
+            let high = floor(centre + radius).min(size - 1);
             (low, high)
         };
         let (x0, x1) = range(pixel[0] * self.scale, width);
@@ -52,24 +52,37 @@ impl SplatDepth {
         }
     }
 
-    /// Depth of the nearest surface at a pixel, and the least and greatest depth within `radius_px` (photo pixels).
-    pub(super) fn around(&self, pixel: [f64; 2], radius_px: f64) -> Option<[f32; 3]> {
-        let centre = [pixel[0] * self.scale, pixel[1] * self.scale];
-        let here = *self.map.at(centre)?;
+    /// Depth of the nearest surface at a pixel.
+    #[inline]
+    pub(super) fn at(&self, pixel: [f64; 2]) -> Option<f32> {
+        self.map.at(pixel.map(|p| p * self.scale)).copied()
+    }
+
+    /// The least and greatest depth at a pixel and within `radius_px` (photo pixels); `here`: that at the pixel.
+    #[inline]
+    pub(super) fn around(&self, pixel: [f64; 2], here: f32, radius_px: f64) -> [f32; 2] {
         let radius = (radius_px * self.scale).max(1.0);
+        let around = |pixel: f64, side: u32| {
+            let centre = pixel * self.scale;
+            [-radius, 0.0, radius].map(|d| {
+                let place = centre + d;
+                (place >= 0.0 && (place as u32) < side).then_some(place as usize)
+            })
+        };
+        let columns = around(pixel[0], self.map.width());
+        let rows = around(pixel[1], self.map.height());
         let (mut least, mut greatest) = (here, if here.is_finite() { here } else { 0.0 });
-        for dy in [-radius, 0.0, radius] {
-            for dx in [-radius, 0.0, radius] {
-                let Some(&depth) = self.map.at([centre[0] + dx, centre[1] + dy]) else {
-                    continue;
-                };
+        for row in rows.into_iter().flatten() {
+            let row = &self.map.data()[row * self.map.width() as usize..];
+            for column in columns.into_iter().flatten() {
+                let depth = row[column];
                 if depth.is_finite() {
                     least = least.min(depth);
                     greatest = greatest.max(depth);
                 }
             }
         }
-        Some([here, least, greatest])
+        [least, greatest]
     }
 }
 
@@ -99,10 +112,11 @@ pub(super) fn splat_all<T: TileSource>(
         progress.check()?;
         let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
         let bounds = tiles.bounds(tile);
+        let groups = surface.groups(&cloud);
         maps.par_iter_mut()
             .zip(views.par_iter().zip(&cones))
             .filter(|(_, (_, cone))| cone.touches(&bounds))
-            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, surface, params));
+            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, &groups, params));
         progress.advance(1);
     }
     Ok((maps, surfaces))
@@ -112,21 +126,20 @@ fn splat_tile(
     map: &mut SplatDepth,
     view: &View,
     cloud: &Cloud,
-    surface: &SurfaceCells,
+    groups: &[SurfaceGroup],
     params: &TransferParams,
 ) {
-    for i in 0..cloud.len() {
-        let Some(seen) = view.project(&cloud.world(i)) else {
-            continue;
-        };
-        if !view.is_inside(seen.pixel) {
-            continue;
+    for group in groups {
+        let spacing = f64::from(group.surface.spacing_m);
+        for &i in &group.points {
+            let Some(seen) = view.project(&cloud.world(i as usize)) else {
+                continue;
+            };
+            if view.is_inside(seen.pixel) {
+                let radius = params.splat_spacings * spacing / view.gsd_m(seen.depth_m);
+                map.splat(seen.pixel, seen.depth_m, radius);
+            }
         }
-        let spacing = surface
-            .at(&cloud.local(i))
-            .map_or(0.0, |s| f64::from(s.spacing_m));
-        let radius = params.splat_spacings * spacing / view.gsd_m(seen.depth_m);
-        map.splat(seen.pixel, seen.depth_m, radius);
     }
 }
 

@@ -1,9 +1,9 @@
 //! Parts of a stone that are cut off from its main body.
 
 use super::TransferParams;
-use crate::geometry::cell_of;
+use crate::geometry::{CellMap, CellSet, cell_of};
 use nalgebra::Point3;
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Cubic cell of a world-aligned grid.
 pub(super) type Voxel = [i64; 3];
@@ -11,14 +11,14 @@ pub(super) type Voxel = [i64; 3];
 /// Where each stone has points, counted in voxels across all tiles.
 pub(super) struct Occupancy {
     voxel_m: f64,
-    counts: HashMap<(u32, Voxel), u32>,
+    counts: CellMap<(u32, Voxel), u32>,
 }
 
 /// What must lose its label.
 pub(super) struct Removal {
     voxel_m: f64,
     /// Voxels of islands and of whole stones.
-    pub voxels: HashSet<(u32, Voxel)>,
+    pub voxels: CellSet<(u32, Voxel)>,
     /// Islands and points on them, of stones that stay.
     pub islands: BTreeMap<u32, (u32, u64)>,
     /// Stones that go, with their points.
@@ -31,7 +31,7 @@ impl Occupancy {
     pub(super) fn new(voxel_m: f64) -> Self {
         Self {
             voxel_m,
-            counts: HashMap::new(),
+            counts: CellMap::default(),
         }
     }
 
@@ -52,7 +52,7 @@ impl Occupancy {
         }
         let mut removal = Removal {
             voxel_m: self.voxel_m,
-            voxels: HashSet::new(),
+            voxels: CellSet::default(),
             islands: BTreeMap::new(),
             stones: BTreeMap::new(),
             kept: BTreeSet::new(),

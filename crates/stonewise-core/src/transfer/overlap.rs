@@ -1,7 +1,8 @@
 //! How far the instances of different photos cover the same surface.
 
 use super::atoms::Atom;
-use std::collections::{BTreeMap, HashMap};
+use crate::geometry::CellMap;
+use std::collections::BTreeMap;
 
 /// One instance of one photo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,12 +19,20 @@ pub(super) struct Instance {
 pub(super) struct Overlaps {
     /// All instances with points, ascending by photo and label.
     pub instances: Vec<Instance>,
-    index: HashMap<(u32, u32), u32>,
+    /// Instance of each small label of a photo; [`NONE`] for background.
+    small: Vec<Vec<u32>>,
+    /// The same for labels of [`SMALL_LABELS`] and above.
+    large: CellMap<(u32, u32), u32>,
     /// Area common to two instances (ascending indices) of different photos.
     pub common: BTreeMap<(u32, u32), u32>,
     /// Area of an instance that another photo sees, whatever it says about it.
-    seen_by: HashMap<(u32, u32), u32>,
+    seen_by: CellMap<(u32, u32), u32>,
 }
+
+/// Labels below this, those of 16-bit label images, are looked up in a table of their photo, which takes 256 KB at most.
+const SMALL_LABELS: u32 = 1 << 16;
+/// In a table: no instance.
+const NONE: u32 = u32::MAX;
 
 impl Overlaps {
     pub(super) fn of(atoms: &[Atom]) -> Self {
@@ -33,15 +42,26 @@ impl Overlaps {
                 *areas.entry((s.photo, s.instance)).or_insert(0) += atom.area;
             }
         }
-        let index: HashMap<_, _> = areas.keys().copied().zip(0..).collect();
+        let (mut small, mut large): (Vec<Vec<u32>>, _) = (Vec::new(), CellMap::default());
+        for (&(photo, label), number) in areas.keys().zip(0..) {
+            if label >= SMALL_LABELS {
+                large.insert((photo, label), number);
+                continue;
+            }
+            small.resize_with(small.len().max(photo as usize + 1), Vec::new);
+            let table = &mut small[photo as usize];
+            table.resize(table.len().max(label as usize + 1), NONE);
+            table[label as usize] = number;
+        }
         let mut overlaps = Self {
             instances: areas
                 .into_iter()
                 .map(|((photo, label), area)| Instance { photo, label, area })
                 .collect(),
-            index,
+            small,
+            large,
             common: BTreeMap::new(),
-            seen_by: HashMap::new(),
+            seen_by: CellMap::default(),
         };
         for atom in atoms {
             overlaps.count(atom);
@@ -69,8 +89,13 @@ impl Overlaps {
     }
 
     /// Index of an instance; `None` for background.
+    #[inline]
     pub(super) fn find(&self, photo: u32, label: u32) -> Option<u32> {
-        self.index.get(&(photo, label)).copied()
+        if label >= SMALL_LABELS {
+            return self.large.get(&(photo, label)).copied();
+        }
+        let number = *self.small.get(photo as usize)?.get(label as usize)?;
+        (number != NONE).then_some(number)
     }
 
     /// Intersection and union of two instances over the points that both photos see.

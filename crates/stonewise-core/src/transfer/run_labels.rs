@@ -5,43 +5,66 @@ use crate::raster::LabelImage;
 /// A label image as runs of equal labels per row.
 ///
 /// A 12 MP photo of masonry takes 2 to 3 MB instead of 48: memory follows the length of the borders. A look-up
-/// is a binary search in one row.
+/// starts at the run in which its part of the row begins, and goes on to the run that holds it: one or two steps.
 pub(super) struct RunLabels {
     width: u32,
     /// Start of each row in `runs`; one more entry than rows.
     rows: Vec<u32>,
     /// First column and label of each run.
     runs: Vec<(u32, u32)>,
+    /// Run of its row, or one before it, in which each part of [`PART_PX`] begins, row by row.
+    parts: Vec<u16>,
 }
+
+/// Pixels of a part of a row: stones are about as wide, so that few runs begin in a part.
+const PART_PX: usize = 64;
 
 impl RunLabels {
     pub(super) fn new(image: &LabelImage) -> Self {
         let width = image.width();
-        let mut rows = vec![0];
-        let mut runs = Vec::new();
+        let mut labels = Self {
+            width,
+            rows: vec![0],
+            runs: Vec::new(),
+            parts: Vec::new(),
+        };
         for row in image.data().chunks_exact(width.max(1) as usize) {
-            let mut previous = None;
-            for (x, &label) in row.iter().enumerate() {
+            labels.add_row(row);
+        }
+        labels
+    }
+
+    fn add_row(&mut self, row: &[u32]) {
+        let start = self.runs.len();
+        for (part, pixels) in row.chunks(PART_PX).enumerate() {
+            let mut previous = (self.runs.len() > start).then(|| self.runs[self.runs.len() - 1].1);
+            let open = (self.runs.len() - start).saturating_sub(1);
+            self.parts.push(open.min(usize::from(u16::MAX)) as u16);
+            for (x, &label) in (part * PART_PX..).zip(pixels) {
                 if previous != Some(label) {
-                    runs.push((x as u32, label));
+                    self.runs.push((x as u32, label));
                     previous = Some(label);
                 }
             }
-            rows.push(runs.len() as u32);
         }
-        Self { width, rows, runs }
+        self.rows.push(self.runs.len() as u32);
     }
 
     /// Label under a pixel coordinate; `None` outside.
+    #[inline]
     pub(super) fn at(&self, pixel: [f64; 2]) -> Option<u32> {
         let [x, y] = pixel;
         if !(x >= 0.0 && y >= 0.0 && x < f64::from(self.width)) {
             return None;
         }
-        let y = y as usize;
+        let (x, y) = (x as usize, y as usize);
         let row = &self.runs[*self.rows.get(y)? as usize..*self.rows.get(y + 1)? as usize];
-        let after = row.partition_point(|&(start, _)| start <= x as u32);
-        Some(row[after - 1].1)
+        let parts = (self.width as usize).div_ceil(PART_PX);
+        let mut at = usize::from(*self.parts.get(y * parts + x / PART_PX)?);
+        while row.get(at + 1).is_some_and(|next| next.0 as usize <= x) {
+            at += 1;
+        }
+        Some(row.get(at)?.1)
     }
 }
 
@@ -59,6 +82,18 @@ mod tests {
                 let pixel = [f64::from(x) + 0.9, f64::from(y) + 0.1];
                 assert_eq!(runs.at(pixel), image.at(pixel).copied());
             }
+        }
+        let wide: Vec<u32> = (0..3 * 1000u32)
+            .map(|i| (i.wrapping_mul(2_654_435_761) >> 27) & (i >> 5))
+            .collect();
+        let image = LabelImage::from_vec(1000, 3, wide).unwrap();
+        let wide = RunLabels::new(&image);
+        for (i, &label) in image.data().iter().enumerate() {
+            assert_eq!(
+                wide.at([(i % 1000) as f64 + 0.5, (i / 1000) as f64]),
+                Some(label),
+                "{i}"
+            );
         }
         for pixel in [[-0.1, 2.0], [7.0, 2.0], [3.0, 5.0], [3.0, -0.5], [f64::NAN, 1.0]] {
             assert_eq!(runs.at(pixel), None);

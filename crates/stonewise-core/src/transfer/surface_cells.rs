@@ -1,11 +1,10 @@
 //! Local spacing, noise and orientation of a tile's surface.
 
 use crate::cloud::{Cloud, GridIndex};
-use crate::geometry::cell_of;
+use crate::geometry::{CellMap, cell_of, floor};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// What the surface is like around a point.
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +24,18 @@ pub(super) struct SurfaceCells {
     /// Of the tile, world frame.
     origin: Point3<f64>,
     cell_m: f64,
-    cells: HashMap<[i32; 3], LocalSurface>,
+    /// Ascending.
+    keys: Vec<[i32; 3]>,
+    /// Of each key.
+    surfaces: Vec<LocalSurface>,
+}
+
+/// Points of a tile that lie in one cell.
+pub(super) struct SurfaceGroup {
+    /// What the surface is like there.
+    pub surface: LocalSurface,
+    /// Ascending indices into the tile.
+    pub points: Vec<u32>,
 }
 
 /// Points around a sample of which spacing and noise are measured.
@@ -45,28 +55,39 @@ impl SurfaceCells {
     /// searches per cell.
     pub(super) fn new(cloud: &Cloud, cell_m: f64) -> Self {
         let points: Vec<Point3<f64>> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
-        let mut members: HashMap<[i32; 3], Vec<u32>> = HashMap::new();
-        for (i, p) in points.iter().enumerate() {
-            members.entry(key(p, cell_m)).or_default().push(i as u32);
-        }
-        let mut members: Vec<_> = members.into_iter().collect();
-        members.sort_unstable_by_key(|(key, _)| *key);
+        let members = members(&points, cell_m);
         let index = GridIndex::new(&points, search_cell(&points, &members, cell_m));
         let measured: Vec<LocalSurface> = members
             .par_iter()
             .map(|(_, ids)| measure(&points, &index, ids, cell_m))
             .collect();
-        let cells = members.iter().map(|m| m.0).zip(measured).collect();
         Self {
             origin: cloud.origin(),
             cell_m,
-            cells,
+            keys: members.iter().map(|m| m.0).collect(),
+            surfaces: measured,
         }
     }
 
-    /// Surface around a point given relative to the tile's origin.
-    pub(super) fn at(&self, local: &Point3<f64>) -> Option<&LocalSurface> {
-        self.cells.get(&key(local, self.cell_m))
+    /// The points of the tile, cell by cell. Neighbours are then asked about together, whose pixels lie in the
+    /// processor's cache.
+    pub(super) fn groups(&self, cloud: &Cloud) -> Vec<SurfaceGroup> {
+        self.groups_of(cloud, &(0..cloud.len() as u32).collect::<Vec<u32>>())
+    }
+
+    /// Some of the points of the tile, cell by cell; places in `chosen` stand for points. Those without a cell are in
+    /// no group.
+    pub(super) fn groups_of(&self, cloud: &Cloud, chosen: &[u32]) -> Vec<SurfaceGroup> {
+        let points: Vec<Point3<f64>> = chosen.iter().map(|&i| cloud.local(i as usize)).collect();
+        let group = |(key, points): ([i32; 3], Vec<u32>)| {
+            let at = self.keys.binary_search(&key).ok()?;
+            let surface = self.surfaces[at];
+            Some(SurfaceGroup { surface, points })
+        };
+        members(&points, self.cell_m)
+            .into_iter()
+            .filter_map(group)
+            .collect()
     }
 
     fn block(&self, key: &[i32; 3]) -> [i64; 3] {
@@ -75,7 +96,7 @@ impl SurfaceCells {
 
     /// Spacings of all cells, in no particular order.
     pub(super) fn spacings(&self) -> impl Iterator<Item = f32> {
-        self.cells.values().map(|c| c.spacing_m)
+        self.surfaces.iter().map(|c| c.spacing_m)
     }
 }
 
@@ -84,20 +105,20 @@ impl SurfaceCells {
 ///
 /// A cell's spacing is limited by what is usual in its block of the world, whatever tiles that falls into.
 pub(super) fn limit_spacings(tiles: &mut [SurfaceCells]) {
-    let mut blocks: HashMap<[i64; 3], Vec<(f32, u32)>> = HashMap::new();
+    let mut blocks: CellMap<[i64; 3], Vec<(f32, u32)>> = CellMap::default();
     for tile in tiles.iter() {
-        for (key, surface) in &tile.cells {
+        for (key, surface) in tile.keys.iter().zip(&tile.surfaces) {
             let spacings = blocks.entry(tile.block(key)).or_default();
             spacings.push((surface.spacing_m, surface.points));
         }
     }
-    let limits: HashMap<[i64; 3], f32> = blocks
+    let limits: CellMap<[i64; 3], f32> = blocks
         .into_iter()
         .map(|(block, spacings)| (block, MAX_SPACINGS * usual(spacings)))
         .collect();
     for tile in tiles {
         let (origin, cell_m) = (tile.origin, tile.cell_m);
-        for (key, surface) in &mut tile.cells {
+        for (key, surface) in tile.keys.iter().zip(&mut tile.surfaces) {
             let limit = limits.get(&block_of(&origin, cell_m, key)).copied();
             surface.spacing_m = surface.spacing_m.min(limit.unwrap_or(f32::INFINITY));
         }
@@ -123,7 +144,29 @@ fn block_of(origin: &Point3<f64>, cell_m: f64, key: &[i32; 3]) -> [i64; 3] {
 }
 
 fn key(p: &Point3<f64>, cell_m: f64) -> [i32; 3] {
-    [0, 1, 2].map(|a| (p[a] / cell_m).floor() as i32)
+    [0, 1, 2].map(|a| floor(p[a] / cell_m) as i32)
+}
+
+/// Indices of the points of each cell; cells and indices ascend.
+fn members(points: &[Point3<f64>], cell_m: f64) -> Vec<([i32; 3], Vec<u32>)> {
+    let mut numbers: CellMap<[i32; 3], usize> = CellMap::default();
+    let mut members: Vec<([i32; 3], Vec<u32>)> = Vec::new();
+    let mut last: Option<([i32; 3], usize)> = None;
+    for (i, p) in points.iter().enumerate() {
+        let key = key(p, cell_m);
+        // Points mostly follow one in the same cell.
+        let number = match last {
+            Some((previous, number)) if previous == key => number,
+            _ => *numbers.entry(key).or_insert_with(|| {
+                members.push((key, Vec::new()));
+                members.len() - 1
+            }),
+        };
+        last = Some((key, number));
+        members[number].1.push(i as u32);
+    }
+    members.sort_unstable_by_key(|(key, _)| *key);
+    members
 }
 
 /// A cell for the index that holds a handful of points where the cloud is as dense as usual.
@@ -205,7 +248,10 @@ mod tests {
             .collect();
         let cloud = Cloud::from_world(Point3::origin(), points);
         let cells = SurfaceCells::new(&cloud, 0.25);
-        let surface = cells.at(&cloud.local(5050)).unwrap();
+        let groups = cells.groups(&cloud);
+        assert_eq!(groups.iter().map(|g| g.points.len()).sum::<usize>(), cloud.len());
+        let group = groups.iter().find(|g| g.points.contains(&5050)).unwrap();
+        let surface = &group.surface;
         assert!(
             (f64::from(surface.spacing_m) - 0.01).abs() < 0.0025,
             "{surface:?}"
@@ -239,7 +285,12 @@ mod tests {
         };
         let mut all: Vec<_> = cut
             .iter()
-            .flat_map(|tile| tile.cells.iter().map(|(key, c)| (place(tile, key), c.spacing_m)))
+            .flat_map(|tile| {
+                tile.keys
+                    .iter()
+                    .zip(&tile.surfaces)
+                    .map(|(key, c)| (place(tile, key), c.spacing_m))
+            })
             .collect();
         all.sort_by_key(|c| c.0);
         all

@@ -16,7 +16,6 @@ use crate::id::{ImageId, InstanceId, StoneId};
 use crate::progress::Progress;
 use crate::raster::LabelImage;
 use nalgebra::Point3;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -169,18 +168,14 @@ fn label_tile(
     electorate: &Electorate,
     names: &Names,
 ) -> TileLabels {
-    let verdicts: Vec<(u32, f32, bool)> = (0..cloud.len())
-        .into_par_iter()
-        .with_min_len(1024)
-        .map_init(Vec::new, |found, i| {
-            observer.sight(tile, cloud, i, candidates, found);
-            let verdict = electorate.count(found);
-            verdict.map_or((0, 0.0, false), |v| {
-                let stone = v.stone.and_then(|s| names.id(s)).map_or(0, |id| id.0);
-                (stone, v.share as f32, true)
-            })
+    let all: Vec<u32> = (0..cloud.len() as u32).collect();
+    let verdicts = observer.sight_all(tile, cloud, &all, candidates, |found| {
+        let verdict = electorate.count(found);
+        verdict.map_or((0, 0.0, false), |v| {
+            let stone = v.stone.and_then(|s| names.id(s)).map_or(0, |id| id.0);
+            (stone, v.share as f32, true)
         })
-        .collect();
+    });
     TileLabels {
         stone: verdicts.iter().map(|v| v.0).collect(),
         confidence: verdicts.iter().map(|v| v.1).collect(),
@@ -231,20 +226,21 @@ fn remove<T: TileSource, S: LabelStore>(
 /// Outward names of stones, photos and instances.
 struct Names {
     /// Number of each group that still has an instance of its own.
-    stones: BTreeMap<u32, StoneId>,
+    stones: Vec<Option<StoneId>>,
     /// Photo and instance of each instance index.
     instances: Vec<(ImageId, InstanceId)>,
 }
 
 impl Names {
     fn of(electorate: &Electorate, overlaps: &Overlaps, views: &[&View]) -> Self {
-        let mut stones: BTreeMap<u32, StoneId> = BTreeMap::new();
+        let mut stones: Vec<Option<StoneId>> = Vec::new();
         for ballot in electorate.ballots() {
             if let Ballot::One(stone) = ballot {
-                stones.insert(*stone, StoneId(0));
+                stones.resize(stones.len().max(*stone as usize + 1), None);
+                stones[*stone as usize] = Some(StoneId(0));
             }
         }
-        for (id, name) in (1..).zip(stones.values_mut()) {
+        for (id, name) in (1..).zip(stones.iter_mut().flatten()) {
             *name = StoneId(id);
         }
         let instances = overlaps
@@ -256,7 +252,7 @@ impl Names {
     }
 
     fn id(&self, stone: u32) -> Option<StoneId> {
-        self.stones.get(&stone).copied()
+        self.stones.get(stone as usize).copied().flatten()
     }
 
     fn decisions(&self, decisions: &BTreeMap<u32, Decision>) -> Vec<AuditEvent> {

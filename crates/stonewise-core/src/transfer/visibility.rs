@@ -5,11 +5,12 @@ use super::TransferParams;
 use super::depth::{SplatDepth, splat_all};
 use super::frustum::Cone;
 use super::run_labels::RunLabels;
-use super::surface_cells::SurfaceCells;
+use super::surface_cells::{LocalSurface, SurfaceCells};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::progress::Progress;
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 /// One photo's word on one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +32,8 @@ pub(super) struct Observer<'a> {
     depths: Vec<SplatDepth>,
     surfaces: Vec<SurfaceCells>,
     params: &'a TransferParams,
+    /// Of the steepest incidence at which a photo votes.
+    least_cosine: f64,
 }
 
 impl<'a> Observer<'a> {
@@ -51,6 +54,7 @@ impl<'a> Observer<'a> {
             depths,
             surfaces,
             params,
+            least_cosine: params.max_incidence_rad.cos(),
         })
     }
 
@@ -73,37 +77,51 @@ impl<'a> Observer<'a> {
         all.get(all.len() / 2).copied().map_or(0.0, f64::from)
     }
 
-    /// Sightings of point `i` of a tile by the candidate photos, in their order.
-    pub(super) fn sight(
+    /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the order of
+    /// `chosen`.
+    ///
+    /// Points are asked about cell by cell: their surface is looked up once, and the photos show them side by side.
+    pub(super) fn sight_all<R: Clone + Default + Send>(
         &self,
         tile: usize,
         cloud: &Cloud,
-        i: usize,
+        chosen: &[u32],
         candidates: &[u32],
-        found: &mut Vec<Sighting>,
-    ) {
-        found.clear();
-        let world = cloud.world(i);
-        let local = cloud.local(i);
-        for &photo in candidates {
-            if let Some(sighting) = self.sight_in(photo, tile, &local, &world) {
-                found.push(sighting);
+        judge: impl Fn(&[Sighting]) -> R + Sync,
+    ) -> Vec<R> {
+        let groups = self.surfaces[tile].groups_of(cloud, chosen);
+        let judged: Vec<Vec<R>> = groups
+            .par_iter()
+            .map_init(Vec::new, |found, group| {
+                let of_point = |&k: &u32| {
+                    let world = cloud.world(chosen[k as usize] as usize);
+                    found.clear();
+                    let sightings = candidates
+                        .iter()
+                        .map(|&photo| self.sight_in(photo, &group.surface, &world));
+                    found.extend(sightings.flatten());
+                    judge(&found[..])
+                };
+                group.points.iter().map(of_point).collect()
+            })
+            .collect();
+        let mut results = vec![R::default(); chosen.len()];
+        for (group, judged) in groups.iter().zip(judged) {
+            for (&k, result) in group.points.iter().zip(judged) {
+                results[k as usize] = result;
             }
         }
+        results
     }
 
-    fn sight_in(
-        &self,
-        photo: u32,
-        tile: usize,
-        local: &Point3<f64>,
-        world: &Point3<f64>,
-    ) -> Option<Sighting> {
+    /// What a photo says about a point; what costs least and rules out most comes first.
+    fn sight_in(&self, photo: u32, surface: &LocalSurface, world: &Point3<f64>) -> Option<Sighting> {
         let p = photo as usize;
         let view = self.views[p];
         let seen = view.project(world)?;
-        let instance = self.labels[p].at(seen.pixel)?;
-        let surface = self.surfaces[tile].at(local)?;
+        if !view.is_inside(seen.pixel) {
+            return None;
+        }
         let line = (world - self.centres[p]).normalize();
         let cosine = line.dot(&surface.normal.cast()).abs();
         // A cell without a normal (one or two points) says nothing about incidence.
@@ -112,18 +130,19 @@ impl<'a> Observer<'a> {
         } else {
             cosine
         };
-        if cosine < self.params.max_incidence_rad.cos() {
+        if cosine < self.least_cosine {
             return None;
         }
         let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
         let tolerance = self.params.tolerance_spacings * f64::from(surface.spacing_m) * (1.0 + tangent)
             + self.params.tolerance_noises * f64::from(surface.noise_m);
-        let [here, least, greatest] = self.depths[p].around(seen.pixel, self.params.silhouette_px)?;
-        let depth = seen.depth_m;
-        let step = self.params.silhouette_step_m + tolerance;
+        let (depth, here) = (seen.depth_m, self.depths[p].at(seen.pixel)?);
         if depth > f64::from(here) + tolerance {
             return None;
         }
+        let instance = self.labels[p].at(seen.pixel)?;
+        let [least, greatest] = self.depths[p].around(seen.pixel, here, self.params.silhouette_px);
+        let step = self.params.silhouette_step_m + tolerance;
         let beside_an_occluder = depth > f64::from(least) + step;
         let on_an_edge = f64::from(greatest) > depth + step;
         // Precision of a border on the face: finer and less oblique photos know better where a stone ends. The

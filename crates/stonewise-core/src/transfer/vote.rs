@@ -2,7 +2,6 @@
 
 use super::overlap::Overlaps;
 use super::visibility::Sighting;
-use std::collections::HashSet;
 
 /// What an instance votes for.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,26 +27,35 @@ pub(super) struct Verdict {
 pub(super) struct Electorate<'a> {
     overlaps: &'a Overlaps,
     ballots: Vec<Ballot>,
-    /// (stone, photo) where the photo shows a part of the stone.
-    shown: HashSet<(u32, u32)>,
+    /// One bit a photo, stone by stone: whether it shows a part of the stone.
+    shown: Vec<u64>,
+    /// Words of `shown` for each stone.
+    words: usize,
     border_weight: f64,
 }
 
 impl<'a> Electorate<'a> {
     pub(super) fn new(overlaps: &'a Overlaps, ballots: Vec<Ballot>, border_weight: f64) -> Self {
-        let mut shown = HashSet::new();
+        let photos = overlaps.instances.iter().map(|i| i.photo as usize + 1).max();
+        let words = photos.unwrap_or(0).div_ceil(64);
+        let mut shown = Vec::new();
         for (instance, ballot) in overlaps.instances.iter().zip(&ballots) {
             let stones: &[u32] = match ballot {
                 Ballot::One(stone) => std::slice::from_ref(stone),
                 Ballot::AnyOf(stones) => stones,
                 Ballot::Nothing => &[],
             };
-            shown.extend(stones.iter().map(|&stone| (stone, instance.photo)));
+            for &stone in stones {
+                let at = stone as usize * words + instance.photo as usize / 64;
+                shown.resize(shown.len().max(at + 1), 0);
+                shown[at] |= 1 << (instance.photo % 64);
+            }
         }
         Self {
             overlaps,
             ballots,
             shown,
+            words,
             border_weight,
         }
     }
@@ -58,7 +66,10 @@ impl<'a> Electorate<'a> {
 
     /// Whether a photo shows a part of the stone.
     pub(super) fn shows(&self, stone: u32, photo: u32) -> bool {
-        self.shown.contains(&(stone, photo))
+        // A photo without instances has no bit, where another stone's could be.
+        let word = photo as usize / 64;
+        let bits = self.shown.get(stone as usize * self.words + word);
+        word < self.words && bits.is_some_and(|bits| bits >> (photo % 64) & 1 == 1)
     }
 
     /// Counts the votes at a point; `None` where no photo votes.

@@ -25,7 +25,7 @@ pub struct GicpStone {
     pub centroid: Point3<f64>,
     /// Centroid in the second epoch, world frame.
     pub centroid_second: Point3<f64>,
-    /// The stone's points, as indices into the first block.
+    /// The stone's points, as indices into the cloud of the first block.
     pub points: Vec<u32>,
     /// Number of the partner's points.
     pub points_second: usize,

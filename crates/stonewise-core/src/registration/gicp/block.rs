@@ -2,7 +2,8 @@
 
 use super::params::GicpParams;
 use crate::cloud::{Cloud, GridIndex};
-use crate::statistics::upper_median;
+use crate::geometry::{CellMap, cell_of};
+use crate::statistics::{split_mix, upper_median};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
@@ -17,6 +18,8 @@ pub struct GicpBlock {
     /// Unit normals; their sign is of no meaning.
     pub(super) normals: Vec<Vector3<f64>>,
     pub(super) index: GridIndex,
+    /// The point that stands for each point of the cloud, where the cloud is thinned.
+    merged: Option<Vec<u32>>,
     /// Typical distance of neighbouring points, metres.
     pub(super) spacing_m: f64,
 }
@@ -27,11 +30,16 @@ const SPACING_SAMPLE: usize = 500;
 const FAR_M: f64 = 1.0;
 
 impl GicpBlock {
-    /// Prepares the points of a region: one index, one plane a point.
+    /// Prepares the points of a region, thinned to [`GicpParams::voxel_m`]: one index, one plane a point.
     ///
     /// Cost: one search for `plane_neighbours` neighbours a point; about 100 bytes a point.
     pub fn new(cloud: &Cloud, params: &GicpParams) -> Self {
-        let points: Vec<Point3<f64>> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
+        let (points, merged) = if params.voxel_m > 0.0 {
+            let (points, merged) = thinned(cloud, params.voxel_m);
+            (points, Some(merged))
+        } else {
+            ((0..cloud.len()).map(|i| cloud.local(i)).collect(), None)
+        };
         let spacing_m = spacing(&points);
         let index = GridIndex::new(&points, 2.0 * spacing_m);
         let normals = points.par_iter().map(|p| normal(&index, p, params)).collect();
@@ -40,8 +48,20 @@ impl GicpBlock {
             points,
             normals,
             index,
+            merged,
             spacing_m,
         }
+    }
+
+    /// The points that stand for some points of the cloud, which indices name; each once.
+    pub(super) fn standing_for(&self, cloud: &[u32]) -> Vec<u32> {
+        let Some(merged) = &self.merged else {
+            return cloud.to_vec();
+        };
+        let mut standing: Vec<u32> = cloud.iter().map(|&i| merged[i as usize]).collect();
+        standing.sort_unstable();
+        standing.dedup();
+        standing
     }
 
     /// Number of points.
@@ -53,6 +73,35 @@ impl GicpBlock {
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
+}
+
+/// One point of each voxel of a world-aligned grid, in the order of the voxels' first points, and which of them stands for
+/// each point.
+///
+/// Which point stays is drawn by a hash of its position. Means of voxels, or the points nearest to their middles, would lie
+/// on the same lattice in both epochs and hold the motion back, by 0.15 of 4 mm at voxels of 1 cm.
+fn thinned(cloud: &Cloud, voxel_m: f64) -> (Vec<Point3<f64>>, Vec<u32>) {
+    let mut numbers: CellMap<[i64; 3], u32> = CellMap::default();
+    let mut kept: Vec<(u64, usize)> = Vec::new();
+    let mut merged = Vec::with_capacity(cloud.len());
+    for (i, offset) in cloud.offsets().iter().enumerate() {
+        let draw = (
+            offset
+                .iter()
+                .fold(0, |hash, c| split_mix(hash ^ u64::from(c.to_bits()))),
+            i,
+        );
+        let number = *numbers
+            .entry(cell_of(&cloud.world(i), voxel_m))
+            .or_insert_with(|| {
+                kept.push(draw);
+                kept.len() as u32 - 1
+            });
+        let least = &mut kept[number as usize];
+        *least = draw.min(*least);
+        merged.push(number);
+    }
+    (kept.iter().map(|(_, i)| cloud.local(*i)).collect(), merged)
 }
 
 /// Median distance to the nearest neighbour, doubled: that of an even grid of random points.

@@ -25,6 +25,9 @@ pub struct GicpParams {
     /// Points further apart do not correspond, metres. 0.1 is twice the largest motion of the paper's
     /// experiment.
     pub max_distance_m: f64,
+    /// Edge of the voxels of which both clouds keep one point each, metres. 0: all points, as in the paper. 0.01 takes
+    /// a quarter of the time on clouds of 4 mm.
+    pub voxel_m: f64,
     /// Neighbours to which the plane of a point is fitted, itself included. 20 as in Segal, Haehnel & Thrun
     /// (2009).
     pub plane_neighbours: usize,
@@ -63,6 +66,7 @@ impl Default for GicpParams {
             buffer_m: 0.6,
             start: GicpStart::Identity,
             max_distance_m: 0.1,
+            voxel_m: 0.0,
             plane_neighbours: 20,
             plane_radius_m: 0.0,
             plane_epsilon: 1e-3,

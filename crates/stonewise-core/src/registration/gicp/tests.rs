@@ -294,3 +294,53 @@ fn parameters_name_themselves() {
     let paper: GicpParams = serde_json::from_str(r#"{"start": "centroids"}"#).unwrap();
     assert_eq!((paper.start, paper.buffer_m), (GicpStart::Centroids, 0.6));
 }
+
+#[test]
+fn a_block_of_voxels_holds_a_point_of_each() {
+    let points = scan(relief, 0.3, 0.004, 0.001, 8);
+    let params = GicpParams {
+        voxel_m: 0.01,
+        ..narrow()
+    };
+    // Another origin, the same voxels of the world.
+    let origin = Point3::new(0.013, -0.2, 0.4);
+    let cloud = Cloud::from_world(origin, points.iter().copied());
+    let block = GicpBlock::new(&cloud, &params);
+    let voxel = |p: &Point3<f64>| [0, 1, 2].map(|a| (p[a] / 0.01).floor() as i64);
+    let mut members = std::collections::BTreeMap::<[i64; 3], Vec<u32>>::new();
+    for i in 0..cloud.len() {
+        members.entry(voxel(&cloud.world(i))).or_default().push(i as u32);
+    }
+    assert_eq!(block.len(), members.len());
+    assert!(3 * block.len() < points.len());
+    for inside in members.values() {
+        let [standing] = block.standing_for(inside)[..] else {
+            panic!("one point stands for a voxel");
+        };
+        let place = block.points[standing as usize];
+        assert!(inside.iter().any(|&i| cloud.local(i as usize) == place));
+    }
+    assert_eq!(
+        self::block(&points, &narrow()).standing_for(&[5, 3, 5]),
+        [5, 3, 5]
+    );
+}
+
+#[test]
+fn voxels_keep_the_motion() {
+    let (first, second) = (
+        scan(relief, 0.6, 0.004, 0.0005, 1),
+        scan(relief, 0.6, 0.004, 0.0005, 2),
+    );
+    let truth = Vector3::new(0.004, -0.003, 0.006);
+    let second: Vec<Point3<f64>> = second.iter().map(|p| p + truth).collect();
+    for voxel_m in [0.0, 0.01] {
+        let params = GicpParams { voxel_m, ..narrow() };
+        let found = measure(&first, &second, &[Point3::origin()], &params);
+        let motion = found[0].motion.as_ref().unwrap();
+        let error = motion.displacement - truth;
+        assert!(error.norm() < 1e-3, "{voxel_m}: {error}");
+        let sigmas = Vector3::from_fn(|a, _| error[a] / motion.covariance[(a, a)].sqrt());
+        assert!(sigmas.amax() < 4.0, "{voxel_m}: {sigmas}");
+    }
+}

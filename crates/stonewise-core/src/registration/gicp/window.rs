@@ -87,7 +87,7 @@ pub(super) fn for_each_pair(
 
 /// Points within the buffer around the stone's points.
 ///
-/// `centroid`: of the stone, world; `stone`: its points, as indices into the block.
+/// `centroid`: of the stone, world; `stone`: its points, as indices into the cloud that the block was made from.
 pub(super) fn window_points(
     first: &GicpBlock,
     centroid: &Point3<f64>,
@@ -95,6 +95,7 @@ pub(super) fn window_points(
     buffer_m: f64,
 ) -> Vec<WindowPoint> {
     let centre = Point3::from(centroid - first.origin);
+    let stone = first.standing_for(stone);
     let point = |i: usize| WindowPoint {
         arm: first.points[i] - centre,
         normal: first.normals[i],
@@ -109,7 +110,7 @@ pub(super) fn window_points(
     let mut inside: Vec<usize> = Vec::new();
     first.index.positions_within(&centre, radius + buffer_m, |i, p| {
         let surely = (p - centre).norm() <= buffer_m - radius;
-        if surely || shape.nearest(p, buffer_m).is_some() {
+        if surely || shape.any_within(p, buffer_m) {
             inside.push(i);
         }
     });
