@@ -72,6 +72,16 @@ pub fn compare_clouds(
     }
 }
 
+/// Cuts the clouds of all epochs of a project into tiles, as the first step of a run; the number of their points.
+pub fn tile_clouds(project: &Project, folder: &OutputFolder, progress: &dyn Progress) -> Result<u64> {
+    let context = Context::new(project, folder, progress)?;
+    let mut points = 0;
+    for number in 1..=project.epochs.len() {
+        points += ingest(&context, number)?.tiles.surveyed.point_count();
+    }
+    Ok(points)
+}
+
 fn views_of(project: &Project) -> Result<Vec<View>> {
     match project.epochs.first() {
         Some(epoch) if !epoch.cameras.as_os_str().is_empty() => Ok(epoch.read_cameras()?.views),

@@ -13,7 +13,7 @@ mod sources;
 mod steps;
 pub(crate) mod storage;
 
-pub use clouds_only::{Comparison, compare_clouds};
+pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
 pub use run::{PairSummary, Summary, Until, run};
 pub(crate) use run::{first_stones, run_in};

@@ -39,6 +39,8 @@ pub struct SourceList {
     rule: SourceRule,
     list: Vec<RawSource>,
     at: BTreeMap<(usize, u32), u16>,
+    /// The entry of the point before: mostly that of the next too.
+    last: Option<((usize, u32), u16)>,
 }
 
 /// A source and a time relative to its start, for every point of a chunk.
@@ -72,8 +74,14 @@ impl SourceList {
     }
 
     fn add(&mut self, file: usize, number: u32, time: Option<f64>) -> PointSource {
-        let next = self.list.len().min(usize::from(u16::MAX)) as u16;
-        let k = *self.at.entry((file, number)).or_insert(next);
+        let k = match self.last {
+            Some((key, k)) if key == (file, number) => k,
+            _ => {
+                let next = self.list.len().min(usize::from(u16::MAX)) as u16;
+                *self.at.entry((file, number)).or_insert(next)
+            }
+        };
+        self.last = Some(((file, number), k));
         if usize::from(k) == self.list.len() {
             self.list.push(RawSource {
                 file,

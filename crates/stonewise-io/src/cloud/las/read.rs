@@ -78,19 +78,22 @@ pub fn fill_chunk(chunk: &mut PointChunk, first_index: u64, data: &PointData) ->
             chunk.positions.push(Point3::new(x, y, z));
         }
     }
-    let kept = |index: &u64| (index - first_index) as usize;
-    let intensities: Vec<f32> = data.intensity().map(f32::from).collect();
-    let rows = chunk.indices.iter().map(kept);
-    chunk.intensities = Some(rows.map(|row| intensities[row]).collect());
-    let colors = data
-        .rgb()
-        .map(|rgb| rgb.map(|(r, g, b)| [r, g, b]).collect::<Vec<_>>());
-    chunk.colors = colors.map(|all| chunk.indices.iter().map(|i| all[kept(i)]).collect());
-    let sources: Vec<u16> = data.point_source_id().collect();
-    chunk.sources = Some(chunk.indices.iter().map(|i| sources[kept(i)]).collect());
-    let times = data.gps_time().map(|times| times.collect::<Vec<f64>>());
-    chunk.times_s = times.map(|all| chunk.indices.iter().map(|i| all[kept(i)]).collect());
+    let indices = &chunk.indices;
+    chunk.intensities = Some(kept(indices, first_index, data.intensity().map(f32::from)));
+    let colors = data.rgb().map(|rgb| rgb.map(|(r, g, b)| [r, g, b]));
+    chunk.colors = colors.map(|all| kept(indices, first_index, all));
+    chunk.sources = Some(kept(indices, first_index, data.point_source_id()));
+    chunk.times_s = data.gps_time().map(|all| kept(indices, first_index, all));
     data.len() as u64 - chunk.len() as u64
+}
+
+/// Values of the records that are kept, of one value for each record from `first_index` on.
+fn kept<T: Copy>(indices: &[u64], first_index: u64, values: impl Iterator<Item = T>) -> Vec<T> {
+    let all: Vec<T> = values.collect();
+    if indices.len() == all.len() {
+        return all;
+    }
+    indices.iter().map(|i| all[(i - first_index) as usize]).collect()
 }
 
 /// Passes all points to `visit`.

@@ -6,9 +6,8 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::storage::step::Key;
 use nalgebra::Point3;
-use std::collections::HashSet;
 use stonewise_core::cloud::TileSource;
-use stonewise_core::geometry::cell_of;
+use stonewise_core::geometry::{CellSet, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::stone::MatchOutcome;
@@ -58,15 +57,19 @@ pub fn r#match(context: &Context, first: &Labelled, second: &Labelled, number: u
 type Cell = [i64; 3];
 
 /// Cells that hold points which a photo of the epoch sees, and where its stones lie.
-fn survey(context: &Context, epoch: &Labelled) -> Result<(HashSet<Cell>, Footprints)> {
-    let mut covered = HashSet::new();
+fn survey(context: &Context, epoch: &Labelled) -> Result<(CellSet<Cell>, Footprints)> {
+    let mut covered = CellSet::default();
+    let mut last = None;
     let mut footprints = Footprints::new();
     for tile in 0..epoch.ingested.tiles.tile_count() {
         context.progress.check()?;
         let (cloud, labels) = (epoch.ingested.tiles.load(tile)?, epoch.labels(tile)?);
         for i in (0..cloud.len()).filter(|&i| labels.seen[i]) {
             let place = cloud.world(i);
-            covered.insert(cell_of(&place, COVERAGE_CELL_M));
+            let cell = cell_of(&place, COVERAGE_CELL_M);
+            if last.replace(cell) != Some(cell) {
+                covered.insert(cell);
+            }
             if labels.stone[i] != 0 {
                 footprints.add(StoneId(labels.stone[i]), &place);
             }

@@ -35,20 +35,20 @@ impl<K: Ord + Clone> Spill<K> {
         })
     }
 
-    /// Adds one record to a bin; says whether it is the bin's first.
-    pub fn push(&mut self, bin: K, record: &[u8]) -> Result<bool> {
+    /// Adds one or more records to a bin; says whether they are the bin's first.
+    pub fn push(&mut self, bin: K, records: &[u8]) -> Result<bool> {
         let is_first = match self.bins.entry(bin) {
             Entry::Occupied(mut bytes) => {
-                bytes.get_mut().extend_from_slice(record);
+                bytes.get_mut().extend_from_slice(records);
                 false
             }
             Entry::Vacant(place) => {
                 let is_first = !self.on_disk.contains(place.key());
-                place.insert(record.to_vec());
+                place.insert(records.to_vec());
                 is_first
             }
         };
-        self.buffered += record.len();
+        self.buffered += records.len();
         if self.buffered >= BUFFER_BYTES {
             self.flush()?;
         }

@@ -19,13 +19,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::progress::Progress;
-use stonewise_io::cloud::{claimed_records, read_cloud};
+use stonewise_io::cloud::{PointChunk, claimed_records, read_cloud};
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
 /// File of the epoch's sources.
 const SOURCES: &str = "sources.json";
 /// Points read from a cloud file at a time.
 const CHUNK: usize = 1 << 20;
+/// Points of a chunk that one thread sorts into tiles at a time.
+const PART: usize = 1 << 15;
 /// Tiles kept in memory by a [`DiskTiles`]: a tile and its neighbours are asked for again and again.
 const CACHED_TILES: usize = 12;
 
@@ -155,7 +157,7 @@ pub fn cut_into_tiles(
     clouds: &[PathBuf],
     rule: SourceRule,
     size_m: f64,
-    takes_part: impl Fn(&Point3<f64>) -> bool,
+    takes_part: impl Fn(&Point3<f64>) -> bool + Sync,
     step: &StepDir,
     progress: &dyn Progress,
 ) -> Result<u64> {
@@ -175,22 +177,9 @@ pub fn cut_into_tiles(
         let summary = read_cloud(path, CHUNK, |chunk| {
             progress.check()?;
             let origins = sources.of_chunk(file, chunk);
-            let taken = chunk
-                .positions
-                .iter()
-                .zip(&chunk.indices)
-                .zip(origins)
-                .filter(|((p, _), _)| takes_part(p));
-            for ((p, &index), source) in taken {
-                let key = cell_of(p, size_m);
-                let record = Record {
-                    offset: (p - tile_origin(&key, size_m)).cast::<f32>().into(),
-                    file: file as u32,
-                    index,
-                    source,
-                };
-                if spill.push(key, &record.encode())? {
-                    occupied.add(key, path)?;
+            for run in tile_runs(chunk, &origins, file as u32, size_m, &takes_part) {
+                if spill.push(run.tile, &run.records)? {
+                    occupied.add(run.tile, path)?;
                 }
             }
             progress.advance(chunk.len() as u64);
@@ -216,6 +205,47 @@ pub fn cut_into_tiles(
     write_json(&step.file(SOURCES), &sources.finish())?;
     write_index(step, &entries)?;
     Ok(invalid)
+}
+
+/// Consecutive points of a file that lie in one tile.
+struct TileRun {
+    tile: [i64; 3],
+    /// [`Record`]s as bytes.
+    records: Vec<u8>,
+}
+
+/// The points of a chunk that take part, in their order; parts of the chunk are looked at in parallel.
+fn tile_runs(
+    chunk: &PointChunk,
+    sources: &[PointSource],
+    file: u32,
+    size_m: f64,
+    takes_part: &(impl Fn(&Point3<f64>) -> bool + Sync),
+) -> Vec<TileRun> {
+    let of_part = |part: usize| {
+        let start = part * PART;
+        let points = chunk.positions.iter().zip(&chunk.indices).zip(sources);
+        let mut runs: Vec<TileRun> = Vec::new();
+        for ((p, &index), &source) in points.skip(start).take(PART).filter(|((p, _), _)| takes_part(p)) {
+            let tile = cell_of(p, size_m);
+            let record = Record {
+                offset: (p - tile_origin(&tile, size_m)).cast::<f32>().into(),
+                file,
+                index,
+                source,
+            };
+            match runs.last_mut() {
+                Some(run) if run.tile == tile => run.records.extend_from_slice(&record.encode()),
+                _ => runs.push(TileRun {
+                    tile,
+                    records: record.encode().to_vec(),
+                }),
+            }
+        }
+        runs
+    };
+    let parts = (0..chunk.len().div_ceil(PART)).into_par_iter();
+    parts.flat_map_iter(of_part).collect()
 }
 
 /// Records of a file at most; a line of text with three numbers has six bytes at least.
