@@ -1,11 +1,16 @@
 //! M3C2 between two epochs of a project.
 
 use crate::error::Result;
-use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::storage::step::Key;
-use stonewise_core::change::{ChangeField, OutwardReference, m3c2_survey};
+use nalgebra::{Point3, Vector3};
+use std::path::Path;
+use stonewise_core::change::{ChangeField, ChangePoint, OutwardReference, m3c2_survey};
+use stonewise_io::table::{Table, read_parquet, write_parquet};
+
+/// The comparison, one row of about 100 bytes a core point; as JSON it took 295, 1.3 GB for the 4.3 million of a dam.
+const FIELD: &str = "field.parquet";
 
 /// Compares two epochs along the normals of the first.
 pub fn m3c2(
@@ -30,7 +35,91 @@ pub fn m3c2(
                 Ok(())
             },
         )?;
-        write_json(&step.file("field.json"), &field)
+        write_field(&step.file(FIELD), &field)
     })?;
-    read_json(&step.file("field.json"))
+    read_field(&step.file(FIELD))
+}
+
+fn write_field(path: &Path, field: &ChangeField) -> Result<()> {
+    let numbers = |value: fn(&ChangePoint) -> f64| field.points.iter().map(value).collect::<Vec<f64>>();
+    let options = |value: fn(&ChangePoint) -> Option<f64>| {
+        let values = field.points.iter().map(value);
+        values.collect::<Vec<Option<f64>>>()
+    };
+    let counts = |value: fn(&ChangePoint) -> u32| field.points.iter().map(value).collect::<Vec<u32>>();
+    let mut table = Table::new();
+    table.push("x", numbers(|p| p.position.x))?;
+    table.push("y", numbers(|p| p.position.y))?;
+    table.push("z", numbers(|p| p.position.z))?;
+    table.push("nx", numbers(|p| p.normal.x))?;
+    table.push("ny", numbers(|p| p.normal.y))?;
+    table.push("nz", numbers(|p| p.normal.z))?;
+    table.push("distance_m", options(|p| p.distance_m))?;
+    table.push("detection_limit_m", options(|p| p.detection_limit_m))?;
+    table.push("spread_1_m", options(|p| p.spread_m[0]))?;
+    table.push("spread_2_m", options(|p| p.spread_m[1]))?;
+    table.push("count_1", counts(|p| p.counts[0]))?;
+    table.push("count_2", counts(|p| p.counts[1]))?;
+    Ok(write_parquet(path, &table)?)
+}
+
+fn read_field(path: &Path) -> Result<ChangeField> {
+    let table = read_parquet(path)?;
+    let [x, y, z] = [
+        table.required::<f64>("x")?,
+        table.required("y")?,
+        table.required("z")?,
+    ];
+    let [nx, ny, nz] = [
+        table.required::<f64>("nx")?,
+        table.required("ny")?,
+        table.required("nz")?,
+    ];
+    let distance_m = table.optional::<f64>("distance_m")?;
+    let detection_limit_m = table.optional::<f64>("detection_limit_m")?;
+    let spread_m = [
+        table.optional::<f64>("spread_1_m")?,
+        table.optional::<f64>("spread_2_m")?,
+    ];
+    let counts = [
+        table.required::<u32>("count_1")?,
+        table.required::<u32>("count_2")?,
+    ];
+    let points = (0..table.rows()).map(|i| ChangePoint {
+        position: Point3::new(x[i], y[i], z[i]),
+        normal: Vector3::new(nx[i], ny[i], nz[i]),
+        distance_m: distance_m[i],
+        detection_limit_m: detection_limit_m[i],
+        spread_m: [spread_m[0][i], spread_m[1][i]],
+        counts: [counts[0][i], counts[1][i]],
+    });
+    Ok(ChangeField {
+        points: points.collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_reads_back_to_the_bit() {
+        let point = |i: u32| ChangePoint {
+            position: Point3::new(4.5e6 + 1e-9 * f64::from(i), -0.1, 1.0 / 3.0),
+            normal: Vector3::new(0.6, -0.0, 0.8),
+            distance_m: (i % 2 == 0).then_some(1e-3 / f64::from(i + 1)),
+            detection_limit_m: (i % 3 == 0).then_some(f64::MIN_POSITIVE),
+            spread_m: [Some(f64::from(i).sqrt()), (i > 5).then_some(0.0)],
+            counts: [i, u32::MAX - i],
+        };
+        let folder = tempfile::tempdir().unwrap();
+        for count in [0, 1, 40] {
+            let field = ChangeField {
+                points: (0..count).map(point).collect(),
+            };
+            let path = folder.path().join(FIELD);
+            write_field(&path, &field).unwrap();
+            assert_eq!(read_field(&path).unwrap(), field);
+        }
+    }
 }
