@@ -344,6 +344,26 @@ mod tests {
     }
 
     #[test]
+    fn the_example_in_the_docs_is_read_and_the_schema_knows_every_edit() {
+        let docs = include_str!("../../../../docs/src/edits.md");
+        let example = docs.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("edits.json");
+        std::fs::write(&path, example).unwrap();
+        let file = EditsFile::read(&path).unwrap();
+        let words: Vec<&str> = file.edits.iter().map(|e| e.action.word()).collect();
+        let schema: Value = serde_json::from_str(include_str!("../../../../docs/src/edits.schema.json")).unwrap();
+        let edit = &schema["$defs"]["edit"]["properties"];
+        assert_eq!(edit["do"]["enum"], serde_json::json!(words));
+        for edit_given in &file.edits {
+            let written = serde_json::to_value(edit_given).unwrap();
+            for key in written.as_object().unwrap().keys() {
+                assert!(edit[key].is_object(), "the schema lacks {key}");
+            }
+        }
+    }
+
+    #[test]
     fn every_mistake_names_its_line_and_the_fix() {
         let cases = [
             (r#""do": "merge", "at": [[1, 2]]"#, "a place [x, y] in each"),

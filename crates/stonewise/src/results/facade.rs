@@ -28,6 +28,9 @@ pub struct Facade {
     start: Point2<f64>,
 }
 
+/// Least length up the face for a metre of height: 1 for an upright wall, less rounding.
+const LEAST_RISE: f64 = 0.999;
+
 /// A facade in files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,7 +72,7 @@ impl TryFrom<FacadeFile> for Facade {
         let stretches: Vec<Stretch> = file.stretches.into_iter().map(stretch).collect();
         let ascends = stretches.windows(2).all(|w| w[0].chord_m <= w[1].chord_m);
         let turns = stretches.iter().all(|s| s.turn_rad.abs() <= MAX_TURN_RAD);
-        if stretches.is_empty() || !ascends || !turns || file.up_per_height < 1.0 {
+        if stretches.is_empty() || !ascends || !turns || file.up_per_height < LEAST_RISE {
             return Err("this is no unrolled wall: copy it from the file that stonewise wrote".to_owned());
         }
         Ok(Self {

@@ -7,6 +7,8 @@
 mod apply;
 mod effect;
 mod line;
+#[cfg(test)]
+mod tests;
 mod touched;
 
 pub use effect::{EditEffect, NoEffect};

@@ -26,9 +26,12 @@ use stonewise_core::transfer::{
 pub struct Edited {
     /// The unrolled wall of the stones as they were found: edits do not move the places of other stones.
     pub facade: Facade,
-    /// By epoch, what each edit of the file did; `None` where it does not concern the epoch.
-    pub effects: Vec<Vec<Option<std::result::Result<EditEffect, NoEffect>>>>,
+    /// By epoch.
+    pub effects: Vec<Effects>,
 }
+
+/// What each edit of the file did in an epoch; `None` where it does not concern the epoch.
+pub type Effects = Vec<Option<std::result::Result<EditEffect, NoEffect>>>;
 
 /// Where an edit lies on the wall, or why it lies nowhere.
 type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
@@ -66,7 +69,7 @@ fn edit_epoch(
     wall: &Facade,
     photos: &Segmented,
     labelled: Labelled,
-) -> Result<(Labelled, Vec<Option<std::result::Result<EditEffect, NoEffect>>>)> {
+) -> Result<(Labelled, Effects)> {
     let epoch = &context.project.epochs[number - 1].name;
     let mut effects = vec![None; file.edits.len()];
     let mut asked: Vec<(usize, LabelEdit)> = Vec::new();
