@@ -155,9 +155,11 @@ pub struct CheckArgs {
 pub enum EditsCommand {
     /// Write a file of edits: what a person changed in the layer stones_facade of stones.gpkg, or the polygons of a COCO file whose
     /// categories are merge, split, delete, add and ignore.
-    #[command(after_help = "Examples:\n  stonewise edits import results/stones.gpkg --who \"A. Keller\" --why \"seen on site\" --out edits.json\n  \
+    #[command(
+        after_help = "Examples:\n  stonewise edits import results/stones.gpkg --who \"A. Keller\" --why \"seen on site\" --out edits.json\n  \
         stonewise edits import drawn.json --epoch 2025-04 --who \"A. Keller\" --why \"hidden joint\" --out edits.json\n\n\
-        Then name the file in the project: [edits] file = \"edits.json\".")]
+        Then name the file in the project: [edits] file = \"edits.json\"."
+    )]
     Import(EditsImportArgs),
     /// Check a file of edits and list them; the list goes to stdout.
     #[command(after_help = "Example:\n  stonewise edits check edits.json")]

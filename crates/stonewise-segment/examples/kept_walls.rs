@@ -44,7 +44,9 @@ fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let number = |i: usize, or: u64| args.get(i).map_or(or, |a| a.parse().expect("a number"));
     let (first, count) = (number(0, FIRST_SEED), number(1, COUNT));
-    let weights = args.get(2).map_or(Weights::BuiltIn, |w| Weights::named(Path::new(w)));
+    let weights = args
+        .get(2)
+        .map_or(Weights::BuiltIn, |w| Weights::named(Path::new(w)));
     let options = TilingOptions::default();
     let detector = StoneFinder::open(&weights, options.min_score as f32).expect("weights");
     let mut table: BTreeMap<(usize, usize), Score> = BTreeMap::new();
@@ -52,7 +54,10 @@ fn main() {
         let wall = masonry_photo(seed, SIDE_PX, SIDE_PX);
         score(&detector, &wall, &options, &mut table);
     }
-    println!("seeds {first} to {}, {SIDE_PX} x {SIDE_PX} px\n", first + count - 1);
+    println!(
+        "seeds {first} to {}, {SIDE_PX} x {SIDE_PX} px\n",
+        first + count - 1
+    );
     println!("| | stones | precision | recall | F1 | mean IoU |\n| --- | --- | --- | --- | --- | --- |");
     let names = [&[(f64::INFINITY, "all")][..], &SIZES, &LIGHTS, &CONTRASTS];
     for ((group, class), score) in &table {
@@ -72,7 +77,10 @@ struct Score {
 impl Score {
     fn cells(&self) -> String {
         let share = |n: usize, of: usize| n as f64 / of.max(1) as f64;
-        let (precision, recall) = (share(self.right, self.found), share(self.recalled, self.references));
+        let (precision, recall) = (
+            share(self.right, self.found),
+            share(self.recalled, self.references),
+        );
         let f1 = 2.0 * precision * recall / (precision + recall).max(f64::MIN_POSITIVE);
         format!(
             "| {} | {precision:.2} | {recall:.2} | {f1:.2} | {:.2} |",
@@ -89,13 +97,22 @@ fn score(
     options: &TilingOptions,
     table: &mut BTreeMap<(usize, usize), Score>,
 ) {
-    let Ok(found) = segment_photo(detector, wall.image(), options, &Silent) else { return };
+    let Ok(found) = segment_photo(detector, wall.image(), options, &Silent) else {
+        return;
+    };
     let ignored = |label: u32, labels: &LabelImage| {
-        let pixels = labels.data().iter().zip(wall.ignore().data()).filter(|p| *p.0 == label);
+        let pixels = labels
+            .data()
+            .iter()
+            .zip(wall.ignore().data())
+            .filter(|p| *p.0 == label);
         let (all, ignored) = pixels.fold((0, 0), |(n, i), p| (n + 1, i + usize::from(*p.1)));
         2 * ignored > all
     };
-    let (own, theirs) = (stones(wall.labels(), wall.image()), stones(&found.labels, wall.image()));
+    let (own, theirs) = (
+        stones(wall.labels(), wall.image()),
+        stones(&found.labels, wall.image()),
+    );
     let mut common: BTreeMap<(u32, u32), usize> = BTreeMap::new();
     for (&f, &r) in found.labels.data().iter().zip(wall.labels().data()) {
         if f != 0 && r != 0 {
@@ -114,7 +131,11 @@ fn score(
             matched.insert(f, (iou, r));
         }
     }
-    let counted: BTreeSet<u32> = own.keys().copied().filter(|&r| !ignored(r, wall.labels())).collect();
+    let counted: BTreeSet<u32> = own
+        .keys()
+        .copied()
+        .filter(|&r| !ignored(r, wall.labels()))
+        .collect();
     for r in &counted {
         for key in own[r].classes() {
             let score = table.entry(key).or_default();

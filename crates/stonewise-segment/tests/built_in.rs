@@ -30,12 +30,26 @@ fn a_plain_image_has_no_stones() {
     for (width, height) in [(64, 96), (320, 200)] {
         for grey in [0u8, 90, 255] {
             let plain: RgbImage = Raster::filled(width, height, [grey; 3]);
-            assert!(detector.detect(&plain).unwrap().is_empty(), "{width}x{height}, {grey}");
+            assert!(
+                detector.detect(&plain).unwrap().is_empty(),
+                "{width}x{height}, {grey}"
+            );
         }
+        // A sky: brighter towards the top.
+        let sky = (0..width * height)
+            .map(|i| [200 - (i / width / 4) as u8; 3])
+            .collect();
+        let sky: RgbImage = Raster::from_vec(width, height, sky).unwrap();
+        assert!(detector.detect(&sky).unwrap().is_empty(), "{width}x{height}, sky");
         // Rounding noise of one value, from place to place.
-        let noisy = (0..width * height).map(|i| [(i * 7919 / 13 % 2) as u8; 3]).collect();
+        let noisy = (0..width * height)
+            .map(|i| [(i * 7919 / 13 % 2) as u8; 3])
+            .collect();
         let noisy: RgbImage = Raster::from_vec(width, height, noisy).unwrap();
-        assert!(detector.detect(&noisy).unwrap().is_empty(), "{width}x{height}, noise");
+        assert!(
+            detector.detect(&noisy).unwrap().is_empty(),
+            "{width}x{height}, noise"
+        );
     }
 }
 
@@ -53,13 +67,20 @@ fn the_built_in_weights_find_the_stones_of_a_real_wall() {
     let valid = ValidRegions::open(&data.join("valid_regions.json")).unwrap();
     let labels = masks.labels_for(&name, width, height).unwrap().unwrap().labels;
     let outside = valid.outside(&name, width, height).unwrap().unwrap();
-    let unknown = outside.data().iter().zip(labels.data()).map(|(o, l)| *o && *l == 0);
+    let unknown = outside
+        .data()
+        .iter()
+        .zip(labels.data())
+        .map(|(o, l)| *o && *l == 0);
     let unknown = Raster::from_vec(width, height, unknown.collect()).unwrap();
     let photo = Sample::new(read_rgb(&data.join(&name)).unwrap(), labels, unknown).unwrap();
     let detector = StoneFinder::open(&Weights::BuiltIn, 0.5).unwrap();
     let score = evaluate_samples(&detector, &[photo]).unwrap();
     assert!(score.references > 10, "{score:?}");
-    assert!(score.f1.unwrap() > 0.85 && score.mean_iou.unwrap() > 0.85, "{score:?}");
+    assert!(
+        score.f1.unwrap() > 0.85 && score.mean_iou.unwrap() > 0.85,
+        "{score:?}"
+    );
 }
 
 #[test]

@@ -45,7 +45,11 @@ fn read_edits(args: &EditsImportArgs, printer: &Printer) -> Result<Outcome> {
     for edit in &imported.file.edits[first..] {
         printer.log(&format!("{} {}", edit.action.word(), shape(edit.shape())));
     }
-    printer.log(&format!("{} edits written to {}", imported.new, args.out.display()));
+    printer.log(&format!(
+        "{} edits written to {}",
+        imported.new,
+        args.out.display()
+    ));
     Ok(Outcome::Done)
 }
 

@@ -58,7 +58,11 @@ impl Reader<'_> {
         let [order] = self.bytes()?;
         self.little = order == 1;
         let code = self.count()?;
-        let extended: usize = EXTENDED.iter().filter(|(bit, _)| code & bit != 0).map(|e| e.1).sum();
+        let extended: usize = EXTENDED
+            .iter()
+            .filter(|(bit, _)| code & bit != 0)
+            .map(|e| e.1)
+            .sum();
         let code = code & 0x0fff_ffff;
         let axes = 2 + extended + [0, 1, 1, 2].get((code / 1000) as usize)?;
         match code % 1000 {
@@ -106,8 +110,8 @@ mod tests {
     /// A multipolygon of a square with a hole and a triangle with z, big-endian and little-endian, put together by hand.
     #[test]
     fn shapes_of_both_byte_orders_and_with_z_are_read() {
-        let square = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
-        let hole = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]];
+        let square: [[f64; 2]; 4] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let hole: [[f64; 2]; 3] = [[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]];
         let mut blob = b"GP\0\x01".to_vec();
         blob.extend(0i32.to_le_bytes());
         blob.push(0);
@@ -130,7 +134,10 @@ mod tests {
             blob.extend(v.to_le_bytes());
         }
         let read = polygons(&blob).unwrap();
-        assert_eq!(read, vec![vec![square.to_vec(), hole.to_vec()], vec![hole.to_vec()]]);
+        assert_eq!(
+            read,
+            vec![vec![square.to_vec(), hole.to_vec()], vec![hole.to_vec()]]
+        );
         // No cut may panic or pass for whole.
         for end in 0..blob.len() {
             assert!(polygons(&blob[..end]).is_none(), "{end}");

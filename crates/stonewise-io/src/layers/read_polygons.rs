@@ -122,7 +122,10 @@ mod tests {
         assert_eq!(read[0].attributes["stone_id"], "7");
         assert_eq!(read[0].attributes["d_out"], "0.5");
         let missing = read_polygons(&path, "joints").unwrap_err().to_string();
-        assert!(missing.contains("no layer \"joints\"") && missing.contains("a.gpkg"), "{missing}");
+        assert!(
+            missing.contains("no layer \"joints\"") && missing.contains("a.gpkg"),
+            "{missing}"
+        );
         std::fs::write(&path, "no database").unwrap();
         assert!(read_polygons(&path, "stones_facade").is_err());
         assert!(read_polygons(&folder.path().join("b.gpkg"), "x").is_err());

@@ -137,7 +137,9 @@ impl Edit {
             Action::Add | Action::Ignore => key == "outline",
         };
         let wanted = match self.action {
-            Action::Merge => "\"at\" with a place [x, y] in each of its stones, two at least, or an \"outline\" around them",
+            Action::Merge => {
+                "\"at\" with a place [x, y] in each of its stones, two at least, or an \"outline\" around them"
+            }
             Action::Delete => "\"at\" with a place [x, y] in each stone, or an \"outline\" around them",
             Action::Split => "\"line\" with two vertices [x, y] or more, or \"outline\" with three or more",
             Action::Add | Action::Ignore => "\"outline\" with three vertices [x, y] or more",
@@ -161,10 +163,14 @@ impl Edit {
             .any(|v| !v.is_finite() || v.abs() > MAX_COORDINATE)
         {
             let frame = "metres along and up the unrolled wall, or pixels of a photo";
-            return Some(format!("a coordinate beyond {MAX_COORDINATE}: shapes are in {frame}"));
+            return Some(format!(
+                "a coordinate beyond {MAX_COORDINATE}: shapes are in {frame}"
+            ));
         }
         if self.photo.is_none() && self.epoch.is_some() {
-            return Some("\"epoch\" belongs to \"photo\"; \"epochs\" says which epochs it changes".to_owned());
+            return Some(
+                "\"epoch\" belongs to \"photo\"; \"epochs\" says which epochs it changes".to_owned(),
+            );
         }
         self.mistake_in_outline().or_else(|| self.mistake_in_signature())
     }
@@ -183,7 +189,9 @@ impl Edit {
     fn mistake_in_signature(&self) -> Option<String> {
         for (key, text) in [("who", &self.who), ("why", &self.why)] {
             if text.trim().is_empty() {
-                return Some(format!("\"{key}\" is empty: the audit names who decided what, and why"));
+                return Some(format!(
+                    "\"{key}\" is empty: the audit names who decided what, and why"
+                ));
             }
         }
         let digits = |text: Option<&str>| text.is_some_and(|t| t.bytes().all(|b| b.is_ascii_digit()));
@@ -220,13 +228,19 @@ impl EditsFile {
         };
         let root: Value = serde_json::from_str(&text).map_err(|e| at(e.line().max(1), e.to_string()))?;
         let root = root.as_object().ok_or_else(|| {
-            at(1, "a file of edits is an object with \"format\" and \"edits\"".to_owned())
+            at(
+                1,
+                "a file of edits is an object with \"format\" and \"edits\"".to_owned(),
+            )
         })?;
         if let Some(key) = root
             .keys()
             .find(|k| !["format", "facade", "edits"].contains(&k.as_str()))
         {
-            return Err(at(1, format!("unknown key {key:?}: known are format, facade, edits")));
+            return Err(at(
+                1,
+                format!("unknown key {key:?}: known are format, facade, edits"),
+            ));
         }
         if root.get("format").and_then(Value::as_u64) != Some(u64::from(FORMAT)) {
             return Err(at(1, format!("\"format\" must be {FORMAT}")));
@@ -294,7 +308,8 @@ impl EditsFile {
     /// # Errors
     /// It cannot be written; an earlier one is kept then.
     pub fn write(&self) -> Result<()> {
-        let json = |value: serde_json::Result<String>| value.map_err(|e| Error::results(&self.path, e.to_string()));
+        let json =
+            |value: serde_json::Result<String>| value.map_err(|e| Error::results(&self.path, e.to_string()));
         let mut text = format!("{{\n\"format\": {FORMAT},\n");
         if let Some(facade) = &self.facade {
             text += &format!("\"facade\": {},\n", json(serde_json::to_string(facade))?);
@@ -339,20 +354,32 @@ mod tests {
         let back = EditsFile::read(&again.path).unwrap();
         assert_eq!(back.edits, file.edits);
         assert!(back.facade.is_some());
-        assert!(file.check_epochs(&["2024"]).unwrap_err().to_string().contains(":4: edit 2: no epoch \"2025\""));
+        assert!(
+            file.check_epochs(&["2024"])
+                .unwrap_err()
+                .to_string()
+                .contains(":4: edit 2: no epoch \"2025\"")
+        );
         file.check_epochs(&["2025"]).unwrap();
     }
 
     #[test]
     fn the_example_in_the_docs_is_read_and_the_schema_knows_every_edit() {
         let docs = include_str!("../../../../docs/src/edits.md");
-        let example = docs.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
+        let example = docs
+            .split("```json\n")
+            .nth(1)
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("edits.json");
         std::fs::write(&path, example).unwrap();
         let file = EditsFile::read(&path).unwrap();
         let words: Vec<&str> = file.edits.iter().map(|e| e.action.word()).collect();
-        let schema: Value = serde_json::from_str(include_str!("../../../../docs/src/edits.schema.json")).unwrap();
+        let schema: Value =
+            serde_json::from_str(include_str!("../../../../docs/src/edits.schema.json")).unwrap();
         let edit = &schema["$defs"]["edit"]["properties"];
         assert_eq!(edit["do"]["enum"], serde_json::json!(words));
         for edit_given in &file.edits {
@@ -370,22 +397,44 @@ mod tests {
             (r#""do": "merge", "line": [[1, 2], [3, 4]]"#, "merge needs \"at\""),
             (r#""do": "delete""#, "delete needs"),
             (r#""do": "split", "line": [[1, 2]]"#, "two vertices"),
-            (r#""do": "add", "outline": [[0, 0], [1, 1], [1, 0], [0, 1]]"#, "crosses itself"),
-            (r#""do": "add", "outline": [[0, 0], [999, 0], [999, 999]]"#, "larger than a wall"),
+            (
+                r#""do": "add", "outline": [[0, 0], [1, 1], [1, 0], [0, 1]]"#,
+                "crosses itself",
+            ),
+            (
+                r#""do": "add", "outline": [[0, 0], [999, 0], [999, 999]]"#,
+                "larger than a wall",
+            ),
             (r#""do": "delete", "at": [[1, 4e9]]"#, "a coordinate beyond"),
             (r#""do": "remove", "at": [[1, 2]]"#, "unknown variant `remove`"),
-            (r#""do": "delete", "at": [[1, 2]], "because": "x""#, "unknown field `because`"),
-            (r#""do": "delete", "epoch": "2025", "at": [[1, 2]]"#, "belongs to \"photo\""),
+            (
+                r#""do": "delete", "at": [[1, 2]], "because": "x""#,
+                "unknown field `because`",
+            ),
+            (
+                r#""do": "delete", "epoch": "2025", "at": [[1, 2]]"#,
+                "belongs to \"photo\"",
+            ),
         ];
         for (edit, expected) in cases {
             let fine = format!("{{\"do\": \"delete\", \"at\": [[1, 2]], {SIGNED}}},\n");
-            let error = read(&format!("{fine}{{{edit}, {SIGNED}}}")).unwrap_err().to_string();
-            assert!(error.contains("edits.json:4: edit 2: ") && error.contains(expected), "{error}");
+            let error = read(&format!("{fine}{{{edit}, {SIGNED}}}"))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                error.contains("edits.json:4: edit 2: ") && error.contains(expected),
+                "{error}"
+            );
         }
         let unsigned = r#"{"do": "delete", "at": [[1, 2]], "who": "me", "when": "yesterday", "why": "x"}"#;
         assert!(read(unsigned).unwrap_err().to_string().contains("YYYY-MM-DD"));
         let nobody = unsigned.replace("\"me\"", "\" \"");
-        assert!(read(&nobody).unwrap_err().to_string().contains("\"who\" is empty"));
+        assert!(
+            read(&nobody)
+                .unwrap_err()
+                .to_string()
+                .contains("\"who\" is empty")
+        );
         assert!(read(unsigned.trim_end_matches('}')).is_err());
     }
 }

@@ -46,8 +46,11 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
         message,
     };
     let text = std::fs::read_to_string(path).map_err(Error::io("reading", path))?;
-    let file: RawFile = serde_json::from_str(&text)
-        .map_err(|e| wrong(format!("no COCO file with images, annotations and categories ({e})")))?;
+    let file: RawFile = serde_json::from_str(&text).map_err(|e| {
+        wrong(format!(
+            "no COCO file with images, annotations and categories ({e})"
+        ))
+    })?;
     let photos: BTreeMap<u64, &str> = file.images.iter().map(|i| (i.id, i.file_name.as_str())).collect();
     let action = |c: &RawCategory| {
         let word = Value::from(c.name.to_lowercase());

@@ -88,7 +88,11 @@ struct Comparison<'a> {
 impl Comparison<'_> {
     fn compare(&mut self) {
         let (known, shapes) = (self.known, self.shapes);
-        let is_area = |s: &&Shape| s.attributes.get("status").is_some_and(|w| w.eq_ignore_ascii_case(IGNORE));
+        let is_area = |s: &&Shape| {
+            s.attributes
+                .get("status")
+                .is_some_and(|w| w.eq_ignore_ascii_case(IGNORE))
+        };
         let (areas, stones): (Vec<&Shape>, Vec<&Shape>) = shapes.iter().partition(is_area);
         let mut parts: BTreeMap<u32, Vec<&Shape>> = known.keys().map(|id| (*id, Vec::new())).collect();
         for shape in stones.iter().filter(|s| !s.rings.is_empty()) {
@@ -129,11 +133,18 @@ impl Comparison<'_> {
         for (id, parts) in &parts {
             self.compare_parts(*id, parts, &stones, &merged);
         }
-        for shape in stones.iter().filter(|s| s.stone.is_none() && !merged.contains(&s.fid)) {
+        for shape in stones
+            .iter()
+            .filter(|s| s.stone.is_none() && !merged.contains(&s.fid))
+        {
             let within = known
                 .iter()
                 .find(|(id, stone)| !gone.contains(id) && share(&shape.rings, &stone.rings) > HELD);
-            let action = if within.is_some() { Action::Split } else { Action::Add };
+            let action = if within.is_some() {
+                Action::Split
+            } else {
+                Action::Add
+            };
             self.push_outlines(action, shape);
         }
         for shape in areas {
@@ -178,7 +189,12 @@ impl Comparison<'_> {
 
     fn push_outlines(&mut self, action: Action, shape: &Shape) {
         for ring in &shape.rings {
-            self.push(action, shape, Vec::new(), ring.iter().map(|p| [p.x, p.y]).collect());
+            self.push(
+                action,
+                shape,
+                Vec::new(),
+                ring.iter().map(|p| [p.x, p.y]).collect(),
+            );
         }
     }
 
@@ -190,7 +206,9 @@ impl Comparison<'_> {
     /// Who, when and why: attributes of those names where a person added them to the layer.
     fn signature(&self, shape: Option<&Shape>) -> Signed {
         let text = |key: &str, or: &str| {
-            let own = shape.and_then(|s| s.attributes.get(key)).filter(|t| !t.trim().is_empty());
+            let own = shape
+                .and_then(|s| s.attributes.get(key))
+                .filter(|t| !t.trim().is_empty());
             own.map_or(or.to_owned(), Clone::clone)
         };
         Signed {
@@ -231,7 +249,10 @@ fn samples(rings: &[Ring]) -> Vec<Point2<f64>> {
     };
     let at = |i: usize| (i as f64 + 0.5) / SAMPLES as f64;
     let place = |i: usize, j: usize| low + (high - low).component_mul(&nalgebra::Vector2::new(at(i), at(j)));
-    (0..SAMPLES).flat_map(|i| (0..SAMPLES).map(move |j| (i, j))).map(|(i, j)| place(i, j)).collect()
+    (0..SAMPLES)
+        .flat_map(|i| (0..SAMPLES).map(move |j| (i, j)))
+        .map(|(i, j)| place(i, j))
+        .collect()
 }
 
 /// Share of a shape that another covers.
@@ -260,7 +281,9 @@ fn boxes_meet(a: &[Ring], b: &[Ring]) -> bool {
     let low = |r: &[Ring]| r.iter().flatten().copied().reduce(|a, b| a.inf(&b));
     let high = |r: &[Ring]| r.iter().flatten().copied().reduce(|a, b| a.sup(&b));
     match (low(a), high(a), low(b), high(b)) {
-        (Some(la), Some(ha), Some(lb), Some(hb)) => la.x <= hb.x && lb.x <= ha.x && la.y <= hb.y && lb.y <= ha.y,
+        (Some(la), Some(ha), Some(lb), Some(hb)) => {
+            la.x <= hb.x && lb.x <= ha.x && la.y <= hb.y && lb.y <= ha.y
+        }
         _ => false,
     }
 }

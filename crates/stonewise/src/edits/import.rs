@@ -66,7 +66,11 @@ pub fn import(
         }
         from_layer::edits(source, &results, signed)?
     };
-    if let Some((index, message)) = edits.iter().enumerate().find_map(|(i, e)| Some((i, e.mistake()?))) {
+    if let Some((index, message)) = edits
+        .iter()
+        .enumerate()
+        .find_map(|(i, e)| Some((i, e.mistake()?)))
+    {
         return Err(Error::Input {
             path: source.to_path_buf(),
             message: format!("edit {}, {}: {message}", index + 1, edits[index].action.word()),

@@ -279,7 +279,12 @@ mod tests {
     fn a_facade_comes_back_from_its_file_and_nonsense_is_refused() {
         let normal = |angle: f64| Vector3::new(angle.cos(), angle.sin(), 0.2);
         let stones: Vec<_> = (0..500)
-            .map(|i| (Point3::from(normal(f64::from(i) * 0.002) * 30.0), normal(f64::from(i) * 0.002)))
+            .map(|i| {
+                (
+                    Point3::from(normal(f64::from(i) * 0.002) * 30.0),
+                    normal(f64::from(i) * 0.002),
+                )
+            })
             .collect();
         let facade = Facade::new(&stones);
         let text = serde_json::to_string(&facade).unwrap();

@@ -82,9 +82,8 @@ impl ResultSet {
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
         Ok(Self {
-            facade: facade.unwrap_or_else(|| {
-                facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)
-            }),
+            facade: facade
+                .unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)),
             stones,
             outlines,
             pair,

@@ -228,11 +228,7 @@ fn face_around(touched: &Touched, outline: &[Point2<f64>], inside: &[usize]) -> 
         .filter(|&i| touched.points[i].stone != 0)
         .filter(|&i| (touched.points[i].place - centre).norm() <= margin)
         .collect();
-    let own = if around.len() < 3 {
-        inside.to_vec()
-    } else {
-        around
-    };
+    let own = if around.len() < 3 { inside.to_vec() } else { around };
     let mut points: Vec<Point3<f64>> = own.into_iter().map(|i| flat(touched, i)).collect();
     let mut plane = Plane::fit(&points)?;
     for _ in 1..FACE_ROUNDS {

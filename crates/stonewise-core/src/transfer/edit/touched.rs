@@ -49,40 +49,55 @@ impl Touched {
     ) -> Result<Self, TransferError> {
         let near = Neighbourhood::of(edits);
         let mut stones: HashSet<u32> = HashSet::new();
-        each_tile(tiles, labels, "stones near edits", progress, |_, cloud, labels| {
-            for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
-                if wall.stones.contains(&StoneId(stone)) && !stones.contains(&stone) {
-                    let place = (wall.place)(&cloud.world(i)).xy();
-                    if near.any.contains(&cell(&place, CELL_M)) {
-                        stones.insert(stone);
+        each_tile(
+            tiles,
+            labels,
+            "stones near edits",
+            progress,
+            |_, cloud, labels| {
+                for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
+                    if wall.stones.contains(&StoneId(stone)) && !stones.contains(&stone) {
+                        let place = (wall.place)(&cloud.world(i)).xy();
+                        if near.any.contains(&cell(&place, CELL_M)) {
+                            stones.insert(stone);
+                        }
                     }
                 }
-            }
-        })?;
+            },
+        )?;
         let mut points = Vec::new();
-        each_tile(tiles, labels, "points of edits", progress, |tile, cloud, labels| {
-            for (i, &stone) in labels.stone.iter().enumerate() {
-                let is_known = stones.contains(&stone);
-                if !is_known && (stone != 0 || near.added.is_empty()) {
-                    continue;
+        each_tile(
+            tiles,
+            labels,
+            "points of edits",
+            progress,
+            |tile, cloud, labels| {
+                for (i, &stone) in labels.stone.iter().enumerate() {
+                    let is_known = stones.contains(&stone);
+                    if !is_known && (stone != 0 || near.added.is_empty()) {
+                        continue;
+                    }
+                    let at: Point3<f64> = (wall.place)(&cloud.world(i));
+                    if is_known || near.added.contains(&cell(&at.xy(), CELL_M)) {
+                        points.push(WallPoint {
+                            place: at.xy(),
+                            out_m: at.z,
+                            stone,
+                            added: false,
+                            labelled: stone,
+                            tile: tile as u32,
+                            index: i as u32,
+                        });
+                    }
                 }
-                let at: Point3<f64> = (wall.place)(&cloud.world(i));
-                if is_known || near.added.contains(&cell(&at.xy(), CELL_M)) {
-                    points.push(WallPoint {
-                        place: at.xy(),
-                        out_m: at.z,
-                        stone,
-                        added: false,
-                        labelled: stone,
-                        tile: tile as u32,
-                        index: i as u32,
-                    });
-                }
-            }
-        })?;
+            },
+        )?;
         let mut cells: HashMap<[i64; 2], Vec<u32>> = HashMap::new();
         for (i, point) in (0..).zip(&points) {
-            cells.entry(cell(&point.place, PLACE_REACH_M)).or_default().push(i);
+            cells
+                .entry(cell(&point.place, PLACE_REACH_M))
+                .or_default()
+                .push(i);
         }
         Ok(Self { points, cells })
     }
@@ -200,8 +215,16 @@ impl Neighbourhood {
 
 /// Cells of the box around places, grown by a margin.
 fn box_cells(places: &[Point2<f64>], margin_m: f64) -> impl Iterator<Item = [i64; 2]> + use<> {
-    let low = places.iter().copied().reduce(|a, b| a.inf(&b)).unwrap_or_default();
-    let high = places.iter().copied().reduce(|a, b| a.sup(&b)).unwrap_or_default();
+    let low = places
+        .iter()
+        .copied()
+        .reduce(|a, b| a.inf(&b))
+        .unwrap_or_default();
+    let high = places
+        .iter()
+        .copied()
+        .reduce(|a, b| a.sup(&b))
+        .unwrap_or_default();
     let [x0, y0] = cell(&low.map(|v| v - margin_m), CELL_M);
     let [x1, y1] = cell(&high.map(|v| v + margin_m), CELL_M);
     (x0..=x1).flat_map(move |x| (y0..=y1).map(move |y| [x, y]))

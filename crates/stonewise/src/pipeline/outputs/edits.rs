@@ -45,7 +45,10 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     table.push("when", text(&|r| edit(r).when.clone()))?;
     table.push("why", text(&|r| edit(r).why.clone()))?;
     table.push("place", text(&|r| file.place(r.0)))?;
-    table.push("drawn_in", text(&|r| edit(r).photo.clone().unwrap_or("facade".to_owned())))?;
+    table.push(
+        "drawn_in",
+        text(&|r| edit(r).photo.clone().unwrap_or("facade".to_owned())),
+    )?;
     table.push("epoch", text(&|r| r.1.clone()))?;
     table.push(
         "stones_before",
@@ -57,7 +60,9 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     )?;
     table.push(
         "points",
-        rows.iter().map(|r| done(r).map(|e| e.points)).collect::<Vec<Option<u64>>>(),
+        rows.iter()
+            .map(|r| done(r).map(|e| e.points))
+            .collect::<Vec<Option<u64>>>(),
     )?;
     table.push(
         "no_effect",
@@ -71,12 +76,19 @@ type Row<'a> = (usize, String, &'a std::result::Result<EditEffect, NoEffect>);
 
 /// A text without line breaks, which rows of the audit do not have.
 fn one_line(text: &str) -> String {
-    text.split(['\r', '\n']).map(str::trim).collect::<Vec<_>>().join(" ").trim().to_owned()
+    text.split(['\r', '\n'])
+        .map(str::trim)
+        .collect::<Vec<_>>()
+        .join(" ")
+        .trim()
+        .to_owned()
 }
 
 /// Says how many steps had to be done again, where the project has edits.
 pub fn tell_steps(context: &Context) {
-    let Some(file) = &context.project.edits else { return };
+    let Some(file) = &context.project.edits else {
+        return;
+    };
     let times = context.times();
     let kept = times.iter().filter(|t| t.resumed).count();
     context.progress.note(&format!(

@@ -79,7 +79,11 @@ pub fn label(context: &Context, number: usize, ingested: Ingested, photos: &Segm
     })?;
     let transfer = read_json(&step.file("transfer.json"))?;
     let store = DiskLabels::new(step.path(), tiles);
-    let labels = Labels { transfer, store, step };
+    let labels = Labels {
+        transfer,
+        store,
+        step,
+    };
     tabulate(context, number, "stones", photos, ingested, labels)
 }
 

@@ -95,7 +95,14 @@ fn edit_epoch(
             min_points: context.project.settings.label.min_points,
             first_new: labelled.stones.last().map_or(0, |s| s.id.0) + 1,
         };
-        let report = edit_labels(tiles, &labelled.store, &mut target, &on_wall, &edits, context.progress)?;
+        let report = edit_labels(
+            tiles,
+            &labelled.store,
+            &mut target,
+            &on_wall,
+            &edits,
+            context.progress,
+        )?;
         write_json(&step.file(REPORT), &report)
     })?;
     let report: EditReport = read_json(&step.file(REPORT))?;
@@ -117,7 +124,14 @@ fn edit_epoch(
     let number_of = |index: &usize| indices[*index] as u32 + 1;
     let edited = report.edited_by.iter();
     let edited = edited.map(|(stone, index)| (StoneId(*stone), number_of(index)));
-    let tabulated = tabulate(context, number, "stones-edited", photos, labelled.ingested, labels)?;
+    let tabulated = tabulate(
+        context,
+        number,
+        "stones-edited",
+        photos,
+        labelled.ingested,
+        labels,
+    )?;
     let tabulated = Labelled {
         edited: edited.collect(),
         ..tabulated

@@ -107,11 +107,16 @@ fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a Vi
     let file = |name: &str| name.rsplit(['/', '\\']).next().unwrap_or(name).to_lowercase();
     let stem = |name: &str| {
         let file = file(name);
-        file.rsplit_once('.').map_or(file.clone(), |(stem, _)| stem.to_owned())
+        file.rsplit_once('.')
+            .map_or(file.clone(), |(stem, _)| stem.to_owned())
     };
     let named = |name: &str| {
         let (name, wanted) = (name.to_lowercase(), wanted.to_lowercase());
-        [name == wanted, file(&name) == file(&wanted), stem(&name) == stem(&wanted)]
+        [
+            name == wanted,
+            file(&name) == file(&wanted),
+            stem(&name) == stem(&wanted),
+        ]
     };
     for level in 0..3 {
         let fits: Vec<&View> = photos
@@ -130,7 +135,9 @@ fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a Vi
             }
         }
     }
-    Err(NoEffect::NoPlace(format!("no photo of the epoch is named {wanted:?}")))
+    Err(NoEffect::NoPlace(format!(
+        "no photo of the epoch is named {wanted:?}"
+    )))
 }
 
 /// The ray of a pixel and the points of stones around it.
@@ -197,7 +204,12 @@ fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()
             continue;
         }
         let (cloud, labels) = (tiles.load(tile)?, labelled.labels(tile)?);
-        for (i, _) in labels.stone.iter().enumerate().filter(|(_, s)| facing.contains(s)) {
+        for (i, _) in labels
+            .stone
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| facing.contains(s))
+        {
             let p = cloud.world(i);
             for ray in rays.iter_mut() {
                 let distance = ray.distance(&p);
