@@ -23,6 +23,7 @@ const LEAST_IOU: f64 = 0.5;
 const JOINT_PX: i64 = 3;
 
 /// Upper ends of the classes and their names.
+const ALL: [(f64, &str); 1] = [(f64::INFINITY, "all")];
 const SIZES: [(f64, &str); 4] = [
     (20.0, "stones below 20 px"),
     (40.0, "20 to 40 px"),
@@ -59,7 +60,7 @@ fn main() {
         first + count - 1
     );
     println!("| | stones | precision | recall | F1 | mean IoU |\n| --- | --- | --- | --- | --- | --- |");
-    let names = [&[(f64::INFINITY, "all")][..], &SIZES, &LIGHTS, &CONTRASTS];
+    let names: [&[(f64, &str)]; 4] = [&ALL, &SIZES, &LIGHTS, &CONTRASTS];
     for ((group, class), score) in &table {
         println!("| {} {}", names[*group][*class].1, score.cells());
     }

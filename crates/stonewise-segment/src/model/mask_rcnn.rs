@@ -113,7 +113,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         self
     }
 
-    /// The stones of an image, best score first; none where the image shows nothing, see [`has_contrast`].
+    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture.
     pub fn detect(&self, image: &RgbImage) -> Vec<Detection> {
         let size = [image.width(), image.height()];
         let detection = |instance: Instance| Detection {
