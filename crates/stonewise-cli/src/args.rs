@@ -41,6 +41,9 @@ pub enum Command {
     #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
         The table goes to stdout; a page with pictures is written beside the project file. Exit code 3 if anything is doubtful or wrong.")]
     Check(CheckArgs),
+    /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of edits.
+    #[command(subcommand)]
+    Edits(EditsCommand),
     /// Write a project file from the surveys found in a folder.
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
@@ -145,6 +148,57 @@ pub struct CheckArgs {
     /// The page with pictures (default: PROJECT.check.html beside the project file).
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
+}
+
+/// What to do with edits.
+#[derive(Debug, Subcommand)]
+pub enum EditsCommand {
+    /// Write a file of edits: what a person changed in the layer stones_facade of stones.gpkg, or the polygons of a COCO file whose
+    /// categories are merge, split, delete, add and ignore.
+    #[command(
+        after_help = "Examples:\n  stonewise edits import results/stones.gpkg --who \"A. Keller\" --why \"seen on site\" --out edits.json\n  \
+        stonewise edits import drawn.json --epoch 2025-04 --who \"A. Keller\" --why \"hidden joint\" --out edits.json\n\n\
+        Then name the file in the project: [edits] file = \"edits.json\"."
+    )]
+    Import(EditsImportArgs),
+    /// Check a file of edits and list them; the list goes to stdout.
+    #[command(after_help = "Example:\n  stonewise edits check edits.json")]
+    Check(EditsCheckArgs),
+}
+
+/// Arguments of `edits import`.
+#[derive(Debug, ClapArgs)]
+pub struct EditsImportArgs {
+    /// The edited stones.gpkg, or a COCO file (.json).
+    pub source: PathBuf,
+    /// The file of edits.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Put the new edits after those that the file has.
+    #[arg(long)]
+    pub append: bool,
+    /// Folder of the results from which stones.gpkg was taken (default: the folder it lies in).
+    #[arg(long, value_name = "DIR")]
+    pub results: Option<PathBuf>,
+    /// Epoch of the photos of a COCO file (default: the first).
+    #[arg(long, value_name = "NAME")]
+    pub epoch: Option<String>,
+    /// Who decided; an attribute of that name in the file comes before it.
+    #[arg(long)]
+    pub who: String,
+    /// Why; an attribute of that name in the file comes before it.
+    #[arg(long)]
+    pub why: String,
+    /// When, YYYY-MM-DD (default: today); an attribute of that name in the file comes before it.
+    #[arg(long, value_name = "DATE")]
+    pub when: Option<String>,
+}
+
+/// Arguments of `edits check`.
+#[derive(Debug, ClapArgs)]
+pub struct EditsCheckArgs {
+    /// The file of edits.
+    pub file: PathBuf,
 }
 
 /// Arguments of `demo`.

@@ -1,10 +1,14 @@
-//! The weights that come with the program, on rendered walls that they were not trained on.
+//! The weights that come with the program, on walls that they were not trained on and on images that show nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail here")]
 
+use std::path::Path;
+use stonewise_core::raster::{Raster, RgbImage};
+use stonewise_io::image_io::read_rgb;
+use stonewise_io::masks::{CocoMasks, ValidRegions};
 use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::train::evaluate_samples;
-use stonewise_segment::{Sample, StoneFinder, Weights};
+use stonewise_segment::{Detector, Sample, StoneFinder, Weights};
 
 /// Seeds kept for this test; training draws 64-bit numbers.
 const SEEDS: std::ops::Range<u64> = 9_000..9_012;
@@ -18,4 +22,80 @@ fn the_built_in_weights_find_the_stones_of_rendered_walls() {
     assert!(score.references > 300, "{score:?}");
     // 0.57 and 0.87 when the weights were built in; dark, blurred and tiny walls are among these.
     assert!(f1 > 0.5 && iou > 0.8, "{score:?}");
+}
+
+#[test]
+fn a_plain_image_has_no_stones() {
+    let detector = StoneFinder::open(&Weights::BuiltIn, 0.05).unwrap();
+    for (width, height) in [(64, 96), (320, 200)] {
+        for grey in [0u8, 90, 255] {
+            let plain: RgbImage = Raster::filled(width, height, [grey; 3]);
+            assert!(
+                detector.detect(&plain).unwrap().is_empty(),
+                "{width}x{height}, {grey}"
+            );
+        }
+        // A sky: brighter towards the top.
+        let sky = (0..width * height)
+            .map(|i| [200 - (i / width / 4) as u8; 3])
+            .collect();
+        let sky: RgbImage = Raster::from_vec(width, height, sky).unwrap();
+        assert!(detector.detect(&sky).unwrap().is_empty(), "{width}x{height}, sky");
+        // Rounding noise of one value, from place to place.
+        let noisy = (0..width * height)
+            .map(|i| [(i * 7919 / 13 % 2) as u8; 3])
+            .collect();
+        let noisy: RgbImage = Raster::from_vec(width, height, noisy).unwrap();
+        assert!(
+            detector.detect(&noisy).unwrap().is_empty(),
+            "{width}x{height}, noise"
+        );
+    }
+}
+
+/// A real photo, where the surveys with truth lie beside the checkout.
+#[test]
+fn the_built_in_weights_find_the_stones_of_a_real_wall() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/masks_real/chambord");
+    if !data.exists() {
+        println!("skipped: {} does not exist", data.display());
+        return;
+    }
+    let masks = CocoMasks::open(&data.join("instances.json")).unwrap();
+    let listed = masks.photos().next().unwrap();
+    let (name, width, height) = (listed.file_name.to_owned(), listed.width, listed.height);
+    let valid = ValidRegions::open(&data.join("valid_regions.json")).unwrap();
+    let labels = masks.labels_for(&name, width, height).unwrap().unwrap().labels;
+    let outside = valid.outside(&name, width, height).unwrap().unwrap();
+    let unknown = outside
+        .data()
+        .iter()
+        .zip(labels.data())
+        .map(|(o, l)| *o && *l == 0);
+    let unknown = Raster::from_vec(width, height, unknown.collect()).unwrap();
+    let photo = Sample::new(read_rgb(&data.join(&name)).unwrap(), labels, unknown).unwrap();
+    let detector = StoneFinder::open(&Weights::BuiltIn, 0.5).unwrap();
+    let score = evaluate_samples(&detector, &[photo]).unwrap();
+    assert!(score.references > 10, "{score:?}");
+    assert!(
+        score.f1.unwrap() > 0.85 && score.mean_iou.unwrap() > 0.85,
+        "{score:?}"
+    );
+}
+
+#[test]
+fn the_weights_say_where_they_come_from() {
+    let bytes = Weights::BuiltIn.bytes().unwrap();
+    let length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let header: serde_json::Value = serde_json::from_slice(&bytes[8..8 + length]).unwrap();
+    let text = header["__metadata__"]["stonewise_provenance"].as_str().unwrap();
+    let provenance: serde_json::Value = serde_json::from_str(text).unwrap();
+    let runs = provenance["runs"].as_array().unwrap();
+    let steps: u64 = runs.iter().map(|run| run["steps"].as_u64().unwrap()).sum();
+    assert_eq!(Some(steps), provenance["steps"].as_u64());
+    let docs = include_str!("../../../docs/src/method/segmentation.md");
+    for run in runs {
+        let commit = run["renderer_commit"].as_str().unwrap();
+        assert!(docs.contains(commit), "the docs do not name {commit}");
+    }
 }

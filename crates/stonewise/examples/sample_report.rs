@@ -109,6 +109,7 @@ impl Wall {
             matched_id: matched.then_some(i as u32 + 1),
             status,
             motion: (status == Status::Ok).then(|| self.row_motion(place, i)),
+            edited: None,
         }
     }
 
@@ -317,6 +318,7 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
         verdict: None,
         epochs: vec![epoch("2025 <b>"), epoch("2026")],
         part: None,
+        edits: None,
         parameters: stonewise::Settings::default(),
         steps: vec![StepTime {
             step: "ingest-1".to_owned(),

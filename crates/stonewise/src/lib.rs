@@ -1,6 +1,7 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
 pub mod check;
+pub mod edits;
 mod error;
 pub mod experiment;
 pub mod export;

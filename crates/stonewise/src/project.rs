@@ -1,5 +1,6 @@
 //! The project file: which surveys, and every parameter of every step.
 
+use crate::edits::EditsFile;
 use crate::error::{Error, Result};
 use crate::limits::impossible;
 use crate::part::Part;
@@ -43,6 +44,8 @@ pub struct Project {
     pub settings: Settings,
     /// What a user should know about how the file was read, one sentence each: keys with a new name, another numbering of epochs.
     pub notes: Vec<String>,
+    /// Corrections by hand; absent where the project names none.
+    pub edits: Option<EditsFile>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -238,6 +241,13 @@ struct RawProject {
     thresholds: Thresholds,
     #[serde(default)]
     report: ReportParams,
+    edits: Option<RawEdits>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEdits {
+    file: Spanned<PathBuf>,
 }
 
 #[derive(Deserialize)]
@@ -315,12 +325,14 @@ impl Project {
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
+        let edits = raw.edits.map(|edits| source.edits(edits, &epochs)).transpose()?;
         Ok(Self {
             path: path.to_path_buf(),
             name: raw.project.name.into_inner(),
             epochs,
             settings,
             notes,
+            edits,
             part: None,
         })
     }
@@ -339,6 +351,7 @@ impl Project {
             inputs.push(file);
         }
         inputs.extend(self.settings.report.logo.clone());
+        inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
         // Comparisons of clouds alone have neither photos nor cameras.
         inputs.retain(|path| !path.as_os_str().is_empty());
         inputs
@@ -375,6 +388,7 @@ impl Project {
                 ..Settings::default()
             },
             notes: Vec::new(),
+            edits: None,
             part: None,
         }
     }
@@ -523,6 +537,14 @@ impl Source<'_> {
             return Err(self.error(at(key)..at(key), format!("{key} {what}")));
         }
         Ok(params)
+    }
+
+    /// The edits by hand, whose file is read at once: a mistake in it is one of the project.
+    fn edits(&self, raw: RawEdits, epochs: &[Epoch]) -> Result<EditsFile> {
+        let edits = EditsFile::read(&self.existing(raw.file)?)?;
+        let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+        edits.check_epochs(&names)?;
+        Ok(edits)
     }
 
     /// The logo, like all paths, is relative to the project file.

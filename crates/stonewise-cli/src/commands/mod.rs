@@ -2,6 +2,7 @@
 
 mod check;
 mod compare;
+mod edits;
 mod evaluate;
 mod experiment;
 mod info;
@@ -58,6 +59,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Tune(args) => tune::tune(&args, force, printer),
         Command::Experiment(which) => experiment::experiment(&which, force, printer),
         Command::Check(args) => check::check(&args, force, printer),
+        Command::Edits(which) => edits::edits(&which, printer),
         Command::Init(args) => init::init(&args),
         Command::Info(args) => info::info(&args),
     }

@@ -27,7 +27,7 @@ pub use moments::Moments;
 pub use outline::{OutlineParams, face_outline, outline};
 pub use plane::Plane;
 pub use rigid::Rigid3;
-pub use ring::{is_simple, signed_area};
+pub use ring::{is_simple, ring_contains, signed_area};
 pub use rotation::nearest_rotation;
 pub use small_motion::{DisplacementSample, SmallMotion, lever};
 pub use triangulate::triangulate;

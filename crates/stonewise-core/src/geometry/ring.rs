@@ -22,6 +22,15 @@ pub fn is_simple(ring: &[Point2<f64>]) -> bool {
         })
 }
 
+/// Whether a point lies inside the polygon: a ray from it crosses an odd number of sides. A point on a side may be either.
+pub fn ring_contains(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
+    let crosses = |i: usize| {
+        let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    };
+    (0..ring.len()).filter(|&i| crosses(i)).count() % 2 == 1
+}
+
 /// Whether two segments share a point.
 fn touches((a, b): (Point2<f64>, Point2<f64>), (c, d): (Point2<f64>, Point2<f64>)) -> bool {
     let side = |p: &Point2<f64>, q: &Point2<f64>, r: &Point2<f64>| (q - p).perp(&(r - p));

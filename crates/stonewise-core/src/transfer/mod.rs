@@ -13,6 +13,7 @@ mod assign;
 mod atoms;
 mod audit;
 mod depth;
+mod edit;
 mod error;
 mod face;
 mod frustum;
@@ -30,6 +31,7 @@ mod visibility;
 mod vote;
 
 pub use audit::AuditEvent;
+pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
 pub use error::TransferError;
 pub use labels::{LabelStore, MemoryLabels, TileLabels};
 pub use params::TransferParams;

@@ -37,6 +37,14 @@ pub enum LayerError {
         /// What it said.
         source: rusqlite::Error,
     },
+    /// A file does not hold the layer, or the layer not what it should.
+    #[error("{message}: {path}", path = .path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is missing, and the fix.
+        message: String,
+    },
     /// The file could not be written.
     #[error(transparent)]
     Io(#[from] std::io::Error),

@@ -1,14 +1,17 @@
 //! Layers of features for other programs: GeoPackage and GeoJSON for geographic information systems, VTK for
-//! ParaView. Only writing.
+//! ParaView. Polygons of a GeoPackage are read back, too.
 
 mod geojson;
 mod geometry;
 mod geopackage;
 mod layer;
+mod polygon_blob;
+mod read_polygons;
 mod schema;
 mod vtk;
 
 pub use geojson::write_geojson;
 pub use geopackage::{LayerError, write_geopackage};
 pub use layer::{Geometry, Layer, LayerStyle};
+pub use read_polygons::{PolygonFeature, read_polygons};
 pub use vtk::{PolyData, write_vtp};

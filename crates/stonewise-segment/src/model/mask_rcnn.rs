@@ -3,6 +3,7 @@
 use super::anchors::anchors;
 use super::boxes::{Bounds, HEAD_WEIGHTS, PROPOSAL_WEIGHTS, clip, decode, encode, is_large};
 use super::config::{ConfigError, MaskRcnnConfig};
+use super::contrast::has_contrast;
 use super::fpn::Fpn;
 use super::heads::RoiHeads;
 use super::init::Init;
@@ -112,7 +113,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         self
     }
 
-    /// The stones of an image, best score first.
+    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture.
     pub fn detect(&self, image: &RgbImage) -> Vec<Detection> {
         let size = [image.width(), image.height()];
         let detection = |instance: Instance| Detection {
@@ -125,7 +126,11 @@ impl<B: ModelBackend> MaskRcnn<B> {
                 size,
             ),
         };
-        self.instances(image).into_iter().map(detection).collect()
+        let instances = self.instances(image).into_iter();
+        instances
+            .filter(|i| has_contrast(image, i.bounds))
+            .map(detection)
+            .collect()
     }
 
     /// The objects of an image, best score first, their masks still on the model's grid.

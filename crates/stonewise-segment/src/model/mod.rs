@@ -7,6 +7,7 @@
 mod anchors;
 mod boxes;
 mod config;
+mod contrast;
 mod fpn;
 mod heads;
 mod init;

@@ -5,7 +5,7 @@ use crate::results::names::{EVIDENCE_DIR, REPORT_DIR, WORK_DIR};
 use std::path::{Path, PathBuf};
 
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 14] = [
+const STEMS: [&str; 16] = [
     "stones",
     "matches",
     "registration",
@@ -18,6 +18,8 @@ const STEMS: [&str; 14] = [
     "series",
     "verdict",
     "audit_epoch",
+    "audit_edits",
+    "facade",
     "c2c",
     "c2m",
 ];

@@ -10,6 +10,7 @@ use crate::pipeline::look::look;
 use crate::pipeline::outputs::audit::write_audit;
 use crate::pipeline::outputs::clouds::write_clouds;
 use crate::pipeline::outputs::crs::coordinate_system;
+use crate::pipeline::outputs::edits::{tell_steps, write_edits_audit};
 use crate::pipeline::outputs::evidence::write_evidence;
 use crate::pipeline::outputs::face_cloud::write_face_cloud;
 use crate::pipeline::outputs::m3c2::write_m3c2;
@@ -18,6 +19,7 @@ use crate::pipeline::outputs::run_record::write_run_record;
 use crate::pipeline::outputs::series::write_series;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
 use crate::pipeline::outputs::verdict::write_verdict;
+use crate::pipeline::steps::edit::edit;
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::label::{Labelled, label};
@@ -125,6 +127,8 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         .zip(1..)
         .map(|((ingested, photos), number)| label(context, number, ingested, photos))
         .collect::<Result<Vec<_>>>()?;
+    let (labelled, edited) = edit(context, &photos, labelled)?;
+    write_edits_audit(context, edited.as_ref())?;
     for number in epochs.clone() {
         write_audit(context, number, &photos[number - 1], &labelled[number - 1])?;
     }
@@ -137,7 +141,10 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     write_stone_outlines(context, &labelled[0])?;
     let outlines = read_outlines(&context.out)?;
     let first = &labelled[0].stones;
-    let facade = facade_of(first.iter().map(|s| (s.id.0, s.centroid)), &outlines);
+    let facade = match edited {
+        Some(edited) => edited.facade,
+        None => facade_of(first.iter().map(|s| (s.id.0, s.centroid)), &outlines),
+    };
     let mut pairs = Vec::new();
     for number in epochs.clone().skip(1) {
         pairs.push(measure(context, &photos, &labelled, &facade, number, until)?);
@@ -170,6 +177,7 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     }
     write_series(context, &rows)?;
     write_run_record(context, &photos, &labelled, &datums(&pairs), &verdict)?;
+    tell_steps(context);
     context.timed("report", || write_report(&context.out))?;
     context.timed("layers", || write_layers(&context.out))?;
     Ok(Summary {

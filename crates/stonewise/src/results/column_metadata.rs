@@ -1,13 +1,13 @@
 //! Units and meanings of the columns of a stone table, for people and programs.
 
-use super::columns::STONE_COLUMNS;
+use super::columns::StoneColumn;
 use serde_json::{Value, json};
 
 /// The sidecar of a stone table as text, after the W3C's CSV on the Web; `csv`: name of the table's file.
 ///
 /// Source: Tennison & Kellogg 2015, "Metadata Vocabulary for Tabular Data"; units as schema.org's `unitText`.
-pub(super) fn column_metadata(csv: &str) -> String {
-    let columns = STONE_COLUMNS.iter().map(|column| {
+pub(super) fn column_metadata(csv: &str, columns: impl Iterator<Item = &'static StoneColumn>) -> String {
+    let columns = columns.map(|column| {
         let mut document = json!({
             "name": column.name,
             "titles": column.name,

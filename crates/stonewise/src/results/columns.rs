@@ -104,6 +104,17 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Motion "cov_rel_zz", "m2", "covariance of rel_dz and rel_dz", relative_covariance.m33),
 ];
 
+/// The column that tables have where stones were edited by hand, after all others.
+#[rustfmt::skip]
+pub(super) static EDITED: StoneColumn =
+    column!(OptionalCount "edited", "", "number of the last edit by hand that made or changed the stone, or its partner; else empty", edited);
+
+/// The columns of a table of these rows.
+pub(super) fn columns_of(rows: &[StoneRow]) -> impl Iterator<Item = &'static StoneColumn> {
+    let is_edited = rows.iter().any(|r| r.edited.is_some());
+    STONE_COLUMNS.iter().chain(is_edited.then_some(&EDITED))
+}
+
 impl StoneColumn {
     /// The column of these rows.
     pub(super) fn of(&self, rows: &[StoneRow]) -> Column {

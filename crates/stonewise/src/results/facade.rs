@@ -1,6 +1,7 @@
 //! The wall, unrolled: from world coordinates to metres along the wall and up its face.
 
 use nalgebra::{Point2, Point3, Rotation3, Vector3};
+use serde::{Deserialize, Serialize};
 use stonewise_core::geometry::FaceFrame;
 
 /// Number of stretches along the wall whose direction is averaged at most.
@@ -15,7 +16,8 @@ const MAX_TURN_RAD: f64 = 1.396;
 /// `along` is the arc length of the wall's horizontal line, from its left end for a viewer in front; `up` is the
 /// length along the batter, from the lowest stone. The direction of the wall is the mean of its stones' normals in
 /// stretches of the chord; the arc length integrates 1 / cos(turn against the mean normal).
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "FacadeFile", into = "FacadeFile")]
 pub struct Facade {
     origin: Point3<f64>,
     /// Upright frame across the mean normal; its `along` is the chord.
@@ -24,6 +26,63 @@ pub struct Facade {
     stretches: Vec<Stretch>,
     up_per_height: f64,
     start: Point2<f64>,
+}
+
+/// Least length up the face for a metre of height: 1 for an upright wall, less rounding.
+const LEAST_RISE: f64 = 0.999;
+
+/// A facade in files.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FacadeFile {
+    /// World, metres; every distance counts from here.
+    origin: [f64; 3],
+    /// Mean normal of the wall, level, world.
+    out: [f64; 3],
+    /// Length up the face for a metre of height.
+    up_per_height: f64,
+    /// (along, up) of the left end and the lowest stone before they became zero, metres.
+    start: [f64; 2],
+    /// Place on the chord and arc length, metres, and turn of the wall, radians, ascending.
+    stretches: Vec<[f64; 3]>,
+}
+
+impl From<Facade> for FacadeFile {
+    fn from(facade: Facade) -> Self {
+        let stretch = |s: &Stretch| [s.chord_m, s.arc_m, s.turn_rad];
+        Self {
+            origin: facade.origin.into(),
+            out: facade.frame.out.into(),
+            up_per_height: facade.up_per_height,
+            start: facade.start.into(),
+            stretches: facade.stretches.iter().map(stretch).collect(),
+        }
+    }
+}
+
+impl TryFrom<FacadeFile> for Facade {
+    type Error = String;
+
+    fn try_from(file: FacadeFile) -> Result<Self, String> {
+        let stretch = |[chord_m, arc_m, turn_rad]: [f64; 3]| Stretch {
+            chord_m,
+            arc_m,
+            turn_rad,
+        };
+        let stretches: Vec<Stretch> = file.stretches.into_iter().map(stretch).collect();
+        let ascends = stretches.windows(2).all(|w| w[0].chord_m <= w[1].chord_m);
+        let turns = stretches.iter().all(|s| s.turn_rad.abs() <= MAX_TURN_RAD);
+        if stretches.is_empty() || !ascends || !turns || file.up_per_height < LEAST_RISE {
+            return Err("this is no unrolled wall: copy it from the file that stonewise wrote".to_owned());
+        }
+        Ok(Self {
+            origin: file.origin.into(),
+            frame: FaceFrame::from_normal(&file.out.into()),
+            stretches,
+            up_per_height: file.up_per_height,
+            start: file.start.into(),
+        })
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -96,6 +155,11 @@ impl Facade {
         // up_per_height = 1 / cos(lean).
         let lean = (1.0 / self.up_per_height).clamp(-1.0, 1.0).acos();
         FaceFrame::from_normal(&(level * lean.cos() + Vector3::z() * lean.sin()))
+    }
+
+    /// Distance in front of the upright plane through the wall's middle, metres.
+    pub fn out_m(&self, p: &Point3<f64>) -> f64 {
+        (p - self.origin).dot(&self.frame.out)
     }
 
     fn chord(&self, p: &Point3<f64>) -> f64 {
@@ -209,6 +273,28 @@ mod tests {
             assert!((facade.place(p).y - p.z).abs() < 1e-9);
             assert!(facade.frame_at(p).out.dot(n) > 0.999);
         }
+    }
+
+    #[test]
+    fn a_facade_comes_back_from_its_file_and_nonsense_is_refused() {
+        let normal = |angle: f64| Vector3::new(angle.cos(), angle.sin(), 0.2);
+        let stones: Vec<_> = (0..500)
+            .map(|i| {
+                (
+                    Point3::from(normal(f64::from(i) * 0.002) * 30.0),
+                    normal(f64::from(i) * 0.002),
+                )
+            })
+            .collect();
+        let facade = Facade::new(&stones);
+        let text = serde_json::to_string(&facade).unwrap();
+        let back: Facade = serde_json::from_str(&text).unwrap();
+        for (p, _) in &stones {
+            assert!((back.place(p) - facade.place(p)).norm() < 1e-9);
+            assert!((back.out_m(p) - facade.out_m(p)).abs() < 1e-9);
+        }
+        let empty = text.replace(text.split_once("\"stretches\":").unwrap().1, "[]}");
+        assert!(serde_json::from_str::<Facade>(&empty).is_err());
     }
 
     #[test]

@@ -8,6 +8,10 @@ pub const RUN: &str = "run.json";
 pub const VERDICT: &str = "verdict.json";
 /// Polygons of the stones of the first epoch.
 pub const OUTLINES: &str = "outlines.json";
+/// The unrolled wall, where stones were edited by hand: that of the stones as they were found.
+pub const FACADE: &str = "facade.json";
+/// Every edit of a person with who, when and why, and what it did in each epoch.
+pub const EDITS_AUDIT: &str = "audit_edits.csv";
 /// Rows of all later epochs, where there are more than one.
 pub const SERIES: &str = "series.parquet";
 /// Scores against a table of true stones.

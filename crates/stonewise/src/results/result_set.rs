@@ -1,7 +1,7 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{PairFile, RUN, VERDICT, audit};
+use super::names::{EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
 use super::stone_table::read_stones;
@@ -37,6 +37,8 @@ pub struct ResultSet {
     pub verdict: Option<Verdict>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance, stones, share, points.
     pub decisions: Vec<Vec<Vec<String>>>,
+    /// Edits by hand, from `audit_edits.csv`: its head and one row for each edit and epoch; empty where there are none.
+    pub edits: Vec<Vec<String>>,
     /// Excerpts of the survey; empty where the folder is missing.
     pub evidence: Evidence,
     /// The unrolled wall.
@@ -60,6 +62,7 @@ impl ResultSet {
         Ok(Self {
             verdict: read_json(&dir.join(VERDICT))?,
             decisions: read_decisions(dir)?,
+            edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
             evidence: Evidence::read(dir, pair + 1)?,
             ..Self::read_measured(dir, pair)?
         })
@@ -77,8 +80,10 @@ impl ResultSet {
         let mut stones = read_stones(&path)?;
         stones.sort_by_key(|s| s.stone_id);
         let outlines = read_outlines(dir)?;
+        let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
         Ok(Self {
-            facade: facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines),
+            facade: facade
+                .unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)),
             stones,
             outlines,
             pair,
@@ -91,6 +96,7 @@ impl ResultSet {
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
             verdict: None,
             decisions: Vec::new(),
+            edits: Vec::new(),
             evidence: Evidence::default(),
         })
     }
@@ -177,20 +183,19 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Error> {
 /// Rows of `audit_epoch1.csv`, `audit_epoch2.csv`, ... without the head, as cells.
 fn read_decisions(dir: &Path) -> Result<Vec<Vec<Vec<String>>>, Error> {
     let mut epochs = Vec::new();
-    loop {
-        let path = dir.join(audit(epochs.len() + 1));
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(epochs),
-            Err(e) => return Err(Error::io("reading results", &path)(e)),
-        };
-        epochs.push(
-            text.lines()
-                .skip(1)
-                .map(cells)
-                .filter(|c| !c[0].is_empty())
-                .collect(),
-        );
+    while let Some(rows) = read_rows(&dir.join(audit(epochs.len() + 1)))? {
+        let rows = rows.into_iter().skip(1).filter(|c| !c[0].is_empty());
+        epochs.push(rows.collect());
+    }
+    Ok(epochs)
+}
+
+/// Rows of a CSV file, the head first, as cells; `None` where there is no such file.
+fn read_rows(path: &Path) -> Result<Option<Vec<Vec<String>>>, Error> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text.lines().map(cells).collect())),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io("reading results", path)(e)),
     }
 }
 

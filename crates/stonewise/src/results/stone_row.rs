@@ -36,6 +36,8 @@ pub struct StoneRow {
     pub status: Status,
     /// The motion, where there is one.
     pub motion: Option<RowMotion>,
+    /// The last edit by hand that made or changed the stone or its partner: its number in the file of edits.
+    pub edited: Option<u32>,
 }
 
 /// The measured motion of a stone.
@@ -199,6 +201,7 @@ impl StoneRow {
             matched_id,
             status: status(outcome, pair),
             motion: motion.map(|m| RowMotion::new(m, &first.normal, reference)),
+            edited: None,
         }
     }
 }

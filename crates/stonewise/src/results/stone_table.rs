@@ -1,6 +1,6 @@
 //! Files of stone rows: CSV with its metadata and Parquet, with the columns of the contract.
 
-use super::columns::STONE_COLUMNS;
+use super::columns::{EDITED, STONE_COLUMNS, columns_of};
 use super::names::PairFile;
 use super::{RowMotion, StoneRow, column_metadata};
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     write_csv(&dir.join(&csv), &table)?;
     let metadata = dir.join(PairFile::StonesMetadata.name(pair));
     write_atomically(&metadata, |partial| {
-        std::fs::write(partial, column_metadata(&csv))
+        std::fs::write(partial, column_metadata(&csv, columns_of(rows)))
     })
     .map_err(Error::io("writing the metadata of the columns", &metadata))
 }
@@ -41,19 +41,22 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
     for column in STONE_COLUMNS {
         column.fill(&mut rows, &table, path)?;
     }
+    if table.names().any(|n| n == EDITED.name) {
+        EDITED.fill(&mut rows, &table, path)?;
+    }
     rows.iter_mut()
         .filter_map(|r| r.motion.as_mut())
         .for_each(RowMotion::mirror);
     Ok(rows)
 }
 
-/// Rows as a table with [`STONE_COLUMNS`]; the metadata hold `NAME.unit` and `NAME.meaning` of every column.
+/// Rows as a table with [`STONE_COLUMNS`], and `edited` where a stone was edited by hand; the metadata hold `NAME.unit` and `NAME.meaning` of every column.
 ///
 /// # Errors
 /// None in practice; a table refuses columns of unequal length.
 pub fn stone_table(rows: &[StoneRow]) -> std::result::Result<Table, TableError> {
     let mut table = Table::new();
-    for column in STONE_COLUMNS {
+    for column in columns_of(rows) {
         table.push(column.name, column.of(rows))?;
         table.set_metadata(&format!("{}.unit", column.name), column.unit);
         table.set_metadata(&format!("{}.meaning", column.name), column.meaning);
@@ -89,7 +92,9 @@ mod tests {
     #[test]
     fn rows_come_back_from_parquet_as_they_were() {
         let folder = tempfile::tempdir().unwrap();
-        for rows in [rows(), Vec::new()] {
+        let mut edited = rows();
+        edited[3].edited = Some(2);
+        for rows in [rows(), Vec::new(), edited] {
             write_stones(folder.path(), 1, &rows).unwrap();
             assert_eq!(read_stones(&folder.path().join("stones.parquet")).unwrap(), rows);
         }

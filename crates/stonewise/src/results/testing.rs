@@ -55,6 +55,7 @@ pub(crate) fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
         verdict: None,
         epochs: epochs.iter().map(epoch).collect(),
         part: None,
+        edits: None,
         parameters: Settings::default(),
         steps: Vec::new(),
         warnings: Vec::new(),
@@ -147,6 +148,7 @@ fn row(stone_id: u32) -> StoneRow {
         matched_id: matched.then_some(100 + stone_id),
         status,
         motion: (status == Status::Ok).then(|| motion(stone_id)),
+        edited: None,
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod audit;
 pub mod clouds;
 pub mod crs;
+pub mod edits;
 pub mod evidence;
 pub mod face_cloud;
 pub mod m3c2;

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::storage::step::Key;
+use crate::pipeline::storage::step::{Key, StepDir};
 use crate::results::names::OUTLINES;
 use crate::results::{StoneOutline, write_outlines};
 use nalgebra::Point3;
@@ -14,15 +14,27 @@ use stonewise_core::geometry::{OutlineParams, face_outline};
 use stonewise_core::stone::Stone;
 use stonewise_io::atomic::write_atomically;
 
+/// The step that makes the outlines of the stones as they were found.
+pub const OUTLINES_STEP: &str = "outlines";
+
 /// Writes the outlines of the first epoch's stones.
 pub fn write_stone_outlines(context: &Context, first: &Labelled) -> Result<()> {
-    let key = Key::new("outlines", &(), &[first.key.as_str()]);
-    let step = context.step("outlines", key, |step, _| {
-        write_outlines(step.path(), &stone_outlines(context, first)?)
-    })?;
+    let name = match first.edited.is_empty() {
+        true => OUTLINES_STEP,
+        false => "outlines-edited",
+    };
+    let step = make_outlines(context, first, name)?;
     let to = context.out.join(OUTLINES);
     write_atomically(&to, |partial| fs::copy(step.file(OUTLINES), partial).map(|_| ()))
         .map_err(Error::io("writing", &to))
+}
+
+/// Makes the outlines in a step of this name.
+pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<StepDir> {
+    let key = Key::new("outlines", &(), &[first.key.as_str()]);
+    context.step(name, key, |step, _| {
+        write_outlines(step.path(), &stone_outlines(context, first)?)
+    })
 }
 
 fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {

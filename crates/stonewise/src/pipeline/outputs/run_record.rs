@@ -43,6 +43,11 @@ pub fn write_run_record(
             .map(|(epoch, (photos, labelled))| epoch_record(context, epoch, photos, labelled))
             .collect::<Result<_>>()?,
         part: project.part.clone(),
+        edits: project
+            .edits
+            .as_ref()
+            .map(|edits| input(context, &edits.path))
+            .transpose()?,
         parameters: project.settings.clone(),
         steps: context.times(),
         warnings: context.warnings.sorted(),
@@ -56,13 +61,7 @@ fn epoch_record(
     photos: &Segmented,
     labelled: &Labelled,
 ) -> Result<EpochRecord> {
-    let input = |path: &Path| {
-        Ok::<_, Error>(InputRecord {
-            path: path.to_path_buf(),
-            bytes: std::fs::metadata(path).map_err(Error::io("reading", path))?.len(),
-            blake3: context.digest(path)?,
-        })
-    };
+    let input = |path: &Path| input(context, path);
     Ok(EpochRecord {
         name: epoch.name.clone(),
         date: epoch.date.clone(),
@@ -75,5 +74,13 @@ fn epoch_record(
         points: labelled.ingested.tiles.surveyed.point_count(),
         photos: photos.photos.len(),
         stones: labelled.stones.len(),
+    })
+}
+
+fn input(context: &Context, path: &Path) -> Result<InputRecord> {
+    Ok(InputRecord {
+        path: path.to_path_buf(),
+        bytes: std::fs::metadata(path).map_err(Error::io("reading", path))?.len(),
+        blake3: context.digest(path)?,
     })
 }

@@ -21,6 +21,7 @@ pub fn stone_rows(
     facade: &Facade,
 ) -> Vec<StoneRow> {
     let [first, second] = epochs.map(|e| &e.stones);
+    let edited = epochs.map(|e| &e.edited);
     let partners: BTreeMap<_, _> = second.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<_, _> = matched.report.outcomes.iter().copied().collect();
     let motions: BTreeMap<_, _> = registered.results.iter().map(|r| (r.first, r)).collect();
@@ -49,14 +50,12 @@ pub fn stone_rows(
         };
         let pair = motions.get(&stone.id).map(|pair| corrected(pair, error));
         let place = facade.place(&stone.centroid);
-        Some(StoneRow::new(
-            stone,
-            outcome,
-            partner,
-            pair.as_ref(),
-            &reference,
-            &place,
-        ))
+        let row = StoneRow::new(stone, outcome, partner, pair.as_ref(), &reference, &place);
+        let of_partner = || edited[1].get(&partner?.id);
+        Some(StoneRow {
+            edited: edited[0].get(&stone.id).or_else(of_partner).copied(),
+            ..row
+        })
     };
     first.iter().filter_map(row).collect()
 }

@@ -7,10 +7,11 @@ use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::steps::segment::Segmented;
 use crate::pipeline::storage::step::{Key, StepDir};
 use crate::pipeline::storage::tiles::DiskTiles;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::Bounds;
+use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
@@ -24,9 +25,11 @@ pub struct Labelled {
     pub stones: Vec<Stone>,
     /// Which instances make up each stone, and what was decided about them.
     pub transfer: Transfer,
+    /// Stones that a person made or changed, with the number of the last edit that did so.
+    pub edited: BTreeMap<StoneId, u32>,
     /// Key of everything above.
     pub key: Key,
-    store: DiskLabels,
+    pub(super) store: DiskLabels,
 }
 
 impl Labelled {
@@ -76,25 +79,43 @@ pub fn label(context: &Context, number: usize, ingested: Ingested, photos: &Segm
     })?;
     let transfer = read_json(&step.file("transfer.json"))?;
     let store = DiskLabels::new(step.path(), tiles);
-    tabulate(context, number, photos, ingested, transfer, store, &step)
+    let labels = Labels {
+        transfer,
+        store,
+        step,
+    };
+    tabulate(context, number, "stones", photos, ingested, labels)
 }
 
-fn tabulate(
+/// The labels of an epoch, before its stones are tabulated.
+pub(super) struct Labels {
+    pub(super) transfer: Transfer,
+    pub(super) store: DiskLabels,
+    /// The step that made them.
+    pub(super) step: StepDir,
+}
+
+/// Tabulates the stones of an epoch in a step of this name.
+pub(super) fn tabulate(
     context: &Context,
     number: usize,
+    name: &str,
     photos: &Segmented,
     ingested: Ingested,
-    transfer: Transfer,
-    store: DiskLabels,
-    labelled: &StepDir,
+    labels: Labels,
 ) -> Result<Labelled> {
+    let Labels {
+        transfer,
+        store,
+        step: labelled,
+    } = labels;
     let params = &context.project.settings.stones;
     let key = Key::new(
         "stones",
         &(params, &ingested.tiles.motion),
         &[labelled.key().as_str()],
     );
-    let step = context.step(&format!("stones-{number}"), key, |step, _| {
+    let step = context.step(&format!("{name}-{number}"), key, |step, _| {
         let stones = build_stones(
             &ingested.tiles,
             &store,
@@ -116,21 +137,30 @@ fn tabulate(
         ingested,
         stones,
         transfer,
+        edited: BTreeMap::new(),
         key: step.key().clone(),
         store,
     })
 }
 
 /// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
-struct DiskLabels {
+#[derive(Clone)]
+pub(super) struct DiskLabels {
     files: Vec<PathBuf>,
 }
 
 impl DiskLabels {
-    fn new(dir: &Path, tiles: &DiskTiles) -> Self {
+    pub(super) fn new(dir: &Path, tiles: &DiskTiles) -> Self {
         let file = |tile| dir.join(format!("{}.parquet", tiles.name(tile)));
         Self {
             files: (0..tiles.tile_count()).map(file).collect(),
+        }
+    }
+
+    /// Takes these tiles from another store.
+    pub(super) fn replace(&mut self, tiles: &BTreeSet<usize>, from: &Self) {
+        for &tile in tiles {
+            self.files[tile].clone_from(&from.files[tile]);
         }
     }
 }

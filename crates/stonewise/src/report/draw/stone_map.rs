@@ -29,6 +29,9 @@ pub(crate) struct MapLayout<'a> {
     stone_px: f64,
 }
 
+/// Width of the dashed outlines of stones that were edited by hand, tenths of a pixel.
+const EDITED_PX: u32 = 12;
+
 /// What a map shows.
 pub(crate) struct MapPicture<'a> {
     pub title: &'a str,
@@ -203,6 +206,20 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
             out,
             r#"<path{class} fill="{}" d="{path}"/>"#,
             picture.scale.colour(step)
+        );
+    }
+    let edited: String = layout
+        .results
+        .stones
+        .iter()
+        .zip(&layout.paths)
+        .filter(|(stone, _)| stone.edited.is_some())
+        .map(|(_, path)| path.as_str())
+        .collect();
+    if !edited.is_empty() {
+        let _ = write!(
+            out,
+            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>edited by hand</title></path>"#
         );
     }
     if !loose.is_empty() {

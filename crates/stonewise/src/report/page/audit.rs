@@ -18,6 +18,7 @@ pub(super) fn audit(results: &ResultSet) -> String {
         Some(run) => warnings(&run.warnings),
         None => "<p>There is no run.json beside the results.</p>".to_owned(),
     };
+    out.push_str(&edits(&results.edits));
     out.push_str(&decision_counts(&results.decisions));
     if let Some(run) = &results.run {
         out.push_str(&details("Steps, times and memory", &steps(&run.steps)));
@@ -35,6 +36,19 @@ pub(super) fn audit(results: &ResultSet) -> String {
     }
     out.push_str(&decision_lists(&results.decisions));
     section("audit", "Audit", &out)
+}
+
+/// What a person corrected, with who, when and why, and what came of it; the head first.
+fn edits(rows: &[Vec<String>]) -> String {
+    let Some((head, rows)) = rows.split_first() else {
+        return String::new();
+    };
+    let cells = |row: &Vec<String>| row.iter().map(|c| escape(c)).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+    let head: Vec<String> = head.iter().map(|h| words(h)).collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let note = "<p class=\"note\">The maps draw the outlines of edited stones dashed.</p>";
+    format!("<h3>Edits by hand</h3>{}{note}", table(&head, &rows, head.len()))
 }
 
 /// What was done, how long it took, and the highest memory up to its end.

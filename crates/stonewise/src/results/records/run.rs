@@ -29,6 +29,9 @@ pub struct RunRecord {
     pub epochs: Vec<EpochRecord>,
     /// The part of the survey that took part; absent: all.
     pub part: Option<Part>,
+    /// The file of edits by hand; absent where the project has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub edits: Option<InputRecord>,
     /// Every parameter as it was used.
     pub parameters: Settings,
     /// The steps, in order.

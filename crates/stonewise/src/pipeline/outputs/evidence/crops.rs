@@ -260,7 +260,8 @@ fn mean_colour(samples: usize, picture: &RgbImage, pixel: impl Fn(f64, f64) -> O
     }
 }
 
-/// Gives every point the photo with the finest ground sampling distance; a stone's points only photos that voted for it.
+/// Gives every point the photo with the finest ground sampling distance; a stone's points only photos that voted for it, where any
+/// did: none votes for a stone that was added by hand.
 fn assign_photos(points: &mut [Candidate], views: &[View], labelled: &Labelled) {
     let voting: BTreeMap<u32, BTreeSet<usize>> = labelled
         .transfer
@@ -270,7 +271,7 @@ fn assign_photos(points: &mut [Candidate], views: &[View], labelled: &Labelled) 
         .collect();
     points.par_iter_mut().for_each(|candidate| {
         let own = voting.get(&candidate.point.stone);
-        let allowed = |p: &usize| own.is_none_or(|photos| photos.contains(p));
+        let allowed = |p: &usize| own.is_none_or(|photos| photos.is_empty() || photos.contains(p));
         let gsd = |p: usize| {
             let projection = views[p].project(&candidate.surveyed)?;
             views[p]

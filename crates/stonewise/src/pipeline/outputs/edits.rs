@@ -1,0 +1,100 @@
+//! What became of the edits by hand.
+
+use crate::error::Result;
+use crate::files::write_readable_json;
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::edit::Edited;
+use crate::results::names::{EDITS_AUDIT, FACADE};
+use stonewise_core::transfer::{EditEffect, NoEffect};
+use stonewise_io::table::{Table, write_csv};
+
+/// Writes `audit_edits.csv`, one row for each edit and epoch, and `facade.json`, the wall on which the stones are unrolled; names
+/// edits that did nothing in any epoch. Nothing where the project has no edits.
+pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<()> {
+    let (Some(edited), Some(file)) = (edited, &context.project.edits) else {
+        return Ok(());
+    };
+    write_readable_json(&context.out.join(FACADE), &edited.facade)?;
+    let mut rows = Vec::new();
+    for (index, edit) in file.edits.iter().enumerate() {
+        let mut reasons = Vec::new();
+        for (epoch, effects) in context.project.epochs.iter().zip(&edited.effects) {
+            let Some(effect) = &effects[index] else { continue };
+            if let Err(reason) = effect {
+                reasons.push(format!("{}: {reason}", epoch.name));
+            }
+            rows.push((index, epoch.name.clone(), effect));
+        }
+        let has_effect = edited
+            .effects
+            .iter()
+            .any(|epoch| matches!(epoch[index], Some(Ok(_))));
+        if !has_effect {
+            let message = format!("{} has no effect; {}", edit.action.word(), reasons.join("; "));
+            context.warnings.skipped("edit", file.place(index), message);
+        }
+    }
+    let edit = |row: &Row| &file.edits[row.0];
+    let text = |of: &dyn Fn(&Row) -> String| rows.iter().map(|r| one_line(&of(r))).collect::<Vec<_>>();
+    let done = |row: &Row| row.2.as_ref().ok().cloned();
+    let stones = |all: Vec<u32>| all.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+    let mut table = Table::new();
+    table.push("edit", rows.iter().map(|r| r.0 as u32 + 1).collect::<Vec<_>>())?;
+    table.push("do", text(&|r| edit(r).action.word().to_owned()))?;
+    table.push("who", text(&|r| edit(r).who.clone()))?;
+    table.push("when", text(&|r| edit(r).when.clone()))?;
+    table.push("why", text(&|r| edit(r).why.clone()))?;
+    table.push("place", text(&|r| file.place(r.0)))?;
+    table.push(
+        "drawn_in",
+        text(&|r| edit(r).photo.clone().unwrap_or("facade".to_owned())),
+    )?;
+    table.push("epoch", text(&|r| r.1.clone()))?;
+    table.push(
+        "stones_before",
+        text(&|r| done(r).map_or(String::new(), |e| stones(e.before))),
+    )?;
+    table.push(
+        "stones_after",
+        text(&|r| done(r).map_or(String::new(), |e| stones(e.after))),
+    )?;
+    table.push(
+        "points",
+        rows.iter()
+            .map(|r| done(r).map(|e| e.points))
+            .collect::<Vec<Option<u64>>>(),
+    )?;
+    table.push(
+        "no_effect",
+        text(&|r| r.2.as_ref().err().map_or(String::new(), NoEffect::to_string)),
+    )?;
+    Ok(write_csv(&context.out.join(EDITS_AUDIT), &table)?)
+}
+
+/// Edit, epoch, and what it did there.
+type Row<'a> = (usize, String, &'a std::result::Result<EditEffect, NoEffect>);
+
+/// A text without line breaks, which rows of the audit do not have.
+fn one_line(text: &str) -> String {
+    text.split(['\r', '\n'])
+        .map(str::trim)
+        .collect::<Vec<_>>()
+        .join(" ")
+        .trim()
+        .to_owned()
+}
+
+/// Says how many steps had to be done again, where the project has edits.
+pub fn tell_steps(context: &Context) {
+    let Some(file) = &context.project.edits else {
+        return;
+    };
+    let times = context.times();
+    let kept = times.iter().filter(|t| t.resumed).count();
+    context.progress.note(&format!(
+        "edits: {} by hand; {kept} of {} steps were taken over, {} done",
+        file.edits.len(),
+        times.len(),
+        times.len() - kept
+    ));
+}

@@ -1,0 +1,176 @@
+//! Corrections by hand, applied to the labelled clouds of all epochs.
+//!
+//! They come after the vote of the photos and before the stones are tabulated, so that photos, masks and votes are taken over
+//! from a run without them, and stones that no edit touches keep their points and their number.
+
+mod photo_places;
+
+use super::label::{DiskLabels, Labelled, Labels, tabulate};
+use super::segment::Segmented;
+use crate::edits::EditsFile;
+use crate::error::Result;
+use crate::files::{read_json, write_json};
+use crate::pipeline::context::Context;
+use crate::pipeline::outputs::outlines::{OUTLINES_STEP, make_outlines};
+use crate::pipeline::storage::step::Key;
+use crate::results::{Facade, facade_of, read_outlines};
+use nalgebra::{Point2, Point3};
+use photo_places::photo_places;
+use std::collections::{BTreeMap, BTreeSet};
+use stonewise_core::id::StoneId;
+use stonewise_core::transfer::{
+    EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, StoneInstances, edit_labels,
+};
+
+/// What the edits did.
+pub struct Edited {
+    /// The unrolled wall of the stones as they were found: edits do not move the places of other stones.
+    pub facade: Facade,
+    /// By epoch.
+    pub effects: Vec<Effects>,
+}
+
+/// What each edit of the file did in an epoch; `None` where it does not concern the epoch.
+pub type Effects = Vec<Option<std::result::Result<EditEffect, NoEffect>>>;
+
+/// Where an edit lies on the wall, or why it lies nowhere.
+type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
+
+/// Applies the project's edits to all epochs; an epoch that none changes stays as it is. `None` where there are no edits.
+pub fn edit(
+    context: &Context,
+    photos: &[Segmented],
+    labelled: Vec<Labelled>,
+) -> Result<(Vec<Labelled>, Option<Edited>)> {
+    let Some(file) = &context.project.edits else {
+        return Ok((labelled, None));
+    };
+    let outlines = read_outlines(make_outlines(context, &labelled[0], OUTLINES_STEP)?.path())?;
+    let found = labelled[0].stones.iter().map(|s| (s.id.0, s.centroid));
+    let facade = facade_of(found, &outlines);
+    let drawn_on = file.facade.as_ref().unwrap_or(&facade);
+    let places = photo_places(context, file, drawn_on, photos, &labelled)?;
+    let mut effects = Vec::new();
+    let mut edited = Vec::new();
+    for ((number, photos), labelled) in (1..).zip(photos).zip(labelled) {
+        let (epoch, done) = edit_epoch(context, number, file, &places, drawn_on, photos, labelled)?;
+        edited.push(epoch);
+        effects.push(done);
+    }
+    Ok((edited, Some(Edited { facade, effects })))
+}
+
+/// Applies the edits that concern one epoch.
+fn edit_epoch(
+    context: &Context,
+    number: usize,
+    file: &EditsFile,
+    places: &[Places],
+    wall: &Facade,
+    photos: &Segmented,
+    labelled: Labelled,
+) -> Result<(Labelled, Effects)> {
+    let epoch = &context.project.epochs[number - 1].name;
+    let mut effects = vec![None; file.edits.len()];
+    let mut asked: Vec<(usize, LabelEdit)> = Vec::new();
+    for (index, (edit, places)) in file.edits.iter().zip(places).enumerate() {
+        match places {
+            _ if !edit.concerns(epoch) => {}
+            Ok(shape) => asked.push((index, edit.on_wall(shape.clone()))),
+            Err(reason) => effects[index] = Some(Err(reason.clone())),
+        }
+    }
+    let (indices, edits): (Vec<usize>, Vec<LabelEdit>) = asked.into_iter().unzip();
+    let tiles = &labelled.ingested.tiles.surveyed;
+    let key = Key::new("edit", &(&edits, wall), &[labelled.key.as_str()]);
+    let step = context.step(&format!("edit-{number}"), key, |step, _| {
+        let mut target = DiskLabels::new(step.path(), tiles);
+        let place = |p: &Point3<f64>| {
+            let at = wall.place(p);
+            Point3::new(at.x, at.y, wall.out_m(p))
+        };
+        let on_wall = EditedWall {
+            place: &place,
+            stones: &facing(&labelled, wall),
+            min_points: context.project.settings.label.min_points,
+            first_new: labelled.stones.last().map_or(0, |s| s.id.0) + 1,
+        };
+        let report = edit_labels(
+            tiles,
+            &labelled.store,
+            &mut target,
+            &on_wall,
+            &edits,
+            context.progress,
+        )?;
+        write_json(&step.file(REPORT), &report)
+    })?;
+    let report: EditReport = read_json(&step.file(REPORT))?;
+    for (&index, effect) in indices.iter().zip(&report.effects) {
+        effects[index] = Some(effect.clone());
+    }
+    if report.tiles.is_empty() {
+        return Ok((labelled, effects));
+    }
+    let mut store = labelled.store;
+    store.replace(&report.tiles, &DiskLabels::new(step.path(), tiles));
+    let mut transfer = labelled.transfer;
+    transfer.stones = instances(&transfer.stones, &report);
+    let labels = Labels {
+        transfer,
+        store,
+        step,
+    };
+    let number_of = |index: &usize| indices[*index] as u32 + 1;
+    let edited = report.edited_by.iter();
+    let edited = edited.map(|(stone, index)| (StoneId(*stone), number_of(index)));
+    let tabulated = tabulate(
+        context,
+        number,
+        "stones-edited",
+        photos,
+        labelled.ingested,
+        labels,
+    )?;
+    let tabulated = Labelled {
+        edited: edited.collect(),
+        ..tabulated
+    };
+    Ok((tabulated, effects))
+}
+
+/// What the step says about its edits.
+const REPORT: &str = "report.json";
+
+/// Stones on the side of the wall that is unrolled: a wall seen from both sides has others behind them.
+fn facing(labelled: &Labelled, wall: &Facade) -> BTreeSet<StoneId> {
+    let faces = labelled
+        .stones
+        .iter()
+        .filter(|s| s.normal.dot(&wall.frame_at(&s.centroid).out) > 0.0);
+    faces.map(|s| s.id).collect()
+}
+
+/// The instances that make up each stone: of an edited one those of all stones whose points it has.
+fn instances(found: &[StoneInstances], report: &EditReport) -> Vec<StoneInstances> {
+    let known: BTreeMap<u32, &StoneInstances> = found.iter().map(|s| (s.stone.0, s)).collect();
+    let changed = |stone: &StoneInstances| {
+        report.gone.contains(&stone.stone.0) || report.origins.contains_key(&stone.stone.0)
+    };
+    let mut all: Vec<StoneInstances> = found.iter().filter(|s| !changed(s)).cloned().collect();
+    for (&stone, origins) in &report.origins {
+        let mut instances: Vec<_> = origins
+            .iter()
+            .filter_map(|o| known.get(o))
+            .flat_map(|s| s.instances.iter().copied())
+            .collect();
+        instances.sort_unstable();
+        instances.dedup();
+        all.push(StoneInstances {
+            stone: StoneId(stone),
+            instances,
+        });
+    }
+    all.sort_by_key(|s| s.stone);
+    all
+}

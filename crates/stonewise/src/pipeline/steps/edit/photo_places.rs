@@ -1,0 +1,223 @@
+//! Edits drawn in photos, brought onto the wall.
+
+use super::Places;
+use crate::edits::{Edit, EditsFile};
+use crate::error::Result;
+use crate::files::{read_json, write_json};
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::segment::Segmented;
+use crate::pipeline::storage::step::Key;
+use crate::results::Facade;
+use nalgebra::{Point2, Point3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
+use stonewise_core::cloud::TileSource;
+use stonewise_core::geometry::{Bounds, Plane, View, cell_of};
+use stonewise_core::transfer::NoEffect;
+
+/// Points of stones this far from the ray of a pixel say where the face is, metres: the neighbourhood in which a stone's normal is
+/// found.
+const REACH_M: f64 = 0.75;
+/// Of points in a cube of this edge the first counts, metres, so that dense clouds do not crowd out the neighbourhood.
+const THIN_M: f64 = 0.05;
+/// Nearest points to which the face is fitted: about three stones.
+const NEAREST: usize = 60;
+/// Points further than this from a first plane are left out of the second, metres: the relief of stones.
+const RELIEF_M: f64 = 0.1;
+
+/// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their rays onto the stones
+/// that the photo's epoch shows there.
+pub(super) fn photo_places(
+    context: &Context,
+    file: &EditsFile,
+    wall: &Facade,
+    photos: &[Segmented],
+    labelled: &[Labelled],
+) -> Result<Vec<Places>> {
+    let mut places: Vec<Places> = file
+        .edits
+        .iter()
+        .map(|edit| Ok(edit.shape().iter().copied().map(Point2::from).collect()))
+        .collect();
+    for (index, (photos, labelled)) in photos.iter().zip(labelled).enumerate() {
+        let name = &context.project.epochs[index].name;
+        let is_here = |edit: &&Edit| edit.epoch.as_ref().map_or(index == 0, |e| e == name);
+        let drawn = file.edits.iter().enumerate().filter(|(_, e)| e.photo.is_some());
+        let drawn: Vec<(usize, &Edit)> = drawn.filter(|(_, e)| is_here(e)).collect();
+        if drawn.is_empty() {
+            continue;
+        }
+        let shapes: Vec<_> = drawn.iter().map(|(_, e)| (&e.photo, e.shape())).collect();
+        let key = Key::new("edit-places", &(&shapes, wall), &[labelled.key.as_str()]);
+        let step = context.step(&format!("edit-places-{}", index + 1), key, |step, _| {
+            let mut found: Vec<Places> = Vec::new();
+            for (_, edit) in &drawn {
+                found.push(carry(context, edit, wall, photos, labelled)?);
+            }
+            write_json(&step.file(PLACES), &found)
+        })?;
+        let found: Vec<Places> = read_json(&step.file(PLACES))?;
+        for ((index, _), found) in drawn.into_iter().zip(found) {
+            places[index] = found;
+        }
+    }
+    Ok(places)
+}
+
+/// What the step found.
+const PLACES: &str = "places.json";
+
+/// The pixels of one edit on the wall.
+fn carry(
+    context: &Context,
+    edit: &Edit,
+    wall: &Facade,
+    photos: &Segmented,
+    labelled: &Labelled,
+) -> Result<Places> {
+    let view = match view_of(edit, photos) {
+        Ok(view) => view,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let mut rays = Vec::new();
+    for pixel in edit.shape() {
+        match view.ray(*pixel).filter(|_| view.is_inside(*pixel)) {
+            Some((centre, direction)) => rays.push(Ray::new(centre, direction)),
+            None => return Ok(Err(nowhere(*pixel, "lies outside the photo"))),
+        }
+    }
+    gather(context, &mut rays, labelled)?;
+    let mut places = Vec::new();
+    for (ray, pixel) in rays.iter().zip(edit.shape()) {
+        match ray.hit() {
+            Some(hit) => places.push(wall.place(&hit)),
+            None => return Ok(Err(nowhere(*pixel, "shows no stone of the cloud within 0.75 m"))),
+        }
+    }
+    Ok(Ok(places))
+}
+
+fn nowhere(pixel: [f64; 2], what: &str) -> NoEffect {
+    NoEffect::NoPlace(format!("pixel ({:.1}, {:.1}) {what}", pixel[0], pixel[1]))
+}
+
+/// The photo of an edit: by its name, with or without folders and extension, in small letters.
+fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a View, NoEffect> {
+    let wanted = edit.photo.as_deref().unwrap_or_default();
+    let file = |name: &str| name.rsplit(['/', '\\']).next().unwrap_or(name).to_lowercase();
+    let stem = |name: &str| {
+        let file = file(name);
+        file.rsplit_once('.')
+            .map_or(file.clone(), |(stem, _)| stem.to_owned())
+    };
+    let named = |name: &str| {
+        let (name, wanted) = (name.to_lowercase(), wanted.to_lowercase());
+        [
+            name == wanted,
+            file(&name) == file(&wanted),
+            stem(&name) == stem(&wanted),
+        ]
+    };
+    for level in 0..3 {
+        let fits: Vec<&View> = photos
+            .views
+            .iter()
+            .zip(&photos.photos)
+            .filter(|(v, p)| named(&v.name)[level] || named(&p.path.to_string_lossy())[level])
+            .map(|(v, _)| v)
+            .collect();
+        match fits[..] {
+            [] => {}
+            [view] => return Ok(view),
+            _ => {
+                let message = format!("{} photos are named {wanted:?}: give its folder too", fits.len());
+                return Err(NoEffect::NoPlace(message));
+            }
+        }
+    }
+    Err(NoEffect::NoPlace(format!(
+        "no photo of the epoch is named {wanted:?}"
+    )))
+}
+
+/// The ray of a pixel and the points of stones around it.
+struct Ray {
+    centre: Point3<f64>,
+    direction: Vector3<f64>,
+    /// By cell: distance from the ray, and the point.
+    near: BTreeMap<[i64; 3], (f64, Point3<f64>)>,
+}
+
+impl Ray {
+    fn new(centre: Point3<f64>, direction: Vector3<f64>) -> Self {
+        Self {
+            centre,
+            direction,
+            near: BTreeMap::new(),
+        }
+    }
+
+    /// Distance of a point from the ray; infinite behind the camera.
+    fn distance(&self, p: &Point3<f64>) -> f64 {
+        let d = p - self.centre;
+        let depth = d.dot(&self.direction);
+        match depth > 0.0 {
+            true => (d - self.direction * depth).norm(),
+            false => f64::INFINITY,
+        }
+    }
+
+    fn may_see(&self, bounds: &Bounds) -> bool {
+        let half = (bounds.max - bounds.min).norm() / 2.0;
+        self.distance(&bounds.centre()) <= half + REACH_M
+    }
+
+    /// Where the ray meets the face of the stones around it.
+    fn hit(&self) -> Option<Point3<f64>> {
+        let mut nearest: Vec<&(f64, Point3<f64>)> = self.near.values().collect();
+        nearest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut points: Vec<Point3<f64>> = nearest.into_iter().take(NEAREST).map(|n| n.1).collect();
+        let first = Plane::fit(&points)?;
+        points.retain(|p| first.normal.dot(&(p - first.centroid)).abs() <= RELIEF_M);
+        let face = Plane::fit(&points)?;
+        let towards = face.normal.dot(&self.direction);
+        let depth = face.normal.dot(&(face.centroid - self.centre)) / towards;
+        (depth.is_finite() && depth > 0.0).then(|| self.centre + self.direction * depth)
+    }
+}
+
+/// Finds the points of stones around the rays that face the camera. Cost: one pass over the tiles that the rays meet.
+fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()> {
+    let Some(ray) = rays.first() else { return Ok(()) };
+    let centre = ray.centre;
+    let facing: BTreeSet<u32> = labelled
+        .stones
+        .iter()
+        .filter(|s| s.normal.dot(&(centre - s.centroid)) > 0.0)
+        .map(|s| s.id.0)
+        .collect();
+    let tiles = &labelled.ingested.tiles.surveyed;
+    for tile in 0..tiles.tile_count() {
+        context.progress.check()?;
+        let bounds = tiles.bounds(tile);
+        if !rays.iter().any(|r| r.may_see(&bounds)) {
+            continue;
+        }
+        let (cloud, labels) = (tiles.load(tile)?, labelled.labels(tile)?);
+        for (i, _) in labels
+            .stone
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| facing.contains(s))
+        {
+            let p = cloud.world(i);
+            for ray in rays.iter_mut() {
+                let distance = ray.distance(&p);
+                if distance <= REACH_M {
+                    ray.near.entry(cell_of(&p, THIN_M)).or_insert((distance, p));
+                }
+            }
+        }
+    }
+    Ok(())
+}
