@@ -263,4 +263,20 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn no_information_is_negative_however_little_the_epochs_share() {
+        let layout = Layout {
+            outlier_sigmas: 3.0,
+            ..LAYOUT
+        };
+        for beside in [0.05, 0.1, 0.15, 0.19, 0.3] {
+            let pair = scans(beside);
+            let x = StoneVector::zeros();
+            let information = equations(&pair, &x, &x, &NOISE, &layout).information;
+            let eigenvalues = information.symmetric_eigenvalues();
+            let scale = information.diagonal().max();
+            assert!(eigenvalues.min() > -1e-9 * scale, "{beside}: {eigenvalues}");
+        }
+    }
 }

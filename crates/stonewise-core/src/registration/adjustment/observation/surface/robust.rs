@@ -20,6 +20,8 @@ pub(crate) fn steepness([u, v]: [f64; 2]) -> f64 {
 }
 
 /// Fits the surface; points on its steep parts and points far off it lose weight and it is fitted again.
+///
+/// The weights are those of the fit that is returned: with others, what the surface absorbs of the information could exceed it.
 pub(crate) fn robust_fit(
     grid: PatchGrid,
     epochs: &mut [Vec<WeightedPoint>; 2],
@@ -28,22 +30,33 @@ pub(crate) fn robust_fit(
 ) -> Option<PatchFit> {
     let mut fit = PatchFit::new(grid, [&epochs[0], &epochs[1]], noise)?;
     for _ in 0..REWEIGHTINGS {
-        let mut changed = false;
-        for (observations, sigma) in epochs.iter_mut().zip(noise.sigma_m) {
-            let limit = layout.outlier_sigmas * sigma;
-            for o in observations {
-                let [h, hu, hv] = fit.surface(o.position[0], o.position[1]);
-                let steepness = steepness([hu, hv]);
-                let r = (o.position[2] - h).abs() * steepness.sqrt();
-                let weight = steepness * if r > limit { (limit / r).powi(2) } else { 1.0 };
-                changed |= (weight - o.weight).abs() > CHANGED;
-                o.weight = weight;
-            }
-        }
-        if !changed {
+        let weights = [0, 1].map(|epoch| {
+            let limit = layout.outlier_sigmas * noise.sigma_m[epoch];
+            let points = epochs[epoch].iter();
+            points.map(|o| weight(&fit, o, limit)).collect::<Vec<f64>>()
+        });
+        let points = || epochs.iter().flatten().zip(weights.iter().flatten());
+        if points().all(|(o, weight)| (weight - o.weight).abs() <= CHANGED) {
             break;
+        }
+        for (o, weight) in epochs.iter_mut().flatten().zip(weights.iter().flatten()) {
+            o.weight = *weight;
         }
         fit = PatchFit::new(grid, [&epochs[0], &epochs[1]], noise)?;
     }
     Some(fit)
+}
+
+/// Weight of a point by the slopes of the surface there and its distance from it.
+fn weight(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
+    let [u, v, z] = point.position;
+    let [h, hu, hv] = fit.surface(u, v);
+    let steepness = steepness([hu, hv]);
+    let distance = (z - h).abs() * steepness.sqrt();
+    let outlying = if distance > limit_m {
+        (limit_m / distance).powi(2)
+    } else {
+        1.0
+    };
+    steepness * outlying
 }
