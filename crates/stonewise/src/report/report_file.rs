@@ -135,7 +135,10 @@ mod tests {
         assert!(
             html.contains("is included in the limits: the stable areas show a registration error of 3.2 mm.")
         );
-        assert!(html.contains("finished <b>2026-04-30 12:00 UTC</b>") && html.contains("temperature_c 9.5"));
+        assert!(
+            html.contains("finished <b>2026-04-30 12:00 UTC</b>")
+                && html.contains("temperature 9.5\u{a0}\u{b0}C")
+        );
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         let html = written(&html);
@@ -328,6 +331,74 @@ mod tests {
         ] {
             assert!(html.contains(words), "{words}");
         }
+    }
+
+    /// What stands in all elements of a name, without markup inside it.
+    fn inside(html: &str, name: &str) -> Vec<String> {
+        let parts = html.split(&format!("<{name}")).skip(1);
+        parts
+            .filter_map(|part| {
+                let content = part.split_once('>')?.1.split(&format!("</{name}>")).next()?;
+                let text: String = content
+                    .split('<')
+                    .map(|t| t.split_once('>').map_or(t, |t| t.1))
+                    .collect();
+                Some(text)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_german_report_has_no_english_heading() {
+        let german = crate::ReportParams {
+            language: Language::German,
+            ..crate::ReportParams::default()
+        };
+        let both = [crate::ReportParams::default(), german].map(|params| {
+            let mut run = run_record("Wall", &["A", "B"]);
+            run.parameters.report = params;
+            written(&report(&rows(), Some(&run)))
+        });
+        for name in [
+            "h2",
+            "h3",
+            "h4",
+            "figcaption",
+            "summary",
+            "th",
+            "nav",
+            "dt",
+            "title",
+        ] {
+            let [english, german] = both.each_ref().map(|html| inside(html, name));
+            assert_eq!(english.len(), german.len(), "{name}");
+            for (e, g) in english.iter().zip(&german) {
+                // Names that are the same in both languages, codes of statuses, keys of run.json.
+                let is_same = [
+                    "Status",
+                    "status",
+                    "Datum",
+                    "Parameter",
+                    "Definitionen",
+                    "M3C2",
+                    "LoD95",
+                    "NMAD mm",
+                    "RMSE mm",
+                    "3D mm",
+                    "Instanz",
+                ]
+                .iter()
+                .any(|word| g.starts_with(word));
+                let is_key = name == "dt"
+                    && g.chars()
+                        .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+                assert!(e != g || is_same || is_key || g.len() < 3, "{name}: {g}");
+            }
+        }
+        // Numbers of tables and pictures.
+        assert!(
+            both[1].contains("<td class=\"n\">20,4</td>") && !both[1].contains("<td class=\"n\">20.4</td>")
+        );
     }
 
     #[test]
