@@ -175,6 +175,8 @@ impl Shown {
                 self.say(&joined(Some(place.trim_start()), &words), now);
             }
             (None, Some(_)) => {}
+            // A small part of a step whose files were there.
+            (None, None) if self.steps.is_within() => {}
             (None, None) => self.say(&self.part.what.clone(), now),
         }
     }

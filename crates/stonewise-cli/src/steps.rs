@@ -82,6 +82,11 @@ impl Steps {
         }
     }
 
+    /// Whether a step of the list has begun, or was done earlier: what begins now is a part of it.
+    pub fn is_within(&self) -> bool {
+        !matches!(self.at, At::Nothing)
+    }
+
     /// The steps after the one at work.
     pub fn to_come(&self) -> &[String] {
         let (At::Work(step, _) | At::TakenOver(step)) = self.at else {

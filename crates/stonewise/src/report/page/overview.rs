@@ -4,6 +4,7 @@ use super::first_page;
 use super::html::{details, section, table};
 use crate::figure::{count, escape};
 use crate::report::summary::{FALSE_ALARMS, Summary};
+use crate::results::records::ReasonCode;
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
 use crate::texts::{Texts, fill};
 use nalgebra::Point2;
@@ -57,7 +58,16 @@ fn tiles(facts: &Summary) -> String {
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
         },
     ];
-    format!("<div class=\"tiles\">{}</div>", tiles.concat())
+    let is_doubted = facts
+        .verdict
+        .reasons
+        .iter()
+        .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt));
+    let note = match is_doubted {
+        true => format!("<p class=\"hedge\">{}</p>", page.as_computed),
+        false => String::new(),
+    };
+    format!("{note}<div class=\"tiles\">{}</div>", tiles.concat())
 }
 
 fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
