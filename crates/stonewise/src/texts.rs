@@ -376,7 +376,7 @@ static GERMAN: Texts = Texts {
         signature: "Unterschrift",
         place_date: "Ort und Datum",
         tile_measured: "von {m} Steinen gemessen",
-        tile_moved: "haben sich bewegt (Falscherkennungsrate 5\u{a0}%)",
+        tile_moved: "haben sich bewegt (Falscherkennungsrate 5 %)",
         tile_above: "\u{fc}ber ihrer eigenen 95-%-Grenze",
         tile_loose: "lose: bewegen sich anders als ihre Nachbarn",
         tile_limit: "Nachweisgrenze (95 %, Median)",

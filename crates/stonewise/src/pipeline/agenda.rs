@@ -4,6 +4,9 @@ use crate::pipeline::run::Until;
 use crate::project::{Estimator, Project};
 use stonewise_core::progress::Progress;
 
+/// Name of the steps that edit labels, before their numbers.
+const EDITS: &str = "edit";
+
 /// The steps of a run in order: each under the name by which the runner knows it, and in words. Work that is not on the
 /// list counts as part of the step before it.
 #[derive(Debug, Default)]
@@ -18,6 +21,9 @@ impl Agenda {
         agenda.push(project, 1..=last, "segment", "stones in the photos of");
         if until >= Until::Labelled {
             agenda.push(project, 1..=last, "label", "stones in the clouds of");
+        }
+        if until >= Until::Labelled && project.edits.is_some() {
+            agenda.0.push((EDITS.to_owned(), "edits by hand".to_owned()));
         }
         if until >= Until::Matched {
             agenda.0.push(("outlines".to_owned(), "outlines".to_owned()));
@@ -47,7 +53,10 @@ impl Agenda {
 
     /// Place of a step in the list, counted from 0.
     pub fn place(&self, step: &str) -> Option<usize> {
-        self.0.iter().position(|(name, _)| name == step)
+        // Edits are one step for a reader, whichever epochs they touch.
+        let is_edit = step.strip_prefix(EDITS).is_some_and(|rest| rest.starts_with('-'));
+        let wanted = if is_edit { EDITS } else { step };
+        self.0.iter().position(|(name, _)| name == wanted)
     }
 
     /// The steps of a later epoch.

@@ -338,10 +338,11 @@ mod tests {
 
     /// What stands in all elements of a name, without markup inside it.
     fn inside(html: &str, name: &str) -> Vec<String> {
-        let parts = html.split(&format!("<{name}")).skip(1);
+        let (start, end) = (format!("<{name}"), format!("</{name}>"));
+        let parts = html.split(&start).skip(1);
         parts
             .filter_map(|part| {
-                let content = part.split_once('>')?.1.split(&format!("</{name}>")).next()?;
+                let content = part.split_once('>')?.1.split(&end).next()?;
                 let text: String = content
                     .split('<')
                     .map(|t| t.split_once('>').map_or(t, |t| t.1))

@@ -86,6 +86,7 @@ in_both! {
         below: "below its own limit (faded)", "unter der eigenen Grenze (blass)";
         unmeasured: "not measured", "nicht gemessen";
         loose: "loose", "lose";
+        edited: "edited by hand", "von Hand geändert";
         intro: "The wall seen from the front, unrolled. Components share one scale; millimetres, second epoch minus first.",
             "Die Mauer von vorn, abgewickelt. Die Komponenten teilen eine Skala; Millimeter, zweite Epoche minus erste.";
         beyond: " {n} components exceed the scale and have its end colours.",

@@ -227,7 +227,8 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     if !edited.is_empty() {
         let _ = write!(
             out,
-            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>edited by hand</title></path>"#
+            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>{}</title></path>"#,
+            layout.texts.maps.edited
         );
     }
     if !loose.is_empty() {
