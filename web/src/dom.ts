@@ -26,9 +26,10 @@ export function svg<K extends keyof SVGElementTagNameMap>(
   return element;
 }
 
-/** A button that says what it does. */
-export function button(text: string, title: string, press: () => void): HTMLButtonElement {
-  const element = el("button", { type: "button", title, "aria-label": title }, text);
+/** A button. Its name is its text, so that what is seen can be said; a sign that is no word gets the hint as its name. */
+export function button(text: string, hint: string, press: () => void): HTMLButtonElement {
+  const isWord = /\p{L}/u.test(text);
+  const element = el("button", { type: "button", ...(hint ? { title: hint } : {}), ...(isWord ? {} : { "aria-label": hint }) }, text);
   element.addEventListener("click", press);
   return element;
 }

@@ -1,12 +1,14 @@
-// Numbers as text: true minus signs, a dash where there is no value.
+// Numbers as text: true minus signs, the language's decimal mark, a dash where there is no value.
+
+import { DECIMAL } from "./texts.ts";
 
 export const DASH = "\u2013";
 
 /** A number with this many decimals. */
 export function fixed(value: number, decimals: number): string {
   if (!Number.isFinite(value)) return DASH;
-  const text = Math.abs(value).toFixed(decimals);
-  return value < 0 && Number(text) !== 0 ? `\u2212${text}` : text;
+  const text = Math.abs(value).toFixed(decimals), sign = value < 0 && Number(text) !== 0 ? "\u2212" : "";
+  return sign + text.replace(".", DECIMAL);
 }
 
 /** The same with a plus sign before positive values. */
@@ -24,7 +26,7 @@ export function mm(metres: number): string {
 /** A length with its sign, decimals as in `mm`. */
 export function signedMm(metres: number): string {
   const text = mm(metres);
-  return metres > 0 && Number(text) !== 0 ? `+${text}` : text;
+  return metres > 0 && /[1-9]/.test(text) ? `+${text}` : text;
 }
 
 /** A share as a percentage. */

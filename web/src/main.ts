@@ -1,9 +1,11 @@
 // Starts the interactive part of the report. Without it the page is whole, only still.
 
-import { readReport } from "./data.ts";
+import { isMeasured, readReport } from "./data.ts";
 import { el } from "./dom.ts";
 import { quantities } from "./quantities.ts";
 import { Store } from "./store.ts";
+import { t } from "./texts.ts";
+import { reachable } from "./reachable.ts";
 import { enliven } from "./views/charts.ts";
 import { legend } from "./views/legend.ts";
 import { stoneList } from "./views/list.ts";
@@ -12,7 +14,7 @@ import { Photos } from "./views/photos.ts";
 import { profile } from "./views/profile.ts";
 import { WallScene } from "./views/scene.ts";
 import { Sections } from "./views/sections.ts";
-import { StonePanel } from "./views/stone.ts";
+import { StonePanel, byMotion } from "./views/stone.ts";
 import { toolbar } from "./views/toolbar.ts";
 import "./style.css";
 
@@ -20,8 +22,11 @@ async function start(): Promise<void> {
   const place = document.getElementById("explore");
   const report = place ? await readReport(document) : null;
   if (!place || !report) return;
+  // The largest motion is what a reader wants to see first.
+  const largest = byMotion(report.stones)[0] ?? -1;
   const store = new Store({
-    quantity: "out", fade: true, arrows: false, view: "map", tool: "move", hover: -1, chosen: -1, follow: 0, profile: null,
+    quantity: "out", fade: true, arrows: false, view: "map", tool: "move", hover: -1,
+    chosen: largest >= 0 && isMeasured(report.stones, largest) ? largest : -1, follow: 0, profile: null,
   });
   const shown = quantities(report);
   const map = new WallMap(report, store, shown);
@@ -32,7 +37,7 @@ async function start(): Promise<void> {
     try {
       if (inSpace) scene ??= new WallScene(report, store, shown);
     } catch (error) {
-      pictures.append(el("p", { class: "note no-scene" }, `This browser shows no 3D graphics (WebGL): ${String(error)}`));
+      pictures.append(el("p", { class: "note no-scene" }, t("no3d", { error: String(error) })));
     }
     if (scene && !scene.element.isConnected) pictures.append(scene.element);
     if (scene) scene.element.hidden = !inSpace;
@@ -47,10 +52,12 @@ async function start(): Promise<void> {
     toolbar(report, store, shown, () => (store.get().view === "scene" && scene ? scene : map)),
     legend(report, store, shown),
     el("div", { class: "views" }, pictures, panel.element),
+    panel.announcer,
     profile(report, store),
     stoneList(report, store),
   );
   enliven(report, store);
+  reachable(document.querySelectorAll<HTMLElement>("main > section .scroll, header .scroll"));
   place.hidden = false;
   for (const link of document.querySelectorAll<HTMLAnchorElement>("a[data-stone]")) {
     const stone = report.indexOfId.get(Number(link.dataset["stone"]));

@@ -1,6 +1,7 @@
 // What the map and the 3D view can show of a stone.
 
 import { type Report, isMeasured, norm } from "./data.ts";
+import { t } from "./texts.ts";
 
 export type QuantityKey =
   | "out" | "along" | "up" | "norm" | "limit" | "relative" | "rotation" | "opening" | "m3c2" | "difference"
@@ -40,45 +41,45 @@ export function quantities(report: Report): readonly Quantity[] {
     value: (i) => stones.move[axis][i]! * 1e3,
   });
   const all: readonly Quantity[] = [
-    component("out", 2, "Out of the wall", "Positive towards the viewer."),
-    component("along", 0, "Along the wall", "Positive to the right of a viewer who faces the wall."),
-    component("up", 1, "Up the face", "Positive upwards along the batter."),
+    component("out", 2, t("quantityOut"), t("quantityOutNote")),
+    component("along", 0, t("quantityAlong"), t("quantityAlongNote")),
+    component("up", 1, t("quantityUp"), t("quantityUpNote")),
     {
-      key: "norm", label: "Length of the motion", unit: "mm", scale: "sequential", limit: limits.norm, fades: true,
-      decimals: 1, value: (i) => norm(stones.move, i) * 1e3, note: "In three dimensions.",
+      key: "norm", label: t("quantityNorm"), unit: "mm", scale: "sequential", limit: limits.norm, fades: true,
+      decimals: 1, value: (i) => norm(stones.move, i) * 1e3, note: t("quantityNormNote"),
     },
     {
-      key: "limit", label: "Detection limit (LoD95)", unit: "mm", scale: "sequential", limit: limits.limit, fades: false,
-      decimals: 2, value: (i) => stones.limit[i]! * 1e3, note: "What a motion must exceed to be above its 95 % limit.",
+      key: "limit", label: t("quantityLimit"), unit: "mm", scale: "sequential", limit: limits.limit, fades: false,
+      decimals: 2, value: (i) => stones.limit[i]! * 1e3, note: t("quantityLimitNote"),
     },
     {
-      key: "relative", label: "Against the neighbours", unit: "mm", scale: "sequential", limit: limits.relative, fades: false,
-      decimals: 2, value: (i) => norm(stones.relative, i) * 1e3, note: "Length of the difference to what the neighbours predict.",
+      key: "relative", label: t("quantityRelative"), unit: "mm", scale: "sequential", limit: limits.relative, fades: false,
+      decimals: 2, value: (i) => norm(stones.relative, i) * 1e3, note: t("quantityRelativeNote"),
     },
     {
-      key: "rotation", label: "Rotation", unit: "mrad", scale: "sequential", limit: limits.rotation, fades: false,
-      decimals: 2, value: (i) => norm(stones.rotation, i) * 1e3, note: "Angle of the stone's turn.",
+      key: "rotation", label: t("quantityRotation"), unit: "mrad", scale: "sequential", limit: limits.rotation, fades: false,
+      decimals: 2, value: (i) => norm(stones.rotation, i) * 1e3, note: t("quantityRotationNote"),
     },
     {
-      key: "opening", label: "Joint opening", unit: "mm", scale: "diverging", limit: limits.opening, fades: true, decimals: 2,
-      value: () => NaN, note: "Across each joint: red opens, blue closes. Pale: less than its 95 % uncertainty.",
+      key: "opening", label: t("quantityOpening"), unit: "mm", scale: "diverging", limit: limits.opening, fades: true, decimals: 2,
+      value: () => NaN, note: t("quantityOpeningNote"),
     },
     {
-      key: "m3c2", label: "M3C2 distance", unit: "mm", scale: "diverging", limit: limits.component, fades: true, decimals: 1,
+      key: "m3c2", label: t("quantityM3c2"), unit: "mm", scale: "diverging", limit: limits.component, fades: true, decimals: 1,
       value: (i) => stones.m3c2[i]! * 1e3,
-      note: "Between the clouds along their normals, for comparison; blind to motion within the face.",
+      note: t("quantityM3c2Note"),
     },
     {
-      key: "difference", label: "Stone minus M3C2", unit: "mm", scale: "diverging", limit: limits.component, fades: false, decimals: 1,
-      value: (i) => (stones.move[2][i]! - stones.m3c2[i]!) * 1e3, note: "Out of the wall: the stone's motion less the median M3C2 distance on it.",
+      key: "difference", label: t("quantityDifference"), unit: "mm", scale: "diverging", limit: limits.component, fades: false, decimals: 1,
+      value: (i) => (stones.move[2][i]! - stones.m3c2[i]!) * 1e3, note: t("quantityDifferenceNote"),
     },
     {
-      key: "confidence", label: "Confidence of the outline", unit: "%", scale: "sequential", start: 50, limit: 100, fades: false, decimals: 0,
-      value: (i) => stones.confidence[i]! * 100, note: "Mean share of the photos' votes that the stone's points gave it.",
+      key: "confidence", label: t("quantityConfidence"), unit: "%", scale: "sequential", start: 50, limit: 100, fades: false, decimals: 0,
+      value: (i) => stones.confidence[i]! * 100, note: t("quantityConfidenceNote"),
     },
     {
-      key: "status", label: "Outcome", unit: "", scale: "outcomes", limit: 1, fades: false, decimals: 0,
-      value: (i) => measured(i, 0), note: "What became of every stone.",
+      key: "status", label: t("quantityStatus"), unit: "", scale: "outcomes", limit: 1, fades: false, decimals: 0,
+      value: (i) => measured(i, 0), note: t("quantityStatusNote"),
     },
   ];
   const hasChange = report.change.a.length > 0;

@@ -9,7 +9,7 @@ import { fileURLToPath } from "node:url";
 import { launch, open } from "./browser.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
-/** Folder of made reports (`200` and `10000`), to test without cargo. */
+/** Folder of made reports (`200`, `10000` and `german`), to test without cargo. */
 const given = process.env["REPORTS"];
 let browser, folder = given;
 
@@ -22,6 +22,7 @@ before(async () => {
   for (const stones of [200, 10_000]) {
     execFileSync(join(target, "debug/examples/sample_report"), [String(stones), join(folder, String(stones))]);
   }
+  execFileSync(join(target, "debug/examples/sample_report"), ["200", join(folder, "german"), "moved", "de"]);
 });
 
 after(async () => {
@@ -43,6 +44,89 @@ const colours = (page, selector) =>
     for (let i = 0; i < data.length; i += 4) seen.add((data[i] >> 4) * 4096 + (data[i + 1] >> 4) * 64 + (data[i + 2] >> 4));
     return seen.size;
   });
+
+/** What axe-core finds in a page as it is. */
+async function findings(page) {
+  await page.evaluate(readFileSync(join(root, "web/node_modules/axe-core/axe.min.js"), "utf8"));
+  const { violations } = await page.evaluate(() => axe.run(document, { resultTypes: ["violations"] }));
+  return violations.flatMap((v) => v.nodes.map((n) => `${v.id}: ${n.target.join(" ")}`));
+}
+
+for (const [name, dark, width] of [["200", false, 1440], ["200", true, 390], ["german", false, 834]]) {
+  test(`screen readers and keyboards find everything: ${name}, ${dark ? "dark" : "light"}, ${width} px`, async () => {
+    const { page, close } = await open(browser, report(name), { width, dark });
+    assert.deepEqual(await findings(page), [], "map");
+    await page.click("#view-scene");
+    await page.waitForSelector(".wall-scene canvas[data-drawn]", { timeout: 60_000 });
+    assert.deepEqual(await findings(page), [], "3D");
+    await page.click("#view-map");
+    await page.$$eval("details", (all) => all.forEach((d) => (d.open = true)));
+    await page.waitForSelector(".stone-list tbody tr");
+    assert.deepEqual(await findings(page), [], "folded parts");
+    // What is seen can be said: the name of a button is its text, unless that is a mere sign.
+    const odd = await page.$$eval("button", (all) => all
+      .filter((b) => /\p{L}/u.test(b.textContent) && b.hasAttribute("aria-label")).map((b) => b.outerHTML));
+    assert.deepEqual(odd, []);
+    await close();
+  });
+}
+
+test("the largest motion is chosen from the start, and the whole wall is in view", async () => {
+  const { page, close } = await open(browser, report(200));
+  const stone = await page.textContent(".stone-panel h3");
+  await page.click(".stone-list summary");
+  assert.equal(stone, `Stone ${await page.textContent(".stone-list tbody tr:first-child a")}`);
+  const fits = await page.$eval(".stone-panel", (e) => [e.scrollHeight > e.clientHeight, getComputedStyle(e).overflowY, e.tabIndex]);
+  assert.deepEqual(fits, [true, "auto", 0]);
+  await close();
+});
+
+test("the chosen stone keeps its colour in space", async () => {
+  const { page, close } = await open(browser, report(200));
+  await page.focus(".wall-map canvas");
+  await page.keyboard.press("Escape");
+  await page.click("#view-scene");
+  const canvas = ".wall-scene canvas";
+  await page.waitForSelector(`${canvas}[data-drawn]`, { timeout: 60_000 });
+  const drawn = async (act) => {
+    const frame = await page.getAttribute(canvas, "data-drawn");
+    await act();
+    await page.waitForFunction((f) => document.querySelector(".wall-scene canvas").dataset.drawn !== f, frame, { timeout: 60_000 });
+    return page.$eval(canvas, (c) => {
+      const copy = document.createElement("canvas");
+      [copy.width, copy.height] = [c.width, c.height];
+      const pen = copy.getContext("2d");
+      pen.drawImage(c, 0, 0);
+      return Array.from(pen.getImageData(0, 0, c.width, c.height).data);
+    });
+  };
+  await drawn(() => page.selectOption("#clouds", "none"));
+  const without = await drawn(() => page.uncheck(".scene-controls label:has-text('arrows') input"));
+  const chosen = await drawn(() => page.fill("#search", "100"));
+  let changed = 0;
+  for (let i = 0; i < without.length; i += 4) {
+    if ([0, 1, 2].some((k) => Math.abs(without[i + k] - chosen[i + k]) > 8)) changed++;
+  }
+  // An outline, not the face: far less than the stone's 1/200 of the wall, and more than nothing.
+  assert.ok(changed > 50 && changed < without.length / 4 / 250, `${changed} of ${without.length / 4} pixels`);
+  await close();
+});
+
+test("a German report speaks German", async () => {
+  const { page, trouble, close } = await open(browser, report("german"));
+  assert.equal(await page.getAttribute("html", "lang"), "de");
+  await page.click("#view-scene");
+  await page.click("#view-map");
+  await page.$$eval("details", (all) => all.forEach((d) => (d.open = true)));
+  await page.waitForSelector(".stone-list tbody tr");
+  const seen = await page.$$eval("#explore button, #explore label, #explore option, #explore h3, #explore h4, #explore th, h2, h3, figcaption, summary",
+    (all) => all.map((e) => e.textContent.trim()));
+  const english = seen.filter((text) => /\b(the|wall|stone|stones|show|motion|along|moved|above|below|measured|all|page|outline|points|limit)\b/i.test(text));
+  assert.deepEqual(english, []);
+  assert.match(await page.textContent(".stone-panel .numbers"), /\d,\d/);
+  assert.deepEqual(trouble, []);
+  await close();
+});
 
 for (const stones of [200, 10_000]) {
   describe(`${stones} stones`, () => {

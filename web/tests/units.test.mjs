@@ -4,12 +4,13 @@ import { test } from "node:test";
 import { gzipSync } from "node:zlib";
 import { load } from "./load.mjs";
 
-const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, movedBack } =
+const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, TABLE, movedBack } =
   await load(`
     export { Columns, unpack } from "./src/blocks.ts";
     export * from "./src/geometry.ts";
     export * from "./src/format.ts";
     export { Store } from "./src/store.ts";
+    export { TABLE } from "./src/texts.ts";
     export { movedBack } from "./src/views/sections.ts";
   `);
 
@@ -28,6 +29,15 @@ test("columns come out of base64 of gzip, and missing values are NaN", async () 
   assert.ok(Math.abs(d[0] - 0.001234) < 1e-12 && Number.isNaN(d[1]));
   assert.equal(columns.integers("flag")[0], 200);
   assert.throws(() => columns.numbers("none"), /no column none/);
+});
+
+test("both languages have every text, with the same values to fill in", () => {
+  const braces = (text) => [...text.matchAll(/\{\w+\}/g)].map(String).sort().join();
+  for (const [key, texts] of Object.entries(TABLE)) {
+    assert.equal(texts.length, 2, key);
+    assert.ok(texts.every((text) => text.trim() !== ""), key);
+    assert.equal(braces(texts[0]), braces(texts[1]), key);
+  }
 });
 
 test("numbers read as an engineer writes them", () => {

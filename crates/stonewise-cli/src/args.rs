@@ -86,7 +86,9 @@ pub enum Command {
     #[command(after_help = "Example:\n  stonewise evaluate results/ --truth truth/stones.csv")]
     Evaluate(EvaluateArgs),
     /// Write the report of a finished run again, from its result files only.
-    #[command(after_help = "Example:\n  stonewise report results/")]
+    #[command(
+        after_help = "Examples:\n  stonewise report results/\n  stonewise report results/ --pdf report.pdf --no-appendix"
+    )]
     Report(ReportArgs),
     /// Simulate a survey with known truth.
     #[command(after_help = "Examples:\n  stonewise simulate --seed 7 --out survey/\n  \
@@ -324,6 +326,12 @@ pub struct EvaluateArgs {
 pub struct ReportArgs {
     /// Folder of a finished run.
     pub results: PathBuf,
+    /// Print the report to this file, too; needs Chromium, Chrome or Edge.
+    #[arg(long, value_name = "FILE")]
+    pub pdf: Option<PathBuf>,
+    /// Leave parameters, digests and decisions about masks out of the PDF.
+    #[arg(long, requires = "pdf")]
+    pub no_appendix: bool,
 }
 
 /// Which experiment.

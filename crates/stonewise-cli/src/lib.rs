@@ -5,6 +5,8 @@
 mod args;
 mod commands;
 mod printer;
+mod screen;
+mod steps;
 
 pub use commands::measure;
 use std::ffi::OsString;
@@ -33,7 +35,10 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
     };
     let printer = printer::Printer::new(args.quiet);
     let outcome = commands::dispatch(args, &printer);
-    printer.finish();
+    match &outcome {
+        Ok(_) => printer.finish(),
+        Err(_) => printer.abandon(),
+    }
     match outcome {
         Ok(commands::Outcome::Done) => DONE,
         Ok(commands::Outcome::InDoubt) => IN_DOUBT,

@@ -1,36 +1,67 @@
-//! The log and the progress bar: all of it on stderr.
+//! The log and the progress: all of it on stderr.
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::screen::Screen;
+use crate::steps::{Ended, Steps, wrapped};
 use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, Once, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::time::Instant;
 use stonewise_core::progress::Progress;
 
-/// Shows progress as a bar on a terminal, as lines elsewhere; Ctrl-C asks the work to stop.
+/// Seconds until a step of a log that is not a terminal says again where it stands; doubled each time, so that a step of a second and one of
+/// a day both leave a few lines.
+const FIRST_WAIT_S: f64 = 5.0;
+/// The longest such wait: within it a reader of the log sees that the run is alive.
+const LONGEST_WAIT_S: f64 = 600.0;
+
+/// Shows progress as a list of steps with a bar on a terminal, as lines elsewhere; Ctrl-C asks the work to stop.
 pub struct Printer {
-    bar: Mutex<ProgressBar>,
+    shown: Mutex<Shown>,
     quiet: bool,
-    terminal: bool,
     cancelled: Arc<AtomicBool>,
     listening: Once,
     started: Instant,
-    /// The last line of progress where there is no terminal: work that begins anew many times is one line.
-    last: Mutex<String>,
+}
+
+/// What has been shown so far.
+struct Shown {
+    steps: Steps,
+    part: Part,
+    /// Where stderr is a terminal.
+    screen: Option<Screen>,
+    /// The last line of progress where it is not: work that begins anew many times is one line.
+    last: String,
+    /// When the step may say again where it stands, seconds.
+    next: f64,
+    wait: f64,
+}
+
+/// The part of a step at work.
+#[derive(Default)]
+struct Part {
+    what: String,
+    detail: String,
+    done: u64,
+    total: u64,
 }
 
 impl Printer {
     /// A printer for this command.
     pub fn new(quiet: bool) -> Self {
-        let terminal = std::io::stderr().is_terminal();
+        let screen = std::io::stderr().is_terminal().then(Screen::new);
         Self {
-            bar: Mutex::new(ProgressBar::hidden()),
+            shown: Mutex::new(Shown {
+                steps: Steps::default(),
+                part: Part::default(),
+                screen,
+                last: String::new(),
+                next: 0.0,
+                wait: FIRST_WAIT_S,
+            }),
             quiet,
-            terminal,
             cancelled: Arc::new(AtomicBool::new(false)),
             listening: Once::new(),
             started: Instant::now(),
-            last: Mutex::default(),
         }
     }
 
@@ -56,19 +87,112 @@ impl Printer {
 
     /// One line of the log.
     pub fn log(&self, line: &str) {
-        if !self.quiet {
-            self.bar().suspend(|| note(line));
+        if self.quiet {
+            return;
+        }
+        match &self.shown().screen {
+            Some(screen) => screen.above(|| {
+                let lines = wrapped(line, screen.width());
+                lines.iter().for_each(|line| note(line));
+            }),
+            None => note(line),
         }
     }
 
-    /// Takes the bar away.
+    /// The list of steps is at its end.
     pub fn finish(&self) {
-        self.bar().finish_and_clear();
+        let now = self.now();
+        let mut shown = self.shown();
+        if let Some(ended) = shown.steps.end(now).filter(|_| !self.quiet) {
+            shown.ended(&ended, now);
+        }
+        if let Some(screen) = &shown.screen {
+            screen.clear();
+        }
     }
 
-    fn bar(&self) -> std::sync::MutexGuard<'_, ProgressBar> {
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Takes the bar away; a step that did not come to its end is marked so.
+    pub fn abandon(&self) {
+        let shown = self.shown();
+        if let Some(screen) = &shown.screen {
+            screen.clear();
+            if let Some(step) = shown.steps.present().filter(|_| !self.quiet) {
+                screen.failed(&step);
+            }
+        }
     }
+
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn now(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+}
+
+impl Shown {
+    fn ended(&mut self, ended: &Ended, now: f64) {
+        match (&self.screen, ended.seconds) {
+            (Some(screen), _) => screen.ended(ended),
+            (None, None) => note(&format!("[{now:.1} s] {}, done earlier", ended.step.trim_start())),
+            (None, Some(_)) => {}
+        }
+    }
+
+    /// A step begins.
+    fn entered(&mut self, now: f64) {
+        self.part = Part::default();
+        let Some(step) = self.steps.present() else { return };
+        match &self.screen {
+            Some(screen) => screen.begin(&step, self.steps.to_come()),
+            None => {
+                note(&format!("[{now:.1} s] {}", step.trim_start()));
+                (self.wait, self.next) = (FIRST_WAIT_S, now + FIRST_WAIT_S);
+            }
+        }
+    }
+
+    /// A part of a step begins, or goes on.
+    fn show(&mut self, now: f64) {
+        let place = self.steps.present();
+        match (&self.screen, place) {
+            (Some(screen), place) => {
+                let words = joined(None, &[self.part.what.as_str(), self.part.detail.as_str()]);
+                match place {
+                    Some(place) => screen.part(&place, &words, self.part.total, self.part.done),
+                    None => screen.part(&words, "", self.part.total, self.part.done),
+                }
+            }
+            (None, Some(place)) if now >= self.next => {
+                self.wait = (2.0 * self.wait).min(LONGEST_WAIT_S);
+                self.next = now + self.wait;
+                let count = match self.part.total {
+                    0 => String::new(),
+                    total => format!("{} of {total}", self.part.done),
+                };
+                let words = [self.part.what.as_str(), self.part.detail.as_str(), count.as_str()];
+                self.say(&joined(Some(place.trim_start()), &words), now);
+            }
+            (None, Some(_)) => {}
+            // A small part of a step whose files were there.
+            (None, None) if self.steps.is_within() => {}
+            (None, None) => self.say(&self.part.what.clone(), now),
+        }
+    }
+
+    /// A line of progress that differs from the last.
+    fn say(&mut self, line: &str, now: f64) {
+        if std::mem::replace(&mut self.last, line.to_owned()) != line {
+            note(&format!("[{now:.1} s] {line}"));
+        }
+    }
+}
+
+/// The place of a step, and what it is at.
+fn joined(place: Option<&str>, words: &[&str]) -> String {
+    let words = words.iter().copied().filter(|w| !w.is_empty());
+    place.into_iter().chain(words).collect::<Vec<_>>().join(", ")
 }
 
 impl Progress for Printer {
@@ -77,29 +201,64 @@ impl Progress for Printer {
         if self.quiet {
             return;
         }
-        let mut bar = self.bar();
-        bar.finish_and_clear();
-        if !self.terminal {
-            let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-            if std::mem::replace(&mut *last, what.to_owned()) == what {
-                return;
-            }
-            note(&format!(
-                "[{:7.1} s] {what}",
-                self.started.elapsed().as_secs_f64()
-            ));
-            return;
-        }
-        let style = ProgressStyle::with_template("{msg:28} {bar:30} {percent:>3} % {eta:>5}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-        *bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(8))
-            .with_style(style);
-        bar.set_message(what.to_owned());
+        let mut shown = self.shown();
+        shown.part = Part {
+            what: what.to_owned(),
+            total,
+            ..Part::default()
+        };
+        shown.show(self.now());
     }
 
     fn advance(&self, units: u64) {
-        if self.terminal && !self.quiet {
-            self.bar().inc(units);
+        if self.quiet {
+            return;
+        }
+        let mut shown = self.shown();
+        shown.part.done += units;
+        match &shown.screen {
+            Some(screen) => screen.advance(units),
+            None if shown.steps.present().is_some() => shown.show(self.now()),
+            None => {}
+        }
+    }
+
+    fn agenda(&self, steps: &[String]) {
+        self.finish();
+        self.shown().steps.list(steps);
+    }
+
+    fn enter(&self, step: usize) {
+        self.listen();
+        let now = self.now();
+        let mut shown = self.shown();
+        let before = shown.steps.present();
+        let ended = shown.steps.enter(step, now);
+        if self.quiet || shown.steps.present() == before {
+            return;
+        }
+        if let Some(ended) = ended {
+            shown.ended(&ended, now);
+        }
+        shown.entered(now);
+    }
+
+    fn take_over(&self, step: usize) {
+        let now = self.now();
+        let mut shown = self.shown();
+        if let Some(ended) = shown.steps.take_over(step, now).filter(|_| !self.quiet) {
+            shown.ended(&ended, now);
+        }
+    }
+
+    fn detail(&self, unit: &str) {
+        if self.quiet {
+            return;
+        }
+        let mut shown = self.shown();
+        unit.clone_into(&mut shown.part.detail);
+        if shown.steps.present().is_some() || shown.screen.is_some() {
+            shown.show(self.now());
         }
     }
 

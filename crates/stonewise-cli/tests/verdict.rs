@@ -6,7 +6,7 @@ mod support;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use support::{copy_of, run, survey};
+use support::{copy_of, outcome, run, stonewise, survey};
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
@@ -29,6 +29,27 @@ fn edit(survey: &Path, from: &str, to: &str) {
     fs::write(&path, text.replace(from, to)).unwrap();
 }
 
+/// Every step has a line with its place, in order, and no line is said twice.
+fn check_progress(log: &str) {
+    let lines: Vec<&str> = log.lines().filter(|l| l.starts_with('[')).collect();
+    let texts: Vec<&str> = lines
+        .iter()
+        .filter_map(|l| Some(l.split_once(" s] ")?.1))
+        .collect();
+    assert_eq!(texts.len(), lines.len(), "{log}");
+    let mut places = Vec::new();
+    for (i, text) in texts.iter().enumerate() {
+        assert!(!texts[..i].contains(text), "said twice: {text}");
+        let (place, of) = text.split(' ').next().unwrap().split_once('/').unwrap();
+        places.push((place.parse::<usize>().unwrap(), of.parse::<usize>().unwrap()));
+    }
+    assert!(places.is_sorted(), "{places:?}");
+    let all = places.last().unwrap().1;
+    let named: std::collections::BTreeSet<usize> = places.iter().map(|p| p.0).collect();
+    assert!(named.into_iter().eq(1..=all), "{log}");
+    assert!(log.contains(&format!("/{all} adjustment of epoch")), "{log}");
+}
+
 #[test]
 fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
     // The simulated wall stands still; its points are moved by 5.4 cm.
@@ -44,7 +65,9 @@ fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
         sentence.starts_with("Alarm: ") && sentence.contains("beyond the alarm threshold of 10 mm"),
         "{sentence}"
     );
-    assert!(log.contains(sentence), "{log}");
+    // The last thing that a person reads.
+    assert_eq!(log.trim_end().lines().last(), Some(sentence), "{log}");
+    check_progress(&log);
     let record = json(&out.path().join("run.json"));
     assert_eq!(
         (&record["verdict"]["sentence"], &record["verdict"]["state"]),
@@ -70,6 +93,82 @@ fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
     );
     let (code, log) = run(dir.path(), out.path(), &["--exit-on", "attention"]);
     assert!(code == 0 && log.contains("Fine: none of the "), "{code} {log}");
+    check_refusals(out.path());
+    check_pdf(out.path());
+}
+
+/// Prints the report with this browser; the usual one where none is named.
+fn print(results: &Path, pdf: &Path, browser: Option<&Path>, extra: &[&str]) -> (i32, String) {
+    let mut command = stonewise();
+    command
+        .arg("report")
+        .arg(results)
+        .arg("--pdf")
+        .arg(pdf)
+        .args(extra);
+    if let Some(browser) = browser {
+        command.env("STONEWISE_BROWSER", browser);
+    }
+    outcome(&mut command)
+}
+
+/// A browser that fails or is not there leaves everything as it was.
+fn check_refusals(results: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let pdf = folder.path().join("report.pdf");
+    let (code, log) = print(results, &pdf, Some(&folder.path().join("none")), &[]);
+    assert!(
+        code == 1 && log.contains("give the program of Chromium, Chrome or Edge"),
+        "{log}"
+    );
+    fs::write(&pdf, "mine").unwrap();
+    let (code, log) = print(results, &pdf, None, &[]);
+    assert!(
+        code == 2 && log.contains("was not made by `stonewise report`"),
+        "{log}"
+    );
+    // A program that ends well and prints nothing.
+    let (code, log) = print(results, &pdf, Some(Path::new("/bin/true")), &["--force"]);
+    assert!(
+        cfg!(not(unix)) || (code == 1 && log.contains("printed no PDF")),
+        "{log}"
+    );
+    assert_eq!(fs::read(&pdf).unwrap(), b"mine");
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "something was left"
+    );
+    let (code, log) = print(results, &folder.path().join("no/report.pdf"), None, &[]);
+    assert!(code == 2 && log.contains("does not exist"), "{log}");
+}
+
+/// The PDF is whole, is printed again over itself, and is shorter without its appendix.
+fn check_pdf(results: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let pdf = folder.path().join("report.pdf");
+    let (code, log) = print(results, &pdf, None, &[]);
+    if log.contains("none is installed") {
+        assert_eq!(code, 1);
+        return eprintln!("skipped: no browser prints PDF here");
+    }
+    let pages = |path: &Path| {
+        let bytes = fs::read(path).unwrap();
+        assert!(bytes.starts_with(b"%PDF-"));
+        // Every page is an object of its own (ISO 32000-1, 7.7.3.3).
+        let is_page = |w: &[u8]| w.starts_with(b"/Type /Page") && !w.ends_with(b"s");
+        bytes.windows(12).filter(|w| is_page(w)).count()
+    };
+    assert_eq!(code, 0, "{log}");
+    let all = pages(&pdf);
+    let (code, log) = print(results, &pdf, None, &["--no-appendix"]);
+    assert_eq!(code, 0, "{log}");
+    assert!(pages(&pdf) >= 3 && pages(&pdf) < all, "{} of {all}", pages(&pdf));
+    assert_eq!(
+        fs::read_dir(folder.path()).unwrap().count(),
+        1,
+        "something was left"
+    );
 }
 
 #[test]

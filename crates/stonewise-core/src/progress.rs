@@ -11,6 +11,14 @@ pub trait Progress: Sync {
     fn begin(&self, what: &str, total: u64);
     /// `units` more are done.
     fn advance(&self, units: u64);
+    /// The steps of the work that begins now, in order, in words. What follows belongs to one of them, until the next list.
+    fn agenda(&self, _steps: &[String]) {}
+    /// Work on the step with this place in the list, counted from 0, begins or goes on; steps before it have ended.
+    fn enter(&self, _step: usize) {}
+    /// The step with this place in the list, or a part of it, was done earlier.
+    fn take_over(&self, _step: usize) {}
+    /// Which unit is worked on, such as "photo 3 of 14".
+    fn detail(&self, _unit: &str) {}
     /// Something that a person should read now, in one line.
     fn note(&self, _line: &str) {}
     /// True once the caller wants the work to stop.

@@ -82,9 +82,17 @@ pub fn attended<T: Send>(
 struct Messenger {
     events: Mutex<Vec<Event>>,
     done: AtomicU64,
+    steps: Mutex<Steps>,
     cancelled: AtomicBool,
     finished: Mutex<bool>,
     ended: Condvar,
+}
+
+/// The steps that the work announced, and the one at work.
+#[derive(Default)]
+struct Steps {
+    names: Vec<String>,
+    present: Option<usize>,
 }
 
 enum Event {
@@ -106,17 +114,25 @@ struct Told {
 
 impl Progress for Messenger {
     fn begin(&self, what: &str, total: u64) {
+        let what = self.steps().with_step(what);
         let mut events = self.events();
         let before = self.done.swap(0, Ordering::Relaxed);
-        events.push(Event::Begin {
-            what: what.to_owned(),
-            total,
-            before,
-        });
+        events.push(Event::Begin { what, total, before });
     }
 
     fn advance(&self, units: u64) {
         self.done.fetch_add(units, Ordering::Relaxed);
+    }
+
+    fn agenda(&self, steps: &[String]) {
+        *self.steps() = Steps {
+            names: steps.to_vec(),
+            present: None,
+        };
+    }
+
+    fn enter(&self, step: usize) {
+        self.steps().present = Some(step);
     }
 
     fn note(&self, line: &str) {
@@ -131,6 +147,10 @@ impl Progress for Messenger {
 impl Messenger {
     fn events(&self) -> MutexGuard<'_, Vec<Event>> {
         self.events.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn steps(&self) -> MutexGuard<'_, Steps> {
+        self.steps.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn finish(&self) {
@@ -173,6 +193,17 @@ impl Messenger {
             }
         }
         told.advance(py, listeners, done)
+    }
+}
+
+impl Steps {
+    /// A task under the name of its step, such as "9/15 adjustment of 2026-04, iteration 3".
+    fn with_step(&self, what: &str) -> String {
+        let step = self.present.and_then(|at| Some((at + 1, self.names.get(at)?)));
+        step.map_or_else(
+            || what.to_owned(),
+            |(number, name)| format!("{number}/{} {name}, {what}", self.names.len()),
+        )
     }
 }
 

@@ -1,9 +1,10 @@
 //! Made-up results of a wall of any number of stones, for the browser tests of the report (`web/tests`).
 //!
-//! `cargo run --example sample_report -- STONES DIR` writes result files into DIR as `stonewise run` would, with names
-//! from inputs that try to be markup, and makes the report and the layers from them.
+//! `cargo run --example sample_report -- STONES DIR [CASE [LANGUAGE]]` writes result files into DIR as `stonewise run` would, with
+//! names from inputs that try to be markup, and makes the report and the layers from them. CASE: `unknown` (the
+//! default: a moved wall whose datum is unknown), `moved`, `still`, `cannot-tell`, `unconverged`. LANGUAGE: `en` or `de`.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -28,17 +29,22 @@ const JOINT_M: f64 = 0.012;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [stones, dir] = arguments.as_slice() else {
-        return Err("usage: sample_report STONES DIR".into());
+    let (stones, dir, rest) = match arguments.as_slice() {
+        [stones, dir, rest @ ..] => (stones.parse()?, Path::new(dir), rest),
+        _ => return Err("usage: sample_report STONES DIR [CASE [LANGUAGE]]".into()),
     };
-    let (stones, dir) = (stones.parse()?, Path::new(dir));
+    let case = rest.first().map_or("unknown", String::as_str);
+    let language = rest.get(1).map_or("en", String::as_str);
     std::fs::create_dir_all(dir)?;
-    let wall = Wall::new(stones);
+    let wall = Wall {
+        moves: !matches!(case, "still" | "cannot-tell"),
+        ..Wall::new(stones)
+    };
     write_stones(dir, 1, &(0..stones).map(|i| wall.row(i)).collect::<Vec<_>>())?;
     write_outlines(dir, &(0..stones).map(|i| wall.outline(i)).collect::<Vec<_>>())?;
     std::fs::write(dir.join("m3c2.csv"), wall.core_points())?;
     wall.write_evidence(dir, stones)?;
-    write_records(dir)?;
+    write_records(dir, case, language)?;
     write_report(dir)?;
     write_layers(dir)?;
     Ok(())
@@ -51,6 +57,8 @@ struct Wall {
     frame: FaceFrame,
     length_m: f64,
     height_m: f64,
+    /// Whether it moves beyond noise.
+    moves: bool,
 }
 
 impl Wall {
@@ -63,6 +71,7 @@ impl Wall {
             frame: FaceFrame::from_normal(&Vector3::new(0.6, -0.75, 0.2)),
             length_m: columns as f64 * PITCH_M[0],
             height_m: courses as f64 * PITCH_M[1],
+            moves: true,
         }
     }
 
@@ -82,6 +91,9 @@ impl Wall {
 
     /// Displacement as (along, up, out).
     fn motion(&self, [along, up]: [f64; 2], i: usize) -> Vector3<f64> {
+        if !self.moves {
+            return Vector3::new(noise(i, 1), noise(i, 2), noise(i, 3));
+        }
         let (x, y) = (along / self.length_m - 0.5, up / self.height_m - 0.5);
         let bulge = 0.03 * (-(x * x * 30.0 + y * y * 8.0)).exp();
         let loose = if i % 97 == 40 { 0.012 } else { 0.0 };
@@ -90,6 +102,10 @@ impl Wall {
             -0.012 * (x + 0.5) + noise(i, 2),
             bulge + noise(i, 3),
         )
+    }
+
+    fn is_loose(&self, i: usize) -> bool {
+        self.moves && i % 97 == 40
     }
 
     fn row(&self, i: usize) -> StoneRow {
@@ -130,12 +146,12 @@ impl Wall {
             face_sd: sigma,
             rotation_covariance: Matrix3::identity() * 1e-8,
             relative: world_from_face
-                * Vector3::new(if i % 97 == 40 { 0.012 } else { noise(i, 5) }, 0.0, 0.0),
+                * Vector3::new(if self.is_loose(i) { 0.012 } else { noise(i, 5) }, 0.0, 0.0),
             relative_covariance: covariance,
             detection_limit_m: limit,
             significant: displacement.norm() > limit,
-            loose: i % 97 == 40,
-            p_loose: Some(if i % 97 == 40 { 0.99 } else { 0.01 }),
+            loose: self.is_loose(i),
+            p_loose: Some(if self.is_loose(i) { 0.99 } else { 0.01 }),
             observability: 0.6,
         }
     }
@@ -288,7 +304,7 @@ fn noise(i: usize, salt: u64) -> f64 {
 }
 
 /// The other files of a run, with hostile names.
-fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
+fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn std::error::Error>> {
     let epoch = |name: &str| EpochRecord {
         name: name.to_owned(),
         date: None,
@@ -302,6 +318,15 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
         photos: 12,
         stones: 200,
     };
+    let datum = match case {
+        "unknown" => Datum::unknown(&Point3::origin(), "unknown".to_owned()),
+        _ => Datum::known(
+            DatumState::Stable,
+            &Point3::origin(),
+            &Matrix6::from_diagonal_element(1e-10),
+            "the stable areas show a registration error of 0.2 mm".to_owned(),
+        ),
+    };
     let run = RunRecord {
         version: "0.0.0".to_owned(),
         finished_at: Timestamp::EPOCH,
@@ -314,12 +339,12 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
             name: "ETRS89 / UTM zone 32N".to_owned(),
             wkt: String::new(),
         }),
-        datum: [("2026".to_owned(), DatumState::Unknown)].into(),
+        datum: [("2026".to_owned(), datum.state)].into(),
         verdict: None,
         epochs: vec![epoch("2025 <b>"), epoch("2026")],
         part: None,
         edits: None,
-        parameters: stonewise::Settings::default(),
+        parameters: settings(case, language)?,
         steps: vec![StepTime {
             step: "ingest-1".to_owned(),
             seconds: 1.5,
@@ -340,9 +365,13 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
         measured: 190,
         loose: 2,
     };
+    let estimator = match case {
+        "unconverged" => serde_json::from_value(unconverged())?,
+        _ => EstimatorRecord::Gicp(gicp),
+    };
     let registration = RegistrationRecord {
-        estimator: EstimatorRecord::Gicp(gicp),
-        datum: Datum::unknown(&Point3::origin(), "unknown".to_owned()),
+        estimator,
+        datum,
         observers: None,
     };
     std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;
@@ -355,6 +384,30 @@ fn write_records(dir: &Path) -> Result<(), Box<dyn std::error::Error>> {
         "event,photo,instance,stones,share,points\nsplit_instance,<script>.jpg,4,1 2,,\n",
     )?;
     Ok(())
+}
+
+/// Thresholds of 5 and 10 mm; below the noise where the wall cannot tell; none where the datum is unknown.
+fn settings(case: &str, language: &str) -> Result<stonewise::Settings, Box<dyn std::error::Error>> {
+    let levels = match case {
+        "unknown" => serde_json::json!({}),
+        "cannot-tell" => serde_json::json!({ "attention_mm": 1.0 }),
+        _ => serde_json::json!({ "attention_mm": 5.0, "alarm_mm": 10.0 }),
+    };
+    Ok(stonewise::Settings {
+        thresholds: serde_json::from_value(levels)?,
+        report: serde_json::from_value(serde_json::json!({ "language": language }))?,
+        ..stonewise::Settings::default()
+    })
+}
+
+/// An adjustment that ran out of iterations.
+fn unconverged() -> serde_json::Value {
+    serde_json::json!({
+        "estimator": "adjustment", "converged": false, "iterations": 30, "noise_m": [0.002, 0.002], "roughness_m": null,
+        "surface_cell_m": null, "correlation_factor": null, "common_motion_m": [0.0, 0.0, 0.0],
+        "common_motion_covariance_m2": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], "loose": 2, "breaks": [],
+        "variance_components": { "drift": [0.0, 0.0], "bending_per_m": 0.0, "error_m": 0.0, "own_m": 0.0, "own_rad": 0.0, "strain": [0.0, 0.0] }
+    })
 }
 
 fn input(path: &str) -> InputRecord {

@@ -115,6 +115,9 @@ pub enum Error {
         /// What is wrong.
         message: String,
     },
+    /// The report cannot be printed.
+    #[error("{0}")]
+    Pdf(String),
     /// There is nothing to report on.
     #[error("no stones.parquet here; give the folder that `stonewise run --out` wrote: {path}", path = .0.display())]
     NoResults(PathBuf),

@@ -1,9 +1,14 @@
-//! The texts of the verdict and of the report's first page, one table for each language.
+//! The texts of the verdict and of the report, in each language.
 
-use crate::figure::{count, mm, number};
+mod report;
+
+use crate::figure::{count, mm, number, percent};
 use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
+pub(crate) use report::{
+    AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
+};
 
 /// A text for one and a text for several.
 type Number = [&'static str; 2];
@@ -11,11 +16,20 @@ type Number = [&'static str; 2];
 /// Texts of one language; words in braces are filled in.
 #[derive(Debug)]
 pub(crate) struct Texts {
+    /// The language (BCP 47).
+    pub tag: &'static str,
     /// What stands between the whole part of a number and its decimals.
     pub decimal: &'static str,
     pub states: States,
     pub clauses: Clauses,
     pub page: PageTexts,
+    pub sections: SectionTexts,
+    pub stones: StoneTexts,
+    pub maps: MapTexts,
+    pub charts: ChartTexts,
+    pub scores: ScoreTexts,
+    pub method: MethodTexts,
+    pub audit: AuditTexts,
     /// What became of stones, in the order of [`Status::ALL`].
     pub statuses: [&'static str; 9],
 }
@@ -100,15 +114,16 @@ pub(crate) struct PageTexts {
     pub chance: &'static str,
     pub doubts: &'static str,
     pub in_numbers: &'static str,
+    pub as_computed: &'static str,
     pub summary: &'static str,
     pub finished: &'static str,
     pub map_title: &'static str,
     pub map_note: &'static str,
-    pub rest_in_english: &'static str,
     pub no_registration: &'static str,
 }
 
 static ENGLISH: Texts = Texts {
+    tag: "en",
     decimal: ".",
     states: States {
         fine: "Fine",
@@ -227,14 +242,21 @@ static ENGLISH: Texts = Texts {
             that remain when the false discovery rate over all stones is held at 5 %: {n}.",
         doubts: "These results must not be relied on as they stand.",
         in_numbers: "In numbers",
+        as_computed: "All numbers below are as computed, and must not be relied on.",
         summary: "Summary",
         finished: "finished",
         map_title: "Length of the motion, with in-plane arrows",
         map_note: "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
             not measured.",
-        rest_in_english: "",
         no_registration: "Nothing is recorded about the registration of the epochs.",
     },
+    sections: SectionTexts::ENGLISH,
+    stones: StoneTexts::ENGLISH,
+    maps: MapTexts::ENGLISH,
+    charts: ChartTexts::ENGLISH,
+    scores: ScoreTexts::ENGLISH,
+    method: MethodTexts::ENGLISH,
+    audit: AuditTexts::ENGLISH,
     statuses: [
         "measured",
         "the later epoch has no points, or no photo of them, at this place",
@@ -249,6 +271,7 @@ static ENGLISH: Texts = Texts {
 };
 
 static GERMAN: Texts = Texts {
+    tag: "de",
     decimal: ",",
     states: States {
         fine: "In Ordnung",
@@ -367,14 +390,21 @@ static GERMAN: Texts = Texts {
             gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
         in_numbers: "In Zahlen",
+        as_computed: "Alle Zahlen unten sind wie berechnet; auf sie ist kein Verlass.",
         summary: "Zusammenfassung",
         finished: "berechnet",
         map_title: "Betrag der Bewegung, mit Pfeilen in der Ebene der Mauer",
         map_note: "Pfeile: Anteil in der Ebene von Bewegungen \u{fc}ber der eigenen Grenze des Steins, ausged\u{fc}nnt, wo sie sich ber\u{fc}hren \
             w\u{fc}rden. Blass: unter der Grenze; schraffiert: nicht gemessen.",
-        rest_in_english: "Karten, Tabellen und Anh\u{e4}nge sind auf Englisch.",
         no_registration: "\u{dc}ber die Registrierung der Epochen ist nichts festgehalten.",
     },
+    sections: SectionTexts::GERMAN,
+    stones: StoneTexts::GERMAN,
+    maps: MapTexts::GERMAN,
+    charts: ChartTexts::GERMAN,
+    scores: ScoreTexts::GERMAN,
+    method: MethodTexts::GERMAN,
+    audit: AuditTexts::GERMAN,
     statuses: [
         "gemessen",
         "die sp\u{e4}tere Epoche hat an dieser Stelle keine Punkte oder kein Foto von ihnen",
@@ -422,6 +452,16 @@ impl Texts {
     /// Metres as millimetres with the digits that mean something.
     pub(crate) fn mm(&self, metres: f64) -> String {
         mm(metres).replace('.', self.decimal)
+    }
+
+    /// The same of a value that may be missing.
+    pub(crate) fn mm_or_dash(&self, metres: Option<f64>) -> String {
+        self.mm(metres.unwrap_or(f64::NAN))
+    }
+
+    /// A share as a percentage.
+    pub(crate) fn percent(&self, part: usize, whole: usize) -> String {
+        percent(part, whole).replace('.', self.decimal)
     }
 
     /// A threshold in millimetres, as short as it can be.
@@ -473,7 +513,10 @@ mod tests {
         let (english, german) = (strings(&ENGLISH), strings(&GERMAN));
         assert_eq!(english.len(), german.len());
         for (e, g) in english.iter().zip(&german) {
-            assert_eq!(braces(e), braces(g), "{e} / {g}");
+            // What a run says in English is said anew in other languages.
+            if e != "{note}" {
+                assert_eq!(braces(e), braces(g), "{e} / {g}");
+            }
         }
     }
 

@@ -5,6 +5,7 @@ import { svg } from "../dom.ts";
 import { signedMm } from "../format.ts";
 import { contains } from "../geometry.ts";
 import type { Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 /** Reach of the pointer, pixels of the picture. */
 const REACH_PX = 9;
@@ -72,7 +73,7 @@ function scatter(report: Report, store: Store, picture: SVGSVGElement): void {
   picture.addEventListener("pointermove", (e) => {
     const stone = nearest(e);
     place(hover, stone);
-    title.textContent = stone < 0 ? "" : `Stone ${stones.id[stone]}: ${of(stone).map((v) => `${signedMm(v / 1e3)} mm`).join(", ")}`;
+    title.textContent = stone < 0 ? "" : t("stoneFacts", { id: stones.id[stone]!, facts: of(stone).map((v) => `${signedMm(v / 1e3)} mm`).join(", ") });
     picture.style.cursor = stone < 0 ? "" : "pointer";
   });
   picture.addEventListener("pointerleave", () => place(hover, -1));

@@ -5,6 +5,7 @@ import { el } from "../dom.ts";
 import { fixed } from "../format.ts";
 import { OUTCOME_COLOURS, Palette, type Quantity } from "../quantities.ts";
 import type { Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 /** The legend, which follows the store. */
 export function legend(report: Report, store: Store, quantities: readonly Quantity[]): HTMLElement {
@@ -13,9 +14,9 @@ export function legend(report: Report, store: Store, quantities: readonly Quanti
     const { quantity: key, fade } = store.get();
     const quantity = quantities.find((q) => q.key === key)!;
     const marks: Node[] = quantity.scale === "outcomes" ? outcomes(report) : [bar(report, quantity)];
-    if (quantity.fades && fade) marks.push(mark("pale", "below its 95 % limit"));
-    if (quantity.scale !== "outcomes" && quantity.key !== "opening") marks.push(mark("hatched", "not measured"));
-    marks.push(mark("ring", "loose"));
+    if (quantity.fades && fade) marks.push(mark("pale", t("belowMark")));
+    if (quantity.scale !== "outcomes" && quantity.key !== "opening") marks.push(mark("hatched", t("unmeasured")));
+    marks.push(mark("ring", t("loose")));
     element.replaceChildren(...marks, el("span", { class: "note" }, quantity.note));
   };
   store.on((state, before) => {

@@ -4,6 +4,7 @@ import { type Report, isMeasured, norm } from "../data.ts";
 import { button, el } from "../dom.ts";
 import { count, fixed, percent, signed } from "../format.ts";
 import type { Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 const ROWS = 40;
 
@@ -14,7 +15,7 @@ interface Column {
   readonly text: (stone: number) => string;
 }
 
-const FILTERS = ["all", "moved", "above the limit", "loose", "below the limit", "not measured"] as const;
+const FILTERS = ["filterAll", "filterMoved", "filterAbove", "loose", "filterBelow", "unmeasured"] as const;
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
@@ -24,30 +25,30 @@ export function stoneList(report: Report, store: Store): HTMLElement {
     title, value: (i) => stones.move[axis][i]!, text: (i) => signed(stones.move[axis][i]! * 1e3, decimals),
   });
   const columns: readonly Column[] = [
-    { title: "stone", value: (i) => stones.id[i]!, text: (i) => String(stones.id[i]) },
-    { title: "along m", value: (i) => stones.a[i]!, text: (i) => fixed(stones.a[i]!, 2) },
-    { title: "up m", value: (i) => stones.u[i]!, text: (i) => fixed(stones.u[i]!, 2) },
-    move("d along mm", 0), move("d up mm", 1), move("d out mm", 2),
-    { title: "length mm", value: (i) => norm(stones.move, i), text: (i) => mm(norm(stones.move, i)) },
-    { title: "LoD95 mm", value: (i) => stones.limit[i]!, text: (i) => mm(stones.limit[i]!) },
-    { title: "against neighbours mm", value: (i) => norm(stones.relative, i), text: (i) => mm(norm(stones.relative, i)) },
-    { title: "rotation mrad", value: (i) => norm(stones.rotation, i), text: (i) => fixed(norm(stones.rotation, i) * 1e3, 2) },
-    { title: "confidence", value: (i) => stones.confidence[i]!, text: (i) => percent(stones.confidence[i]!) },
-    { title: "outcome", value: (i) => stones.state[i]!, text: (i) => statuses[stones.state[i]!]!.word },
+    { title: t("columnStone"), value: (i) => stones.id[i]!, text: (i) => String(stones.id[i]) },
+    { title: t("columnAlong"), value: (i) => stones.a[i]!, text: (i) => fixed(stones.a[i]!, 2) },
+    { title: t("columnUp"), value: (i) => stones.u[i]!, text: (i) => fixed(stones.u[i]!, 2) },
+    move(t("columnMoveAlong"), 0), move(t("columnMoveUp"), 1), move(t("columnMoveOut"), 2),
+    { title: t("columnLength"), value: (i) => norm(stones.move, i), text: (i) => mm(norm(stones.move, i)) },
+    { title: t("columnLimit"), value: (i) => stones.limit[i]!, text: (i) => mm(stones.limit[i]!) },
+    { title: t("columnRelative"), value: (i) => norm(stones.relative, i), text: (i) => mm(norm(stones.relative, i)) },
+    { title: t("columnRotation"), value: (i) => norm(stones.rotation, i), text: (i) => fixed(norm(stones.rotation, i) * 1e3, 2) },
+    { title: t("columnConfidence"), value: (i) => stones.confidence[i]!, text: (i) => percent(stones.confidence[i]!) },
+    { title: t("columnOutcome"), value: (i) => stones.state[i]!, text: (i) => statuses[stones.state[i]!]!.word },
   ];
-  const passes: Record<string, (i: number) => boolean> = {
-    all: () => true,
-    "moved": (i) => stones.moved[i] === 1,
-    "above the limit": (i) => stones.significant[i] === 1,
-    "loose": (i) => stones.loose[i] === 1,
-    "below the limit": (i) => isMeasured(stones, i) && !stones.significant[i],
-    "not measured": (i) => !isMeasured(stones, i),
+  const passes: Record<(typeof FILTERS)[number], (i: number) => boolean> = {
+    filterAll: () => true,
+    filterMoved: (i) => stones.moved[i] === 1,
+    filterAbove: (i) => stones.significant[i] === 1,
+    loose: (i) => stones.loose[i] === 1,
+    filterBelow: (i) => isMeasured(stones, i) && !stones.significant[i],
+    unmeasured: (i) => !isMeasured(stones, i),
   };
   let sortBy = columns[6]!, descending = true, page = 0;
-  const filter = el("select", {}, ...FILTERS.map((f) => el("option", { value: f }, f)));
-  const body = el("div", { class: "scroll" }), pager = el("p", { class: "choices" });
+  const filter = el("select", {}, ...FILTERS.map((f) => el("option", { value: f }, t(f))));
+  const body = el("div", { class: "scroll", tabindex: 0, role: "group", "aria-label": t("tableOfAll") }), pager = el("p", { class: "choices" });
   const rows = () => {
-    const kept = Array.from({ length: stones.count }, (_, i) => i).filter(passes[filter.value]!);
+    const kept = Array.from({ length: stones.count }, (_, i) => i).filter(passes[filter.value as (typeof FILTERS)[number]]);
     const sign = descending ? -1 : 1;
     return kept.sort((p, q) => {
       const [a, b] = [sortBy.value(p), sortBy.value(q)];
@@ -60,8 +61,8 @@ export function stoneList(report: Report, store: Store): HTMLElement {
     page = Math.min(page, pages - 1);
     const head = columns.map((column) => {
       const mark = column === sortBy ? (descending ? " \u2193" : " \u2191") : "";
-      const sort = button(column.title + mark, `sort by ${column.title}`, () => {
-        descending = column === sortBy ? !descending : column.title !== "stone";
+      const sort = button(column.title + mark, "", () => {
+        descending = column === sortBy ? !descending : column !== columns[0];
         sortBy = column;
         draw();
       });
@@ -74,13 +75,13 @@ export function stoneList(report: Report, store: Store): HTMLElement {
     };
     body.replaceChildren(el("table", { class: "list" }, el("thead", {}, el("tr", {}, ...head)),
       el("tbody", {}, ...all.slice(page * ROWS, (page + 1) * ROWS).map(row))));
-    pager.replaceChildren(`${count(all.length)} stones, page ${page + 1} of ${pages} `,
-      button("\u2190", "previous page", () => { page = Math.max(0, page - 1); draw(); }),
-      button("\u2192", "next page", () => { page = Math.min(pages - 1, page + 1); draw(); }));
+    pager.replaceChildren(t("page", { n: count(all.length), page: page + 1, pages }),
+      button("\u2190", t("previousPage"), () => { page = Math.max(0, page - 1); draw(); }),
+      button("\u2192", t("nextPage"), () => { page = Math.min(pages - 1, page + 1); draw(); }));
   };
   filter.addEventListener("change", () => { page = 0; draw(); });
-  const element = el("details", { class: "stone-list" }, el("summary", {}, "List of all stones"),
-    el("p", { class: "choices" }, el("label", {}, "Only ", filter)), body, pager);
+  const element = el("details", { class: "stone-list" }, el("summary", {}, t("listOfAll")),
+    el("p", { class: "choices" }, el("label", {}, t("only"), filter)), body, pager);
   element.addEventListener("toggle", () => { if (element.open && !body.hasChildNodes()) draw(); });
   return element;
 }

@@ -6,6 +6,7 @@ import { fixed, signedMm } from "../format.ts";
 import { Squares, contains } from "../geometry.ts";
 import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Line, Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 /** Length of the longest arrow, least distance between arrows, pixels. */
 const ARROW_PX = 46;
@@ -53,7 +54,7 @@ export class WallMap {
     this.#canvas = el("canvas", {
       tabindex: 0,
       role: "application",
-      "aria-label": "Map of the stones. Arrow keys move, plus and minus zoom, Home shows the whole wall, Escape lets go of the stone.",
+      "aria-label": t("mapName"),
     });
     this.#pen = this.#canvas.getContext("2d")!;
     this.#tip = el("div", { class: "tip", hidden: true });
@@ -141,7 +142,8 @@ export class WallMap {
     this.whole();
     // Before the next frame: a resized canvas is empty.
     this.#draw();
-    if (first) this.#show(this.#store.get().chosen);
+    // The stone that is chosen from the start leaves the whole wall in view.
+    if (first && this.#store.get().follow > 0) this.#show(this.#store.get().chosen);
   }
 
   #toWall(px: number, py: number): [number, number] {
@@ -329,7 +331,7 @@ export class WallMap {
     }
     arrow(pen, 14, 18, ARROW_PX, 0);
     this.#strokeTwice(1.4);
-    this.#label(14 + ARROW_PX + 8, 22, `${fixed(reference * 1e3, reference < 0.01 ? 1 : 0)} mm in-plane`, ink);
+    this.#label(14 + ARROW_PX + 8, 22, t("inPlane", { length: fixed(reference * 1e3, reference < 0.01 ? 1 : 0) }), ink);
   }
 
   #drawLine({ a1, u1, a2, u2 }: Line, ink: string): void {
@@ -454,8 +456,8 @@ export class WallMap {
     const [along, up, out] = stones.move.map((d) => signedMm(d[stone]!));
     const facts = Number.isNaN(stones.move[2][stone]!)
       ? statuses[stones.state[stone]!]!.meaning
-      : `along ${along}, up ${up}, out ${out} mm; limit ${signedMm(stones.limit[stone]!).replace("+", "")} mm`;
-    this.#tip.textContent = `Stone ${stones.id[stone]}: ${facts}`;
+      : t("tipFacts", { along: along!, up: up!, out: out!, limit: signedMm(stones.limit[stone]!).replace("+", "") });
+    this.#tip.textContent = t("stoneFacts", { id: stones.id[stone]!, facts });
     this.#tip.style.left = `${Math.max(0, Math.min(px + 14, this.#width - this.#tip.offsetWidth - 4))}px`;
     this.#tip.style.top = `${Math.max(0, py - 34)}px`;
   }

@@ -4,6 +4,7 @@ import { fromBase64, type Columns } from "../blocks.ts";
 import type { CropDocument, Report } from "../data.ts";
 import { el } from "../dom.ts";
 import { fixed } from "../format.ts";
+import { t } from "../texts.ts";
 
 /** Shortest time between the pictures of a blink, milliseconds. */
 const BLINK_MS = 700;
@@ -34,7 +35,7 @@ export class Photos {
   of(stone: number): Node | null {
     window.clearInterval(this.#blinking);
     if (!this.#epochs) return null;
-    const canvases = [this.#canvas(), this.#canvas()] as const;
+    const canvases = [this.#canvas(0), this.#canvas(1)] as const;
     const captions = [el("figcaption", { class: "note" }), el("figcaption", { class: "note" })] as const;
     const outline = el("input", { type: "checkbox", checked: true });
     const blink = el("input", { type: "checkbox" });
@@ -46,13 +47,14 @@ export class Photos {
       void this.#blink(stone, blink.checked, canvases[0], captions, outline);
     });
     draw();
-    return el("div", { class: "card photos" }, el("h4", {}, "Photos, seen straight onto the stone"),
+    return el("div", { class: "card photos" }, el("h4", {}, t("photoTitle")),
       el("div", { class: "pair" }, ...([0, 1] as const).map((k) => el("figure", {}, canvases[k], captions[k]))),
-      el("p", { class: "choices" }, el("label", {}, outline, " outline of the mask"), el("label", {}, blink, " blink before and after")));
+      el("p", { class: "choices" }, el("label", {}, outline, t("outlineOfMask")), el("label", {}, blink, t("blink"))));
   }
 
-  #canvas(): HTMLCanvasElement {
-    return el("canvas", { width: 340, height: 340, role: "img", "aria-label": "photo crop" });
+  #canvas(epoch: 0 | 1): HTMLCanvasElement {
+    const name = t("photoCrop", { epoch: this.#report.document.epochs[epoch] });
+    return el("canvas", { width: 340, height: 340, role: "img", "aria-label": name });
   }
 
   /** Shows both epochs in turns in the first place. */
@@ -89,7 +91,7 @@ export class Photos {
     const name = this.#report.document.epochs[epoch];
     if (!crops || place === undefined) {
       pen.clearRect(0, 0, canvas.width, canvas.height);
-      caption.textContent = `${name}: no photo`;
+      caption.textContent = t("noPhoto", { epoch: name });
       return;
     }
     const { side, perRow, photos } = crops.document;

@@ -5,13 +5,14 @@ import { button, el, svg } from "../dom.ts";
 import { decimalsOf, fixed, niceAbove, signedMm, ticks } from "../format.ts";
 import { crossings } from "../geometry.ts";
 import type { Line, Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 const QUANTILE = 1.96;
 /** M3C2 core points within this distance of the line are shown, metres. */
 const CHANGE_REACH_M = 0.08;
 /** Narrowest and widest chart, pixels; wider pages enlarge it, narrower ones shrink it. */
 const WIDTH_PX = [420, 1180] as const;
-const NAMES = ["along", "up", "out"] as const;
+const NAMES = [t("along"), t("up"), t("out")] as const;
 
 /** A stone under the line: from and to, metres from the line's start. */
 export interface Step {
@@ -80,10 +81,10 @@ function charts(report: Report, store: Store, line: Line, width: number): Node[]
   const length = Math.hypot(line.a2 - line.a1, line.u2 - line.u1);
   const measured = steps.filter((s) => isMeasured(report.stones, s.stone));
   const head = el("p", { class: "profile-head" },
-    el("b", {}, `Profile over ${fixed(length, 2)} m, ${new Set(measured.map((s) => s.stone)).size} measured stones`),
-    " Lines: motion of each stone, its rotation included; bands: 95 % of the component at its centroid. ",
-    report.change.a.length ? "Dots: M3C2 near the line. " : "",
-    button("close", "close the profile", () => store.set({ profile: null })));
+    el("b", {}, t("profileHead", { length: fixed(length, 2), n: new Set(measured.map((s) => s.stone)).size })),
+    t("profileLines"),
+    report.change.a.length ? t("profileDots") : "",
+    button(t("closeProfile"), "", () => store.set({ profile: null })));
   return [head, ...([2, 0, 1] as const).map((axis) => chart(report, store, line, width, length, steps, axis))];
 }
 
@@ -106,7 +107,7 @@ function chart(report: Report, store: Store, line: Line, width: number, length: 
   [low, high] = [low - margin, high + margin];
   const x = (m: number) => left + (m / length) * (width - left - right);
   const y = (v: number) => top + ((high - v) / (high - low)) * (height - top - bottom);
-  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `${NAMES[axis]}, millimetres, along the line` });
+  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": t("profileAxis", { axis: NAMES[axis] }) });
   const add = (...nodes: Node[]) => picture.append(...nodes);
   const yTicks = ticks(low, high, axis === 2 ? 5 : 3), xTicks = ticks(0, length, width / 95);
   for (const t of yTicks) {
@@ -132,7 +133,7 @@ function chart(report: Report, store: Store, line: Line, width: number, length: 
         svg("path", { class: "band", d: `M${x0} ${y(v0 + s)}L${x1} ${y(v1 + s)}V${y(v1 - s)}L${x0} ${y(v0 - s)}z` }),
         svg("path", { class: "line", d: `M${x0} ${y(v0)}L${x1} ${y(v1)}` }),
         svg("rect", { class: "catch", x: x0, y: top, width: x1 - x0, height: height - top - bottom }));
-    mark.append(svg("title", {}, `Stone ${stones.id[stone]}: ${Number.isNaN(v) ? "not measured" : `${signedMm(v / 1e3)} \u00b1 ${fixed(s, 2)} mm`}`));
+    mark.append(svg("title", {}, t("stoneFacts", { id: stones.id[stone]!, facts: Number.isNaN(v) ? t("unmeasured") : `${signedMm(v / 1e3)} \u00b1 ${fixed(s, 2)} mm` })));
     mark.addEventListener("pointerenter", () => store.set({ hover: stone }));
     mark.addEventListener("click", () => store.set({ chosen: stone }));
     add(mark);

@@ -11,8 +11,10 @@ import { fixed, mm } from "../format.ts";
 import { faceAxes } from "../geometry.ts";
 import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Store } from "../store.ts";
+import { type TextKey, t } from "../texts.ts";
 
 type Clouds = "none" | "before" | "after" | "both";
+const CLOUDS: readonly (readonly [Clouds, TextKey])[] = [["none", "cloudNone"], ["before", "cloudBefore"], ["after", "cloudAfter"], ["both", "cloudBoth"]];
 
 /** Patches stand this far before the plane of their stone, so that its relief does not hide them, metres. */
 const LIFT_M = 0.02;
@@ -51,6 +53,8 @@ export class WallScene {
   /** First vertex of every stone's patch, and one past the last. */
   readonly #firstVertex: number[] = [];
   #stoneOfTriangle: Int32Array = new Int32Array();
+  /** Outline of the chosen stone, light below dark, so that it shows on every colour. */
+  #ring!: Mesh<BufferGeometry, MeshBasicMaterial>;
   #edges!: LineSegments<BufferGeometry, LineBasicMaterial>;
   #shafts!: LineSegments<BufferGeometry, LineBasicMaterial>;
   #heads!: InstancedMesh<ConeGeometry, MeshBasicMaterial>;
@@ -72,7 +76,7 @@ export class WallScene {
     this.#quantities = new Map(quantities.map((q) => [q.key, q]));
     const canvas = el("canvas", {
       tabindex: 0, role: "application",
-      "aria-label": "The wall in space. Drag turns, right drag or arrow keys move, the wheel zooms. Buttons below give fixed views.",
+      "aria-label": t("sceneName"),
     });
     this.#renderer = new WebGLRenderer({ canvas, antialias: report.stones.count <= MANY_STONES, preserveDrawingBuffer: true });
     this.#controls = new OrbitControls(this.#camera, canvas);
@@ -81,6 +85,7 @@ export class WallScene {
     this.#camera.up.set(0, 0, 1);
     this.#survey();
     this.#buildPatches();
+    this.#buildRing();
     this.#buildArrows();
     this.#buildRibbons();
     this.#buildCameras();
@@ -246,6 +251,46 @@ export class WallScene {
     this.#scene.add(this.#ribbons);
   }
 
+  #buildRing(): void {
+    this.#ring = new Mesh(new BufferGeometry(), new MeshBasicMaterial({ vertexColors: true, side: DoubleSide, depthTest: false, transparent: true }));
+    this.#ring.frustumCulled = false;
+    this.#ring.renderOrder = 1;
+    this.#scene.add(this.#ring);
+  }
+
+  /** Puts the outline around the chosen stone, moved as the stone is. */
+  #placeRing(): void {
+    const { stones } = this.#report, stone = this.#store.get().chosen;
+    this.#ring.visible = stone >= 0 && this.#shown.stones;
+    if (stone < 0) return;
+    const { along, up, out } = faceAxes(stones.normal.map((v) => v[stone]!));
+    const centre = this.#position(stone).addScaledVector(this.#moves[stone]!, this.#after ? this.#exaggeration : 0);
+    const from = stone === 0 ? 0 : stones.ringEnd[stone - 1]!, to = stones.ringEnd[stone]!;
+    const world = (x: number, y: number) => [0, 1, 2].map((k) => centre.getComponent(k) + x * along[k]! + y * up[k]! + 2 * LIFT_M * out[k]!);
+    const places: number[] = [], colours: number[] = [];
+    const half = 0.05 * Math.sqrt(stones.area[stone]!);
+    for (const [width, name] of [[half, "--panel"], [0.55 * half, "--accent"]] as const) {
+      const { r, g, b } = new Color(css(name));
+      for (let k = from; k < to; k++) {
+        const next = k + 1 < to ? k + 1 : from;
+        const [x0, y0, x1, y1] = [stones.ring[2 * k]!, stones.ring[2 * k + 1]!, stones.ring[2 * next]!, stones.ring[2 * next + 1]!];
+        const length = Math.hypot(x1 - x0, y1 - y0) || 1, [dx, dy] = [((x1 - x0) / length) * width, ((y1 - y0) / length) * width];
+        // Longer by half its width at both ends, so that corners are closed.
+        const corner = (end: number, side: number) => {
+          const [x, y] = end < 0 ? [x0, y0] : [x1, y1];
+          return world(x + end * dx - side * dy, y + end * dy + side * dx);
+        };
+        const [a, b4, c, d] = [corner(-1, 1), corner(-1, -1), corner(1, 1), corner(1, -1)];
+        places.push(...a, ...b4, ...c, ...c, ...b4, ...d);
+        for (let v = 0; v < 6; v++) colours.push(r, g, b);
+      }
+    }
+    this.#ring.geometry.dispose();
+    this.#ring.geometry = new BufferGeometry();
+    this.#ring.geometry.setAttribute("position", new BufferAttribute(new Float32Array(places), 3));
+    this.#ring.geometry.setAttribute("color", new BufferAttribute(new Float32Array(colours), 3));
+  }
+
   #recolourRibbons(palette: Palette, fade: boolean, ground: Color): void {
     const { count, opening, sigma } = this.#report.joints;
     const colours = this.#ribbons.geometry.getAttribute("color") as BufferAttribute;
@@ -330,6 +375,7 @@ export class WallScene {
     }
     place.needsUpdate = shafts.needsUpdate = this.#heads.instanceMatrix.needsUpdate = true;
     this.#patches.geometry.computeBoundingSphere();
+    this.#placeRing();
     this.#showInPlace();
     this.redraw();
   }
@@ -351,8 +397,7 @@ export class WallScene {
       const fill = key === "opening" ? null : stoneColour(this.#report, quantity, palette, i);
       const colour = fill ? new Color(fill) : key === "opening" ? plain.clone() : unknown.clone();
       if (fill && isFaded(this.#report, quantity, fade, i)) colour.lerp(ground, 0.7);
-      if (i === chosen) colour.copy(accent);
-      else if (i === hover) colour.lerp(accent, 0.4);
+      if (i === hover && i !== chosen) colour.lerp(plain, 0.25);
       for (let v = this.#firstVertex[i]!; v < this.#firstVertex[i + 1]!; v++) colours.setXYZ(v, colour.r, colour.g, colour.b);
     }
     colours.needsUpdate = true;
@@ -368,6 +413,7 @@ export class WallScene {
   #show(): void {
     const { clouds, stones, arrows, cameras } = this.#shown;
     this.#patches.visible = stones;
+    this.#placeRing();
     this.#showInPlace();
     this.#shafts.visible = this.#heads.visible = arrows;
     if (this.#frusta) this.#frusta.visible = cameras;
@@ -377,23 +423,23 @@ export class WallScene {
   }
 
   #panel(): HTMLElement {
-    const check = (text: string, key: "stones" | "arrows" | "cameras") => {
+    const check = (text: TextKey, key: "stones" | "arrows" | "cameras") => {
       const box = el("input", { type: "checkbox", ...(this.#shown[key] ? { checked: true } : {}) });
       box.addEventListener("change", () => {
         this.#shown = { ...this.#shown, [key]: box.checked };
         this.#show();
       });
-      return el("label", {}, box, ` ${text}`);
+      return el("label", {}, box, t(text));
     };
     const hasClouds = this.#report.document.blocks["cloud1"] !== undefined;
-    const clouds = el("select", { id: "clouds" }, ...(["none", "before", "after", "both"] as const).map((c) =>
-      el("option", { value: c, ...(c === this.#shown.clouds ? { selected: true } : {}) }, c)));
+    const clouds = el("select", { id: "clouds" }, ...CLOUDS.map(([c, text]) =>
+      el("option", { value: c, ...(c === this.#shown.clouds ? { selected: true } : {}) }, t(text))));
     clouds.addEventListener("change", () => {
       this.#shown = { ...this.#shown, clouds: clouds.value as Clouds };
       this.#show();
     });
     const value = el("output", {}, `\u00d7${fixed(this.#exaggeration, 0)}`);
-    const slider = el("input", { type: "range", min: 0, max: 3.3, step: 0.01, value: Math.log10(this.#exaggeration), "aria-label": "exaggeration of the motion", id: "exaggeration" });
+    const slider = el("input", { type: "range", min: 0, max: 3.3, step: 0.01, value: Math.log10(this.#exaggeration), id: "exaggeration" });
     slider.addEventListener("input", () => {
       this.#exaggeration = Math.round(10 ** Number(slider.value));
       value.textContent = `\u00d7${fixed(this.#exaggeration, 0)}`;
@@ -404,12 +450,12 @@ export class WallScene {
       this.#after = after.checked;
       this.#move();
     });
-    const looks = (["front", "left", "right", "above"] as const).map((from) => button(from, `look from ${from === "above" ? "above" : `the ${from}`}`, () => this.look(from)));
+    const looks = (["front", "left", "right", "above"] as const).map((from) => button(t(from), "", () => this.look(from)));
     return el("div", { class: "scene-controls" },
       el("span", { class: "group" }, ...looks),
-      el("label", {}, "motion ", slider, value), el("label", {}, after, " stones moved"),
-      check("stones", "stones"), check("arrows", "arrows"),
-      hasClouds ? el("label", {}, "cloud ", clouds) : null, this.#frusta ? check("cameras", "cameras") : null);
+      el("label", {}, t("motion"), slider, value), el("label", {}, after, t("stonesMoved")),
+      check("sceneStones", "stones"), check("sceneArrows", "arrows"),
+      hasClouds ? el("label", {}, t("cloud"), clouds) : null, this.#frusta ? check("sceneCameras", "cameras") : null);
   }
 
   #listen(canvas: HTMLCanvasElement): void {
@@ -442,7 +488,7 @@ export class WallScene {
     this.#store.set({ hover: stone });
     this.#tip.hidden = stone < 0 && camera === null;
     if (camera !== null) this.#tip.textContent = camera;
-    else if (stone >= 0) this.#tip.textContent = `Stone ${stones.id[stone]}${isMeasured(stones, stone) ? `: ${mm(norm(stones.move, stone))} mm` : ": not measured"}`;
+    else if (stone >= 0) this.#tip.textContent = t("stoneFacts", { id: stones.id[stone]!, facts: isMeasured(stones, stone) ? `${mm(norm(stones.move, stone))} mm` : t("unmeasured") });
     this.#tip.style.left = `${px + 14}px`;
     this.#tip.style.top = `${Math.max(0, py - 34)}px`;
   }

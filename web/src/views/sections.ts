@@ -4,6 +4,7 @@ import { type Report, isMeasured } from "../data.ts";
 import type { Columns } from "../blocks.ts";
 import { el, svg } from "../dom.ts";
 import { decimalsOf, fixed, ticks } from "../format.ts";
+import { t } from "../texts.ts";
 
 /** A point of a section: place along it and height out of the face, metres. */
 export type SectionPoint = readonly [place: number, out: number];
@@ -53,9 +54,9 @@ export class Sections {
     void draw();
     const [first, later] = this.#report.document.epochs;
     const moved = isMeasured(stones, stone);
-    return el("div", { class: "card sections" }, el("h4", {}, "Its points, cut through the middle"),
+    return el("div", { class: "card sections" }, el("h4", {}, t("sectionsTitle")),
       el("p", { class: "choices" }, el("span", {}, el("i", { class: "dot a" }), first), el("span", {}, el("i", { class: "dot b" }), later),
-        moved ? el("label", {}, aligned, " moved back by the measured motion") : null),
+        moved ? el("label", {}, aligned, t("movedBack")) : null),
       place);
   }
 
@@ -87,8 +88,8 @@ export class Sections {
     const width = 372, height = 128, left = 40, right = 6, top = 6, bottom = 30;
     const x = (v: number) => left + ((v - x0) / (x1 - x0)) * (width - left - right);
     const y = (v: number) => top + ((y1 - v) / (y1 - y0)) * (height - top - bottom);
-    const name = axis === 0 ? "along the wall" : "up the face";
-    const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": `section ${name}` });
+    const name = axis === 0 ? t("alongTheWall") : t("upTheFace");
+    const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": t("section", { direction: name }) });
     const xs = ticks(x0 * 100, x1 * 100, 5), ys = ticks(y0 * 1e3, y1 * 1e3, 3);
     for (const t of ys) {
       picture.append(svg("path", { class: "grid", d: `M${left} ${y(t / 1e3)}H${width - right}` }),
@@ -99,7 +100,7 @@ export class Sections {
         svg("text", { x: x(t / 100), y: height - bottom + 13, "text-anchor": "middle" }, fixed(t, decimalsOf(xs))));
     }
     picture.append(svg("text", { class: "label", x: (left + width - right) / 2, y: height - 3, "text-anchor": "middle" }, `${name}, cm`),
-      svg("text", { class: "label", transform: `translate(10 ${(top + height - bottom) / 2})rotate(-90)`, "text-anchor": "middle" }, "out, mm"));
+      svg("text", { class: "label", transform: `translate(10 ${(top + height - bottom) / 2})rotate(-90)`, "text-anchor": "middle" }, `${t("out")}, mm`));
     const dots = (points: readonly SectionPoint[], kind: string) => {
       const d = points.filter((p) => p[1] >= y0 && p[1] <= y1 && p[0] >= x0 && p[0] <= x1).map((p) => `M${x(p[0]).toFixed(1)} ${y(p[1]).toFixed(1)}h0`).join("");
       return svg("path", { class: `section-dots ${kind}`, d });

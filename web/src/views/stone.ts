@@ -5,6 +5,7 @@ import { button, el, svg } from "../dom.ts";
 import { count, DASH, fixed, mm, percent, signed, signedMm } from "../format.ts";
 import { eigen3, ellipse } from "../geometry.ts";
 import type { Store } from "../store.ts";
+import { t } from "../texts.ts";
 import type { Photos } from "./photos.ts";
 import type { Sections } from "./sections.ts";
 
@@ -13,11 +14,13 @@ const CHI2_3_95 = 7.814727903251179;
 /** 95 % of a normal distribution lie within this many standard deviations. */
 const QUANTILE = 1.96;
 const NEIGHBOURS = 8;
-const AXES = ["along", "up", "out"] as const;
+const AXES = [t("along"), t("up"), t("out")] as const;
 
 /** The panel of the chosen stone. */
 export class StonePanel {
   readonly element: HTMLElement;
+  /** Says to screen readers which stone was chosen, in one sentence. */
+  readonly announcer = el("p", { class: "announcer", role: "status" });
   readonly #report: Report;
   readonly #store: Store;
   readonly #photos: Photos;
@@ -39,9 +42,11 @@ export class StonePanel {
     this.#sections = sections;
     this.#lineThrough = lineThrough;
     this.#order = byMotion(report.stones);
-    this.element = el("div", { class: "stone-panel", "aria-live": "polite" });
+    this.element = el("div", { class: "stone-panel", role: "region", tabindex: 0, "aria-label": t("panelName") });
     store.on((state, before) => {
-      if (state.chosen !== before.chosen) this.#show(state.chosen);
+      if (state.chosen === before.chosen) return;
+      this.#show(state.chosen);
+      this.announcer.textContent = this.#sentence(state.chosen);
     });
     this.#show(store.get().chosen);
   }
@@ -60,11 +65,21 @@ export class StonePanel {
     this.element.replaceChildren(...parts.filter((part) => part !== null));
   }
 
+  #sentence(stone: number): string {
+    if (stone < 0) return "";
+    const { stones, document: { statuses } } = this.#report;
+    const [along, up, out] = stones.move.map((d) => signedMm(d[stone]!));
+    const facts = isMeasured(stones, stone)
+      ? t("tipFacts", { along: along!, up: up!, out: out!, limit: mm(stones.limit[stone]!) })
+      : statuses[stones.state[stone]!]!.meaning;
+    return t("stoneFacts", { id: stones.id[stone]!, facts });
+  }
+
   #nothing(): Node {
-    const start = button("Largest motion", "choose the stone with the largest motion", () => this.#step(-1, 1));
+    const start = button(t("largestMotion"), "", () => this.#step(-1, 1));
     return el("div", { class: "nothing" },
-      el("p", {}, "Choose a stone: click it on the map, or enter its number above. Its motion, uncertainty, photos, section and neighbours appear here."),
-      el("p", {}, "Drag moves the map; the wheel zooms once the map was clicked; a double click zooms in."),
+      el("p", {}, t("nothing")),
+      el("p", {}, t("nothingDrag")),
       start);
   }
 
@@ -78,25 +93,25 @@ export class StonePanel {
     const { stones, document: { statuses } } = this.#report;
     const badge = (text: string, kind: string) => el("span", { class: `badge ${kind}` }, text);
     const badges = isMeasured(stones, stone)
-      ? [stones.moved[stone] ? badge("moved", "strong") : badge(stones.significant[stone] ? "above its limit" : "below its limit", "weak"),
-        ...(stones.loose[stone] ? [badge("loose", "alarm")] : [])]
+      ? [stones.moved[stone] ? badge(t("badgeMoved"), "strong") : badge(t(stones.significant[stone] ? "badgeAbove" : "badgeBelow"), "weak"),
+        ...(stones.loose[stone] ? [badge(t("loose"), "alarm")] : [])]
       : [badge(statuses[stones.state[stone]!]!.word, "weak")];
     return el("div", { class: "stone-head" },
       el("div", { class: "stone-title" },
-        el("h3", {}, `Stone ${stones.id[stone]}`),
+        el("h3", {}, t("stoneTitle", { id: stones.id[stone]! })),
         el("span", { class: "steps" },
-          button("\u2190", "previous stone, by size of motion", () => this.#step(stone, -1)),
-          button("\u2192", "next stone, by size of motion", () => this.#step(stone, 1)),
-          button("\u00d7", "close", () => this.#store.set({ chosen: -1 })))),
+          button("\u2190", t("previousStone"), () => this.#step(stone, -1)),
+          button("\u2192", t("nextStone"), () => this.#step(stone, 1)),
+          button("\u00d7", t("close"), () => this.#store.set({ chosen: -1 })))),
       el("p", { class: "badges" }, ...badges),
-      el("p", { class: "note" }, `${fixed(stones.a[stone]!, 2)} m along, ${fixed(stones.u[stone]!, 2)} m up the face. Profile: `,
-        button("level", "profile along a level line through this stone", () => this.#lineThrough(stone, false)), " ",
-        button("upright", "profile along an upright line through this stone", () => this.#lineThrough(stone, true))));
+      el("p", { class: "note" }, t("place", { along: fixed(stones.a[stone]!, 2), up: fixed(stones.u[stone]!, 2) }),
+        button(t("level"), "", () => this.#lineThrough(stone, false)), " ",
+        button(t("upright"), "", () => this.#lineThrough(stone, true))));
   }
 
   #failure(stone: number): Node {
     const { stones, document: { statuses } } = this.#report;
-    return el("p", {}, `Not measured: ${statuses[stones.state[stone]!]!.meaning}. Its motion is unknown, not zero.`);
+    return el("p", {}, t("failure", { meaning: statuses[stones.state[stone]!]!.meaning }));
   }
 
   #numbers(stone: number): Node {
@@ -108,14 +123,14 @@ export class StonePanel {
         cell(signedMm(stones.move[k][stone]!)), cell(`\u00b1 ${mm(QUANTILE * stones.sigma[k][stone]!)}`),
         cell(signedMm(stones.relative[k][stone]!)), cell(signedMrad(stones.rotation[k][stone]!)));
     const table = el("table", { class: "numbers" },
-      el("thead", {}, el("tr", {}, ...["", "motion mm", "95 %", "against neighbours mm", "rotation mrad"].map((text, i) =>
+      el("thead", {}, el("tr", {}, ...[t("direction"), t("columnMotion"), t("column95"), t("columnRelative"), t("columnRotation")].map((text, i) =>
         el("th", { scope: "col", ...(i ? { class: "n" } : {}) }, text)))),
       el("tbody", {}, row(0), row(1), row(2),
-        el("tr", { class: "sum" }, el("th", { scope: "row" }, "length"), cell(mm(norm(stones.move, stone))),
+        el("tr", { class: "sum" }, el("th", { scope: "row" }, t("length")), cell(mm(norm(stones.move, stone))),
           cell(`LoD ${mm(stones.limit[stone]!)}`), cell(mm(norm(stones.relative, stone))),
           cell(fixed(norm(stones.rotation, stone) * 1e3, 2)))));
     return registrationKnown ? table : el("div", {}, table,
-      el("p", { class: "note" }, "95 % and LoD hold against the common motion of the measured stones: the registration error of the epochs is unknown."));
+      el("p", { class: "note" }, t("unknownDatum")));
   }
 
   /** The displacement with the projections of its 95 % ellipsoid, from the front and from the side. */
@@ -129,12 +144,12 @@ export class StonePanel {
     const larger = [1, 10, 100].find((f) => f * reach > 0.08 * longest) ?? 1000;
     const extent = longest + larger * reach;
     const plot = (x: 0 | 2, label: string) =>
-      vectorPlot(label, [d[x], d[1]], [c[x]![x]!, c[x]![1]!, c[1]![1]!], extent, larger, x === 2 ? "out" : "along");
+      vectorPlot(label, [d[x], d[1]], [c[x]![x]!, c[x]![1]!, c[1]![1]!], extent, larger, AXES[x]);
     const { values, vectors } = eigen3(c);
     const axes = values.map((v, k) => `${mm(Math.sqrt(CHI2_3_95 * Math.max(0, v)))} mm ${direction(vectors[k]!)}`);
-    return el("div", { class: "card" }, el("h4", {}, "Error ellipsoid (95 %)"),
-      el("div", { class: "pair" }, plot(0, "from the front"), plot(2, "from the side")),
-      el("p", { class: "note" }, `${larger > 1 ? `Ellipsoid drawn ${larger} times larger than the motion. ` : ""}Half axes: ${axes.join(", ")}. Least observable direction seen to ${percent(stones.observability[stone]!)} by the stone's own points.`));
+    return el("div", { class: "card" }, el("h4", {}, t("ellipsoidTitle")),
+      el("div", { class: "pair" }, plot(0, t("fromFront")), plot(2, t("fromSide"))),
+      el("p", { class: "note" }, (larger > 1 ? t("enlarged", { n: larger }) : "") + t("halfAxes", { axes: axes.join(", "), share: percent(stones.observability[stone]!) })));
   }
 
   #neighbours(stone: number): Node | null {
@@ -152,25 +167,25 @@ export class StonePanel {
       return el("tr", {}, el("td", {}, link), el("td", { class: "n" }, fixed(distance, 2)),
         ...difference.map((text) => el("td", { class: "n" }, text)));
     };
-    return el("div", { class: "card" }, el("h4", {}, "Neighbours"),
+    return el("div", { class: "card" }, el("h4", {}, t("neighbours")),
       el("table", { class: "numbers" },
-        el("thead", {}, el("tr", {}, ...["stone", "away m", "along mm", "up mm", "out mm"].map((text, i) =>
+        el("thead", {}, el("tr", {}, ...[t("columnStone"), t("columnAway"), t("neighbourAlong"), t("neighbourUp"), t("neighbourOut")].map((text, i) =>
           el("th", { scope: "col", ...(i ? { class: "n" } : {}) }, text)))),
         el("tbody", {}, ...near.map(row))),
-      el("p", { class: "note" }, "Their motion less this stone's."));
+      el("p", { class: "note" }, t("neighboursNote")));
   }
 
   #quality(stone: number): Node {
     const { stones } = this.#report;
     const partner = stones.partner[stone]!;
     const facts: [string, string][] = [
-      ["Points", `${count(stones.points[0][stone]!)} and ${partner ? count(stones.points[1][stone]!) : "none"}`],
-      ["Visible face", `${fixed(stones.area[stone]! * 1e4, 0)} cm\u00b2`],
-      ["Photos", `${stones.photos[stone]}, share of votes ${percent(stones.confidence[stone]!)}`],
-      ["Partner", partner ? `stone ${partner} of the later epoch` : "none"],
-      ["M3C2 on it", Number.isNaN(stones.m3c2[stone]!) ? DASH : `${signedMm(stones.m3c2[stone]!)} mm (median)`],
+      [t("points"), t("pointsText", { first: count(stones.points[0][stone]!), second: partner ? count(stones.points[1][stone]!) : t("none") })],
+      [t("visibleFace"), `${fixed(stones.area[stone]! * 1e4, 0)} cm\u00b2`],
+      [t("photos"), t("photosText", { n: stones.photos[stone]!, share: percent(stones.confidence[stone]!) })],
+      [t("partner"), partner ? t("partnerText", { id: partner }) : t("noPartner")],
+      [t("m3c2On"), Number.isNaN(stones.m3c2[stone]!) ? DASH : t("m3c2Text", { distance: signedMm(stones.m3c2[stone]!) })],
     ];
-    return el("div", { class: "card" }, el("h4", {}, "Quality"),
+    return el("div", { class: "card" }, el("h4", {}, t("quality")),
       el("dl", {}, ...facts.flatMap(([term, text]) => [el("dt", {}, term), el("dd", {}, text)])));
   }
 }
@@ -196,13 +211,13 @@ export function nearest(stones: Stones, stone: number, wanted: number): number[]
 
 function signedMrad(radians: number): string {
   const text = fixed(radians * 1e3, 2);
-  return radians > 0 && Number(text) !== 0 ? `+${text}` : text;
+  return radians > 0 && /[1-9]/.test(text) ? `+${text}` : text;
 }
 
 /** The axis that a unit vector is nearest to, in words. */
 function direction(vector: readonly number[]): string {
   const k = vector.reduce((best, v, i) => (Math.abs(v) > Math.abs(vector[best]!) ? i : best), 0);
-  return Math.abs(vector[k]!) > 0.9 ? AXES[k]! : `mostly ${AXES[k]!}`;
+  return Math.abs(vector[k]!) > 0.9 ? AXES[k]! : t("mostly", { axis: AXES[k]! });
 }
 
 /** A vector from the origin and the ellipse of its error around its tip. `c`: xx, xy, yy in m^2. */
@@ -215,13 +230,13 @@ function vectorPlot(title: string, [x, y]: [number, number], c: [number, number,
   const head = Math.min(7, 0.5 * length) / length, [bx, by] = [(px - middle) * head, (py - middle) * head];
   const ring = (radius: number) => svg("circle", { cx: middle, cy: middle, r: radius, class: "grid" });
   return el("figure", {},
-    svg("svg", { viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": `${title}: ${axis} ${signedMm(x)} mm, up ${signedMm(y)} mm` },
+    svg("svg", { viewBox: `0 0 ${size} ${size}`, role: "img", "aria-label": `${title}: ${axis} ${signedMm(x)} mm, ${AXES[1]} ${signedMm(y)} mm` },
       ring((middle - 14) / 2), ring(middle - 14),
       svg("path", { d: `M0 ${middle}H${size}M${middle} 0V${size}`, class: "zero" }),
       svg("ellipse", { rx: Math.max(1, major * factor), ry: Math.max(1, minor * factor), class: "ellipse", transform: `translate(${px} ${py})rotate(${(-turn * 180) / Math.PI})` }),
       svg("path", { class: "vector", d: `M${middle} ${middle}L${px} ${py}M${px - bx - 0.6 * by} ${py - by + 0.6 * bx}L${px} ${py}L${px - bx + 0.6 * by} ${py - by - 0.6 * bx}` }),
       svg("text", { x: size - 2, y: middle - 4, "text-anchor": "end" }, axis),
-      svg("text", { x: middle + 4, y: 10 }, "up"),
+      svg("text", { x: middle + 4, y: 10 }, AXES[1]),
       svg("text", { x: middle + 3, y: middle + (middle - 14) + 12 }, `${mm(extent)} mm`)),
     el("figcaption", { class: "note" }, title));
 }

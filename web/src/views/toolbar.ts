@@ -4,6 +4,7 @@ import type { Report } from "../data.ts";
 import { button, el } from "../dom.ts";
 import type { Quantity, QuantityKey } from "../quantities.ts";
 import type { State, Store } from "../store.ts";
+import { t } from "../texts.ts";
 
 /** What the buttons of a view do. */
 export interface Zoomable {
@@ -18,15 +19,15 @@ export function toolbar(report: Report, store: Store, quantities: readonly Quant
   const check = (text: string, key: "fade" | "arrows") => {
     const box = el("input", { type: "checkbox", ...(store.get()[key] ? { checked: true } : {}), id: key });
     box.addEventListener("change", () => store.set({ [key]: box.checked }));
-    return el("label", {}, box, ` ${text}`);
+    return el("label", {}, box, text);
   };
   const tab = (text: string, view: State["view"]) => {
-    const element = button(text, view === "map" ? "show the unrolled wall" : "show the wall in space", () => store.set({ view }));
+    const element = button(text, "", () => store.set({ view }));
     element.id = `view-${view}`;
     return element;
   };
-  const tabs = [tab("Map", "map"), tab("3D", "scene")] as const;
-  const draw = button("Draw a profile", "then drag a line across the map", () =>
+  const tabs = [tab(t("mapTab"), "map"), tab(t("sceneTab"), "scene")] as const;
+  const draw = button(t("drawProfile"), t("drawProfileHint"), () =>
     store.set({ view: "map", tool: store.get().tool === "profile" ? "move" : "profile" }));
   draw.id = "draw-profile";
   const reflect = () => {
@@ -38,22 +39,22 @@ export function toolbar(report: Report, store: Store, quantities: readonly Quant
   store.on(reflect);
   reflect();
   const zoom = el("span", { class: "group" },
-    button("+", "zoom in", () => current().zoom(1.6)),
-    button("\u2212", "zoom out", () => current().zoom(1 / 1.6)),
-    button("whole wall", "show the whole wall", () => current().whole()));
-  return el("div", { class: "controls" }, el("span", { class: "group", role: "group", "aria-label": "view" }, ...tabs),
-    el("label", {}, "Show ", select), check("fade below the limit", "fade"), check("in-plane arrows", "arrows"),
+    button("+", t("zoomIn"), () => current().zoom(1.6)),
+    button("\u2212", t("zoomOut"), () => current().zoom(1 / 1.6)),
+    button(t("wholeWall"), "", () => current().whole()));
+  return el("div", { class: "controls" }, el("span", { class: "group", role: "group", "aria-label": t("viewGroup") }, ...tabs),
+    el("label", {}, t("show"), select), check(t("fade"), "fade"), check(t("arrows"), "arrows"),
     search(report, store), draw, zoom);
 }
 
 /** Finds a stone by its number. */
 function search(report: Report, store: Store): HTMLElement {
-  const input = el("input", { type: "search", id: "search", inputmode: "numeric", size: 7, placeholder: "number" });
+  const input = el("input", { type: "search", id: "search", inputmode: "numeric", size: 7, placeholder: t("number") });
   input.addEventListener("input", () => {
     const text = input.value.trim();
     const stone = text === "" ? undefined : report.indexOfId.get(Number(text));
     input.setAttribute("aria-invalid", String(text !== "" && stone === undefined));
     if (stone !== undefined) store.choose(stone);
   });
-  return el("label", {}, "Stone ", input);
+  return el("label", {}, t("searchStone"), input);
 }

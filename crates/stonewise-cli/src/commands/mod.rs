@@ -52,7 +52,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::C2c(args) => compare::c2c(&args, force, printer),
         Command::C2m(args) => compare::c2m(&args, force, printer),
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
-        Command::Report(args) => report::report(&args, printer),
+        Command::Report(args) => report::report(&args, force, printer),
         Command::Demo(args) => simulate::demo(&args, force, printer),
         Command::Simulate(args) => simulate::simulate(&args, force, printer),
         Command::Split(args) => split::split(&args, force, printer),

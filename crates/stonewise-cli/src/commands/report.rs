@@ -5,9 +5,11 @@ use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::Result;
 use stonewise::OutputFolder;
+use stonewise::report::Pdf;
 
-/// Writes the report and the layers again, from result files alone.
-pub fn report(args: &ReportArgs, printer: &Printer) -> Result<Outcome> {
+/// Writes the report and the layers again, from result files alone; as PDF too where that is asked for.
+pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let pdf = args.pdf.as_deref().map(|pdf| Pdf::at(pdf, force)).transpose()?;
     let _folder = OutputFolder::of_results(&args.results)?;
     stonewise::report::write_report(&args.results)?;
     stonewise::export::write_layers(&args.results)?;
@@ -15,5 +17,9 @@ pub fn report(args: &ReportArgs, printer: &Printer) -> Result<Outcome> {
     printer.log(&format!(
         "wrote {results}/report/index.html, stones.gpkg, stones.geojson, stones.vtp and stones.ply"
     ));
+    if let Some(pdf) = &pdf {
+        pdf.write(&args.results, !args.no_appendix, printer)?;
+        printer.log(&format!("wrote {}", pdf.path().display()));
+    }
     Ok(Outcome::Done)
 }

@@ -15,6 +15,7 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
     let project = Project::read(&args.project.project)?;
     let folder = OutputFolder::of_project(&args.project.out, &project, force)?;
     let (outcome, summary) = run_to(&folder, &project, Until::Reported, printer)?;
+    say_verdict(&summary, printer);
     let state = summary.verdict.as_ref().map(|v| v.state);
     Ok(match (args.exit_on, state) {
         (Some(_), Some(State::Alarm)) | (Some(ExitOn::Attention), Some(State::Attention)) => Outcome::Verdict,
@@ -27,15 +28,20 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
 pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read(&args.project)?;
     let folder = OutputFolder::of_project(&args.out, &project, force)?;
-    run_in(&folder, &project, until, printer)
+    let (outcome, summary) = run_to(&folder, &project, until, printer)?;
+    say_verdict(&summary, printer);
+    Ok(outcome)
 }
 
-/// The same in a folder that is claimed already.
-pub fn run_in(folder: &OutputFolder, project: &Project, until: Until, printer: &Printer) -> Result<Outcome> {
-    Ok(run_to(folder, project, until, printer)?.0)
+/// The verdict's sentence, which is the last thing that a person reads.
+pub fn say_verdict(summary: &Summary, printer: &Printer) {
+    if let Some(verdict) = &summary.verdict {
+        printer.log(&verdict.sentence);
+    }
 }
 
-fn run_to(
+/// Runs a project as far as asked, in a folder that is claimed already, and says what came out but for the verdict.
+pub fn run_to(
     folder: &OutputFolder,
     project: &Project,
     until: Until,
@@ -95,7 +101,8 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         let verdict = verdicts.into_iter().find(|v| v.epoch == epoch.name);
         let against = format!("{} against {}", epoch.name, project.epochs[0].name);
         printer.log(&format!("{against}: {}", counts(&pair.rows, verdict)));
-        if let Some(verdict) = verdict {
+        // The sentence on a single later epoch is the last line.
+        if let Some(verdict) = verdict.filter(|_| summary.pairs.len() > 1) {
             printer.log(&format!("{against}: {}", verdict.sentence));
         }
     }

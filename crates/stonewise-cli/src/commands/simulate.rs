@@ -19,9 +19,10 @@ pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     let folder = OutputFolder::of_inputs(&args.out, &owner, &[], &[], force)?;
     make_once(&survey, &params, force, printer)?;
     let project = Project::read(&path)?;
-    let outcome = run::run_in(&folder, &project, Until::Reported, printer)?;
+    let (outcome, summary) = run::run_to(&folder, &project, Until::Reported, printer)?;
     super::evaluate::score(&args.out, &survey.join("truth/stones.csv"), printer)?;
     printer.log(&format!("open {}", args.out.join("report/index.html").display()));
+    run::say_verdict(&summary, printer);
     Ok(outcome)
 }
 

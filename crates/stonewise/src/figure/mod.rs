@@ -19,4 +19,4 @@ pub(crate) use colour_bar::colour_bar;
 pub(crate) use page::{Page, jpeg_element, table};
 pub(crate) use plot::{Item, Plot};
 pub(crate) use scale::{Scale, colours};
-pub(crate) use text::{count, escape, mm, mm_or_dash, number, percent};
+pub(crate) use text::{count, escape, mm, number, percent};

@@ -44,11 +44,6 @@ pub(crate) fn mm(metres: f64) -> String {
     number(value, decimals)
 }
 
-/// The same of a value that may be missing.
-pub(crate) fn mm_or_dash(metres: Option<f64>) -> String {
-    mm(metres.unwrap_or(f64::NAN))
-}
-
 /// A whole number with thin spaces between thousands.
 pub(crate) fn count(value: usize) -> String {
     let digits = value.to_string();

@@ -3,6 +3,7 @@
 use crate::error::Result;
 use crate::files::{create_results_folder, read_json, write_json};
 use crate::output::OutputFolder;
+use crate::pipeline::agenda::Agenda;
 use crate::pipeline::clock::{Clock, peak_memory_bytes};
 use crate::pipeline::storage::step::{Keeps, Key, Origin, StepDir, StepStore};
 use crate::project::Project;
@@ -30,6 +31,8 @@ pub struct Context<'a> {
     pub progress: &'a dyn Progress,
     /// What went wrong without stopping the run.
     pub warnings: Warnings,
+    /// The steps that the caller was told of; empty where the run is part of something larger.
+    pub agenda: Agenda,
     times: Mutex<Vec<StepTime>>,
 }
 
@@ -63,6 +66,7 @@ impl<'a> Context<'a> {
             output: None,
             progress,
             warnings,
+            agenda: Agenda::default(),
             times: Mutex::default(),
         })
     }
@@ -88,12 +92,16 @@ impl<'a> Context<'a> {
         self.progress.check()?;
         let started = Clock::start();
         let (dir, origin) = self.store.step(name, key, published, |dir| {
+            self.enter(name);
             let warnings = Warnings::default();
             make(dir, &warnings)?;
             write_json(&dir.file(WARNINGS), &warnings.sorted())
         })?;
         if let Origin::MadeAgain(why) = &origin {
             self.progress.note(&format!("step {name} was done again: {why}"));
+        }
+        if let (Origin::Found, Some(place)) = (&origin, self.agenda.place(name)) {
+            self.progress.take_over(place);
         }
         let warnings: Vec<Warning> = read_json(&dir.file(WARNINGS))?;
         warnings.into_iter().for_each(|w| self.warnings.push(w));
@@ -104,6 +112,7 @@ impl<'a> Context<'a> {
     /// Does a piece of work that keeps nothing between runs, and notes its time.
     pub fn timed<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.progress.check()?;
+        self.enter(name);
         let started = Clock::start();
         let result = work()?;
         self.record(name, started, false);
@@ -118,6 +127,12 @@ impl<'a> Context<'a> {
     /// Times of all steps so far, in order.
     pub fn times(&self) -> Vec<StepTime> {
         self.times.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn enter(&self, step: &str) {
+        if let Some(place) = self.agenda.place(step) {
+            self.progress.enter(place);
+        }
     }
 
     fn record(&self, step: &str, started: Clock, resumed: bool) {

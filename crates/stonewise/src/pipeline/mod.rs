@@ -2,6 +2,7 @@
 //!
 //! `storage` keeps files between steps, `steps` are the steps, `outputs` writes what a user opens.
 
+mod agenda;
 mod clock;
 mod clouds_only;
 mod context;

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::export::write_layers;
 use crate::files::write_readable_json;
 use crate::output::OutputFolder;
+use crate::pipeline::agenda::Agenda;
 use crate::pipeline::context::Context;
 use crate::pipeline::doubts::note_doubts;
 use crate::pipeline::look::look;
@@ -99,7 +100,9 @@ impl Summary {
 /// not overlap, a full disk, interruption. What is finished stays, and the same call goes on from there.
 pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn Progress) -> Result<Summary> {
     out.begin_results(project)?;
-    let context = Context::new(project, out, progress)?;
+    let mut context = Context::new(project, out, progress)?;
+    context.agenda = Agenda::of(project, until);
+    context.agenda.announce(progress);
     look(&context, out.is_forced())?;
     let summary = run_in(&context, until)?;
     out.finish_results(until == Until::Reported)?;

@@ -1,8 +1,11 @@
 //! The report, made from result files alone.
 
+mod browser;
 mod draw;
 mod page;
+mod pdf;
 mod report_file;
 mod summary;
 
+pub use pdf::Pdf;
 pub use report_file::write_report;

@@ -123,6 +123,8 @@ mod tests {
             html.contains("<div class=\"verdict cannot-tell\"")
                 && html.contains("Cannot tell: the adjustment did not converge")
         );
+        // Nothing below contradicts that.
+        assert!(html.contains("<p class=\"hedge\">All numbers below are as computed"));
         // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
         assert!(html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
@@ -135,7 +137,10 @@ mod tests {
         assert!(
             html.contains("is included in the limits: the stable areas show a registration error of 3.2 mm.")
         );
-        assert!(html.contains("finished <b>2026-04-30 12:00 UTC</b>") && html.contains("temperature_c 9.5"));
+        assert!(
+            html.contains("finished <b>2026-04-30 12:00 UTC</b>")
+                && html.contains("temperature 9.5\u{a0}\u{b0}C")
+        );
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
         assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
         let html = written(&html);
@@ -280,6 +285,7 @@ mod tests {
             html.contains("<div class=\"verdict fine\"")
                 && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)")
         );
+        assert!(!html.contains("<p class=\"hedge\">"));
         assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
         assert!(
             html.contains("No stone calls for a closer look.")
@@ -328,6 +334,83 @@ mod tests {
         ] {
             assert!(html.contains(words), "{words}");
         }
+    }
+
+    /// What stands in all elements of a name, without markup inside it.
+    fn inside(html: &str, name: &str) -> Vec<String> {
+        let (start, end) = (format!("<{name}"), format!("</{name}>"));
+        let parts = html.split(&start).skip(1);
+        parts
+            .filter_map(|part| {
+                let content = part.split_once('>')?.1.split(&end).next()?;
+                let text: String = content
+                    .split('<')
+                    .map(|t| t.split_once('>').map_or(t, |t| t.1))
+                    .collect();
+                Some(text)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_german_report_has_no_english_heading() {
+        let german = crate::ReportParams {
+            language: Language::German,
+            ..crate::ReportParams::default()
+        };
+        let both = [crate::ReportParams::default(), german].map(|params| {
+            let mut run = run_record("Wall", &["A", "B"]);
+            run.parameters.report = params;
+            written(&report(&rows(), Some(&run)))
+        });
+        // Names that are the same in both languages.
+        let shared = [
+            "Datum",
+            "Parameter",
+            "M3C2",
+            "LoD95",
+            "LoD95 mm",
+            "NMAD mm",
+            "RMSE mm",
+            "3D mm",
+            "status",
+        ];
+        for name in [
+            "h2",
+            "h3",
+            "h4",
+            "figcaption",
+            "summary",
+            "nav",
+            "title",
+            "th",
+            "dt",
+        ] {
+            let [english, german] = both.each_ref().map(|html| {
+                // The audit lists keys of run.json as they are.
+                let listed = html.split("<section id=\"audit\">").next().unwrap();
+                inside(
+                    if ["th", "dt"].contains(&name) {
+                        listed
+                    } else {
+                        html
+                    },
+                    name,
+                )
+            });
+            assert_eq!(english.len(), german.len(), "{name}");
+            for (e, g) in english.iter().zip(&german) {
+                let is_shared = shared.iter().any(|word| g.eq_ignore_ascii_case(word)) || g.len() < 3;
+                let is_key = g
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+                assert!(e != g || is_shared || (name == "dt" && is_key), "{name}: {g}");
+            }
+        }
+        // Numbers of tables and pictures.
+        assert!(
+            both[1].contains("<td class=\"n\">20,4</td>") && !both[1].contains("<td class=\"n\">20.4</td>")
+        );
     }
 
     #[test]

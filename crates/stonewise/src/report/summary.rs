@@ -1,6 +1,5 @@
 //! The facts that the report states in words.
 
-use crate::figure::number;
 use crate::report_params::{Language, ReportParams};
 use crate::results::records::{EpochVerdict, StoneVerdict};
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m};
@@ -104,7 +103,7 @@ impl<'a> Summary<'a> {
 
     /// Millimetres for tables.
     pub(crate) fn mm(&self, metres: f64) -> String {
-        number(metres * 1e3, self.decimals())
+        self.texts().number(metres * 1e3, self.decimals())
     }
 
     /// End of the colour scale that the components share, metres.

@@ -104,8 +104,9 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let mut masks = CocoFile::default();
     let (mut count, mut stones) = (0, 0);
     let mut scores: Vec<(String, PhotoPairs)> = Vec::new();
-    for photo in &photos {
+    for (photo, number) in photos.iter().zip(1..) {
         progress.check()?;
+        progress.detail(&format!("photo {number} of {}", photos.len()));
         let name = photo.strip_prefix(&root).unwrap_or(photo);
         let segmented = match taken_over(job, &step, photo, name)? {
             Some(segmented) => {

@@ -155,8 +155,10 @@ impl<S: PairSource> Run<'_, S> {
     fn begins(&mut self) -> bool {
         let is_left = self.iterations < self.allowed;
         if is_left {
-            self.progress.begin("adjust", self.adjustment.stones.len() as u64);
             self.iterations += 1;
+            let stones = self.adjustment.stones.len() as u64;
+            self.progress
+                .begin(&format!("iteration {}", self.iterations), stones);
         }
         is_left
     }

@@ -70,8 +70,8 @@ pub(crate) fn scatter(
     out
 }
 
-/// A histogram of values in millimetres between two limits; values beyond are counted in the end bars.
-pub(crate) fn histogram(title: &str, label: &str, values_mm: &[f64], limits_mm: [f64; 2]) -> String {
+/// A histogram of values in millimetres, with labels below and beside it, between two limits; values beyond are counted in the end bars.
+pub(crate) fn histogram(title: &str, labels: [&str; 2], values_mm: &[f64], limits_mm: [f64; 2]) -> String {
     const BARS: usize = 40;
     let span = limits_mm[1] - limits_mm[0];
     let mut bars = [0usize; BARS];
@@ -81,8 +81,8 @@ pub(crate) fn histogram(title: &str, label: &str, values_mm: &[f64], limits_mm: 
     }
     let highest = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let axes = Axes {
-        x: Axis::linear(label, limits_mm),
-        y: Axis::linear("stones", [0.0, highest * 1.08]),
+        x: Axis::linear(labels[0], limits_mm),
+        y: Axis::linear(labels[1], [0.0, highest * 1.08]),
         area: [52.0, 8.0, 320.0, 150.0],
     };
     let mut out = format!(

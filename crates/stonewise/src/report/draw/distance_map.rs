@@ -54,7 +54,7 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
         let (w, h) = (edge(left, column + 1) - x, edge(top, row + 1) - y);
         let _ = write!(path, "M{x} {y}h{w}v{h}h-{w}z");
     }
-    let mut out = layout.open("M3C2 distance");
+    let mut out = layout.open(layout.texts().maps.m3c2);
     layout.axes.draw(&mut out);
     out.push_str(r#"<g transform="scale(.1)" shape-rendering="crispEdges">"#);
     for ((shown, step), path) in groups {

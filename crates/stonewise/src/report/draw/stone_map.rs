@@ -2,6 +2,7 @@
 
 use crate::figure::{Axes, Axis, Scale, escape, mm, nice_above};
 use crate::results::{ResultSet, Sorted, StoneRow};
+use crate::texts::{Texts, fill};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -19,6 +20,7 @@ const ARROW_SPACING_PX: f64 = 14.0;
 /// Where everything lies in every map of one wall, and the path of every stone.
 pub(crate) struct MapLayout<'a> {
     results: &'a ResultSet,
+    texts: &'static Texts,
     /// Data: metres along and up.
     pub axes: Axes,
     pub width: f64,
@@ -50,7 +52,7 @@ pub(crate) struct MapPicture<'a> {
 
 impl<'a> MapLayout<'a> {
     /// Two walls stand beside each other on the page unless they are wide.
-    pub(crate) fn new(results: &'a ResultSet) -> Self {
+    pub(crate) fn new(results: &'a ResultSet, texts: &'static Texts) -> Self {
         let rings: Vec<Vec<Point2<f64>>> = results.stones.iter().map(|s| results.unrolled(s)).collect();
         let all = || {
             rings
@@ -73,12 +75,12 @@ impl<'a> MapLayout<'a> {
         let area = [MARGIN[0], MARGIN[1], size.x * scale, size.y * scale];
         // A long label does not fit beside a low wall.
         let up = if area[3] < 110.0 {
-            "up (m)"
+            texts.maps.axis_up_short
         } else {
-            "up the face (m)"
+            texts.maps.axis_up
         };
         let axes = Axes {
-            x: Axis::linear("along the wall (m)", [low.x, low.x + size.x]),
+            x: Axis::linear(texts.maps.axis_along, [low.x, low.x + size.x]),
             y: Axis::linear(up, [low.y, low.y + size.y]),
             area,
         };
@@ -93,12 +95,18 @@ impl<'a> MapLayout<'a> {
         let paths = rings.iter().map(|ring| path(ring, &axes)).collect();
         Self {
             results,
+            texts,
             axes,
             width,
             height,
             paths,
             stone_px,
         }
+    }
+
+    /// The texts of the page.
+    pub(crate) fn texts(&self) -> &'static Texts {
+        self.texts
     }
 
     /// Whether maps need the whole width of the page.
@@ -219,7 +227,8 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     if !edited.is_empty() {
         let _ = write!(
             out,
-            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>edited by hand</title></path>"#
+            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>{}</title></path>"#,
+            layout.texts.maps.edited
         );
     }
     if !loose.is_empty() {
@@ -313,10 +322,10 @@ fn draw_arrows(layout: &MapLayout, out: &mut String) {
     let reference = arrow([left, bottom], [ARROW_PX, 0.0]);
     let _ = write!(
         out,
-        r#"<path class="arrow halo" d="{shafts}{reference}"/><path class="arrow" d="{shafts}{reference}"/><text x="{:.1}" y="{:.1}">{} mm in-plane</text>"#,
+        r#"<path class="arrow halo" d="{shafts}{reference}"/><path class="arrow" d="{shafts}{reference}"/><text x="{:.1}" y="{:.1}">{}</text>"#,
         left + ARROW_PX + 8.0,
         bottom + 4.0,
-        mm(reference_m)
+        fill(layout.texts.maps.in_plane, &[("length", &*mm(reference_m))])
     );
 }
 

@@ -4,6 +4,7 @@ use super::html::{details, section, table};
 use crate::figure::{count, escape, number};
 use crate::results::ResultSet;
 use crate::results::records::StepTime;
+use crate::texts::{AuditTexts, Texts, fill};
 use crate::warnings::Warning;
 use serde::Serialize;
 use serde_json::Value;
@@ -13,33 +14,31 @@ use std::collections::{BTreeMap, BTreeSet};
 const MAX_DECISIONS: usize = 150;
 
 /// Decisions about masks, the adjustment, and everything in run.json, warnings first.
-pub(super) fn audit(results: &ResultSet) -> String {
+pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
+    let names = &texts.audit;
     let mut out = match &results.run {
-        Some(run) => warnings(&run.warnings),
-        None => "<p>There is no run.json beside the results.</p>".to_owned(),
+        Some(run) => warnings(&run.warnings, names),
+        None => format!("<p>{}</p>", names.no_run),
     };
-    out.push_str(&edits(&results.edits));
-    out.push_str(&decision_counts(&results.decisions));
+    out.push_str(&edits(&results.edits, names));
+    out.push_str(&decision_counts(&results.decisions, texts));
     if let Some(run) = &results.run {
-        out.push_str(&details("Steps, times and memory", &steps(&run.steps)));
-        out.push_str(&details("Epochs", &tree_of(&run.epochs)));
-        out.push_str(&details("Parameters", &tree_of(&run.parameters)));
+        out.push_str(&details(names.steps, &steps(&run.steps, texts)));
+        out.push_str(&details(names.epochs, &tree_of(&run.epochs)));
+        out.push_str(&details(names.parameters, &tree_of(&run.parameters)));
         if let Some(part) = &run.part {
-            out.push_str(&details("Part of the survey", &tree_of(part)));
+            out.push_str(&details(names.part, &tree_of(part)));
         }
     }
     if let Some(registration) = &results.registration {
-        out.push_str(&details(
-            "Adjustment of the motions (registration.json)",
-            &tree_of(registration),
-        ));
+        out.push_str(&details(names.adjustment, &tree_of(registration)));
     }
-    out.push_str(&decision_lists(&results.decisions));
-    section("audit", "Audit", &out)
+    out.push_str(&decision_lists(&results.decisions, names));
+    section("audit", texts.sections.audit, &out)
 }
 
 /// What a person corrected, with who, when and why, and what came of it; the head first.
-fn edits(rows: &[Vec<String>]) -> String {
+fn edits(rows: &[Vec<String>], names: &AuditTexts) -> String {
     let Some((head, rows)) = rows.split_first() else {
         return String::new();
     };
@@ -47,34 +46,39 @@ fn edits(rows: &[Vec<String>]) -> String {
     let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
     let head: Vec<String> = head.iter().map(|h| words(h)).collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
-    let note = "<p class=\"note\">The maps draw the outlines of edited stones dashed.</p>";
-    format!("<h3>Edits by hand</h3>{}{note}", table(&head, &rows, head.len()))
+    let table = table(&head, &rows, head.len());
+    format!(
+        "<h3>{}</h3>{table}<p class=\"note\">{}</p>",
+        names.edits, names.edits_note
+    )
 }
 
 /// What was done, how long it took, and the highest memory up to its end.
-fn steps(steps: &[StepTime]) -> String {
-    let or_dash = |v: Option<f64>| v.map_or("\u{2013}".into(), |v| number(v, 1));
+fn steps(steps: &[StepTime], texts: &Texts) -> String {
+    let names = &texts.audit;
+    let or_dash = |v: Option<f64>| v.map_or("\u{2013}".into(), |v| texts.number(v, 1));
     let row = |step: &StepTime| {
         vec![
             escape(&step.step),
-            number(step.seconds, 1),
+            texts.number(step.seconds, 1),
             or_dash(step.processor_seconds),
             or_dash(step.peak_memory_bytes.map(|b| b as f64 / 1e6)),
-            if step.resumed {
-                "taken from an earlier run"
-            } else {
-                ""
-            }
-            .into(),
+            if step.resumed { names.resumed } else { "" }.into(),
         ]
     };
     let rows: Vec<Vec<String>> = steps.iter().map(row).collect();
-    let head = ["step", "seconds", "processor seconds", "highest memory MB", ""];
+    let head = [
+        names.step,
+        names.seconds,
+        names.processor,
+        names.memory,
+        names.origin,
+    ];
     table(&head, &rows, 1)
 }
 
 /// How many mask instances were merged, split, dropped, by epoch.
-fn decision_counts(epochs: &[Vec<Vec<String>>]) -> String {
+fn decision_counts(epochs: &[Vec<Vec<String>>], texts: &Texts) -> String {
     let counted: Vec<BTreeMap<&str, usize>> = epochs
         .iter()
         .map(|rows| {
@@ -88,78 +92,106 @@ fn decision_counts(epochs: &[Vec<Vec<String>>]) -> String {
     if kinds.is_empty() {
         return String::new();
     }
-    let mut head = vec!["decision of the majority of the photos".to_owned()];
-    head.extend((1..=epochs.len()).map(|e| format!("epoch {e}")));
+    let mut head = vec![texts.audit.decision_of.to_owned()];
+    head.extend((1..=epochs.len()).map(|e| fill(texts.sections.epoch, &[("n", &*e.to_string())])));
     let row = |kind: &&str| {
-        let mut row = vec![escape(&words(kind))];
+        let mut row = vec![escape(&decision(kind, &texts.audit))];
         row.extend(counted.iter().map(|e| count(e.get(*kind).copied().unwrap_or(0))));
         row
     };
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     format!(
-        "<h3>Decisions about mask instances</h3>{}",
+        "<h3>{}</h3>{}",
+        texts.audit.decisions,
         table(&head, &kinds.iter().map(row).collect::<Vec<_>>(), 1)
     )
 }
 
+/// A kind of decision in words.
+fn decision(kind: &str, names: &AuditTexts) -> String {
+    match kind {
+        "merged_instance" => names.merged.to_owned(),
+        "joined_fragment" => names.joined.to_owned(),
+        "split_instance" => names.split.to_owned(),
+        "outvoted_instance" => names.outvoted.to_owned(),
+        "dropped_islands" => names.dropped_islands.to_owned(),
+        "dropped_stone" => names.dropped_stone.to_owned(),
+        other => words(other),
+    }
+}
+
 /// Which instances were merged, split, dropped.
-fn decision_lists(epochs: &[Vec<Vec<String>>]) -> String {
+fn decision_lists(epochs: &[Vec<Vec<String>>], names: &AuditTexts) -> String {
     epochs
         .iter()
         .zip(1..)
-        .map(|(rows, number)| decision_list(rows, number))
+        .map(|(rows, number)| decision_list(rows, number, names))
         .collect()
 }
 
 /// The decisions of one epoch, one a row.
-fn decision_list(rows: &[Vec<String>], number: usize) -> String {
+fn decision_list(rows: &[Vec<String>], number: usize, names: &AuditTexts) -> String {
     if rows.is_empty() {
         return String::new();
     }
     let text = |row: &Vec<String>| {
         let mut cells: Vec<String> = row.iter().map(|c| escape(c)).collect();
         cells.resize(6, String::new());
-        cells[0] = escape(&words(&row[0]));
+        cells[0] = escape(&decision(&row[0], names));
         cells
     };
     let shown: Vec<Vec<String>> = rows.iter().take(MAX_DECISIONS).map(text).collect();
     let rest = if rows.len() > MAX_DECISIONS {
-        format!(
-            "<p class=\"note\">{MAX_DECISIONS} of {}; all are in audit_epoch{number}.csv.</p>",
-            count(rows.len())
-        )
+        let values = [
+            ("shown", &*MAX_DECISIONS.to_string()),
+            ("n", &*count(rows.len())),
+            ("e", &*number.to_string()),
+        ];
+        format!("<p class=\"note\">{}</p>", fill(names.decision_rest, &values))
     } else {
         String::new()
     };
-    let head = ["decision", "photo", "instance", "stones", "share", "points"];
+    let head = [
+        names.decision,
+        names.photo,
+        names.instance,
+        names.of_stones,
+        names.share,
+        names.points,
+    ];
     details(
-        &format!(
-            "Merged, split and dropped masks of epoch {number} ({})",
-            count(rows.len())
+        &fill(
+            names.decision_list,
+            &[("e", &*number.to_string()), ("n", &*count(rows.len()))],
         ),
         &format!("{}{rest}", table(&head, &shown, 2)),
     )
 }
 
-fn warnings(warnings: &[Warning]) -> String {
+fn warnings(warnings: &[Warning], names: &AuditTexts) -> String {
     if warnings.is_empty() {
-        return "<p>No warnings.</p>".into();
+        return format!("<p>{}</p>", names.no_warnings);
     }
     let row = |w: &Warning| {
         vec![
             escape(&w.step),
             escape(&w.subject),
             escape(&w.message),
-            if w.skipped_input { "<b>left out</b>" } else { "" }.into(),
+            match w.skipped_input {
+                true => format!("<b>{}</b>", names.left_out),
+                false => String::new(),
+            },
         ]
     };
     let rows: Vec<Vec<String>> = warnings.iter().map(row).collect();
     let left_out = warnings.iter().filter(|w| w.skipped_input).count();
     format!(
-        "<h3>Warnings ({}; inputs left out: {})</h3>{}",
-        count(warnings.len()),
-        count(left_out),
-        table(&["step", "about", "what happened", "input"], &rows, 4)
+        "<h3>{}</h3>{}",
+        fill(
+            names.warnings,
+            &[("n", &*count(warnings.len())), ("out", &*count(left_out))]
+        ),
+        table(&[names.step, names.about, names.happened, names.input], &rows, 4)
     )
 }
 

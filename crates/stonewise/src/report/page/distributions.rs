@@ -1,14 +1,19 @@
 //! Histograms, in-plane scatter, stones against M3C2, and the datum check.
 
+use super::first_page::datum_note;
 use super::html::{figure, section, table};
-use crate::figure::{count, escape, mm, mm_or_dash};
+use crate::figure::count;
 use crate::report::draw::{Series, histogram, scatter};
 use crate::report::summary::Summary;
 use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{ResultSet, Sorted};
+use crate::texts::{ChartTexts, Texts, fill};
 
-const NAMES: [&str; 3] = ["along the wall", "up the face", "out of the wall"];
+/// The three directions in words.
+fn directions(names: &ChartTexts) -> [&'static str; 3] {
+    [names.along, names.up, names.out]
+}
 
 /// Histograms and scatter plots. `truth_mm`: a known common in-plane translation.
 pub(super) fn distributions(
@@ -17,13 +22,20 @@ pub(super) fn distributions(
     compared: &Comparison,
     truth_mm: Option<[f64; 2]>,
 ) -> String {
+    let texts = facts.texts();
+    let names = &texts.charts;
     let mut grid = String::new();
-    for (name, component) in NAMES.iter().zip(&facts.components) {
+    for (name, component) in directions(names).iter().zip(&facts.components) {
         let values: Vec<f64> = component.values().iter().map(|v| v * 1e3).collect();
-        let title = format!("Displacement {name}");
+        let title = fill(names.displacement, &[("direction", *name)]);
         grid.push_str(&figure(
             &title,
-            &histogram(&title, "mm", &values, own_limits_mm(component)),
+            &histogram(
+                &title,
+                ["mm", texts.stones.stones],
+                &values,
+                own_limits_mm(component),
+            ),
             "",
         ));
     }
@@ -35,15 +47,11 @@ pub(super) fn distributions(
         .collect();
     let vectors: Vec<[f64; 2]> = compared.in_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
     let limits = shared_limits(&[&stones, &vectors, truth_mm.as_slice()]);
-    let note = |n: usize, what: &str| {
-        let truth = if truth_mm.is_some() {
-            " Cross: the known motion."
-        } else {
-            ""
-        };
-        format!("{} {what}.{truth}", count(n))
+    let note = |n: usize, text: &str| {
+        let truth = if truth_mm.is_some() { names.cross } else { "" };
+        format!("{}{truth}", fill(text, &[("n", &*count(n))]))
     };
-    let labels = ["along (mm)", "up (mm)"];
+    let labels = [names.axis_along, names.axis_up];
     let plot = |key, title: &str, class, points: &Vec<[f64; 2]>| {
         let series = [Series {
             class,
@@ -52,15 +60,15 @@ pub(super) fn distributions(
         scatter(key, title, labels, &series, limits, truth_mm, false)
     };
     grid.push_str(&figure(
-        "In-plane motion of the stones",
-        &plot("in-plane", "stones", "a", &stones),
-        &note(stones.len(), "stones"),
+        names.stones_title,
+        &plot("in-plane", names.stones_title, "a", &stones),
+        &note(stones.len(), names.stones),
     ));
     if !vectors.is_empty() {
-        let text = note(vectors.len(), "core points; vector = distance times normal");
+        let text = note(vectors.len(), names.m3c2);
         grid.push_str(&figure(
-            "In-plane part of M3C2",
-            &plot("", "M3C2", "b", &vectors),
+            names.m3c2_title,
+            &plot("", names.m3c2_title, "b", &vectors),
             &text,
         ));
     }
@@ -68,30 +76,30 @@ pub(super) fn distributions(
         let pairs: Vec<[f64; 2]> = out_of_plane.iter().map(|d| d.map(|v| v * 1e3)).collect();
         let limits = shared_limits(&[&pairs]);
         let difference = Sorted::new(pairs.iter().map(|p| p[0] - p[1]));
-        let text = format!(
-            "{} stones; median difference {} mm, NMAD {} mm.",
-            count(pairs.len()),
-            mm_or_dash(difference.median().map(|v| v / 1e3)),
-            mm_or_dash(difference.nmad().map(|v| v / 1e3))
-        );
+        let values = [
+            ("n", &*count(pairs.len())),
+            ("median", &*texts.mm_or_dash(difference.median().map(|v| v / 1e3))),
+            ("nmad", &*texts.mm_or_dash(difference.nmad().map(|v| v / 1e3))),
+        ];
+        let text = fill(names.out_note, &values);
         let series = [Series {
             class: "a",
             points: pairs,
         }];
         let picture = scatter(
             "out-of-plane",
-            "out of plane",
-            ["stone, out (mm)", "M3C2 (mm)"],
+            names.out_title,
+            [names.axis_out, "M3C2 (mm)"],
             &series,
             limits,
             None,
             true,
         );
-        grid.push_str(&figure("Out of plane: stones against M3C2", &picture, &text));
+        grid.push_str(&figure(names.out_title, &picture, &text));
     }
     section(
         "distributions",
-        "Distributions",
+        texts.sections.distributions,
         &format!("<div class=\"charts\">{grid}</div>"),
     )
 }
@@ -124,6 +132,8 @@ fn shared_limits(series: &[&[[f64; 2]]]) -> [[f64; 2]; 2] {
 
 /// What all stones have in common, and what stands still.
 pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
+    let texts = facts.texts();
+    let names = &texts.charts;
     let still: Vec<_> = facts.measured.iter().filter(|(_, m)| !m.significant).collect();
     let rows: Vec<Vec<String>> = (0..3)
         .map(|k| {
@@ -131,7 +141,7 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
             let rest = Sorted::new(still.iter().map(|(_, m)| m.face[k]));
             let cell = |v: Option<f64>| facts.mm(v.unwrap_or(f64::NAN));
             vec![
-                NAMES[k].into(),
+                directions(names)[k].into(),
                 cell(all.median()),
                 cell(all.nmad()),
                 cell(rest.median()),
@@ -140,49 +150,53 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         })
         .collect();
     let head = [
-        "direction",
-        "all: median mm",
-        "all: NMAD mm",
-        "below their limit: median mm",
-        "below their limit: NMAD mm",
+        names.direction,
+        names.all_median,
+        names.all_nmad,
+        names.below_median,
+        names.below_nmad,
+    ];
+    let values = [
+        ("n", &*count(facts.measured.len())),
+        ("below", &*count(still.len())),
     ];
     let body = format!(
-        "<p>Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
-         error of that registration; only stable points outside the wall can tell. Stones below their own limit should \
-         scatter around zero.</p><p>{}</p>{}<p class=\"note\">NMAD: 1.4826 times the median distance from the median, the standard \
-         deviation of normally distributed values. {} stones in all, {} below their limit.</p>",
-        registration(results),
+        "<p>{}</p><p>{}</p>{}<p class=\"note\">{}</p>",
+        names.datum,
+        registration(results, texts),
         table(&head, &rows, 1),
-        count(facts.measured.len()),
-        count(still.len())
+        fill(names.nmad, &values)
     );
-    section("datum", "Datum check", &body)
+    section("datum", texts.sections.datum_title, &body)
 }
 
 /// What is known about the registration, in words.
-fn registration(results: &ResultSet) -> String {
+fn registration(results: &ResultSet, texts: &Texts) -> String {
+    let names = &texts.charts;
     let estimated = results.datum().filter(|d| d.is_estimated());
     let observers = results.registration.as_ref().and_then(|r| r.observers.as_ref());
     if let (Some(datum), Some(observers)) = (estimated, observers) {
         let axes = ["x", "y", "z"].into_iter().enumerate();
         let part = |(k, axis): (usize, &str)| {
             let sd = datum.covariance_6x6.map_or(0.0, |c| c[k][k].max(0.0).sqrt());
-            format!("{axis} {} \u{b1} {} mm", mm(observers.error[k]), mm(sd))
+            format!(
+                "{axis} {} \u{b1} {} mm",
+                texts.mm(observers.error[k]),
+                texts.mm(sd)
+            )
         };
-        return format!(
-            "Datum: {}. Error of the later epoch in the middle of the wall: {} (one standard deviation, world axes; {} plane cells in stable \
-             areas, sources compared on {} stones).",
-            escape(&datum.note),
-            axes.map(part).collect::<Vec<_>>().join(", "),
-            count(observers.stable_cells),
-            observers.compared_stones.map(count).join(" and ")
-        );
+        let values = [
+            ("note", &*datum_note(datum, texts)),
+            ("parts", &*axes.map(part).collect::<Vec<_>>().join(", ")),
+            ("cells", &*count(observers.stable_cells)),
+            ("compared", &*observers.compared_stones.map(count).join(names.and)),
+        ];
+        return fill(names.estimated, &values);
     }
     match results.datum() {
-        Some(datum) if datum.state != DatumState::Unknown => format!("Datum: {}.", escape(&datum.note)),
-        _ => "<b>The registration error of the epochs is unknown.</b> The project names no stable areas \
-            (<code>[[registration.stable]]</code>) that show it and states no error (<code>epoch_error_m</code>): intervals, limits and \
-            significance hold for motions against the common rigid motion of the measured stones, not against the ground."
-            .into(),
+        Some(datum) if datum.state != DatumState::Unknown => {
+            fill(names.known, &[("note", &*datum_note(datum, texts))])
+        }
+        _ => names.unknown.to_owned(),
     }
 }

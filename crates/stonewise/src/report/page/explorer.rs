@@ -12,6 +12,7 @@ use crate::report::summary::Summary;
 use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
+use crate::texts::fill;
 use nalgebra::{Point2, Point3, Vector3};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
@@ -76,10 +77,13 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         .run
         .as_ref()
         .and_then(|run| epoch_names(run, results.pair));
+    let texts = facts.texts();
     let [diverging, sequential] = colours();
     json!({
-        "epochs": names.unwrap_or_else(|| [1, results.pair + 1].map(|n| format!("epoch {n}"))),
-        "statuses": Status::ALL.map(|s| json!({ "word": s.word(), "meaning": s.meaning() })),
+        "epochs": names.unwrap_or_else(|| {
+            [1, results.pair + 1].map(|n| fill(texts.sections.epoch, &[("n", &*n.to_string())]))
+        }),
+        "statuses": Status::ALL.map(|s| json!({ "word": s.word(), "meaning": texts.status(s) })),
         "colours": { "diverging": diverging, "sequential": sequential },
         "limits": {
             "component": component,

@@ -2,7 +2,7 @@
 
 use super::html::table;
 use super::maps::motion_map;
-use crate::figure::{count, escape, percent};
+use crate::figure::{count, escape};
 use crate::report::summary::Summary;
 use crate::results::records::{Datum, DatumState, EpochRecord, State, StoneVerdict};
 use crate::results::{ResultSet, Status, StoneRow};
@@ -93,7 +93,7 @@ pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
 }
 
 /// Conditions by name, with the unit that the end of the name gives.
-fn conditions(epoch: &EpochRecord, texts: &Texts) -> Option<String> {
+pub(super) fn conditions(epoch: &EpochRecord, texts: &Texts) -> Option<String> {
     const UNITS: [(&str, &str); 5] = [
         ("_c", "\u{b0}C"),
         ("_mm", "mm"),
@@ -244,7 +244,7 @@ fn not_measured(facts: &Summary) -> String {
             format!(
                 "<li>{} ({}): {}</li>",
                 count(n),
-                percent(n, facts.stones).replace('.', texts.decimal),
+                texts.percent(n, facts.stones),
                 escape(texts.status(*status))
             )
         })
@@ -291,11 +291,24 @@ pub(super) fn registration(datum: Option<&Datum>, texts: &Texts) -> String {
     match datum {
         Some(datum) if datum.state != DatumState::Unknown => fill(
             texts.page.registration_included,
-            &[("note", &*escape(&datum.note))],
+            &[("note", &*datum_note(datum, texts))],
         ),
         Some(_) => texts.page.registration_unknown.to_owned(),
         None => texts.page.no_registration.to_owned(),
     }
+}
+
+/// Where the registration error is known from; the run's own sentence, where the language is the one it speaks.
+pub(super) fn datum_note(datum: &Datum, texts: &Texts) -> String {
+    let shift = |k: usize| datum.covariance_6x6.map_or(f64::NAN, |c| c[k][k]);
+    let size = ((shift(0) + shift(1) + shift(2)) / 3.0).max(0.0).sqrt();
+    let text = match datum.state {
+        DatumState::Stable => texts.charts.note_stable,
+        DatumState::Stated => texts.charts.note_stated,
+        DatumState::Sources => texts.charts.note_sources,
+        DatumState::Unknown => "{note}",
+    };
+    fill(text, &[("sd", &*texts.mm(size)), ("note", &*escape(&datum.note))])
 }
 
 /// The warning that limits do not hold the registration error, where it is unknown.

@@ -2,19 +2,29 @@
 
 use super::explorer::PLACE;
 use super::html::{figure, section};
-use crate::figure::{Scale, mm};
+use crate::figure::{Scale, count};
 use crate::report::draw::{MapLayout, MapPicture, distance_map, joint_map, stone_map};
 use crate::report::summary::Summary;
 use crate::results::{Joint, ResultSet, StoneRow, nice_scale_m};
+use crate::texts::{MapTexts, fill};
 
 /// What the marks in the maps mean.
-const LEGEND: &str = "<p class=\"legend\"><span><i class=\"key solid\"></i>above its own 95 % limit</span>\
-    <span><i class=\"key pale\"></i>below its own limit (faded)</span>\
-    <span><i class=\"key hatched\"></i>not measured</span><span><i class=\"key ring\"></i>loose</span></p>";
+fn legend(names: &MapTexts) -> String {
+    let key = |class: &str, words: &str| format!("<span><i class=\"key {class}\"></i>{words}</span>");
+    let keys = [
+        key("solid", names.above),
+        key("pale", names.below),
+        key("hatched", names.unmeasured),
+        key("ring", names.loose),
+    ];
+    format!("<p class=\"legend\">{}</p>", keys.concat())
+}
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
 pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> String {
-    let layout = MapLayout::new(results);
+    let texts = facts.texts();
+    let names = &texts.maps;
+    let layout = MapLayout::new(results, texts);
     let shared = Scale::Diverging(facts.component_limit_m());
     let beyond = facts
         .components
@@ -36,41 +46,30 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
         figure(title, &stone_map(&layout, &picture), note)
     };
     let mut grid = String::new();
-    grid.push_str(&component(
-        "Along the wall",
-        "Positive to the right of a viewer who faces the wall.",
-        0,
-    ));
-    grid.push_str(&component("Up the face", "Positive upwards along the batter.", 1));
-    grid.push_str(&component(
-        "Out of the wall",
-        "Positive towards the viewer (downstream).",
-        2,
-    ));
+    grid.push_str(&component(names.along, names.along_note, 0));
+    grid.push_str(&component(names.up, names.up_note, 1));
+    grid.push_str(&component(names.out, names.out_note, 2));
     if let Some(picture) = distance_map(&layout, results, shared) {
-        grid.push_str(&figure(
-            "M3C2 distance, for comparison",
-            &picture,
-            "Core points, along the normal; same scale. Faded: below its LoD95.",
-        ));
+        grid.push_str(&figure(names.m3c2, &picture, names.m3c2_note));
     }
-    grid.push_str(&opening_map(&layout, joints));
+    grid.push_str(&opening_map(&layout, joints, names));
     grid.push_str(&magnitude_maps(&layout, facts));
     let wide = if layout.is_wide() { " wide" } else { "" };
     let note = if beyond > 0 {
-        format!(" {beyond} components exceed the scale and have its end colours.")
+        fill(names.beyond, &[("n", &*count(beyond))])
     } else {
         String::new()
     };
     let body = format!(
-        "<p>The wall seen from the front, unrolled. Components share one scale; millimetres, second epoch minus first.{note}</p>\
-         {PLACE}{LEGEND}<div class=\"maps{wide}\">{grid}</div>"
+        "<p>{}{note}</p>{PLACE}{}<div class=\"maps{wide}\">{grid}</div>",
+        names.intro,
+        legend(names)
     );
-    section("maps", "Maps", &body)
+    section("maps", texts.sections.maps, &body)
 }
 
 /// How joints open and close; empty where no joint has both its stones measured.
-fn opening_map(layout: &MapLayout, joints: &[Joint]) -> String {
+fn opening_map(layout: &MapLayout, joints: &[Joint], names: &MapTexts) -> String {
     let moved: Vec<_> = joints
         .iter()
         .filter_map(|j| j.motion.map(|m| (j.line, m.opening_m, m.is_significant())))
@@ -79,15 +78,17 @@ fn opening_map(layout: &MapLayout, joints: &[Joint]) -> String {
         return String::new();
     }
     let scale = Scale::Diverging(nice_scale_m(moved.iter().map(|(_, opening, _)| opening.abs())));
-    let title = "Joint opening";
-    let note = "Motion of neighbouring stones apart, across their joint: red opens, blue closes; a scale of its own. Faded: less \
-                than its 95 % uncertainty.";
-    figure(title, &joint_map(layout, title, &moved, scale), note)
+    let title = names.opening;
+    figure(
+        title,
+        &joint_map(layout, title, &moved, scale),
+        names.opening_note,
+    )
 }
 
 /// How far the stones moved, for the summary: lengths and in-plane arrows.
 pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
-    let layout = MapLayout::new(results);
+    let layout = MapLayout::new(results, facts.texts());
     let norm = |s: &StoneRow| s.motion.as_ref().map(|m| m.displacement.norm());
     let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
     let page = &facts.texts().page;
@@ -109,6 +110,8 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
 }
 
 fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
+    let texts = facts.texts();
+    let names = &texts.maps;
     let limit = |s: &StoneRow| s.motion.as_ref().map(|m| m.detection_limit_m);
     let relative = |s: &StoneRow| s.motion.as_ref().map(|m| m.relative.norm());
     let relatives = facts.measured.iter().map(|(_, m)| m.relative.norm());
@@ -129,19 +132,17 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
     };
     let mut out = String::new();
     out.push_str(&draw(
-        "Motion against the neighbours",
-        "Length of the difference to what the neighbours predict.",
+        names.relative,
+        names.relative_note,
         &relative,
         "mm",
         nice_scale_m(relatives),
         true,
     ));
-    let note = format!(
-        "What a motion must exceed to be above its 95 % limit; median {} mm.",
-        facts.limits.median().map_or("–".into(), mm)
-    );
+    let median = texts.mm_or_dash(facts.limits.median());
+    let note = fill(names.limit_note, &[("median", &*median)]);
     out.push_str(&draw(
-        "Detection limit (LoD95)",
+        names.limit,
         &note,
         &limit,
         "mm",
@@ -149,8 +150,8 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         false,
     ));
     out.push_str(&draw(
-        "Rotation",
-        "Angle of the stone's turn.",
+        names.rotation,
+        names.rotation_note,
         &turn,
         "mrad",
         nice_scale_m(turns),

@@ -17,10 +17,13 @@ mod survey;
 use super::summary::Summary;
 use crate::error::Error;
 use crate::figure::escape;
+use crate::report_params::Language;
 use crate::results::names::PairFile;
 use crate::results::records::RunRecord;
-use crate::results::{ResultSet, compare, joints};
-use crate::texts::Texts;
+use crate::results::{Comparison, Joint, ResultSet, compare, joints};
+use crate::texts::{Texts, fill};
+use html::with_decimals;
+use std::fmt::Write;
 
 #[cfg(test)]
 pub(super) use explorer::{SCRIPT, STYLE};
@@ -28,16 +31,19 @@ pub(super) use explorer::{SCRIPT, STYLE};
 const PAGE_STYLE: &str = include_str!("style.css");
 
 /// Sections in the order of the page.
-const SECTIONS: [(&str, &str); 8] = [
-    ("summary", "Summary"),
-    ("maps", "Maps"),
-    ("tables", "Stones"),
-    ("distributions", "Distributions"),
-    ("datum", "Datum"),
-    ("evaluation", "Known motion"),
-    ("method", "Method"),
-    ("audit", "Audit"),
-];
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 8] {
+    let names = &texts.sections;
+    [
+        ("summary", texts.page.summary),
+        ("maps", names.maps),
+        ("tables", names.tables),
+        ("distributions", names.distributions),
+        ("datum", names.datum),
+        ("evaluation", names.evaluation),
+        ("method", names.method),
+        ("audit", names.audit),
+    ]
+}
 
 /// The whole report as one HTML document. The same results give the same bytes.
 ///
@@ -48,32 +54,11 @@ const SECTIONS: [(&str, &str); 8] = [
 /// None in practice: compressing in memory does not fail.
 pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
     let facts = Summary::new(results);
-    let texts = facts.texts();
     let (compared, joints) = (compare(results), joints(results));
-    let mut body = String::new();
-    body.push_str(&overview::summary(results, &facts));
-    if !results.stones.is_empty() {
-        body.push_str(&maps::maps(results, &facts, &joints));
-        body.push_str(&overview::tables(results, &facts));
-    }
-    if !facts.measured.is_empty() {
-        body.push_str(&distributions::distributions(
-            results,
-            &facts,
-            &compared,
-            known_translation_mm(results),
-        ));
-        body.push_str(&distributions::datum(results, &facts));
-    }
-    if let Some(evaluation) = &results.evaluation {
-        body.push_str(&evaluation::evaluation(evaluation));
-    }
-    body.push_str(&method::method());
-    body.push_str(&audit::audit(results));
-    let title = title(results);
-    let present = SECTIONS
-        .iter()
-        .filter(|(id, _)| body.contains(&format!("<section id=\"{id}\">")));
+    let content = content(results, &facts, &compared, &joints, true);
+    let present = sections(facts.texts())
+        .into_iter()
+        .filter(|(id, _)| content.contains(&format!("<section id=\"{id}\">")));
     let links: String = present
         .map(|(id, name)| format!("<a href=\"#{id}\">{name}</a>"))
         .collect();
@@ -83,39 +68,120 @@ pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
         explorer::data(results, &facts, &compared, &joints)?
     };
     let body = format!(
-        "<body><svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
-         <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
-         <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
-         <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n\
-         <header>{}<h1>{title}</h1>{}{}{}{}{}</header>\n<nav>{links}</nav>\n<main>\n{body}</main>\n{data}",
-        first_page::letterhead(results, texts),
-        first_page::verdict(&facts),
-        doubts::doubts(
-            results.run.as_ref().map_or(&[], |run| run.warnings.as_slice()),
-            texts
-        ),
-        first_page::datum_warning(results.datum(), texts),
-        first_page::cover(results, &facts),
-        cover(results, texts)
+        "<body>{PATTERNS}{}<nav>{links}</nav>\n<main>\n{content}</main>\n{data}",
+        header(results, &facts)
     );
     // Of all that the page holds, so that no input can guess it.
     let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
+    let head = head(
+        &title(results, facts.texts()),
+        facts.texts(),
+        &format!("script-src 'nonce-{nonce}'; "),
+        &format!("{}{}", footer(results, ""), explorer::STYLE),
+    );
     Ok(format!(
-        "<!DOCTYPE html>\n<html lang=\"{}\"><head><meta charset=\"utf-8\">\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'nonce-{nonce}'; \
-         style-src 'unsafe-inline'; img-src blob: data:; base-uri 'none'; form-action 'none'\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: stone by stone</title>\n\
-         <style>\n{PAGE_STYLE}{}{}</style></head>\n{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
-        facts.cover.language.tag(),
-        footer(results),
-        explorer::STYLE,
+        "{head}{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
         explorer::SCRIPT
     ))
 }
 
-/// The rule that prints project and epochs at the foot of every page.
-fn footer(results: &ResultSet) -> String {
+/// The reports on all later epochs as one document for paper, without anything that runs.
+pub(super) fn printed(all: &[&ResultSet], appendix: bool) -> String {
+    let (mut style, mut body) = (String::new(), String::new());
+    let mut texts = Language::default().texts();
+    for (results, number) in all.iter().zip(1..) {
+        let facts = Summary::new(results);
+        let (compared, joints) = (compare(results), joints(results));
+        texts = facts.texts();
+        let content = content(results, &facts, &compared, &joints, appendix);
+        // What is folded on the screen is open on paper.
+        let content = content.replace("<details>", "<details open>");
+        let name = format!("epoch{number}");
+        style.push_str(&footer(results, &name));
+        let _ = write!(
+            body,
+            "<div style=\"page:{name}\">{}<main>\n{content}</main></div>\n",
+            header(results, &facts)
+        );
+    }
+    let title = all.first().map_or(String::new(), |results| title(results, texts));
+    let head = head(&title, texts, "", &style);
+    format!("{head}<body>{PATTERNS}{body}</body></html>\n")
+}
+
+/// The sections in order; the last one can be left out.
+fn content(
+    results: &ResultSet,
+    facts: &Summary,
+    compared: &Comparison,
+    joints: &[Joint],
+    appendix: bool,
+) -> String {
+    let mut body = String::new();
+    body.push_str(&overview::summary(results, facts));
+    if !results.stones.is_empty() {
+        body.push_str(&maps::maps(results, facts, joints));
+        body.push_str(&overview::tables(results, facts));
+    }
+    if !facts.measured.is_empty() {
+        body.push_str(&distributions::distributions(
+            results,
+            facts,
+            compared,
+            known_translation_mm(results),
+        ));
+        body.push_str(&distributions::datum(results, facts));
+    }
+    if let Some(evaluation) = &results.evaluation {
+        body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
+    }
+    body.push_str(&method::method(facts.texts()));
+    if appendix {
+        body.push_str(&audit::audit(results, facts.texts()));
+    }
+    with_decimals(body, facts.texts().decimal)
+}
+
+/// Patterns that the pictures use.
+const PATTERNS: &str = "<svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
+    <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+    <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+    <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n";
+
+/// All that stands above the sections.
+fn header(results: &ResultSet, facts: &Summary) -> String {
+    let texts = facts.texts();
+    let warnings = results
+        .run
+        .as_ref()
+        .map_or(&[][..], |run| run.warnings.as_slice());
+    format!(
+        "<header>{}<h1>{}</h1>{}{}{}{}{}</header>\n",
+        first_page::letterhead(results, texts),
+        title(results, texts),
+        first_page::verdict(facts),
+        doubts::doubts(warnings, texts),
+        first_page::datum_warning(results.datum(), texts),
+        first_page::cover(results, facts),
+        cover(results, texts)
+    )
+}
+
+/// The head of a document; `scripts`: what its policy lets run.
+fn head(title: &str, texts: &Texts, scripts: &str, style: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"{}\"><head><meta charset=\"utf-8\">\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; {scripts}\
+         style-src 'unsafe-inline'; img-src blob: data:; base-uri 'none'; form-action 'none'\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: {}</title>\n\
+         <style>\n{PAGE_STYLE}{style}</style></head>\n",
+        texts.tag, texts.sections.title_end
+    )
+}
+
+/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without one.
+fn footer(results: &ResultSet, page: &str) -> String {
     let Some(run) = &results.run else {
         return String::new();
     };
@@ -132,13 +198,13 @@ fn footer(results: &ResultSet) -> String {
             }
         })
         .collect();
-    format!("@media print{{@page{{@bottom-left{{content:\"{quoted}\"}}}}}}\n")
+    format!("@media print{{@page {page}{{@bottom-left{{content:\"{quoted}\"}}}}}}\n")
 }
 
 /// Name of the structure.
-fn title(results: &ResultSet) -> String {
+fn title(results: &ResultSet, texts: &Texts) -> String {
     let name = results.run.as_ref().map(|run| run.project.name.as_str());
-    escape(name.filter(|n| !n.is_empty()).unwrap_or("Survey"))
+    escape(name.filter(|n| !n.is_empty()).unwrap_or(texts.sections.survey))
 }
 
 /// Names of the first and of the compared epoch, as far as run.json has them.
@@ -167,7 +233,8 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
     }
     let others = (1..=results.pairs).filter(|p| *p != results.pair);
     facts.extend(others.map(|pair| {
-        let name = line(pair).unwrap_or_else(|| format!("epoch {}", pair + 1));
+        let name =
+            line(pair).unwrap_or_else(|| fill(texts.sections.epoch, &[("n", &(pair + 1).to_string())]));
         format!("<a href=\"{}\">{name}</a>", PairFile::ReportPage.name(pair))
     }));
     let line = if facts.is_empty() {
@@ -175,7 +242,7 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
     } else {
         format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
     };
-    format!("{line}{}", survey::survey(results))
+    format!("{line}{}", survey::survey(results, texts))
 }
 
 /// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.

@@ -2,11 +2,11 @@
 
 use super::first_page;
 use super::html::{details, section, table};
-use crate::figure::{count, escape, mm, mm_or_dash, number, percent};
+use crate::figure::{count, escape};
 use crate::report::summary::{FALSE_ALARMS, Summary};
-use crate::report_params::Language;
+use crate::results::records::ReasonCode;
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
-use crate::texts::fill;
+use crate::texts::{Texts, fill};
 use nalgebra::Point2;
 use std::fmt::Write;
 
@@ -22,13 +22,6 @@ pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
         "<h3 class=\"numbers\">{}</h3>",
         facts.texts().page.in_numbers
     );
-    if facts.cover.language != Language::English {
-        let _ = write!(
-            out,
-            "<p class=\"note\">{}</p>",
-            facts.texts().page.rest_in_english
-        );
-    }
     out.push_str("<ul class=\"findings\">");
     for sentence in sentences(results, facts) {
         let _ = write!(out, "<li>{sentence}</li>");
@@ -41,8 +34,14 @@ fn tiles(facts: &Summary) -> String {
     let (texts, page) = (facts.texts(), &facts.texts().page);
     let tile =
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
-    let share = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.stones));
-    let of_measured = |n: usize| format!("{} <small>{}</small>", count(n), percent(n, facts.measured.len()));
+    let share = |n: usize| format!("{} <small>{}</small>", count(n), texts.percent(n, facts.stones));
+    let of_measured = |n: usize| {
+        format!(
+            "{} <small>{}</small>",
+            count(n),
+            texts.percent(n, facts.measured.len())
+        )
+    };
     let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
     let largest = facts.verdict.wall.largest;
     let tiles = [
@@ -59,7 +58,16 @@ fn tiles(facts: &Summary) -> String {
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
         },
     ];
-    format!("<div class=\"tiles\">{}</div>", tiles.concat())
+    let is_doubted = facts
+        .verdict
+        .reasons
+        .iter()
+        .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt));
+    let note = match is_doubted {
+        true => format!("<p class=\"hedge\">{}</p>", page.as_computed),
+        false => String::new(),
+    };
+    format!("{note}<div class=\"tiles\">{}</div>", tiles.concat())
 }
 
 fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
@@ -76,51 +84,37 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
         )];
     }
     let mut out = vec![first_page::registration(results.datum(), texts), chance(facts)];
-    let [along, up, outward] = facts.components.each_ref().map(|c| mm_or_dash(c.median()));
-    out.push(format!(
-        "Median of all measured stones: <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{outward}</b> mm out of \
-         the wall."
-    ));
+    let [along, up, outward] = facts.components.each_ref().map(|c| texts.mm_or_dash(c.median()));
+    let values = [("along", &*along), ("up", &*up), ("out", &*outward)];
+    out.push(fill(texts.stones.median, &values));
     if !facts.moved.is_empty() {
         out.extend(places(facts));
     }
     out.push(match facts.loose.len() {
-        0 => "No stone is loose: none moves unlike its neighbours beyond what the noise explains.".into(),
-        1 => "<b>One stone is loose</b>: it moves unlike its neighbours; it is listed below.".into(),
-        n => format!(
-            "<b>{} stones are loose</b>: they move unlike their neighbours; they are listed below.",
-            count(n)
-        ),
+        0 => texts.stones.none_loose.to_owned(),
+        1 => texts.stones.one_loose.to_owned(),
+        n => fill(texts.stones.some_loose, &[("n", &*count(n))]),
     });
     out
 }
 
 /// Where the motions are, all of them and the largest.
 fn places(facts: &Summary) -> Vec<String> {
+    let texts = facts.texts();
     let between = |[from, to]: [Point2<f64>; 2]| {
-        format!(
-            "between {} and {} m along the wall and {} and {} m up the face",
-            number(from.x, 1),
-            number(to.x, 1),
-            number(from.y, 1),
-            number(to.y, 1)
-        )
+        let [a0, a1, u0, u1] = [from.x, to.x, from.y, to.y].map(|v| texts.number(v, 1));
+        let values = [("a0", &*a0), ("a1", &*a1), ("u0", &*u0), ("u1", &*u1)];
+        fill(texts.stones.between, &values)
     };
     let mut out = Vec::new();
     if 10 * facts.moved.len() >= 9 * facts.measured.len() {
-        out.push("Stones that moved are found all over the measured wall.".into());
+        out.push(texts.stones.all_over.to_owned());
     } else if let Some(region) = facts.region {
-        out.push(format!(
-            "Nine tenths of the stones that moved lie {}.",
-            between(region)
-        ));
+        out.push(fill(texts.stones.nine_tenths, &[("where", &*between(region))]));
     }
     if let Some((least, region)) = facts.strongest {
-        out.push(format!(
-            "The largest tenth of their motions, {} mm and more, lies {}.",
-            mm(least),
-            between(region)
-        ));
+        let values = [("least", &*texts.mm(least)), ("where", &*between(region))];
+        out.push(fill(texts.stones.largest_tenth, &values));
     }
     out
 }
@@ -148,26 +142,32 @@ fn capital(text: &str) -> String {
 
 /// Outcomes, largest motions, loose stones, stretches.
 pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
-    let mut out = String::from("<h3>Outcomes</h3>");
+    let texts = facts.texts();
+    let names = &texts.stones;
+    let mut out = format!("<h3>{}</h3>", names.outcomes);
     let rows: Vec<Vec<String>> = facts
         .by_status
         .iter()
         .map(|(status, stones)| {
             vec![
                 format!("<code>{status}</code>"),
-                escape(status.meaning()),
+                escape(texts.status(*status)),
                 count(stones.len()),
-                percent(stones.len(), facts.stones),
+                texts.percent(stones.len(), facts.stones),
             ]
         })
         .collect();
-    out.push_str(&table(&["status", "meaning", "stones", "share"], &rows, 2));
+    out.push_str(&table(
+        &[names.status, names.meaning, names.stones, names.share],
+        &rows,
+        2,
+    ));
     if !facts.moved.is_empty() {
-        out.push_str("<h3>Largest motions of stones that moved</h3>");
+        let _ = write!(out, "<h3>{}</h3>", names.largest);
         out.push_str(&stone_rows(results, facts, &facts.moved));
     }
     if !facts.loose.is_empty() {
-        out.push_str("<h3>Loose stones</h3>");
+        let _ = write!(out, "<h3>{}</h3>", names.loose_stones);
         out.push_str(&stone_rows(results, facts, &facts.loose));
     }
     out.push_str(&stretches(results, facts));
@@ -175,52 +175,51 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
         .by_status
         .iter()
         .filter(|(s, _)| *s != Status::Ok)
-        .map(id_list)
+        .map(|list| id_list(list, texts))
         .collect();
     if !lists.is_empty() {
-        out.push_str(&details("Stones that were not measured, by reason", &lists));
+        out.push_str(&details(names.by_reason, &lists));
     }
-    section("tables", "Stones", &out)
+    section("tables", texts.sections.tables, &out)
 }
 
 fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMotion)]) -> String {
+    let texts = facts.texts();
+    let names = &texts.stones;
     let head = [
-        "stone",
-        "along m",
-        "up m",
-        "d along mm",
-        "d up mm",
-        "d out mm",
-        "norm mm",
-        "LoD95 mm",
-        "against neighbours mm",
-        "rotation mrad",
-        "loose",
+        names.stone,
+        names.along,
+        names.up,
+        names.d_along,
+        names.d_up,
+        names.d_out,
+        names.norm,
+        names.limit,
+        names.neighbours,
+        names.rotation,
+        names.loose,
     ];
     let row = |(s, m): &(&StoneRow, &RowMotion)| {
         let place = results.facade.place(&s.centroid);
         vec![
             format!("<a data-stone=\"{0}\">{0}</a>", s.stone_id),
-            number(place.x, 2),
-            number(place.y, 2),
+            texts.number(place.x, 2),
+            texts.number(place.y, 2),
             facts.mm(m.face.x),
             facts.mm(m.face.y),
             facts.mm(m.face.z),
             facts.mm(m.displacement.norm()),
             facts.mm(m.detection_limit_m),
             facts.mm(m.relative.norm()),
-            number(m.rotation.norm() * 1e3, 1),
-            if m.loose { "loose" } else { "" }.into(),
+            texts.number(m.rotation.norm() * 1e3, 1),
+            if m.loose { names.loose } else { "" }.into(),
         ]
     };
     let rows: Vec<Vec<String>> = stones.iter().take(MAX_ROWS).map(row).collect();
     let mut out = table(&head, &rows, 0);
     if stones.len() > MAX_ROWS {
-        let _ = write!(
-            out,
-            "<p class=\"note\">{MAX_ROWS} of {}; all are in stones.csv.</p>",
-            count(stones.len())
-        );
+        let values = [("shown", &*MAX_ROWS.to_string()), ("n", &*count(stones.len()))];
+        let _ = write!(out, "<p class=\"note\">{}</p>", fill(names.rest, &values));
     }
     out
 }
@@ -240,6 +239,7 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
     if n < 2 || to - from < 1e-6 {
         return String::new();
     }
+    let texts = facts.texts();
     let edge = |i: usize| from + (to - from) * i as f64 / n as f64;
     let row = |i: usize| {
         let inside = |s: &StoneRow| {
@@ -254,35 +254,37 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
                 .unwrap_or(f64::NAN))
         };
         vec![
-            format!("{} – {}", number(edge(i), 1), number(edge(i + 1), 1)),
+            format!("{} – {}", texts.number(edge(i), 1), texts.number(edge(i + 1), 1)),
             count(part.len()),
-            percent(above, part.len()),
+            texts.percent(above, part.len()),
             median(|m| m.face.x),
             median(|m| m.face.y),
             median(|m| m.face.z),
             median(|m| m.detection_limit_m),
         ]
     };
+    let names = &texts.stones;
     let head = [
-        "along the wall m",
-        "measured",
-        "above their limit",
-        "d along mm",
-        "d up mm",
-        "d out mm",
-        "LoD95 mm",
+        names.stretch,
+        names.measured,
+        names.above,
+        names.d_along,
+        names.d_up,
+        names.d_out,
+        names.limit,
     ];
     format!(
-        "<h3>By stretch of the wall (medians)</h3>{}",
+        "<h3>{}</h3>{}",
+        names.stretches,
         table(&head, &(0..n).map(row).collect::<Vec<_>>(), 1)
     )
 }
 
-fn id_list((status, stones): &(Status, Vec<&StoneRow>)) -> String {
+fn id_list((status, stones): &(Status, Vec<&StoneRow>), texts: &Texts) -> String {
     let ids: Vec<String> = stones.iter().map(|s| s.stone_id.to_string()).collect();
     format!(
         "<h4><code>{status}</code>: {}</h4><p class=\"ids\">{}</p>",
-        escape(status.meaning()),
+        escape(texts.status(*status)),
         ids.join(", ")
     )
 }

@@ -1,15 +1,18 @@
 //! The survey data of the cover: what was measured with what.
 
+use super::first_page::conditions;
 use super::html::{details, table};
-use crate::figure::{count, escape, number};
+use crate::figure::{count, escape};
 use crate::results::ResultSet;
 use crate::results::records::{EpochRecord, InputRecord};
+use crate::texts::{Texts, fill};
 use serde_json::Value;
 use std::fmt::Write;
 use stonewise_core::evaluate::MotionField;
 
 /// A table of the epochs, folded on the screen and open on the printed cover; empty without run.json.
-pub(super) fn survey(results: &ResultSet) -> String {
+pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
+    let names = &texts.audit;
     let Some(run) = &results.run else {
         return String::new();
     };
@@ -24,68 +27,69 @@ pub(super) fn survey(results: &ResultSet) -> String {
     };
     let dash = || "\u{2013}".to_owned();
     let rows = vec![
-        row("date", &|e| e.date.as_deref().map_or_else(dash, escape)),
-        row("conditions", &conditions),
-        row("point clouds", &|e| files(&e.clouds)),
-        row("points", &|e| {
+        row(names.date, &|e| e.date.as_deref().map_or_else(dash, escape)),
+        row(names.conditions, &|e| conditions(e, texts).unwrap_or_else(dash)),
+        row(names.clouds, &|e| files(&e.clouds, texts)),
+        row(names.points, &|e| {
             count(usize::try_from(e.points).unwrap_or(usize::MAX))
         }),
-        row("camera file", &|e| file(&e.cameras)),
-        row("photos used", &|e| count(e.photos)),
-        row("masks", &|e| e.masks.as_ref().map_or_else(dash, file)),
-        row("stones found", &|e| count(e.stones)),
-        row("known motion put in", &|e| {
-            e.motion.as_ref().map_or("none".into(), known_motion)
+        row(names.cameras, &|e| file(&e.cameras, texts)),
+        row(names.photos, &|e| count(e.photos)),
+        row(names.masks, &|e| {
+            e.masks.as_ref().map_or_else(dash, |m| file(m, texts))
+        }),
+        row(names.stones, &|e| count(e.stones)),
+        row(names.motion, &|e| {
+            let motion = e.motion.as_ref();
+            motion.map_or(names.none.into(), |m| known_motion(m, texts))
         }),
     ];
-    let mut head = vec!["epoch"];
+    let mut head = vec![names.epoch];
     head.extend(chosen.iter().map(|e| e.name.as_str()));
     let columns = head.len();
-    let local = || "the survey's own local frame, metres".to_owned();
+    let local = || names.local.to_owned();
     let frame = run.crs.as_ref().map_or_else(local, |crs| escape(&crs.name));
     details(
-        "Survey data",
+        names.survey,
         &format!(
-            "{}<p class=\"note\">Coordinates: {frame}.</p>",
-            table(&head, &rows, columns)
+            "{}<p class=\"note\">{}</p>",
+            table(&head, &rows, columns),
+            fill(names.coordinates, &[("frame", &*frame)])
         ),
     )
 }
 
-/// Conditions by name.
-fn conditions(epoch: &EpochRecord) -> String {
-    let one = |(name, value): (&String, &f64)| format!("{} {value}", escape(name));
-    let list: Vec<String> = epoch.conditions.iter().map(one).collect();
-    if list.is_empty() {
-        "\u{2013}".into()
-    } else {
-        list.join("<br>")
-    }
-}
-
 /// Names and sizes of inputs.
-fn files(inputs: &[InputRecord]) -> String {
-    inputs.iter().map(file).collect::<Vec<_>>().join("<br>")
+fn files(inputs: &[InputRecord], texts: &Texts) -> String {
+    inputs
+        .iter()
+        .map(|i| file(i, texts))
+        .collect::<Vec<_>>()
+        .join("<br>")
 }
 
 /// Name and size of an input.
-fn file(input: &InputRecord) -> String {
+fn file(input: &InputRecord, texts: &Texts) -> String {
     let name = input.path.file_name().unwrap_or(input.path.as_os_str());
-    format!("{} ({})", escape(&name.to_string_lossy()), bytes(input.bytes))
+    format!(
+        "{} ({})",
+        escape(&name.to_string_lossy()),
+        bytes(input.bytes, texts)
+    )
 }
 
 /// A size of a file in the unit that suits it.
-fn bytes(value: u64) -> String {
+fn bytes(value: u64, texts: &Texts) -> String {
     let value = value as f64;
     if value < 1e5 {
         format!("{:.0}\u{a0}kB", (value / 1e3).max(1.0))
     } else {
-        format!("{:.1}\u{a0}MB", value / 1e6)
+        format!("{}\u{a0}MB", texts.number(value / 1e6, 1))
     }
 }
 
 /// Kind of the motion and its numbers, metres.
-fn known_motion(motion: &MotionField) -> String {
+fn known_motion(motion: &MotionField, texts: &Texts) -> String {
     let Ok(Value::Object(parts)) = serde_json::to_value(motion) else {
         return String::new();
     };
@@ -93,14 +97,14 @@ fn known_motion(motion: &MotionField) -> String {
     let mut text = escape(kind);
     for (key, value) in parts.iter().filter(|(key, _)| *key != "kind") {
         let numbers: Vec<String> = match value {
-            Value::Array(items) => items.iter().map(metres).collect(),
-            value => vec![metres(value)],
+            Value::Array(items) => items.iter().map(|i| metres(i, texts)).collect(),
+            value => vec![metres(value, texts)],
         };
         let _ = write!(text, "; {} {}", escape(key), numbers.join(", "));
     }
     text
 }
 
-fn metres(value: &Value) -> String {
-    number(value.as_f64().unwrap_or(f64::NAN), 3)
+fn metres(value: &Value, texts: &Texts) -> String {
+    texts.number(value.as_f64().unwrap_or(f64::NAN), 3)
 }

@@ -60,11 +60,11 @@ fn write_stones(
     let candidates = posed_photos(epoch, warnings)?;
     let tiles = |view: &View| tiling.tile_count(view.camera.width, view.camera.height);
     let total = candidates.iter().map(|(view, _)| tiles(view)).sum();
-    context
-        .progress
-        .begin(&format!("stones of {}", epoch.name), total);
+    context.progress.begin("tiles", total);
     let mut photos: Vec<VotingPhoto> = Vec::new();
-    for (view, path) in candidates {
+    let count = candidates.len();
+    for (number, (view, path)) in (1..).zip(candidates) {
+        context.progress.detail(&format!("photo {number} of {count}"));
         // Photos that are left out are left out again by a run that goes on, so that the numbers stay the
         // same.
         let unit = format!("{:05}", photos.len());

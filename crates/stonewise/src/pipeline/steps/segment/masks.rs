@@ -20,9 +20,7 @@ pub fn write_labels(
 ) -> Result<Vec<VotingPhoto>> {
     let candidates = posed_photos(epoch, warnings)?;
     let source = MaskSource::open(masks)?;
-    context
-        .progress
-        .begin(&format!("masks of {}", epoch.name), candidates.len() as u64);
+    context.progress.begin("photos", candidates.len() as u64);
     let read = candidates
         .par_iter()
         .map(|(view, path)| {
