@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fs;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
@@ -68,6 +69,27 @@ impl DiskTiles {
     /// Number of points in all tiles.
     pub fn point_count(&self) -> u64 {
         self.tiles.iter().map(|t| t.points).sum()
+    }
+
+    /// The tiles of one of `count` batches with about as many points each, in order; a batch may be empty.
+    pub fn batch(&self, number: usize, count: usize) -> Range<usize> {
+        let all = self.point_count();
+        let limit = |batch: usize| (u128::from(all) * batch as u128 / count.max(1) as u128) as u64;
+        let start_of = |batch: usize| match batch {
+            0 => 0,
+            b if b >= count => self.tiles.len(),
+            b => {
+                let mut before = 0;
+                self.tiles
+                    .iter()
+                    .take_while(|t| {
+                        before += t.points;
+                        before <= limit(b)
+                    })
+                    .count()
+            }
+        };
+        start_of(number)..start_of(number + 1)
     }
 
     /// File-name stem of a tile, for files that go beside it.
@@ -249,7 +271,7 @@ fn tile_runs(
 }
 
 /// Records of a file at most; a line of text with three numbers has six bytes at least.
-fn most_records(path: &Path) -> Result<u64> {
+pub fn most_records(path: &Path) -> Result<u64> {
     match claimed_records(path)? {
         Some(records) => Ok(records),
         None => Ok(fs::metadata(path).map_err(Error::io("reading", path))?.len() / 6),
