@@ -10,21 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 use std::time::Duration;
-use support::{contents, copy_of, outcome, run, stonewise, survey};
+use support::{Dice, contents, copy_of, outcome, run, stonewise, survey};
 use tempfile::TempDir;
-
-/// Numbers that look random and are the same every time.
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self, below: usize) -> usize {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % below
-    }
-}
 
 /// Result files with their bytes, but for those that hold times, and what is stonewise's own.
 fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
@@ -125,24 +112,24 @@ fn units_in_any_order_killed_and_repeated_give_the_bytes_of_a_run() {
     while done.len() < needs.len() {
         let open = needs.iter().filter(|(id, _)| !done.contains(*id));
         let (ready, early): (Vec<_>, Vec<_>) = open.partition(|(_, needs)| needs.is_subset(&done));
-        if dice.next(6) == 0 && !early.is_empty() {
-            let (id, needs) = early[dice.next(early.len())];
+        if dice.below(6) == 0 && !early.is_empty() {
+            let (id, needs) = early[dice.below(early.len())];
             let (code, log) = unit(out.path(), id);
             let missing: Vec<&str> = needs.difference(&done).map(String::as_str).collect();
             assert_eq!(code, 1, "{id}: {log}");
             let said = missing.iter().all(|first| log.contains(first));
             assert!(said && log.contains(&format!("unit {id} needs")), "{log}");
         }
-        let id = ready[dice.next(ready.len())].0.clone();
-        if dice.next(3) == 0 {
-            kill(out.path(), &id, Duration::from_millis(dice.next(400) as u64));
+        let id = ready[dice.below(ready.len())].0.clone();
+        if dice.below(3) == 0 {
+            kill(out.path(), &id, Duration::from_millis(dice.below(400) as u64));
         }
         let (code, log) = unit(out.path(), &id);
         // The last one ends as a run does.
         assert!(code == 0 || (code == 3 && id == "report"), "{id}: {log}");
         let note = out.path().join("work/units").join(format!("{id}.json"));
         assert!(note.exists(), "{id} left no output");
-        if dice.next(4) == 0 {
+        if dice.below(4) == 0 {
             let (code, log) = unit(out.path(), &id);
             assert!(code == 0 && log.contains("was done"), "{log}");
         }
