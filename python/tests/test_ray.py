@@ -44,7 +44,7 @@ def expected(tiled, tmp_path_factory) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def cluster():
-    """A head that does no work beyond one core, and two machines of one core each."""
+    """Two machines of one core each."""
     cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
     cluster.add_node(num_cpus=1)
     cluster.wait_for_nodes()
@@ -120,11 +120,11 @@ def test_workers_that_are_killed_and_a_machine_that_is_lost_change_nothing(clust
 def test_many_projects_and_one_that_fails(cluster, tiled, survey, expected, tmp_path):
     wrong = survey / "wrong_in_ray.toml"
     wrong.write_text(tiled.read_text().replace("size_m = 0.5", "size_n = 0.5"))
-    jobs = [(tiled, tmp_path / "a"), (wrong, tmp_path / "b"), (tiled, tmp_path / "c")]
+    jobs = [(wrong, tmp_path / "b"), (tiled, tmp_path / "a")]
     with pytest.raises(stonewise.Error, match="size_n") as raised:
         stonewise.ray.run_many(jobs, **SMALL)
     assert str(tmp_path / "b") in str(raised.value) and str(tmp_path / "a") not in str(raised.value)
-    assert contents(tmp_path / "a") == contents(tmp_path / "c") == expected
+    assert contents(tmp_path / "a") == expected
 
 
 def test_a_folder_in_use_is_left_alone(cluster, tiled, tmp_path):
