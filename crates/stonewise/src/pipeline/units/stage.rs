@@ -136,19 +136,30 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         list.add_labels(n, batches_of(points[n - 1], batch_points), depth_maps, of_cloud);
         list.add(Stage::Stones, n, &[format!("label-{n}")], 1, of_cloud, &[]);
     }
+    // Corrections by hand look at the stones of all epochs.
+    let stones: Vec<String> = (1..=project.epochs.len())
+        .map(|n| format!("stones-{n}"))
+        .collect();
+    let bytes = 2 * POINT_BYTES * points[0];
     list.push(
         "outlines".to_owned(),
         Stage::Outlines,
         None,
-        &["stones-1".to_owned()],
+        &stones,
         1,
-        2 * POINT_BYTES * points[0],
+        bytes,
         &[],
     );
     for n in 2..=project.epochs.len() {
         let both = points[0] + points[n - 1];
-        let stones = ["stones-1".to_owned(), format!("stones-{n}")];
-        list.add(Stage::Match, n, &stones, 1, POINT_BYTES * both, &[]);
+        list.add(
+            Stage::Match,
+            n,
+            &["outlines".to_owned()],
+            1,
+            POINT_BYTES * both,
+            &[],
+        );
         list.add(Stage::Offsets, n, &[format!("match-{n}")], 2, 0, &[]);
         list.add(
             Stage::Register,
@@ -174,9 +185,10 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
     }
     for n in 1..=project.epochs.len() {
         let needs = match n {
-            1 => vec!["register-2".to_owned(), "outlines".to_owned()],
-            _ => vec![format!("stones-{n}")],
+            1 => "register-2".to_owned(),
+            _ => "outlines".to_owned(),
         };
+        let needs = [needs];
         list.add(Stage::Clouds, n, &needs, 1, POINT_BYTES * points[n - 1], &[]);
     }
     let rest = list.not_needed();
