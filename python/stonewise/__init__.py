@@ -8,6 +8,7 @@
 Lengths are metres, angles radians, everywhere. Points may be an (n, 3) array, what ``laspy.read`` returns, or a py4dgeo ``Epoch``.
 """
 
+from . import _native as _compiled
 from ._change import Change, m3c2
 from ._detector import Detector
 from ._errors import Doubt
@@ -16,6 +17,9 @@ from ._native import Error, View, __version__
 from ._results import Pair, Results, Warning, open  # noqa: A004
 from ._run import run
 from ._transfer import read_cameras, transfer
+
+# Before any work: steps are done again by another build of it.
+_compiled.loaded_from(_compiled.__file__)
 
 __all__ = [
     "Change",

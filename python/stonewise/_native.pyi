@@ -111,3 +111,22 @@ def adjust(
     parameters: str,
     progress: _Progress,
 ) -> tuple[dict[str, tuple[Any, NDArray[np.bool_]]], dict[str, Any]]: ...
+
+class Plan:
+    """A plan whose folder nobody else may use while this object lives."""
+
+    @property
+    def json(self) -> str:
+        """The plan as JSON."""
+
+def plan(
+    project: _Path,
+    out: _Path,
+    parameters: str,
+    force: bool,
+    batch_points: Optional[int],
+    progress: _Progress,
+    note: Optional[Callable[[str], Any]],
+) -> Plan: ...
+def unit(out: _Path, unit: str, threads: int) -> None: ...
+def loaded_from(file: _Path) -> None: ...

@@ -43,7 +43,12 @@ def run(
     with listener(progress) as told:
         _native.run(project, out, to_json(parameters), force, told, log.info)
     results = _results.open(out)
+    warn_of_doubts(results, stacklevel=2)
+    return results
+
+
+def warn_of_doubts(results: _results.Results, stacklevel: int) -> None:
+    """Says what the command line says with exit code 3; ``stacklevel``: of the caller's caller."""
     for warning in results.warnings:
         if warning.doubt or warning.skipped_input:
-            warnings.warn(f"{warning.subject}: {warning.message}", Doubt, stacklevel=2)
-    return results
+            warnings.warn(f"{warning.subject}: {warning.message}", Doubt, stacklevel=stacklevel + 1)

@@ -33,6 +33,16 @@ pub enum Command {
         Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 verdict at or above the --exit-on level."
     )]
     Run(RunArgs),
+    /// Split a run into units of work that other programs do on other machines; prints them as JSON.
+    #[command(
+        after_help = "Examples:\n  stonewise plan survey/stonewise.toml --out results/ > plan.json\n  \
+        stonewise plan survey/stonewise.toml --out results/ --ids --rank 0\n\n\
+        See docs/src/units.md for Slurm, Snakemake and Ray."
+    )]
+    Plan(PlanArgs),
+    /// Do one unit of the plan in a results folder.
+    #[command(after_help = "Example:\n  stonewise unit ingest-1 --out results/")]
+    Unit(UnitArgs),
     /// Simulate a small survey with known motion, and measure it.
     #[command(after_help = "Example:\n  stonewise demo --out demo")]
     Demo(DemoArgs),
@@ -128,6 +138,34 @@ pub struct RunArgs {
     /// Exit with code 4 if the verdict is this state or worse, and with 3 if the results allow no verdict.
     #[arg(long, value_enum, value_name = "STATE")]
     pub exit_on: Option<ExitOn>,
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, ClapArgs)]
+pub struct PlanArgs {
+    /// The project and the folder of its results.
+    #[command(flatten)]
+    pub project: ProjectArgs,
+    /// Print only the names of the units that are not done, one a line.
+    #[arg(long)]
+    pub ids: bool,
+    /// Only units of this rank: they need units of lower ranks only.
+    #[arg(long, value_name = "N", requires = "ids")]
+    pub rank: Option<usize>,
+    /// Points of a cloud in a unit that labels a batch of its tiles (default: 4 million). Results do not depend on it.
+    #[arg(long, value_name = "N")]
+    pub batch_points: Option<u64>,
+}
+
+/// Arguments of `unit`.
+#[derive(Debug, ClapArgs)]
+pub struct UnitArgs {
+    /// The unit's name in the plan.
+    #[arg(value_name = "ID")]
+    pub unit: String,
+    /// Folder of the results, in which the plan was made.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// Verdicts that can end a run with an exit code of their own.

@@ -12,28 +12,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{contents, run, survey};
+use support::{Dice, contents, run, survey};
 
 /// Kills where the environment does not say how many.
 const KILLS: usize = 20;
-
-/// Numbers that look random and are the same every time.
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        self.0 >> 33
-    }
-
-    /// 0 to 1.
-    fn share(&mut self) -> f64 {
-        (self.next() % 1_000_000) as f64 / 1e6
-    }
-}
 
 /// Result files with their bytes; not those that hold times, and not what lies aside or is stonewise's own.
 fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File};
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -45,15 +46,21 @@ impl Drop for Partial {
     }
 }
 
-fn partial_name(path: &Path) -> io::Result<PathBuf> {
+/// A name beside `path` for what is not finished yet, `.NAME.DIGITS.partial`; another one at every call, whichever process of
+/// whichever machine asks.
+///
+/// # Errors
+/// `path` ends in no name.
+pub fn partial_name(path: &Path) -> io::Result<PathBuf> {
     let Some(name) = path.file_name() else {
         let message = format!("not the name of a file: {}", path.display());
         return Err(io::Error::new(io::ErrorKind::InvalidInput, message));
     };
     let mut partial = OsString::from(".");
     partial.push(name);
-    // The process id keeps two runs from writing into each other's file.
-    partial.push(format!(".{}.partial", std::process::id()));
+    // Process ids of two machines that share a folder can be the same; the keys of a hasher are random.
+    let digits = RandomState::new().build_hasher().finish();
+    partial.push(format!(".{digits}.partial"));
     Ok(path.with_file_name(partial))
 }
 

@@ -11,7 +11,7 @@ use stonewise_core::progress::Progress;
 /// How often Python looks at the work: often enough for a bar that moves and for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
 /// As much as the main thread of a program has.
-const STACK_BYTES: usize = 8 << 20;
+pub const STACK_BYTES: usize = 8 << 20;
 
 /// Python functions that want to know how the work goes on.
 pub struct Listeners {

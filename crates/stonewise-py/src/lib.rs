@@ -12,6 +12,7 @@ mod detector;
 mod error;
 mod m3c2;
 mod transfer;
+mod units;
 mod view;
 
 use pyo3::prelude::*;
@@ -31,6 +32,8 @@ mod _native {
     use crate::m3c2::{m3c2, thin};
     #[pymodule_export]
     use crate::transfer::transfer;
+    #[pymodule_export]
+    use crate::units::{Plan, loaded_from, plan, unit};
     #[pymodule_export]
     use crate::view::{View, read_cameras};
 

@@ -13,6 +13,11 @@ pub type Compute = burn::backend::Flex;
 /// The same, keeping track of gradients.
 pub type Training = Autodiff<Compute>;
 
+/// Whether a GPU, where there is one, would be used.
+pub fn can_use_gpu() -> bool {
+    cfg!(feature = "tch")
+}
+
 /// The first GPU if there is one, else the CPU.
 #[cfg(feature = "tch")]
 pub fn device() -> Device<Compute> {

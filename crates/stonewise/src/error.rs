@@ -57,6 +57,22 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// A unit of a plan whose inputs are not there yet.
+    #[error("unit {unit} needs {}: do {} first", .first.join(", "), if .first.len() == 1 { "it" } else { "them" })]
+    UnitFirst {
+        /// The unit.
+        unit: String,
+        /// The units that come before it and are not done.
+        first: Vec<String>,
+    },
+    /// There is no such unit, or no plan that holds for the inputs and the program of now.
+    #[error("{message}: {path}", path = .path.display())]
+    Plan {
+        /// The plan or the input.
+        path: PathBuf,
+        /// What is wrong, and the fix.
+        message: String,
+    },
     /// Each input is valid, but together they are not.
     #[error("{0}")]
     Survey(String),
@@ -184,7 +200,7 @@ impl Error {
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,
-            Self::Project { .. } | Self::Parameters(_) | Self::Output { .. }
+            Self::Project { .. } | Self::Parameters(_) | Self::Output { .. } | Self::Plan { .. }
         )
     }
 

@@ -32,7 +32,10 @@ pub use error::{Error, Result};
 pub use init::{Initialised, init};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
-pub use pipeline::{Comparison, PairSummary, Summary, Until, compare_clouds, run, tile_clouds};
+pub use pipeline::{
+    Comparison, Coordinator, PairSummary, Plan, PlanOptions, Stage, Summary, Unit, UnitDone, Until,
+    compare_clouds, do_unit, plan, run, set_program, tile_clouds,
+};
 pub use project::{Epoch, IngestParams, Project, RegistrationParams, SegmentParams, Settings};
 pub use report_params::{Language, ReportParams};
 pub use split::split;

@@ -15,6 +15,7 @@ mod simulate;
 mod split;
 mod train;
 mod tune;
+mod units;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
@@ -43,6 +44,8 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     let force = args.force;
     match args.command {
         Command::Run(args) => run::run_all(&args, force, printer),
+        Command::Plan(args) => units::plan(&args, force, printer),
+        Command::Unit(args) => units::unit(&args, printer),
         Command::Segment(args) => segment::segment(args, force, printer),
         Command::Train(args) => train::train(&args, force, printer),
         Command::Label(args) => run::run(&args, Until::Labelled, force, printer),

@@ -49,15 +49,28 @@ pub fn run_to(
 ) -> Result<(Outcome, Summary)> {
     let summary = measure(folder, project, until, printer)?;
     printer.finish();
-    tell(project, &summary, printer);
-    if until == Until::Reported {
-        printer.log(&format!("results: {}", folder.path().display()));
-    }
-    let outcome = match summary.skipped_inputs() || summary.doubts().next().is_some() {
-        true => Outcome::InDoubt,
-        false => Outcome::Done,
+    let outcome = match until {
+        Until::Reported => conclude(project, &summary, folder.path(), printer),
+        _ => {
+            tell(project, &summary, printer);
+            outcome_of(&summary)
+        }
     };
     Ok((outcome, summary))
+}
+
+/// Says what came out of a finished run, and where it is.
+pub fn conclude(project: &Project, summary: &Summary, out: &Path, printer: &Printer) -> Outcome {
+    tell(project, summary, printer);
+    printer.log(&format!("results: {}", out.display()));
+    outcome_of(summary)
+}
+
+fn outcome_of(summary: &Summary) -> Outcome {
+    match summary.skipped_inputs() || summary.doubts().next().is_some() {
+        true => Outcome::InDoubt,
+        false => Outcome::Done,
+    }
 }
 
 /// Runs a project as far as asked; an error says where the results of the last finished run are.

@@ -47,6 +47,29 @@ focal_px = 1700.0
 distance_m = 5.0
 "#;
 
+/// Numbers that look random and are the same every time.
+pub struct Dice(pub u64);
+
+impl Dice {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 >> 33
+    }
+
+    /// From 0, less than `limit`.
+    pub fn below(&mut self, limit: usize) -> usize {
+        self.next() as usize % limit
+    }
+
+    /// 0 to 1.
+    pub fn share(&mut self) -> f64 {
+        (self.next() % 1_000_000) as f64 / 1e6
+    }
+}
+
 pub fn stonewise() -> Command {
     Command::new(env!("CARGO_BIN_EXE_stonewise"))
 }

@@ -8,6 +8,7 @@ use crate::cloud::{GridIndex, TileSource};
 use crate::geometry::Bounds;
 use crate::progress::{Interrupted, Progress};
 use nalgebra::{Point3, Vector3};
+use std::ops::Range;
 
 /// What the receiver of results may fail with.
 pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
@@ -41,6 +42,31 @@ pub fn m3c2_survey<A: TileSource, B: TileSource>(
     outward: &OutwardReference<'_>,
     params: &M3c2Params,
     progress: &dyn Progress,
+    sink: impl FnMut(usize, ChangeField) -> Result<(), SinkError>,
+) -> Result<(), SurveyError>
+where
+    A::Error: Sync,
+    B::Error: Sync,
+{
+    m3c2_tiles(
+        first,
+        second,
+        outward,
+        params,
+        0..first.tile_count(),
+        progress,
+        sink,
+    )
+}
+
+/// The same at the core points of some tiles of the first survey.
+pub fn m3c2_tiles<A: TileSource, B: TileSource>(
+    first: &A,
+    second: &B,
+    outward: &OutwardReference<'_>,
+    params: &M3c2Params,
+    tiles: Range<usize>,
+    progress: &dyn Progress,
     mut sink: impl FnMut(usize, ChangeField) -> Result<(), SinkError>,
 ) -> Result<(), SurveyError>
 where
@@ -49,8 +75,8 @@ where
 {
     params.check()?;
     let cylinder_reach = params.cylinder_radius_m.hypot(params.max_depth_m);
-    progress.begin("M3C2", first.tile_count() as u64);
-    for tile in 0..first.tile_count() {
+    progress.begin("M3C2", tiles.len() as u64);
+    for tile in tiles {
         progress.check()?;
         // The far corner of a voxel that straddles the border is at most its diagonal away.
         let halo = params

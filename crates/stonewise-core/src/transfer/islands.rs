@@ -1,6 +1,7 @@
 //! Parts of a stone that are cut off from its main body.
 
-use super::TransferParams;
+use super::bytes::{Reader, Writer};
+use super::{TransferError, TransferParams};
 use crate::geometry::{CellMap, CellSet, cell_of};
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,8 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Cubic cell of a world-aligned grid.
 pub(super) type Voxel = [i64; 3];
 
-/// Where each stone has points, counted in voxels across all tiles.
-pub(super) struct Occupancy {
+/// Where each stone has points, counted in voxels across tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Occupancy {
     voxel_m: f64,
     counts: CellMap<(u32, Voxel), u32>,
 }
@@ -28,7 +30,8 @@ pub(super) struct Removal {
 }
 
 impl Occupancy {
-    pub(super) fn new(voxel_m: f64) -> Self {
+    /// Without points; `voxel_m`: side of the voxels, metres.
+    pub fn new(voxel_m: f64) -> Self {
         Self {
             voxel_m,
             counts: CellMap::default(),
@@ -40,6 +43,44 @@ impl Occupancy {
             .counts
             .entry((stone, cell_of(world, self.voxel_m)))
             .or_insert(0) += 1;
+    }
+
+    /// The points of other tiles, too.
+    pub fn merge(&mut self, other: Self) {
+        for (voxel, count) in other.counts {
+            *self.counts.entry(voxel).or_insert(0) += count;
+        }
+    }
+
+    /// As bytes, for [`Self::decode`]; the same for the same counts.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = Writer::default();
+        out.f64(self.voxel_m);
+        let sorted: BTreeMap<&(u32, Voxel), &u32> = self.counts.iter().collect();
+        out.list(sorted.into_iter(), |out, ((stone, voxel), &count)| {
+            out.u32(*stone);
+            voxel.iter().for_each(|&v| out.i64(v));
+            out.u32(count);
+        });
+        out.0
+    }
+
+    /// From bytes.
+    ///
+    /// # Errors
+    /// They are not those of an occupancy.
+    pub fn decode(bytes: &[u8]) -> Result<Self, TransferError> {
+        let mut bytes = Reader(bytes);
+        let voxel_m = bytes.f64()?;
+        let counts = bytes.list(|bytes| {
+            let stone = bytes.u32()?;
+            let voxel = [bytes.i64()?, bytes.i64()?, bytes.i64()?];
+            Ok(((stone, voxel), bytes.u32()?))
+        })?;
+        Ok(Self {
+            voxel_m,
+            counts: counts.into_iter().collect(),
+        })
     }
 
     /// Finds islands smaller than a share of their stone's largest part, and stones with too few points.
@@ -128,6 +169,14 @@ fn neighbours([x, y, z]: Voxel) -> impl Iterator<Item = Voxel> {
 mod tests {
     use super::*;
 
+    /// Every voxel's points shared out between two.
+    fn split(whole: &Occupancy) -> [Occupancy; 2] {
+        [0, 1].map(|half| Occupancy {
+            voxel_m: whole.voxel_m,
+            counts: whole.counts.iter().map(|(k, n)| (*k, (n + half) / 2)).collect(),
+        })
+    }
+
     #[test]
     fn a_far_speck_goes_a_second_half_stays_and_a_tiny_stone_goes() {
         let mut occupancy = Occupancy::new(0.04);
@@ -143,6 +192,11 @@ mod tests {
         patch(1, 0.5, 15);
         patch(1, 1.0, 3);
         patch(2, 2.0, 4);
+        let (mut whole, halves) = (Occupancy::new(0.04), split(&occupancy));
+        for half in halves {
+            whole.merge(Occupancy::decode(&half.encode()).unwrap());
+        }
+        assert_eq!(whole, occupancy);
         let removal = occupancy.removal(&TransferParams::default());
         assert_eq!(removal.islands, BTreeMap::from([(1, (1, 9))]));
         assert_eq!(removal.stones, BTreeMap::from([(2, 16)]));

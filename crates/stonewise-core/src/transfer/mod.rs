@@ -12,8 +12,10 @@ mod area;
 mod assign;
 mod atoms;
 mod audit;
+mod bytes;
 mod depth;
 mod edit;
+mod election;
 mod error;
 mod face;
 mod frustum;
@@ -32,8 +34,12 @@ mod vote;
 
 pub use audit::AuditEvent;
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
+pub use election::Election;
 pub use error::TransferError;
+pub use islands::Occupancy;
 pub use labels::{LabelStore, MemoryLabels, TileLabels};
 pub use params::TransferParams;
 pub use stones::{StoneParams, build_stones};
-pub use transfer_labels::{PhotoVotes, StoneInstances, Transfer, transfer_labels};
+pub use transfer_labels::{
+    KeptParts, PhotoVotes, PreparedTransfer, StoneInstances, Transfer, finish_transfer, transfer_labels,
+};

@@ -42,8 +42,20 @@ impl Overlaps {
                 *areas.entry((s.photo, s.instance)).or_insert(0) += atom.area;
             }
         }
+        let instances = areas
+            .into_iter()
+            .map(|((photo, label), area)| Instance { photo, label, area });
+        let mut overlaps = Self::of_instances(instances.collect());
+        for atom in atoms {
+            overlaps.count(atom);
+        }
+        overlaps
+    }
+
+    /// Instances without what they share, ascending by photo and label.
+    pub(super) fn of_instances(instances: Vec<Instance>) -> Self {
         let (mut small, mut large): (Vec<Vec<u32>>, _) = (Vec::new(), CellMap::default());
-        for (&(photo, label), number) in areas.keys().zip(0..) {
+        for (&Instance { photo, label, .. }, number) in instances.iter().zip(0..) {
             if label >= SMALL_LABELS {
                 large.insert((photo, label), number);
                 continue;
@@ -53,20 +65,13 @@ impl Overlaps {
             table.resize(table.len().max(label as usize + 1), NONE);
             table[label as usize] = number;
         }
-        let mut overlaps = Self {
-            instances: areas
-                .into_iter()
-                .map(|((photo, label), area)| Instance { photo, label, area })
-                .collect(),
+        Self {
+            instances,
             small,
             large,
             common: BTreeMap::new(),
             seen_by: CellMap::default(),
-        };
-        for atom in atoms {
-            overlaps.count(atom);
         }
-        overlaps
     }
 
     fn count(&mut self, atom: &Atom) {

@@ -30,7 +30,9 @@ pub(super) struct Observer<'a> {
     cones: Vec<Cone>,
     labels: Vec<RunLabels>,
     depths: Vec<SplatDepth>,
+    /// Of the tiles from `first_tile` on.
     surfaces: Vec<SurfaceCells>,
+    first_tile: usize,
     params: &'a TransferParams,
     /// Of the steepest incidence at which a photo votes.
     least_cosine: f64,
@@ -46,16 +48,39 @@ impl<'a> Observer<'a> {
     ) -> Result<Self, TransferError> {
         let (views, labels): (Vec<&View>, Vec<RunLabels>) = masked.into_iter().unzip();
         let (depths, surfaces) = splat_all(tiles, &views, params, progress)?;
-        Ok(Self {
+        Ok(Self::of(views, labels, depths, (surfaces, 0), params))
+    }
+
+    /// The same from depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles, and the number of the first.
+    /// What no tile of these needs may be empty.
+    pub(super) fn of(
+        views: Vec<&'a View>,
+        labels: Vec<RunLabels>,
+        depths: Vec<SplatDepth>,
+        (surfaces, first_tile): (Vec<SurfaceCells>, usize),
+        params: &'a TransferParams,
+    ) -> Self {
+        Self {
             centres: views.iter().map(|v| v.centre()).collect(),
             cones: views.iter().map(|v| Cone::of(v)).collect(),
             views,
             labels,
             depths,
             surfaces,
+            first_tile,
             params,
             least_cosine: params.max_incidence_rad.cos(),
-        })
+        }
+    }
+
+    /// The depth map of a photo.
+    pub(super) fn depth(&self, photo: usize) -> Option<&SplatDepth> {
+        self.depths.get(photo)
+    }
+
+    /// The local surface of a tile.
+    pub(super) fn surface(&self, tile: usize) -> Option<&SurfaceCells> {
+        self.surfaces.get(tile.checked_sub(self.first_tile)?)
     }
 
     /// The photos that have masks.
@@ -89,7 +114,7 @@ impl<'a> Observer<'a> {
         candidates: &[u32],
         judge: impl Fn(&[Sighting]) -> R + Sync,
     ) -> Vec<R> {
-        let groups = self.surfaces[tile].groups_of(cloud, chosen);
+        let groups = self.surfaces[tile - self.first_tile].groups_of(cloud, chosen);
         let judged: Vec<Vec<R>> = groups
             .par_iter()
             .map_init(Vec::new, |found, group| {

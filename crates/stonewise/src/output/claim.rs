@@ -64,6 +64,25 @@ impl OutputFolder {
         })
     }
 
+    /// Takes the folder of a plan to do one of its units, beside others who do.
+    ///
+    /// Errors: a run, or the making of a plan, is under way; files cannot be locked there.
+    pub(crate) fn of_unit(path: &Path) -> Result<Self> {
+        Ok(Self {
+            path: path.to_path_buf(),
+            forced: false,
+            _lock: FolderLock::take_for_unit(path)?,
+        })
+    }
+
+    /// Keeps the folder for a plan whose units other processes do.
+    pub(crate) fn admit_units(self) -> Self {
+        Self {
+            _lock: self._lock.admit_units(),
+            ..self
+        }
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path

@@ -3,42 +3,81 @@
 use crate::error::{Error, Result};
 use crate::results::names::WORK_DIR;
 use std::fs::{self, File, TryLockError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The file that is locked; it stays behind empty and means nothing then.
 pub(super) const LOCK_FILE: &str = "lock";
+/// The file that every unit of a plan locks together with all others, and a run for itself; the same holds for it.
+pub(super) const UNITS_LOCK_FILE: &str = "units.lock";
 
 /// Holds an output folder for this process. The system releases it with the process, however that ends.
 #[derive(Debug)]
 pub(super) struct FolderLock {
-    _file: File,
+    /// `None` for a unit: another process coordinates.
+    _folder: Option<File>,
+    /// `None` for a coordinator while others do the units.
+    _units: Option<File>,
 }
 
 impl FolderLock {
-    /// Locks a folder, which exists.
+    /// Locks a folder, which exists, for a run: nobody else works in it.
     ///
-    /// Errors: another process, or another run of this one, holds it; the file system has no locks.
+    /// Errors: another process, or another run of this one, holds it; units are being done; the file system has no locks.
     pub fn take(folder: &Path) -> Result<Self> {
-        let work = folder.join(WORK_DIR);
-        fs::create_dir_all(&work).map_err(Error::io("making a folder", &work))?;
-        let path = work.join(LOCK_FILE);
-        let file = File::options()
-            .create(true)
-            .truncate(false)
-            .write(true)
-            .open(&path)
-            .map_err(Error::io("opening", &path))?;
-        match file.try_lock() {
-            Ok(()) => Ok(Self { _file: file }),
-            Err(TryLockError::WouldBlock) => Err(Error::Busy {
-                path: folder.to_path_buf(),
-            }),
-            Err(TryLockError::Error(source)) => Err(Error::Io {
-                action: "locking the results folder (it must lie where files can be locked, such as a local disk)",
-                path,
-                source,
-            }),
+        let (lock, path) = open(folder, LOCK_FILE)?;
+        held(lock.try_lock(), folder, &path)?;
+        let (units, path) = open(folder, UNITS_LOCK_FILE)?;
+        held(units.try_lock(), folder, &path)?;
+        Ok(Self {
+            _folder: Some(lock),
+            _units: Some(units),
+        })
+    }
+
+    /// Locks a folder for a unit of its plan, beside other units.
+    pub fn take_for_unit(folder: &Path) -> Result<Self> {
+        let (units, path) = open(folder, UNITS_LOCK_FILE)?;
+        held(units.try_lock_shared(), folder, &path)?;
+        Ok(Self {
+            _folder: None,
+            _units: Some(units),
+        })
+    }
+
+    /// Lets units work; no other run, and no other coordinator, may begin.
+    pub fn admit_units(self) -> Self {
+        Self {
+            _folder: self._folder,
+            _units: None,
         }
+    }
+}
+
+fn open(folder: &Path, name: &str) -> Result<(File, PathBuf)> {
+    let work = folder.join(WORK_DIR);
+    fs::create_dir_all(&work).map_err(Error::io("making a folder", &work))?;
+    let path = work.join(name);
+    let file = File::options()
+        .create(true)
+        .truncate(false)
+        .read(true)
+        .write(true)
+        .open(&path)
+        .map_err(Error::io("opening", &path))?;
+    Ok((file, path))
+}
+
+fn held(outcome: std::result::Result<(), TryLockError>, folder: &Path, path: &Path) -> Result<()> {
+    match outcome {
+        Ok(()) => Ok(()),
+        Err(TryLockError::WouldBlock) => Err(Error::Busy {
+            path: folder.to_path_buf(),
+        }),
+        Err(TryLockError::Error(source)) => Err(Error::Io {
+            action: "locking the results folder (it must lie where files can be locked, such as a local disk)",
+            path: path.to_path_buf(),
+            source,
+        }),
     }
 }
 
@@ -54,5 +93,19 @@ mod tests {
         assert!(message.contains("another run works in this folder"), "{message}");
         drop(held);
         FolderLock::take(folder.path()).unwrap();
+    }
+
+    #[test]
+    fn units_work_side_by_side_and_keep_runs_out() {
+        let folder = tempfile::tempdir().unwrap();
+        let units = [0, 1].map(|_| FolderLock::take_for_unit(folder.path()).unwrap());
+        assert!(FolderLock::take(folder.path()).is_err());
+        drop(units);
+        let run = FolderLock::take(folder.path()).unwrap();
+        assert!(FolderLock::take_for_unit(folder.path()).is_err());
+        let coordinator = run.admit_units();
+        let _unit = FolderLock::take_for_unit(folder.path()).unwrap();
+        assert!(FolderLock::take(folder.path()).is_err());
+        drop(coordinator);
     }
 }

@@ -1,9 +1,9 @@
-//! Temporary files that a killed run left behind.
+//! Temporary files and folders that a killed run left behind.
 
 use std::fs;
 use std::path::Path;
 
-/// Removes temporary files below a folder, `.NAME.PID.partial`. Only for the holder of the folder's lock: nobody else
+/// Removes temporary files and folders below a folder, `.NAME.DIGITS.partial`. Only for the holder of the folder's lock: nobody else
 /// writes there. What cannot be removed or listed stays; it does no harm.
 ///
 /// `is_ours`: whether to look into a folder, by its path below `folder`.
@@ -16,16 +16,23 @@ pub(super) fn sweep(folder: &Path, is_ours: &dyn Fn(&Path) -> bool) {
             // Links are not followed: what lies behind them is somebody else's.
             let is_dir = entry.file_type().is_ok_and(|t| t.is_dir());
             let below = path.strip_prefix(folder).unwrap_or(&path);
-            if is_dir && is_ours(below) {
-                open.push(path);
-            } else if !is_dir && is_partial(&entry.file_name().to_string_lossy()) {
-                let _ = fs::remove_file(&path);
+            let is_partial = is_partial(&entry.file_name().to_string_lossy());
+            match (is_dir, is_partial) {
+                // The folder of a step whose work was not finished, in the folder of all steps.
+                (true, true) if !below.parent().is_none_or(|p| p == Path::new("")) && is_ours(below) => {
+                    let _ = fs::remove_dir_all(&path);
+                }
+                (true, _) if is_ours(below) => open.push(path),
+                (false, true) => {
+                    let _ = fs::remove_file(&path);
+                }
+                _ => {}
             }
         }
     }
 }
 
-/// Whether a name is that of a temporary file of [`stonewise_io::atomic::write_atomically`].
+/// Whether a name is one that [`stonewise_io::atomic::partial_name`] gives.
 pub(super) fn is_partial(name: &str) -> bool {
     let stem = name.strip_prefix('.').and_then(|n| n.strip_suffix(".partial"));
     stem.and_then(|s| s.rsplit_once('.')).is_some_and(|(file, pid)| {
@@ -42,6 +49,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let files = [
             ("work/a/.tile.parquet.77.partial", false),
+            ("work/.label-1.1234.partial/0_0_0.parquet", false),
+            (".mine.12.partial/notes", true),
             (".stones.csv.1.partial", false),
             ("survey/.mine.2.partial", true),
             ("notes.partial", true),

@@ -5,11 +5,13 @@ use crate::files::{create_results_folder, read_json, write_json};
 use crate::output::OutputFolder;
 use crate::pipeline::agenda::Agenda;
 use crate::pipeline::clock::{Clock, peak_memory_bytes};
-use crate::pipeline::storage::step::{Keeps, Key, Origin, StepDir, StepStore};
+use crate::pipeline::storage::step::{Key, StepDir};
+use crate::pipeline::storage::store::{Keeps, Origin, Scope, StepStore};
 use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
 use crate::warnings::{Warning, Warnings};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::progress::Progress;
@@ -33,6 +35,8 @@ pub struct Context<'a> {
     pub warnings: Warnings,
     /// The steps that the caller was told of; empty where the run is part of something larger.
     pub agenda: Agenda,
+    /// How long other processes took for the steps that they did, by the name of the step.
+    pub unit_times: BTreeMap<String, StepTime>,
     times: Mutex<Vec<StepTime>>,
 }
 
@@ -40,6 +44,22 @@ impl<'a> Context<'a> {
     /// Makes the folders of a run that keeps its steps beside its results.
     pub fn new(project: &'a Project, output: &'a OutputFolder, progress: &'a dyn Progress) -> Result<Self> {
         let store = StepStore::new(&output.path().join(WORK_DIR), Keeps::Newest)?;
+        let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
+        Ok(Self {
+            output: Some(output),
+            ..context
+        })
+    }
+
+    /// The same for a process that does one unit of a plan.
+    pub fn of_unit(
+        project: &'a Project,
+        output: &'a OutputFolder,
+        scope: Scope,
+        digests: BTreeMap<PathBuf, String>,
+        progress: &'a dyn Progress,
+    ) -> Result<Self> {
+        let store = StepStore::of_unit(&output.path().join(WORK_DIR), scope, digests)?;
         let context = Self::with_store(project, output.path(), Arc::new(store), progress)?;
         Ok(Self {
             output: Some(output),
@@ -67,6 +87,7 @@ impl<'a> Context<'a> {
             progress,
             warnings,
             agenda: Agenda::default(),
+            unit_times: BTreeMap::new(),
             times: Mutex::default(),
         })
     }
@@ -109,6 +130,17 @@ impl<'a> Context<'a> {
         Ok(dir)
     }
 
+    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another process may have done.
+    pub fn part(
+        &self,
+        whole: (&str, &Key),
+        part: &str,
+        make: impl FnOnce(&StepDir) -> Result<()>,
+    ) -> Result<StepDir> {
+        self.progress.check()?;
+        self.store.part(whole, part, make)
+    }
+
     /// Does a piece of work that keeps nothing between runs, and notes its time.
     pub fn timed<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.progress.check()?;
@@ -136,13 +168,14 @@ impl<'a> Context<'a> {
     }
 
     fn record(&self, step: &str, started: Clock, resumed: bool) {
-        let time = StepTime {
+        let by_unit = self.unit_times.get(step).filter(|_| resumed);
+        let time = by_unit.cloned().unwrap_or_else(|| StepTime {
             step: step.to_owned(),
             seconds: started.wall_seconds(),
             processor_seconds: started.processor_seconds(),
             resumed,
             peak_memory_bytes: peak_memory_bytes(),
-        };
+        });
         self.times
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

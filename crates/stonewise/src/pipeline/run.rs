@@ -20,22 +20,24 @@ use crate::pipeline::outputs::run_record::write_run_record;
 use crate::pipeline::outputs::series::write_series;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
 use crate::pipeline::outputs::verdict::write_verdict;
-use crate::pipeline::steps::edit::edit;
+use crate::pipeline::steps::edit::{Edited, edit};
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::label::{Labelled, label};
 use crate::pipeline::steps::m3c2::m3c2;
-use crate::pipeline::steps::r#match::r#match;
+use crate::pipeline::steps::r#match::{Matched, r#match};
 use crate::pipeline::steps::offsets::label_offsets;
-use crate::pipeline::steps::register::{datum, register};
+use crate::pipeline::steps::register::{Registered, datum, register};
 use crate::pipeline::steps::segment::{Segmented, segment};
+use crate::pipeline::units::forget;
 use crate::project::Project;
 use crate::report::write_report;
 use crate::results::names::PairFile;
 use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRecord, Verdict};
-use crate::results::{Facade, StoneRow, facade_of, read_outlines, write_stones};
+use crate::results::{Facade, StoneOutline, StoneRow, facade_of, read_outlines, write_stones};
 use crate::warnings::Warning;
 use nalgebra::Point3;
+use std::collections::BTreeMap;
 use stonewise_core::change::OutwardReference;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::evaluate::Evaluation;
@@ -99,6 +101,7 @@ impl Summary {
 /// Results of an earlier run lie aside until this one has finished. Errors: an input that cannot be used, epochs that do
 /// not overlap, a full disk, interruption. What is finished stays, and the same call goes on from there.
 pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn Progress) -> Result<Summary> {
+    forget(out.path())?;
     out.begin_results(project)?;
     let mut context = Context::new(project, out, progress)?;
     context.agenda = Agenda::of(project, until);
@@ -116,7 +119,7 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         .clone()
         .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
-    check_overlap(context, &ingested)?;
+    check_overlap(context, &ingested.iter().zip(1..).collect::<Vec<_>>())?;
     let photos = epochs
         .clone()
         .map(|n| segment(context, n))
@@ -141,13 +144,7 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
             .try_for_each(|n| write_clouds(context, n, &labelled[n - 1], None))?;
         return Ok(summary(context, Vec::new()));
     }
-    write_stone_outlines(context, &labelled[0])?;
-    let outlines = read_outlines(&context.out)?;
-    let first = &labelled[0].stones;
-    let facade = match edited {
-        Some(edited) => edited.facade,
-        None => facade_of(first.iter().map(|s| (s.id.0, s.centroid)), &outlines),
-    };
+    let (outlines, facade) = outlined(context, &labelled[0], edited)?;
     let mut pairs = Vec::new();
     for number in epochs.clone().skip(1) {
         pairs.push(measure(context, &photos, &labelled, &facade, number, until)?);
@@ -191,8 +188,90 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
 
 /// Stones of the first epoch, before any known motion is asked for.
 pub(crate) fn first_stones(context: &Context) -> Result<Vec<Stone>> {
-    let ingested = ingest(context, 1)?;
-    Ok(label(context, 1, ingested, &segment(context, 1)?)?.stones)
+    Ok(labelled(context, 1)?.stones)
+}
+
+/// An epoch with its stones.
+pub(super) fn labelled(context: &Context, number: usize) -> Result<Labelled> {
+    label(
+        context,
+        number,
+        ingest(context, number)?,
+        &segment(context, number)?,
+    )
+}
+
+/// The stones of the first epoch in a later one; it is an error if there are none.
+pub(super) fn matched(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+    number: usize,
+) -> Result<Matched> {
+    let matched = r#match(context, first, second, number)?;
+    match matched.pairs().is_empty() {
+        false => Ok(matched),
+        true => Err(Error::NoMatch {
+            epochs: [0, number - 1].map(|e| context.project.epochs[e].name.clone()),
+            stones: [first.stones.len(), second.stones.len()],
+        }),
+    }
+}
+
+/// What was measured of a later epoch against the first.
+pub(super) struct Measured {
+    /// The motions.
+    pub registered: Registered,
+    /// What is known about the registration of the epoch.
+    pub datum: Datum,
+    /// One row for each stone of the first epoch.
+    pub rows: Vec<StoneRow>,
+}
+
+/// Measures the matched stones of a later epoch; the outlines are written.
+pub(super) fn measured(
+    context: &Context,
+    first: &Labelled,
+    second: &Labelled,
+    matched: &Matched,
+    facade: &Facade,
+    number: usize,
+) -> Result<Measured> {
+    let registered = register(context, first, second, matched, number)?;
+    let common = motion_in_common(first, &registered);
+    let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
+    let rows = stone_rows([first, second], matched, &registered, &datum, facade);
+    Ok(Measured {
+        registered,
+        datum,
+        rows,
+    })
+}
+
+/// All epochs with their stones, as a person corrected them, and what the corrections did.
+pub(super) fn corrected(context: &Context) -> Result<(Vec<Labelled>, Option<Edited>)> {
+    let epochs = 1..=context.project.epochs.len();
+    let photos = epochs
+        .clone()
+        .map(|n| segment(context, n))
+        .collect::<Result<Vec<_>>>()?;
+    let labelled = epochs.map(|n| labelled(context, n)).collect::<Result<Vec<_>>>()?;
+    edit(context, &photos, labelled)
+}
+
+/// Writes the outlines of the first epoch's stones; where each stone lies on the unrolled wall.
+pub(super) fn outlined(
+    context: &Context,
+    first: &Labelled,
+    edited: Option<Edited>,
+) -> Result<(BTreeMap<u32, StoneOutline>, Facade)> {
+    write_stone_outlines(context, first)?;
+    let outlines = read_outlines(&context.out)?;
+    let facade = match edited {
+        Some(edited) => edited.facade,
+        None => facade_of(first.stones.iter().map(|s| (s.id.0, s.centroid)), &outlines),
+    };
+    Ok((outlines, facade))
 }
 
 /// Matches, measures and compares one later epoch against the first, and writes its tables.
@@ -205,13 +284,7 @@ fn measure(
     until: Until,
 ) -> Result<PairSummary> {
     let (first, second) = (&labelled[0], &labelled[number - 1]);
-    let matched = r#match(context, first, second, number)?;
-    if matched.pairs().is_empty() {
-        return Err(Error::NoMatch {
-            epochs: [0, number - 1].map(|e| context.project.epochs[e].name.clone()),
-            stones: [first.stones.len(), second.stones.len()],
-        });
-    }
+    let matched = matched(context, first, second, number)?;
     let pair = number - 1;
     let file = |file: PairFile| context.out.join(file.name(pair));
     write_readable_json(&file(PairFile::Matches), &matched.report)?;
@@ -219,14 +292,15 @@ fn measure(
         return Ok(PairSummary::default());
     }
     let offsets = label_offsets(context, first, second, &matched, number)?;
-    let registered = register(context, first, second, &matched, number)?;
-    let common = motion_in_common(first, &registered);
-    let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
+    let Measured {
+        registered,
+        datum,
+        rows,
+    } = measured(context, first, second, &matched, facade, number)?;
     if datum.state == DatumState::Unknown {
         let epoch = &context.project.epochs[number - 1].name;
         context.warnings.notice("register", epoch, &datum.note);
     }
-    let rows = stone_rows([first, second], &matched, &registered, &datum, facade);
     note_doubts(context, number, &offsets, &registered, &rows);
     write_stones(&context.out, pair, &rows)?;
     let record = RegistrationRecord {
@@ -267,24 +341,30 @@ fn datums(pairs: &[PairSummary]) -> Vec<DatumState> {
         .collect()
 }
 
-/// Epochs whose clouds lie apart cannot be compared.
-fn check_overlap(context: &Context, ingested: &[Ingested]) -> Result<()> {
+/// Epochs whose clouds lie apart cannot be compared; `ingested`: with their numbers, the reference first.
+pub(super) fn check_overlap(context: &Context, ingested: &[(&Ingested, usize)]) -> Result<()> {
     let bounds = |t: &Ingested| {
         (0..t.tiles.tile_count())
             .map(|i| t.tiles.bounds(i))
             .reduce(|a, b| a.union(&b))
     };
-    let boxes: Vec<Bounds> = ingested.iter().filter_map(bounds).collect();
-    for (number, bounds) in boxes.iter().enumerate().skip(1) {
-        if !boxes[0].intersects(bounds) {
-            let names = [0, number].map(|e| &context.project.epochs[e].name);
+    let mut boxes: Vec<(Bounds, usize)> = Vec::new();
+    for (epoch, number) in ingested {
+        boxes.extend(bounds(epoch).map(|b| (b, *number)));
+    }
+    let Some((reference, _)) = boxes.first() else {
+        return Ok(());
+    };
+    for (bounds, number) in &boxes[1..] {
+        if !reference.intersects(bounds) {
+            let names = [0, number - 1].map(|e| &context.project.epochs[e].name);
             return Err(Error::Survey(format!(
                 "epochs {:?} and {:?} do not overlap: one reaches from {:.1?} to {:.1?} m, the other from {:.1?} to {:.1?} m; \
                  are they in one frame?",
                 names[0],
                 names[1],
-                boxes[0].min.coords.as_slice(),
-                boxes[0].max.coords.as_slice(),
+                reference.min.coords.as_slice(),
+                reference.max.coords.as_slice(),
                 bounds.min.coords.as_slice(),
                 bounds.max.coords.as_slice()
             )));

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
+use crate::pipeline::steps::label_batch::LabelBatches;
 use crate::pipeline::steps::segment::Segmented;
 use crate::pipeline::storage::step::{Key, StepDir};
 use crate::pipeline::storage::tiles::DiskTiles;
@@ -16,6 +17,9 @@ use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
 use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// What was decided about the instances, in the step's folder.
+const TRANSFER: &str = "transfer.json";
 
 /// A labelled epoch: its points (moved, where the project says so), their labels, its stones.
 pub struct Labelled {
@@ -63,28 +67,60 @@ impl Labelled {
 
 /// Carries the photos' labels into the points of an epoch; then moves the points, where the project says so.
 pub fn label(context: &Context, number: usize, ingested: Ingested, photos: &Segmented) -> Result<Labelled> {
-    let params = &context.project.settings.label;
-    let tiles = &ingested.tiles.surveyed;
-    let map = &context.project.epochs[number - 1].map;
-    let key = Key::new(
-        "label",
-        &(params, &map.crs, map.false_origin),
-        &[ingested.step.key().as_str(), photos.step.key().as_str()],
-    );
-    let step = context.step(&format!("label-{number}"), key, |step, _| {
-        let mut store = DiskLabels::new(step.path(), tiles);
-        let mask = |image| photos.labels(image).map(Some);
-        let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
-        write_json(&step.file("transfer.json"), &transfer)
-    })?;
-    let transfer = read_json(&step.file("transfer.json"))?;
-    let store = DiskLabels::new(step.path(), tiles);
+    let step = transferred(context, number, &ingested, photos)?;
+    let transfer = read_json(&step.file(TRANSFER))?;
+    let store = DiskLabels::new(step.path(), &ingested.tiles.surveyed);
     let labels = Labels {
         transfer,
         store,
         step,
     };
     tabulate(context, number, "stones", photos, ingested, labels)
+}
+
+/// Carries the photos' labels into the points of an epoch.
+fn transferred(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Result<StepDir> {
+    let params = &context.project.settings.label;
+    let tiles = &ingested.tiles.surveyed;
+    let key = label_key(context, number, ingested, photos);
+    context.step(&label_name(number), key, |step, _| {
+        let mut store = DiskLabels::new(step.path(), tiles);
+        let mask = |image| photos.labels(image).map(Some);
+        let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
+        write_json(&step.file(TRANSFER), &transfer)
+    })
+}
+
+/// The same from batches of tiles that other processes labelled.
+pub fn gather_labels(
+    context: &Context,
+    number: usize,
+    ingested: &Ingested,
+    photos: &Segmented,
+    batches: usize,
+) -> Result<()> {
+    let (name, key) = (label_name(number), label_key(context, number, ingested, photos));
+    context.step(&name, key.clone(), |step, _| {
+        let batches = LabelBatches::new(context, number, ingested, photos, batches);
+        write_json(&step.file(TRANSFER), &batches.gather(step)?)
+    })?;
+    context.store.remove_parts(&name, &key)
+}
+
+/// Name of the step.
+pub fn label_name(number: usize) -> String {
+    format!("label-{number}")
+}
+
+/// Its key.
+pub fn label_key(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Key {
+    let params = &context.project.settings.label;
+    let map = &context.project.epochs[number - 1].map;
+    Key::new(
+        "label",
+        &(params, &map.crs, map.false_origin),
+        &[ingested.step.key().as_str(), photos.step.key().as_str()],
+    )
 }
 
 /// The labels of an epoch, before its stones are tabulated.
@@ -145,13 +181,14 @@ pub(super) fn tabulate(
 
 /// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
 #[derive(Clone)]
-pub(super) struct DiskLabels {
+pub struct DiskLabels {
     files: Vec<PathBuf>,
 }
 
 impl DiskLabels {
-    pub(super) fn new(dir: &Path, tiles: &DiskTiles) -> Self {
-        let file = |tile| dir.join(format!("{}.parquet", tiles.name(tile)));
+    /// Those in a folder.
+    pub fn new(dir: &Path, tiles: &DiskTiles) -> Self {
+        let file = |tile| dir.join(Self::file_name(tiles, tile));
         Self {
             files: (0..tiles.tile_count()).map(file).collect(),
         }
@@ -162,6 +199,11 @@ impl DiskLabels {
         for &tile in tiles {
             self.files[tile].clone_from(&from.files[tile]);
         }
+    }
+
+    /// Name of the file of a tile.
+    pub fn file_name(tiles: &DiskTiles, tile: usize) -> String {
+        format!("{}.parquet", tiles.name(tile))
     }
 }
 

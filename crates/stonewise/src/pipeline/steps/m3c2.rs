@@ -3,10 +3,13 @@
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::storage::step::Key;
+use crate::pipeline::steps::label_batch::batch_name;
+use crate::pipeline::storage::step::{Key, StepDir};
 use nalgebra::{Point3, Vector3};
+use std::ops::Range;
 use std::path::Path;
-use stonewise_core::change::{ChangeField, ChangePoint, OutwardReference, m3c2_survey};
+use stonewise_core::change::{ChangeField, ChangePoint, OutwardReference, m3c2_tiles};
+use stonewise_core::cloud::TileSource;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
 
 /// The comparison, one row of about 100 bytes a core point; as JSON it took 295, 1.3 GB for the 4.3 million of a dam.
@@ -19,25 +22,81 @@ pub fn m3c2(
     number: usize,
     outward: &OutwardReference,
 ) -> Result<ChangeField> {
-    let params = &context.project.settings.m3c2;
-    let motions = epochs.map(|e| &e.tiles.motion);
-    let key = Key::new("m3c2", &(params, motions), &epochs.map(|e| e.step.key().as_str()));
-    let step = context.step(&format!("m3c2-{number}"), key, |step, _| {
-        let mut field = ChangeField::default();
-        m3c2_survey(
-            &epochs[0].tiles,
-            &epochs[1].tiles,
+    let comparison = Comparison::new(context, epochs, number, outward);
+    let all = 0..epochs[0].tiles.tile_count();
+    let step = context.step(&comparison.name, comparison.key.clone(), |step, _| {
+        write_field(&step.file(FIELD), &comparison.field(all)?)
+    })?;
+    read_field(&step.file(FIELD))
+}
+
+/// The comparison of two epochs, for processes that share it.
+pub struct Comparison<'a> {
+    context: &'a Context<'a>,
+    epochs: [&'a Ingested; 2],
+    outward: &'a OutwardReference<'a>,
+    name: String,
+    key: Key,
+}
+
+impl<'a> Comparison<'a> {
+    /// That of epoch `number` with the first.
+    pub fn new(
+        context: &'a Context<'a>,
+        epochs: [&'a Ingested; 2],
+        number: usize,
+        outward: &'a OutwardReference<'a>,
+    ) -> Self {
+        let params = &context.project.settings.m3c2;
+        let motions = epochs.map(|e| &e.tiles.motion);
+        let keys = epochs.map(|e| e.step.key().as_str());
+        Self {
+            context,
+            epochs,
             outward,
-            params,
-            context.progress,
+            name: format!("m3c2-{number}"),
+            key: Key::new("m3c2", &(params, motions), &keys),
+        }
+    }
+
+    fn field(&self, tiles: Range<usize>) -> Result<ChangeField> {
+        let mut field = ChangeField::default();
+        m3c2_tiles(
+            &self.epochs[0].tiles,
+            &self.epochs[1].tiles,
+            self.outward,
+            &self.context.project.settings.m3c2,
+            tiles,
+            self.context.progress,
             |_, tile| {
                 field.points.extend(tile.points);
                 Ok(())
             },
         )?;
-        write_field(&step.file(FIELD), &field)
-    })?;
-    read_field(&step.file(FIELD))
+        Ok(field)
+    }
+
+    /// The core points of one of `count` batches of tiles of the first epoch.
+    pub fn batch(&self, number: usize, count: usize) -> Result<StepDir> {
+        let whole = (self.name.as_str(), &self.key);
+        self.context.part(whole, &batch_name(number, count), |part| {
+            let tiles = self.epochs[0].tiles.surveyed.batch(number, count);
+            write_field(&part.file(FIELD), &self.field(tiles)?)
+        })
+    }
+
+    /// Takes the core points of all batches together.
+    pub fn gather(&self, count: usize) -> Result<()> {
+        self.context.step(&self.name, self.key.clone(), |step, _| {
+            let mut field = ChangeField::default();
+            for number in 0..count {
+                let batch = read_field(&self.batch(number, count)?.file(FIELD))?;
+                field.points.extend(batch.points);
+            }
+            write_field(&step.file(FIELD), &field)
+        })?;
+        self.context.store.remove_parts(&self.name, &self.key)
+    }
 }
 
 fn write_field(path: &Path, field: &ChangeField) -> Result<()> {

@@ -3,4 +3,5 @@
 pub mod epoch_tiles;
 pub mod spill;
 pub mod step;
+pub mod store;
 pub mod tiles;

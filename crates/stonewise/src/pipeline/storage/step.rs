@@ -1,18 +1,17 @@
-//! Steps that keep their results and resume.
+//! The folder of a step.
 //!
-//! A step owns a folder. `step.json` in it names the key its files were made under: the digest of everything
-//! that the result depends on. Another key empties the folder; the same key keeps every finished file, so an
-//! interrupted step goes on where it stopped. `done` is written last: it lists length and digest of every file that
-//! the step stands for, and a step whose files differ from it is done again.
+//! `step.json` in it names the key its files were made under: the digest of everything that the result depends on. `done` lists length
+//! and digest of every file that the step stands for, and a step whose files differ from it is done again. The work is done in a folder
+//! beside it, which takes its place when everything is there.
 
 use crate::error::{Error, Result};
-use crate::files::{create_results_folder, write_json, write_text};
+use crate::files::{write_json, write_text};
 use crate::kept::{Kept, file_digest, files_of};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::OnceLock;
+use stonewise_io::atomic::partial_name;
 
 /// Digest of everything that a step's result depends on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,111 +36,6 @@ impl Key {
     }
 }
 
-/// How many versions of a step's files are kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keeps {
-    /// One: a step that is done under another key replaces its files. For a project that is run again and again.
-    Newest,
-    /// One for each key. For experiments, whose variants share what they have in common.
-    Every,
-}
-
-/// The folder that holds the folders of all steps.
-pub struct StepStore {
-    folder: PathBuf,
-    keeps: Keeps,
-    /// One for each folder in which somebody works.
-    turns: Mutex<BTreeMap<PathBuf, Arc<Mutex<()>>>>,
-    digests: Mutex<BTreeMap<PathBuf, String>>,
-    /// Steps whose files this process has compared with their digests or made itself.
-    sound: Mutex<BTreeSet<(PathBuf, String)>>,
-}
-
-/// Where a step's files come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Origin {
-    /// They were made now.
-    Made,
-    /// An earlier run made them, and they are as it left them.
-    Found,
-    /// An earlier run made them, and they were not as it left them, for this reason: they were made again.
-    MadeAgain(String),
-}
-
-impl StepStore {
-    /// A store in a folder, which is made if need be.
-    pub fn new(folder: &Path, keeps: Keeps) -> Result<Self> {
-        create_results_folder(folder)?;
-        Ok(Self {
-            folder: folder.to_path_buf(),
-            keeps,
-            turns: Mutex::default(),
-            digests: Mutex::default(),
-            sound: Mutex::default(),
-        })
-    }
-
-    /// Does a step with `make`, unless its files are there under this key, as they were left.
-    ///
-    /// `published`: files outside the step's folder that it makes too. Of several threads that start the same step one
-    /// does it and the others wait: call it from threads that no thread pool lends out, or they may wait for themselves.
-    /// Cost of a step that is taken over: its files are read once to compare their digests.
-    pub fn step(
-        &self,
-        name: &str,
-        key: Key,
-        published: &[PathBuf],
-        make: impl FnOnce(&StepDir) -> Result<()>,
-    ) -> Result<(StepDir, Origin)> {
-        let path = match self.keeps {
-            Keeps::Newest => self.folder.join(name),
-            Keeps::Every => self.folder.join(name).join(&key.as_str()[..VERSION_DIGITS]),
-        };
-        let turn = {
-            let mut turns = self.turns.lock().unwrap_or_else(PoisonError::into_inner);
-            Arc::clone(turns.entry(path.clone()).or_default())
-        };
-        let _mine = turn.lock().unwrap_or_else(PoisonError::into_inner);
-        let identity = (path.clone(), key.as_str().to_owned());
-        let dir = StepDir::open(path, key)?;
-        if self.sound().contains(&identity) && published.is_empty() {
-            return Ok((dir, Origin::Found));
-        }
-        let origin = match dir.state(published) {
-            State::Done => Origin::Found,
-            State::Unfinished => Origin::Made,
-            State::Damaged(why) => {
-                dir.empty()?;
-                Origin::MadeAgain(why)
-            }
-        };
-        if origin != Origin::Found {
-            make(&dir)?;
-            dir.finish(published)?;
-        }
-        self.sound().insert(identity);
-        Ok((dir, origin))
-    }
-
-    fn sound(&self) -> MutexGuard<'_, BTreeSet<(PathBuf, String)>> {
-        self.sound.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Digest of an input file or folder, read once.
-    pub fn digest(&self, path: &Path) -> Result<String> {
-        let mut known = self.digests.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(digest) = known.get(path) {
-            return Ok(digest.clone());
-        }
-        let digest = path_digest(path)?;
-        known.insert(path.to_path_buf(), digest.clone());
-        Ok(digest)
-    }
-}
-
-/// Digits of a key that name one version of a step's files.
-const VERSION_DIGITS: usize = 16;
-
 /// The folder of one step.
 #[derive(Clone, Debug)]
 pub struct StepDir {
@@ -151,13 +45,22 @@ pub struct StepDir {
 
 /// What is known of a step's files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum State {
-    /// Some are still to be made.
+pub(super) enum State {
+    /// Some are still to be made, or they were made under another key.
     Unfinished,
     /// All are there, as they were left.
     Done,
     /// Something differs from how it was left, for this reason.
     Damaged(String),
+}
+
+/// How closely a step's files are looked at before they are taken over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// Their lengths: one of many processes looks at what another has just made.
+    Lengths,
+    /// Their digests; each file is read once.
+    Digests,
 }
 
 /// The key that a folder was made under.
@@ -171,10 +74,69 @@ impl StepDir {
     /// Errors: something lies there that no step made; a file cannot be written or removed.
     pub fn open(path: PathBuf, key: Key) -> Result<Self> {
         let dir = Self { path, key };
-        if fs::read_to_string(dir.file(STAMP)).ok().as_deref() != Some(dir.key.as_str()) {
+        if !dir.is_of_key() {
             dir.empty()?;
         }
         Ok(dir)
+    }
+
+    /// The folder of a step as it is, if it is there.
+    pub(super) fn at(path: PathBuf, key: Key) -> Self {
+        Self { path, key }
+    }
+
+    fn is_of_key(&self) -> bool {
+        fs::read_to_string(self.file(STAMP)).ok().as_deref() == Some(self.key.as_str())
+    }
+
+    /// Does the step's work in a folder beside its own, and puts that in its place when everything is there.
+    ///
+    /// Where another process has done the same in the meantime, its folder stays. Errors: something lies there that no step made; the
+    /// work fails; a file cannot be written or removed.
+    pub(super) fn replace(
+        &self,
+        published: &[PathBuf],
+        make: impl FnOnce(&Self) -> Result<()>,
+    ) -> Result<()> {
+        self.remove()?;
+        let path = partial_name(&self.path).map_err(Error::io("making a folder beside", &self.path))?;
+        fs::create_dir_all(&path).map_err(Error::io("making a folder", &path))?;
+        let begun = Begun(Self::at(path, self.key.clone()));
+        write_text(&begun.0.file(STAMP), self.key.as_str())?;
+        make(&begun.0)?;
+        begun.0.finish(published)?;
+        match fs::rename(&begun.0.path, &self.path) {
+            Err(error) if self.state(published, Look::Lengths) != State::Done => {
+                Err(Error::io("putting a finished step in place", &self.path)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Removes the folder, whatever it holds of this step's files.
+    fn remove(&self) -> Result<()> {
+        if !self.path.exists() {
+            return Ok(());
+        }
+        self.refuse_foreign()?;
+        let aside = partial_name(&self.path).map_err(Error::io("removing a stale step", &self.path))?;
+        match fs::rename(&self.path, &aside) {
+            Ok(()) => fs::remove_dir_all(&aside).map_err(Error::io("removing a stale step", &aside)),
+            // Another process was faster.
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+            Err(error) => Err(Error::io("removing a stale step", &self.path)(error)),
+        }
+    }
+
+    /// Files without a stamp are none of ours.
+    fn refuse_foreign(&self) -> Result<()> {
+        if self.file(STAMP).exists() || files_of(&self.path, &[])?.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Output {
+            path: self.path.clone(),
+            message: "files that stonewise did not make lie where a step works: move them away".to_owned(),
+        })
     }
 
     /// What the step's result depends on.
@@ -186,14 +148,7 @@ impl StepDir {
     fn empty(&self) -> Result<()> {
         let stamp = self.file(STAMP);
         if self.path.exists() {
-            let files = files_of(&self.path, &[STAMP])?;
-            if !files.is_empty() && !stamp.exists() {
-                return Err(Error::Output {
-                    path: self.path.clone(),
-                    message: "files that stonewise did not make lie where a step works: move them away"
-                        .to_owned(),
-                });
-            }
+            self.refuse_foreign()?;
             for entry in fs::read_dir(&self.path).map_err(Error::io("listing", &self.path))? {
                 let path = entry.map_err(Error::io("listing", &self.path))?.path();
                 let removed = match path.is_dir() {
@@ -209,8 +164,8 @@ impl StepDir {
     }
 
     /// Compares the step's files with what `done` says of them.
-    fn state(&self, published: &[PathBuf]) -> State {
-        if !self.file(DONE).exists() {
+    pub(super) fn state(&self, published: &[PathBuf], look: Look) -> State {
+        if !self.is_of_key() || !self.file(DONE).exists() {
             return State::Unfinished;
         }
         let Some(kept) = self.record(DONE) else {
@@ -222,7 +177,11 @@ impl StepDir {
         };
         let own = own.iter().map(|k| (k, self.file(&k.file)));
         let outside = outside.iter().zip(published.iter().cloned());
-        match own.chain(outside).find_map(|(k, path)| k.differs(&path)) {
+        let differs = |(kept, path): (&Kept, PathBuf)| match look {
+            Look::Lengths => kept.differs_in_length(&path),
+            Look::Digests => kept.differs(&path),
+        };
+        match own.chain(outside).find_map(differs) {
             Some(why) => State::Damaged(why),
             None => State::Done,
         }
@@ -242,23 +201,19 @@ impl StepDir {
         write_json(&self.file(DONE), &kept)
     }
 
-    /// Notes that one unit of the step's work is there: these files, relative to the folder.
-    pub fn keep(&self, unit: &str, files: &[&str]) -> Result<()> {
-        let kept = files
-            .iter()
-            .map(|name| Kept::of(&self.file(name), PathBuf::from(name)))
-            .collect::<Result<Vec<_>>>()?;
-        write_json(&self.file(format!("{unit}.kept")), &kept)
-    }
-
-    /// Whether a unit of the step's work is there, as it was left.
-    pub fn has(&self, unit: &str) -> bool {
-        let kept = self.record(&format!("{unit}.kept"));
-        kept.is_some_and(|all| all.iter().all(|k| k.differs(&self.file(&k.file)).is_none()))
-    }
-
     fn record(&self, name: &str) -> Option<Vec<Kept>> {
         serde_json::from_slice(&fs::read(self.file(name)).ok()?).ok()
+    }
+
+    /// Takes a file of another step, which stays there, under a name of its own. Cost: a link, where the file system has them.
+    pub fn take(&self, from: &Self, file: &str, name: &str) -> Result<()> {
+        let (from, to) = (from.file(file), self.file(name));
+        match fs::hard_link(&from, &to) {
+            Ok(()) => Ok(()),
+            Err(_) => fs::copy(&from, &to)
+                .map(|_| ())
+                .map_err(Error::io("copying", &from)),
+        }
     }
 
     /// Where a file of the step lies.
@@ -269,6 +224,16 @@ impl StepDir {
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+/// The folder in which a step works; it goes unless it took the step's place.
+struct Begun(StepDir);
+
+impl Drop for Begun {
+    fn drop(&mut self) {
+        // After the renaming there is nothing; else the next run removes it.
+        let _ = fs::remove_dir_all(&self.0.path);
     }
 }
 
@@ -305,14 +270,26 @@ fn digest_below(path: &Path, above: &mut Vec<PathBuf>) -> Result<String> {
     Ok(hasher.finalize().to_hex().to_string())
 }
 
+/// The file that this code was loaded from, where it is not the program itself.
+static LOADED_FROM: OnceLock<PathBuf> = OnceLock::new();
+
+/// Says which file this code was loaded from, before any work: a module of Python lies beside its interpreter, whose digest tells nothing
+/// about it.
+pub fn set_program(file: PathBuf) {
+    // The first word counts; nobody says two.
+    let _ = LOADED_FROM.set(file);
+}
+
 /// Identifies the code that made a result: another build never reuses this one's files.
-fn code_version() -> String {
-    static VERSION: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+pub fn code_version() -> String {
+    static VERSION: OnceLock<String> = OnceLock::new();
     VERSION
         .get_or_init(|| {
-            let digest = std::env::current_exe()
-                .ok()
-                .and_then(|exe| file_digest(&exe).ok());
+            let program = LOADED_FROM
+                .get()
+                .cloned()
+                .or_else(|| std::env::current_exe().ok());
+            let digest = program.and_then(|file| file_digest(&file).ok());
             digest.unwrap_or_else(|| env!("CARGO_PKG_VERSION").to_owned())
         })
         .clone()
@@ -321,7 +298,6 @@ fn code_version() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn the_same_key_keeps_finished_files_and_another_key_empties_the_folder() {
@@ -331,81 +307,12 @@ mod tests {
         fs::write(step.file("unit"), "x").unwrap();
         let again = open(1);
         assert!(again.file("unit").exists());
-        assert_eq!(again.state(&[]), State::Unfinished);
+        assert_eq!(again.state(&[], Look::Digests), State::Unfinished);
         again.finish(&[]).unwrap();
-        assert_eq!(step.state(&[]), State::Done);
+        assert_eq!(step.state(&[], Look::Digests), State::Done);
         let other = open(2);
         assert!(!other.file("unit").exists());
-        assert_eq!(other.state(&[]), State::Unfinished);
-    }
-
-    /// What a step finds after `spoil` changed its folder and what it published; and what it leaves.
-    fn after(spoil: impl FnOnce(&Path, &Path)) -> (Origin, String, String) {
-        let work = tempfile::tempdir().unwrap();
-        let published = work.path().join("cloud.laz");
-        let step = |store: &StepStore| {
-            let make = |dir: &StepDir| {
-                write_text(&dir.file("tile"), "some points")?;
-                write_text(&published, "labelled points")
-            };
-            let outputs = [published.clone()];
-            store.step("a", Key::new("a", &0, &[]), &outputs, make).unwrap().1
-        };
-        let store = || StepStore::new(&work.path().join("work"), Keeps::Newest).unwrap();
-        assert_eq!(step(&store()), Origin::Made);
-        assert_eq!(step(&store()), Origin::Found);
-        spoil(&work.path().join("work/a"), &published);
-        let origin = step(&store());
-        let read = |path: &Path| fs::read_to_string(path).unwrap();
-        assert_eq!(step(&store()), Origin::Found);
-        (origin, read(&work.path().join("work/a/tile")), read(&published))
-    }
-
-    #[test]
-    fn damaged_truncated_and_missing_files_are_made_again_with_the_reason() {
-        type Spoil = fn(&Path, &Path);
-        let cases: [(&str, Spoil); 6] = [
-            ("changed or damaged", |dir, _| {
-                fs::write(dir.join("tile"), "some pointz").unwrap()
-            }),
-            ("5 bytes instead of 11", |dir, _| {
-                fs::write(dir.join("tile"), "some ").unwrap()
-            }),
-            ("tile is missing", |dir, _| {
-                fs::remove_file(dir.join("tile")).unwrap()
-            }),
-            ("done is damaged", |dir, _| {
-                fs::write(dir.join("done"), "[{").unwrap()
-            }),
-            ("cloud.laz is missing", |_, cloud| fs::remove_file(cloud).unwrap()),
-            ("cloud.laz was changed", |_, cloud| {
-                fs::write(cloud, "labelled pointz").unwrap()
-            }),
-        ];
-        for (expected, spoil) in cases {
-            let (origin, tile, cloud) = after(spoil);
-            assert!(
-                matches!(&origin, Origin::MadeAgain(why) if why.contains(expected)),
-                "{expected}: {origin:?}"
-            );
-            assert_eq!(
-                (tile.as_str(), cloud.as_str()),
-                ("some points", "labelled points"),
-                "{expected}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_unit_of_an_unfinished_step_is_taken_over_only_as_it_was_left() {
-        let work = tempfile::tempdir().unwrap();
-        let step = StepDir::open(work.path().join("a"), Key::new("a", &1, &[])).unwrap();
-        fs::write(step.file("1.png"), "labels").unwrap();
-        assert!(!step.has("1"));
-        step.keep("1", &["1.png"]).unwrap();
-        assert!(step.has("1") && !step.has("2"));
-        fs::write(step.file("1.png"), "labelz").unwrap();
-        assert!(!step.has("1"));
+        assert_eq!(other.state(&[], Look::Digests), State::Unfinished);
     }
 
     #[test]
@@ -416,34 +323,6 @@ mod tests {
         let refused = StepDir::open(work.path().join("a"), Key::new("a", &1, &[]));
         assert!(refused.unwrap_err().to_string().contains("did not make"));
         assert!(work.path().join("a/thesis.tex").exists());
-    }
-
-    #[test]
-    fn a_store_of_every_version_does_each_key_once_from_any_number_of_threads() {
-        let work = tempfile::tempdir().unwrap();
-        let store = StepStore::new(work.path(), Keeps::Every).unwrap();
-        let made = AtomicUsize::new(0);
-        std::thread::scope(|scope| {
-            for i in 0..8 {
-                let (store, made) = (&store, &made);
-                scope.spawn(move || {
-                    let key = Key::new("a", &(i % 2), &[]);
-                    let make = |dir: &StepDir| {
-                        made.fetch_add(1, Ordering::SeqCst);
-                        write_text(&dir.file("unit"), "x")
-                    };
-                    let (dir, _) = store.step("a", key, &[], make).unwrap();
-                    assert!(dir.file("unit").exists());
-                });
-            }
-        });
-        assert_eq!(made.into_inner(), 2);
-        let newest = StepStore::new(work.path(), Keeps::Newest).unwrap();
-        let other = newest.step("b", Key::new("b", &0, &[]), &[], |_| Ok(())).unwrap();
-        assert_eq!(
-            (other.0.path(), other.1),
-            (work.path().join("b").as_path(), Origin::Made)
-        );
     }
 
     #[test]

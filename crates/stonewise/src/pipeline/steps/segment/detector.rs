@@ -1,42 +1,203 @@
 //! Photos without masks: their stones, as the detector finds them.
 
-use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_path, posed_photos};
+use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_name, posed_photos};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::storage::step::{Key, StepDir};
 use crate::project::Epoch;
 use crate::warnings::Warnings;
+use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+use std::path::Path;
 use stonewise_core::geometry::View;
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::write_label_png;
 use stonewise_segment::tiling::segment_photo;
 use stonewise_segment::{Segmentation, StoneFinder, Weights};
 
-/// Finds the stones of every posed photo of an epoch; photos that an interrupted run finished are taken over.
-pub fn detect_stones(context: &Context, epoch: &Epoch, name: &str) -> Result<StepDir> {
-    let params = &context.project.settings.segment;
-    let weights = Weights::named(&params.model);
-    let digest = match &weights {
-        Weights::BuiltIn => blake3::hash(
-            &weights
-                .bytes()
-                .map_err(|error| no_masks(context, epoch, &error))?,
-        )
-        .to_hex()
-        .to_string(),
-        Weights::File(path) => context.digest(path)?,
-    };
-    let digests = [
-        context.digest(&epoch.cameras)?,
-        context.digest(&epoch.images)?,
-        digest,
-    ];
-    let key = Key::new(STEP, &params.tiling, &digests.each_ref().map(String::as_str));
-    context.step(name, key, |step, warnings| {
-        let photos = write_stones(context, epoch, &weights, step, warnings)?;
-        write_json(&step.file(PHOTOS), &photos)
-    })
+/// What became of a photo, in the folder of its part of the step.
+const PHOTO: &str = "photo.json";
+/// Its label image.
+const LABELS: &str = "labels.png";
+
+/// The step of one epoch: every posed photo is a part of it.
+pub struct Detection<'a> {
+    context: &'a Context<'a>,
+    epoch: &'a Epoch,
+    name: String,
+    key: Key,
+    weights: Weights,
+    /// Opened for the first photo that needs it.
+    detector: OnceCell<StoneFinder>,
+}
+
+/// What became of a photo.
+#[derive(Serialize, Deserialize)]
+struct Outcome {
+    /// Its stones; absent where it is left out.
+    instances: Option<Vec<Instance>>,
+    /// Why it is left out.
+    reason: Option<String>,
+}
+
+impl<'a> Detection<'a> {
+    /// The step `name` of an epoch.
+    pub fn new(context: &'a Context<'a>, epoch: &'a Epoch, name: &str) -> Result<Self> {
+        let params = &context.project.settings.segment;
+        let weights = Weights::named(&params.model);
+        let digest = match &weights {
+            Weights::BuiltIn => blake3::hash(
+                &weights
+                    .bytes()
+                    .map_err(|error| no_masks(context, epoch, &error))?,
+            )
+            .to_hex()
+            .to_string(),
+            Weights::File(path) => context.digest(path)?,
+        };
+        let digests = [
+            context.digest(&epoch.cameras)?,
+            context.digest(&epoch.images)?,
+            digest,
+        ];
+        Ok(Self {
+            context,
+            epoch,
+            name: name.to_owned(),
+            key: Key::new(STEP, &params.tiling, &digests.each_ref().map(String::as_str)),
+            weights,
+            detector: OnceCell::new(),
+        })
+    }
+
+    /// Finds the stones of every posed photo; photos that are done already are taken over.
+    pub fn all(&self) -> Result<StepDir> {
+        let done = self
+            .context
+            .step(&self.name, self.key.clone(), |step, warnings| {
+                let photos = self.gather(step, warnings)?;
+                write_json(&step.file(PHOTOS), &photos)
+            })?;
+        self.context.store.remove_parts(&self.name, &self.key)?;
+        Ok(done)
+    }
+
+    /// Finds the stones of one posed photo, counted from 0.
+    pub fn photo(&self, number: usize) -> Result<()> {
+        let candidates = posed_photos(self.epoch, &Warnings::default())?;
+        let Some((view, path)) = candidates.get(number) else {
+            return Err(Error::Survey(format!(
+                "epoch {:?} has {} posed photos",
+                self.epoch.name,
+                candidates.len()
+            )));
+        };
+        let tiles = self.tiles(view);
+        self.context.progress.begin("tiles", tiles);
+        self.part(number, view, path).map(|_| ())
+    }
+
+    fn tiles(&self, view: &View) -> u64 {
+        let tiling = &self.context.project.settings.segment.tiling;
+        tiling.tile_count(view.camera.width, view.camera.height)
+    }
+
+    fn gather(&self, step: &StepDir, warnings: &Warnings) -> Result<Vec<VotingPhoto>> {
+        let candidates = posed_photos(self.epoch, warnings)?;
+        let total = candidates.iter().map(|(view, _)| self.tiles(view)).sum();
+        self.context.progress.begin("tiles", total);
+        let mut photos: Vec<VotingPhoto> = Vec::new();
+        let count = candidates.len();
+        for (number, (view, path)) in candidates.into_iter().enumerate() {
+            self.context
+                .progress
+                .detail(&format!("photo {} of {count}", number + 1));
+            let part = self.part(number, &view, &path)?;
+            let outcome: Outcome = read_json(&part.file(PHOTO))?;
+            if let Some(reason) = outcome.reason {
+                warnings.skipped(STEP, path.to_string_lossy(), reason);
+            }
+            let Some(instances) = outcome.instances else {
+                continue;
+            };
+            step.take(&part, LABELS, &label_name(photos.len()))?;
+            photos.push(VotingPhoto {
+                camera: view.name,
+                path,
+                instances,
+            });
+        }
+        check_any(&photos, self.epoch, warnings)?;
+        Ok(photos)
+    }
+
+    fn part(&self, number: usize, view: &View, path: &Path) -> Result<StepDir> {
+        let mut is_made = false;
+        let part = self
+            .context
+            .part((&self.name, &self.key), &part_name(number), |part| {
+                is_made = true;
+                let outcome = self.find(part, view, path)?;
+                write_json(&part.file(PHOTO), &outcome)
+            })?;
+        if !is_made {
+            self.context.progress.advance(self.tiles(view));
+        }
+        Ok(part)
+    }
+
+    fn find(&self, part: &StepDir, view: &View, path: &Path) -> Result<Outcome> {
+        let progress = self.context.progress;
+        let image = match read_rgb(path) {
+            Ok(image) => image,
+            Err(error) => {
+                progress.advance(self.tiles(view));
+                return Ok(Outcome::left_out(error.to_string()));
+            }
+        };
+        let (found, expected) = (
+            [image.width(), image.height()],
+            [view.camera.width, view.camera.height],
+        );
+        if found != expected {
+            progress.advance(self.tiles(view));
+            return Ok(Outcome::left_out(format!(
+                "the photo is {}x{} px, its camera {}x{} px: give the photo as it was posed",
+                found[0], found[1], expected[0], expected[1]
+            )));
+        }
+        let tiling = &self.context.project.settings.segment.tiling;
+        let stones = segment_photo(self.detector()?, &image, tiling, progress)?;
+        write_label_png(&part.file(LABELS), &stones.labels)?;
+        Ok(Outcome {
+            instances: Some(instances(&stones)),
+            reason: None,
+        })
+    }
+
+    fn detector(&self) -> Result<&StoneFinder> {
+        if let Some(detector) = self.detector.get() {
+            return Ok(detector);
+        }
+        let least_score = self.context.project.settings.segment.tiling.min_score as f32;
+        let opened = StoneFinder::open(&self.weights, least_score)?;
+        Ok(self.detector.get_or_init(|| opened))
+    }
+}
+
+impl Outcome {
+    fn left_out(reason: String) -> Self {
+        Self {
+            instances: None,
+            reason: Some(reason),
+        }
+    }
+}
+
+/// Name of a photo's part of the step.
+pub fn part_name(number: usize) -> String {
+    format!("{number:05}")
 }
 
 fn no_masks(context: &Context, epoch: &Epoch, error: &impl std::fmt::Display) -> Error {
@@ -46,68 +207,6 @@ fn no_masks(context: &Context, epoch: &Epoch, error: &impl std::fmt::Display) ->
         epoch.name,
         context.project.path.display()
     ))
-}
-
-fn write_stones(
-    context: &Context,
-    epoch: &Epoch,
-    weights: &Weights,
-    step: &StepDir,
-    warnings: &Warnings,
-) -> Result<Vec<VotingPhoto>> {
-    let tiling = &context.project.settings.segment.tiling;
-    let detector = StoneFinder::open(weights, tiling.min_score as f32)?;
-    let candidates = posed_photos(epoch, warnings)?;
-    let tiles = |view: &View| tiling.tile_count(view.camera.width, view.camera.height);
-    let total = candidates.iter().map(|(view, _)| tiles(view)).sum();
-    context.progress.begin("tiles", total);
-    let mut photos: Vec<VotingPhoto> = Vec::new();
-    let count = candidates.len();
-    for (number, (view, path)) in (1..).zip(candidates) {
-        context.progress.detail(&format!("photo {number} of {count}"));
-        // Photos that are left out are left out again by a run that goes on, so that the numbers stay the
-        // same.
-        let unit = format!("{:05}", photos.len());
-        let done = format!("{unit}.json");
-        if step.has(&unit) {
-            context.progress.advance(tiles(&view));
-            photos.push(read_json(&step.file(&done))?);
-            continue;
-        }
-        let image = match read_rgb(&path) {
-            Ok(image) => image,
-            Err(error) => {
-                warnings.skipped(STEP, path.to_string_lossy(), error.to_string());
-                context.progress.advance(tiles(&view));
-                continue;
-            }
-        };
-        let (found, expected) = (
-            [image.width(), image.height()],
-            [view.camera.width, view.camera.height],
-        );
-        if found != expected {
-            let message = format!(
-                "the photo is {}x{} px, its camera {}x{} px: give the photo as it was posed",
-                found[0], found[1], expected[0], expected[1]
-            );
-            warnings.skipped(STEP, path.to_string_lossy(), message);
-            context.progress.advance(tiles(&view));
-            continue;
-        }
-        let stones = segment_photo(&detector, &image, tiling, context.progress)?;
-        write_label_png(&label_path(step, photos.len()), &stones.labels)?;
-        let photo = VotingPhoto {
-            camera: view.name,
-            path,
-            instances: instances(&stones),
-        };
-        write_json(&step.file(&done), &photo)?;
-        step.keep(&unit, &[&done, &format!("{unit}.png")])?;
-        photos.push(photo);
-    }
-    check_any(&photos, epoch, warnings)?;
-    Ok(photos)
 }
 
 fn instances(stones: &Segmentation) -> Vec<Instance> {

@@ -8,7 +8,10 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::storage::step::{Key, StepDir};
-use detector::detect_stones;
+use crate::project::Epoch;
+use crate::warnings::Warnings;
+use detector::Detection;
+pub use detector::part_name;
 use masks::write_labels;
 use std::fs;
 use std::path::Path;
@@ -16,7 +19,7 @@ use stonewise_core::geometry::View;
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::read_label_png;
-use voting_photo::{PHOTOS, STEP, VotingPhoto, label_path};
+use voting_photo::{PHOTOS, STEP, VotingPhoto, label_path, posed_photos};
 
 /// The photos of an epoch after the segment step.
 pub struct Segmented {
@@ -41,7 +44,7 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     let epoch = &context.project.epochs[number - 1];
     let name = format!("{STEP}-{number}");
     let step = match &epoch.masks {
-        None => detect_stones(context, epoch, &name)?,
+        None => Detection::new(context, epoch, &name)?.all()?,
         Some(masks) => {
             let digests = [
                 context.digest(&epoch.cameras)?,
@@ -66,6 +69,20 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     });
     let views = views.collect();
     Ok(Segmented { step, photos, views })
+}
+
+/// Finds the stones of one posed photo, counted from 0, of an epoch without masks: a part of [`segment`].
+pub fn segment_photo(context: &Context, number: usize, photo: usize) -> Result<()> {
+    let epoch = &context.project.epochs[number - 1];
+    Detection::new(context, epoch, &format!("{STEP}-{number}"))?.photo(photo)
+}
+
+/// Photos of an epoch that the detector has to look at; none where it has masks.
+pub fn photos_to_segment(epoch: &Epoch) -> Result<usize> {
+    match &epoch.masks {
+        None => Ok(posed_photos(epoch, &Warnings::default())?.len()),
+        Some(_) => Ok(0),
+    }
 }
 
 /// Digest of the names and sizes of a folder's files: masks, not photos, decide the labels.

@@ -110,5 +110,10 @@ fn reason_without_camera(photo: &Path, skipped: &[(String, String)]) -> String {
 
 /// Where the label image of a photo lies in the step's folder.
 pub fn label_path(step: &StepDir, image: usize) -> PathBuf {
-    step.file(format!("{image:05}.png"))
+    step.file(label_name(image))
+}
+
+/// The name of that file.
+pub fn label_name(image: usize) -> String {
+    format!("{image:05}.png")
 }

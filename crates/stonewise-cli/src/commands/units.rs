@@ -1,0 +1,50 @@
+//! `plan` and `unit`: a run in pieces, for other programs to spread over machines.
+
+use crate::args::{PlanArgs, UnitArgs};
+use crate::commands::Outcome;
+use crate::commands::run::conclude;
+use crate::printer::Printer;
+use anyhow::Result;
+use serde_json::Map;
+use std::io::Write;
+use stonewise::PlanOptions;
+
+/// Plans the units of a project and prints them.
+pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> {
+    let (project, out) = (&args.project.project, &args.project.out);
+    let mut options = PlanOptions {
+        force,
+        ..PlanOptions::default()
+    };
+    options.batch_points = args.batch_points.unwrap_or(options.batch_points);
+    let coordinator = stonewise::plan(project, &Map::new(), out, &options, printer)?;
+    printer.finish();
+    let plan = &coordinator.plan;
+    let text = match args.ids {
+        false => serde_json::to_string_pretty(plan)?,
+        true => {
+            let open = plan.units.iter().filter(|u| !u.done);
+            let of_rank = open.filter(|u| args.rank.is_none_or(|rank| u.rank == rank));
+            of_rank.map(|u| u.id.as_str()).collect::<Vec<_>>().join("\n")
+        }
+    };
+    let done = plan.units.iter().filter(|u| u.done).count();
+    printer.log(&format!("{} units, {done} of them done", plan.units.len()));
+    if !text.is_empty() {
+        writeln!(std::io::stdout(), "{text}")?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Does a unit; the last one ends as `run` does.
+pub fn unit(args: &UnitArgs, printer: &Printer) -> Result<Outcome> {
+    let done = stonewise::do_unit(&args.out, &args.unit, printer)?;
+    printer.finish();
+    if done.was_done {
+        printer.log(&format!("{} was done", args.unit));
+    }
+    Ok(match &done.summary {
+        Some(summary) => conclude(&done.project, summary, &args.out, printer),
+        None => Outcome::Done,
+    })
+}

@@ -1,0 +1,348 @@
+//! Steps that keep their results and resume, in the folders of a store.
+
+use super::step::{Key, Look, State, StepDir, path_digest};
+use crate::error::{Error, Result};
+use crate::files::create_results_folder;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// How many versions of a step's files are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Keeps {
+    /// One: a step that is done under another key replaces its files. For a project that is run again and again.
+    Newest,
+    /// One for each key. For experiments, whose variants share what they have in common.
+    Every,
+}
+
+/// Where a step's files come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// They were made now.
+    Made,
+    /// An earlier run made them, and they are as it left them.
+    Found,
+    /// An earlier run made them, and they were not as it left them, for this reason: they were made again.
+    MadeAgain(String),
+}
+
+/// The unit of a plan that a process does: steps that are other units are other processes' business.
+#[derive(Clone, Debug, Default)]
+pub struct Scope {
+    /// The unit.
+    pub unit: String,
+    /// All units of the plan.
+    pub units: BTreeSet<String>,
+}
+
+/// The folder that holds the folders of all steps.
+pub struct StepStore {
+    folder: PathBuf,
+    keeps: Keeps,
+    /// `None`: this process does everything.
+    scope: Option<Scope>,
+    /// One for each folder in which somebody works.
+    turns: Mutex<BTreeMap<PathBuf, Arc<Mutex<()>>>>,
+    digests: Mutex<BTreeMap<PathBuf, String>>,
+    /// Steps whose files this process has compared with their digests or made itself.
+    sound: Mutex<BTreeSet<(PathBuf, String)>>,
+}
+
+/// A step: which, where, and what it depends on.
+struct Place<'a> {
+    name: &'a str,
+    path: PathBuf,
+    key: Key,
+}
+
+impl StepStore {
+    /// A store in a folder, which is made if need be.
+    pub fn new(folder: &Path, keeps: Keeps) -> Result<Self> {
+        create_results_folder(folder)?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            keeps,
+            scope: None,
+            turns: Mutex::default(),
+            digests: Mutex::default(),
+            sound: Mutex::default(),
+        })
+    }
+
+    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan knows them.
+    pub fn of_unit(folder: &Path, scope: Scope, digests: BTreeMap<PathBuf, String>) -> Result<Self> {
+        Ok(Self {
+            scope: Some(scope),
+            digests: Mutex::new(digests),
+            ..Self::new(folder, Keeps::Newest)?
+        })
+    }
+
+    /// Does a step with `make`, unless its files are there under this key, as they were left.
+    ///
+    /// `published`: files outside the step's folder that it makes too. Of several threads that start the same step one
+    /// does it and the others wait: call it from threads that no thread pool lends out, or they may wait for themselves.
+    /// Cost of a step that is taken over: its files are read once to compare their digests.
+    pub fn step(
+        &self,
+        name: &str,
+        key: Key,
+        published: &[PathBuf],
+        make: impl FnOnce(&StepDir) -> Result<()>,
+    ) -> Result<(StepDir, Origin)> {
+        let path = self.path(name, &key);
+        self.do_at(Place { name, path, key }, published, make)
+    }
+
+    /// The same for a part of a step: a step of its own, which lies beside the whole until that is done.
+    pub fn part(
+        &self,
+        (whole, key): (&str, &Key),
+        part: &str,
+        make: impl FnOnce(&StepDir) -> Result<()>,
+    ) -> Result<StepDir> {
+        let place = Place {
+            name: &format!("{whole}.{part}"),
+            path: self.parts(whole, key).join(part),
+            key: Key::new("part", &part, &[key.as_str()]),
+        };
+        Ok(self.do_at(place, &[], make)?.0)
+    }
+
+    /// Removes the parts of a step that is done.
+    pub fn remove_parts(&self, whole: &str, key: &Key) -> Result<()> {
+        let parts = self.parts(whole, key);
+        match fs::remove_dir_all(&parts) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(Error::io("removing what is gathered", &parts)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn do_at(
+        &self,
+        place: Place,
+        published: &[PathBuf],
+        make: impl FnOnce(&StepDir) -> Result<()>,
+    ) -> Result<(StepDir, Origin)> {
+        let Place { name, path, key } = place;
+        let turn = {
+            let mut turns = self.turns.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(turns.entry(path.clone()).or_default())
+        };
+        let _mine = turn.lock().unwrap_or_else(PoisonError::into_inner);
+        let identity = (path.clone(), key.as_str().to_owned());
+        let dir = StepDir::at(path, key);
+        if self.sound().contains(&identity) && published.is_empty() {
+            return Ok((dir, Origin::Found));
+        }
+        let look = match self.scope {
+            Some(_) => Look::Lengths,
+            None => Look::Digests,
+        };
+        let origin = match dir.state(published, look) {
+            State::Done => Origin::Found,
+            State::Unfinished => Origin::Made,
+            State::Damaged(why) => Origin::MadeAgain(why),
+        };
+        if origin != Origin::Found {
+            self.refuse_others_work(name)?;
+            dir.replace(published, make)?;
+        }
+        self.sound().insert(identity);
+        Ok((dir, origin))
+    }
+
+    /// A process that does one unit leaves the others alone; steps that are in no plan it may do itself.
+    fn refuse_others_work(&self, name: &str) -> Result<()> {
+        match &self.scope {
+            Some(scope) if scope.unit != name && scope.units.contains(name) => Err(Error::UnitFirst {
+                unit: scope.unit.clone(),
+                first: vec![name.to_owned()],
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    fn path(&self, name: &str, key: &Key) -> PathBuf {
+        match self.keeps {
+            Keeps::Newest => self.folder.join(name),
+            Keeps::Every => self.folder.join(name).join(&key.as_str()[..VERSION_DIGITS]),
+        }
+    }
+
+    fn parts(&self, whole: &str, key: &Key) -> PathBuf {
+        self.path(whole, key).with_extension("parts")
+    }
+
+    fn sound(&self) -> MutexGuard<'_, BTreeSet<(PathBuf, String)>> {
+        self.sound.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether this process does one unit of a plan.
+    pub fn is_of_unit(&self) -> bool {
+        self.scope.is_some()
+    }
+
+    /// Digest of an input file or folder, read once.
+    pub fn digest(&self, path: &Path) -> Result<String> {
+        let mut known = self.digests.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(digest) = known.get(path) {
+            return Ok(digest.clone());
+        }
+        let digest = path_digest(path)?;
+        known.insert(path.to_path_buf(), digest.clone());
+        Ok(digest)
+    }
+}
+
+/// Digits of a key that name one version of a step's files.
+const VERSION_DIGITS: usize = 16;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::write_text;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// What a step finds after `spoil` changed its folder and what it published; and what it leaves.
+    fn after(spoil: impl FnOnce(&Path, &Path)) -> (Origin, String, String) {
+        let work = tempfile::tempdir().unwrap();
+        let published = work.path().join("cloud.laz");
+        let step = |store: &StepStore| {
+            let make = |dir: &StepDir| {
+                write_text(&dir.file("tile"), "some points")?;
+                write_text(&published, "labelled points")
+            };
+            let outputs = [published.clone()];
+            store.step("a", Key::new("a", &0, &[]), &outputs, make).unwrap().1
+        };
+        let store = || StepStore::new(&work.path().join("work"), Keeps::Newest).unwrap();
+        assert_eq!(step(&store()), Origin::Made);
+        assert_eq!(step(&store()), Origin::Found);
+        spoil(&work.path().join("work/a"), &published);
+        let origin = step(&store());
+        let read = |path: &Path| fs::read_to_string(path).unwrap();
+        assert_eq!(step(&store()), Origin::Found);
+        (origin, read(&work.path().join("work/a/tile")), read(&published))
+    }
+
+    #[test]
+    fn damaged_truncated_and_missing_files_are_made_again_with_the_reason() {
+        type Spoil = fn(&Path, &Path);
+        let cases: [(&str, Spoil); 6] = [
+            ("changed or damaged", |dir, _| {
+                fs::write(dir.join("tile"), "some pointz").unwrap()
+            }),
+            ("5 bytes instead of 11", |dir, _| {
+                fs::write(dir.join("tile"), "some ").unwrap()
+            }),
+            ("tile is missing", |dir, _| {
+                fs::remove_file(dir.join("tile")).unwrap()
+            }),
+            ("done is damaged", |dir, _| {
+                fs::write(dir.join("done"), "[{").unwrap()
+            }),
+            ("cloud.laz is missing", |_, cloud| fs::remove_file(cloud).unwrap()),
+            ("cloud.laz was changed", |_, cloud| {
+                fs::write(cloud, "labelled pointz").unwrap()
+            }),
+        ];
+        for (expected, spoil) in cases {
+            let (origin, tile, cloud) = after(spoil);
+            assert!(
+                matches!(&origin, Origin::MadeAgain(why) if why.contains(expected)),
+                "{expected}: {origin:?}"
+            );
+            assert_eq!(
+                (tile.as_str(), cloud.as_str()),
+                ("some points", "labelled points"),
+                "{expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_store_of_every_version_does_each_key_once_from_any_number_of_threads() {
+        let work = tempfile::tempdir().unwrap();
+        let store = StepStore::new(work.path(), Keeps::Every).unwrap();
+        let made = AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for i in 0..8 {
+                let (store, made) = (&store, &made);
+                scope.spawn(move || {
+                    let key = Key::new("a", &(i % 2), &[]);
+                    let make = |dir: &StepDir| {
+                        made.fetch_add(1, Ordering::SeqCst);
+                        write_text(&dir.file("unit"), "x")
+                    };
+                    let (dir, _) = store.step("a", key, &[], make).unwrap();
+                    assert!(dir.file("unit").exists());
+                });
+            }
+        });
+        assert_eq!(made.into_inner(), 2);
+        let newest = StepStore::new(work.path(), Keeps::Newest).unwrap();
+        let other = newest.step("b", Key::new("b", &0, &[]), &[], |_| Ok(())).unwrap();
+        assert_eq!(
+            (other.0.path(), other.1),
+            (work.path().join("b").as_path(), Origin::Made)
+        );
+    }
+
+    #[test]
+    fn what_fails_or_is_stale_leaves_nothing_and_parts_go_with_the_whole() {
+        let work = tempfile::tempdir().unwrap();
+        let store = StepStore::new(work.path(), Keeps::Newest).unwrap();
+        let key = Key::new("a", &0, &[]);
+        let failed = store.step("a", key.clone(), &[], |dir| {
+            write_text(&dir.file("half"), "x")?;
+            Err(Error::Survey("no".to_owned()))
+        });
+        assert!(failed.is_err() && fs::read_dir(work.path()).unwrap().count() == 0);
+        let gather = |dir: &StepDir| {
+            for name in ["1", "2"] {
+                let part = store.part(("a", &key), name, |part| write_text(&part.file("text"), name))?;
+                dir.take(&part, "text", name)?;
+            }
+            Ok(())
+        };
+        let (dir, _) = store.step("a", key.clone(), &[], gather).unwrap();
+        assert!(work.path().join("a.parts/2/done").exists());
+        store.remove_parts("a", &key).unwrap();
+        assert_eq!(fs::read_to_string(dir.file("2")).unwrap(), "2");
+        let other = store.step("a", Key::new("a", &1, &[]), &[], |_| Ok(())).unwrap();
+        assert!(!other.0.file("2").exists());
+        let names: Vec<_> = fs::read_dir(work.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        assert_eq!(names, ["a"]);
+    }
+
+    #[test]
+    fn a_unit_does_its_own_step_and_names_the_one_that_is_missing() {
+        let work = tempfile::tempdir().unwrap();
+        let scope = Scope {
+            unit: "b".to_owned(),
+            units: ["a", "b", "c.1"].map(str::to_owned).into(),
+        };
+        let store = StepStore::of_unit(work.path(), scope, BTreeMap::new()).unwrap();
+        let key = |name: &str| Key::new(name, &0, &[]);
+        let refused = store
+            .step("a", key("a"), &[], |_| Ok(()))
+            .unwrap_err()
+            .to_string();
+        assert!(refused.contains("unit b needs a: do it first"), "{refused}");
+        assert!(store.part(("c", &key("c")), "1", |_| Ok(())).is_err());
+        for name in ["b", "in-no-plan"] {
+            assert_eq!(
+                store.step(name, key(name), &[], |_| Ok(())).unwrap().1,
+                Origin::Made
+            );
+        }
+    }
+}

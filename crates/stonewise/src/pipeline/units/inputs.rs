@@ -1,0 +1,81 @@
+//! The inputs of a plan: what they hold, and whether they are still the same.
+
+use crate::error::{Error, Result};
+use crate::kept::files_of;
+use crate::pipeline::context::Context;
+use crate::pipeline::storage::step::Key;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+/// An input as the plan knows it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct PlannedInput {
+    /// File or folder.
+    pub path: PathBuf,
+    /// Digest of names, lengths and times of change: compared by every unit, which reads no input that it does not need.
+    pub look: String,
+    /// Digest of the content.
+    pub blake3: String,
+}
+
+/// All inputs of a project with their digests. Photos count where no masks do.
+pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
+    let project = context.project;
+    let images = |path: &PathBuf| {
+        project
+            .epochs
+            .iter()
+            .any(|e| e.masks.is_some() && e.images == *path)
+    };
+    let used = project.inputs().into_iter().filter(|path| !images(path));
+    used.map(|path| {
+        Ok(PlannedInput {
+            look: look_of(&path)?,
+            blake3: context.digest(&path)?,
+            path,
+        })
+    })
+    .collect()
+}
+
+/// Digests of the inputs, if all of them are as they were; `plan`: the file to name otherwise.
+pub(super) fn unchanged(inputs: &[PlannedInput], plan: &Path) -> Result<BTreeMap<PathBuf, String>> {
+    for input in inputs {
+        if look_of(&input.path).ok().as_deref() != Some(&input.look) {
+            return Err(Error::Plan {
+                path: plan.to_path_buf(),
+                message: format!(
+                    "{} was changed or moved since the plan was made: run `stonewise plan` again",
+                    input.path.display()
+                ),
+            });
+        }
+    }
+    Ok(inputs
+        .iter()
+        .map(|i| (i.path.clone(), i.blake3.clone()))
+        .collect())
+}
+
+fn look_of(path: &Path) -> Result<String> {
+    let files = match path.is_dir() {
+        true => files_of(path, &[])?,
+        false => vec![path.to_path_buf()],
+    };
+    let looks = files
+        .into_iter()
+        .map(|file| {
+            let data = fs::metadata(&file).map_err(Error::io("reading", &file))?;
+            let time = data
+                .modified()
+                .ok()
+                .and_then(|t| t.duration_since(UNIX_EPOCH).ok());
+            // Machines that share a folder may see fractions of a second differently.
+            Ok((file, data.len(), time.map(|t| t.as_secs())))
+        })
+        .collect::<Result<Vec<_>>>()?;
+    Ok(Key::new("look", &looks, &[]).as_str().to_owned())
+}

@@ -1,0 +1,189 @@
+//! The units of a run, and who coordinates them.
+
+use super::inputs::{PlannedInput, inputs_of};
+use super::receipt::{Receipt, plan_file, withdraw, withdraw_all};
+use super::stage::{Stage, Unit, units_of};
+use crate::error::{Error, Result};
+use crate::files::write_readable_json;
+use crate::output::{OutputFolder, UNFINISHED_FILE};
+use crate::pipeline::context::Context;
+use crate::pipeline::look::look;
+use crate::pipeline::storage::step::{Key, code_version};
+use crate::project::Project;
+use crate::results::names::{RUN, WORK_DIR};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::fs;
+use std::path::{Path, PathBuf};
+use stonewise_core::progress::Progress;
+
+/// Version of the document.
+const VERSION: u32 = 1;
+
+/// The units of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Version of this document.
+    pub version: u32,
+    /// Digest of everything that the results depend on: inputs, parameters, program.
+    pub id: String,
+    /// Version of stonewise.
+    pub stonewise: String,
+    /// Digest of the program; every unit has to be done by the same.
+    pub program: String,
+    /// The project file.
+    pub project: PathBuf,
+    /// Parameters that replace those of the project file.
+    pub parameters: Map<String, Value>,
+    /// Points of a cloud in a batch of tiles, about.
+    pub batch_points: u64,
+    /// Whether the work goes on in spite of findings against it.
+    pub forced: bool,
+    pub(super) inputs: Vec<PlannedInput>,
+    /// The units, each after those that it needs.
+    pub units: Vec<Unit>,
+}
+
+/// How a run is planned.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanOptions {
+    /// Points of a cloud in a batch of tiles, about. Results do not depend on it.
+    pub batch_points: u64,
+    /// Write into a folder that holds other things, and go on in spite of findings against the survey.
+    pub force: bool,
+}
+
+impl Default for PlanOptions {
+    /// Batches of 4 million points: at 3 million points and photos a second and core, and ten photos a point, 14 seconds; much longer
+    /// than it takes to start a process, and 50 batches for a cloud of 200 million.
+    fn default() -> Self {
+        Self {
+            batch_points: 4_000_000,
+            force: false,
+        }
+    }
+}
+
+/// Holds a results folder while others do the units of its plan: no run and no other plan may begin there.
+#[derive(Debug)]
+pub struct Coordinator {
+    /// The plan.
+    pub plan: Plan,
+    _folder: OutputFolder,
+}
+
+/// Plans the units of a run in a folder and notes the plan there.
+///
+/// Units that were done for the same plan stay done; results of an earlier run lie aside until the last unit is done. `parameters`
+/// replace those of the project file. Every input is read once for its digest.
+///
+/// # Errors
+/// A project file that is wrong, an input that cannot be read, a survey that cannot be right, a folder that must not be written into, a
+/// full disk, interruption.
+pub fn plan(
+    project: &Path,
+    parameters: &Map<String, Value>,
+    out: &Path,
+    options: &PlanOptions,
+    progress: &dyn Progress,
+) -> Result<Coordinator> {
+    // Units are done by processes in other folders.
+    let path = std::path::absolute(project).map_err(Error::io("finding", project))?;
+    let project = Project::read(&path)?.with_parameters(parameters)?;
+    let folder = OutputFolder::of_project(out, &project, options.force)?;
+    let mut plan = {
+        let context = Context::new(&project, &folder, progress)?;
+        look(&context, options.force)?;
+        Plan::of(&context, parameters, options)?
+    };
+    plan.take_over(out)?;
+    if plan.units.iter().any(|unit| !unit.done) {
+        folder.begin_results(&project)?;
+    }
+    write_readable_json(&plan_file(out), &plan)?;
+    Ok(Coordinator {
+        plan,
+        _folder: folder.admit_units(),
+    })
+}
+
+impl Plan {
+    fn of(context: &Context, parameters: &Map<String, Value>, options: &PlanOptions) -> Result<Self> {
+        let project = context.project;
+        let inputs = inputs_of(context)?;
+        let units = units_of(project, options.batch_points)?;
+        let program = code_version();
+        let digests: Vec<&str> = inputs.iter().map(|i| i.blake3.as_str()).collect();
+        let paths: Vec<&PathBuf> = inputs.iter().map(|i| &i.path).collect();
+        let id = Key::new(
+            "plan",
+            &(&project.settings, paths, &units, options.force),
+            &digests,
+        );
+        Ok(Self {
+            version: VERSION,
+            id: id.as_str().to_owned(),
+            stonewise: env!("CARGO_PKG_VERSION").to_owned(),
+            program,
+            project: project.path.clone(),
+            parameters: parameters.clone(),
+            batch_points: options.batch_points,
+            forced: options.force,
+            inputs,
+            units,
+        })
+    }
+
+    /// Notes which units were done for the same plan earlier and have their files still; other receipts go.
+    fn take_over(&mut self, out: &Path) -> Result<()> {
+        if Self::read(out).ok().is_none_or(|earlier| earlier.id != self.id) {
+            return withdraw_all(out);
+        }
+        let work = out.join(WORK_DIR);
+        let is_finished = out.join(RUN).exists() && !out.join(UNFINISHED_FILE).exists();
+        for unit in &mut self.units {
+            let step = unit.id.split('.').next().unwrap_or_default();
+            let whole = work.join(step).join("done").exists();
+            let part = || {
+                let part = unit.id.strip_prefix(step).and_then(|p| p.strip_prefix('.'));
+                part.is_some_and(|p| work.join(format!("{step}.parts")).join(p).join("done").exists())
+            };
+            let has_files = match unit.stage {
+                Stage::Report => is_finished,
+                _ => whole || part(),
+            };
+            unit.done = has_files && Receipt::read(out, &self.id, &unit.id).is_some();
+            if !unit.done {
+                withdraw(out, &unit.id)?;
+            }
+        }
+        // The tables are written together with the report.
+        if self.units.iter().any(|unit| !unit.done) {
+            withdraw(out, "report")?;
+            if let Some(report) = self.units.last_mut() {
+                report.done = false;
+            }
+        }
+        Ok(())
+    }
+
+    /// The plan of a results folder.
+    ///
+    /// # Errors
+    /// There is none, or one of another version.
+    pub fn read(out: &Path) -> Result<Self> {
+        let path = plan_file(out);
+        let none = |message: &str| Error::Plan {
+            path: path.clone(),
+            message: message.to_owned(),
+        };
+        let text = fs::read(&path)
+            .map_err(|_| none("no plan here: run `stonewise plan PROJECT --out DIR` first"))?;
+        let plan: Self = serde_json::from_slice(&text)
+            .map_err(|_| none("the plan cannot be read: run `stonewise plan` again"))?;
+        match plan.version {
+            VERSION => Ok(plan),
+            _ => Err(none("the plan has another version: run `stonewise plan` again")),
+        }
+    }
+}

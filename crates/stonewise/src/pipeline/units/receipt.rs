@@ -1,0 +1,119 @@
+//! The note that a unit is done: its output, as other programs see it.
+
+use crate::error::{Error, Result};
+use crate::files::write_json;
+use crate::pipeline::clock::{Clock, peak_memory_bytes};
+use crate::results::names::WORK_DIR;
+use crate::results::records::StepTime;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The folder of all receipts, in that of the steps.
+const RECEIPTS: &str = "units";
+/// The plan, beside it.
+const PLAN: &str = "plan.json";
+
+/// What is noted of a unit that is done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Receipt {
+    /// The unit.
+    pub unit: String,
+    /// The plan that it was done for.
+    pub plan: String,
+    /// Wall time, seconds.
+    pub seconds: f64,
+    /// Processor time of all threads, seconds; absent where the system does not report it.
+    pub processor_seconds: Option<f64>,
+    /// Highest memory of the process, bytes; absent where the system does not report it.
+    pub peak_memory_bytes: Option<u64>,
+}
+
+impl Receipt {
+    /// Notes that a unit is done which began with the clock.
+    pub fn write(out: &Path, plan: &str, unit: &str, clock: &Clock) -> Result<()> {
+        let receipt = Self {
+            unit: unit.to_owned(),
+            plan: plan.to_owned(),
+            seconds: clock.wall_seconds(),
+            processor_seconds: clock.processor_seconds(),
+            peak_memory_bytes: peak_memory_bytes(),
+        };
+        let path = out.join(receipt_file(unit));
+        let folder = path.parent().unwrap_or(out);
+        fs::create_dir_all(folder).map_err(Error::io("making a folder", folder))?;
+        write_json(&path, &receipt)
+    }
+
+    /// The receipt of a unit under this plan; `None` where it is not done.
+    pub fn read(out: &Path, plan: &str, unit: &str) -> Option<Self> {
+        let text = fs::read(out.join(receipt_file(unit))).ok()?;
+        let receipt: Self = serde_json::from_slice(&text).ok()?;
+        (receipt.plan == plan && receipt.unit == unit).then_some(receipt)
+    }
+}
+
+/// Where the receipt of a unit lies, relative to the results folder.
+pub(super) fn receipt_file(unit: &str) -> PathBuf {
+    Path::new(WORK_DIR).join(RECEIPTS).join(format!("{unit}.json"))
+}
+
+/// Where the plan lies.
+pub(super) fn plan_file(out: &Path) -> PathBuf {
+    out.join(WORK_DIR).join(PLAN)
+}
+
+/// Removes the receipt of a unit.
+pub(super) fn withdraw(out: &Path, unit: &str) -> Result<()> {
+    remove(&out.join(receipt_file(unit)), |path| fs::remove_file(path))
+}
+
+/// Removes all receipts.
+pub(super) fn withdraw_all(out: &Path) -> Result<()> {
+    remove(&out.join(WORK_DIR).join(RECEIPTS), |path| {
+        fs::remove_dir_all(path)
+    })
+}
+
+/// Removes a plan and its receipts: a run takes the folder over.
+pub(in crate::pipeline) fn forget(out: &Path) -> Result<()> {
+    remove(&plan_file(out), |path| fs::remove_file(path))?;
+    withdraw_all(out)
+}
+
+fn remove(path: &Path, how: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<()> {
+    match how(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(Error::io("removing notes of an earlier plan", path)(error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Times of the steps whose units are done, by the name of the step; those of a step that was done in parts are added up.
+pub(super) fn times<'a>(
+    out: &Path,
+    plan: &str,
+    units: impl Iterator<Item = &'a str>,
+) -> BTreeMap<String, StepTime> {
+    let mut times: BTreeMap<String, StepTime> = BTreeMap::new();
+    for receipt in units.filter_map(|unit| Receipt::read(out, plan, unit)) {
+        let step = receipt.unit.split('.').next().unwrap_or_default().to_owned();
+        let time = times.entry(step.clone()).or_insert(StepTime {
+            step,
+            seconds: 0.0,
+            processor_seconds: Some(0.0),
+            resumed: false,
+            peak_memory_bytes: None,
+        });
+        time.seconds += receipt.seconds;
+        time.processor_seconds = time
+            .processor_seconds
+            .zip(receipt.processor_seconds)
+            .map(|(a, b)| a + b);
+        time.peak_memory_bytes = time.peak_memory_bytes.max(receipt.peak_memory_bytes);
+    }
+    times
+}
