@@ -1,7 +1,7 @@
 //! Edits from a COCO file: polygons in photos whose category is the name of an edit.
 
 use super::edits_file::{Action, Edit};
-use super::import::Signed;
+use super::signed::Signed;
 use crate::error::{Error, Result};
 use serde::Deserialize;
 use serde_json::Value;

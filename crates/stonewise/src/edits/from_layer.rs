@@ -1,7 +1,7 @@
 //! Edits from the layer `stones_facade` of a GeoPackage that a person changed: what differs from the results.
 
 use super::edits_file::{Action, Edit};
-use super::import::Signed;
+use super::signed::Signed;
 use crate::error::Result;
 use crate::results::ResultSet;
 use nalgebra::Point2;
@@ -215,24 +215,6 @@ impl Comparison<'_> {
             who: text("who", &self.signed.who),
             when: text("when", &self.signed.when),
             why: text("why", &self.signed.why),
-        }
-    }
-}
-
-impl Signed {
-    /// An edit of this person without a shape yet.
-    fn edit(self, action: Action) -> Edit {
-        Edit {
-            action,
-            photo: None,
-            epoch: None,
-            epochs: None,
-            at: Vec::new(),
-            line: Vec::new(),
-            outline: Vec::new(),
-            who: self.who,
-            when: self.when,
-            why: self.why,
         }
     }
 }

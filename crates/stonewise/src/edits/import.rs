@@ -1,6 +1,7 @@
 //! Edits from other programs.
 
 use super::edits_file::{Edit, EditsFile};
+use super::signed::Signed;
 use super::{from_coco, from_layer};
 use crate::error::{Error, Result};
 use crate::results::ResultSet;
@@ -9,17 +10,6 @@ use std::path::Path;
 
 /// Places on two unrolled walls that are the same differ by less, metres: less than anyone draws.
 const SAME_WALL_M: f64 = 0.001;
-
-/// Who made edits, when and why, where the file from which they come does not say it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Signed {
-    /// Name.
-    pub who: String,
-    /// Date, YYYY-MM-DD, with a time or without.
-    pub when: String,
-    /// Reason.
-    pub why: String,
-}
 
 /// Edits that another program made.
 #[derive(Clone, Debug)]

@@ -5,6 +5,8 @@ mod from_coco;
 mod from_layer;
 mod import;
 mod lines;
+mod signed;
 
 pub use edits_file::{Action, Edit, EditsFile};
-pub use import::{Imported, Signed, import};
+pub use import::{Imported, import};
+pub use signed::Signed;

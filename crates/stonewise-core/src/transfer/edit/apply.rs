@@ -1,8 +1,9 @@
 //! One edit after the other.
 
+use super::effect::{EditEffect, NoEffect};
+use super::label_edit::LabelEdit;
 use super::line::DividingLine;
-use super::touched::Touched;
-use super::{EditEffect, LabelEdit, NoEffect};
+use super::touched::{FACE_REACH_M, Touched};
 use crate::geometry::{Plane, ring_contains};
 use nalgebra::{Point2, Point3};
 use std::collections::BTreeSet;
@@ -222,7 +223,7 @@ fn distance_m(plane: &Plane, p: &Point3<f64>) -> f64 {
 fn face_around(touched: &Touched, outline: &[Point2<f64>], inside: &[usize]) -> Option<Plane> {
     let low = outline.iter().copied().reduce(|a, b| a.inf(&b))?;
     let high = outline.iter().copied().reduce(|a, b| a.sup(&b))?;
-    let margin = (high - low).norm() / 2.0 + super::touched::FACE_REACH_M;
+    let margin = (high - low).norm() / 2.0 + FACE_REACH_M;
     let centre = nalgebra::center(&low, &high);
     let around: Vec<usize> = (0..touched.points.len())
         .filter(|&i| touched.points[i].stone != 0)

@@ -2,9 +2,11 @@
 
 use super::*;
 use crate::cloud::{Cloud, MemoryTiles};
+use crate::id::StoneId;
 use crate::progress::Silent;
 use crate::transfer::{MemoryLabels, TileLabels};
-use nalgebra::Vector3;
+use nalgebra::{Point2, Point3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Stones of 0.4 x 0.2 m in three courses, joints of 2 cm, a point every centimetre; the face leans back.
 const PITCH: [f64; 2] = [0.42, 0.22];

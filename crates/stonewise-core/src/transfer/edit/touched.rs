@@ -1,7 +1,8 @@
 //! The points that edits can touch.
 
 use super::super::{LabelStore, TileLabels, TransferError};
-use super::{EditedWall, LabelEdit};
+use super::edited_wall::EditedWall;
+use super::label_edit::LabelEdit;
 use crate::cloud::{Cloud, TileSource};
 use crate::id::StoneId;
 use crate::progress::Progress;

@@ -14,8 +14,8 @@ use crate::pipeline::context::Context;
 use crate::pipeline::outputs::outlines::{OUTLINES_STEP, make_outlines};
 use crate::pipeline::storage::step::Key;
 use crate::results::{Facade, facade_of, read_outlines};
-use nalgebra::{Point2, Point3};
-use photo_places::photo_places;
+use nalgebra::Point3;
+use photo_places::{Places, photo_places};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::id::StoneId;
 use stonewise_core::transfer::{
@@ -32,9 +32,6 @@ pub struct Edited {
 
 /// What each edit of the file did in an epoch; `None` where it does not concern the epoch.
 pub type Effects = Vec<Option<std::result::Result<EditEffect, NoEffect>>>;
-
-/// Where an edit lies on the wall, or why it lies nowhere.
-type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
 /// Applies the project's edits to all epochs; an epoch that none changes stays as it is. `None` where there are no edits.
 pub fn edit(

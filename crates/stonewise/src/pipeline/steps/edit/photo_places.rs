@@ -1,6 +1,5 @@
 //! Edits drawn in photos, brought onto the wall.
 
-use super::Places;
 use crate::edits::{Edit, EditsFile};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
@@ -24,6 +23,9 @@ const THIN_M: f64 = 0.05;
 const NEAREST: usize = 60;
 /// Points further than this from a first plane are left out of the second, metres: the relief of stones.
 const RELIEF_M: f64 = 0.1;
+
+/// Where an edit lies on the wall, or why it lies nowhere.
+pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
 /// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their rays onto the stones
 /// that the photo's epoch shows there.
