@@ -216,7 +216,13 @@ fn measure(
         return Ok(PairSummary::default());
     }
     let offsets = label_offsets(context, first, second, &matched, number)?;
-    let registered = register(context, first, second, &matched, number)?;
+    let registered = register(
+        context,
+        [&photos[0], &photos[number - 1]],
+        [first, second],
+        &matched,
+        number,
+    )?;
     let common = motion_in_common(first, &registered);
     let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
     if datum.state == DatumState::Unknown {

@@ -1,0 +1,231 @@
+//! All stones' photos as one type of observation.
+
+use super::poses::{CloudMotion, PoseProblem, PoseStone};
+use super::stone_photos::StonePhotos;
+use crate::geometry::Bounds;
+use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
+use crate::statistics::upper_median;
+use nalgebra::{Matrix3, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Strains that stand for as many more before those of a stone count by themselves: four known degrees of freedom hold a factor on a
+/// variance within a half and three.
+const PRIOR_STRAINS: f64 = 4.0;
+/// Components of a strain.
+const STRAINS: usize = 3;
+/// Least strain that counts as usual, so that a survey without any keeps factors of one.
+const LEAST_STRAIN_M: f64 = 2e-5;
+/// Distance from the wall where no stone shows one, metres; nothing depends on it then.
+const USUAL_DISTANCE_M: f64 = 10.0;
+
+/// What photos show of all stones.
+pub(crate) struct PhotoModel {
+    params: PhotoParams,
+    names: Vec<String>,
+    epochs: Vec<usize>,
+    centres: Vec<Point3<f64>>,
+    scales: Vec<[f64; 2]>,
+    tracks: Vec<Track>,
+    stones: Vec<Option<StonePhotos>>,
+    factor: f64,
+    poses_px: Vec<f64>,
+}
+
+/// A stone as the model needs it.
+pub(crate) struct StoneInPhotos {
+    pub centroid: Point3<f64>,
+    pub face_from_world: Matrix3<f64>,
+    /// The displacement of its place on the face by the clouds; `None` where they show none.
+    pub clouds: Option<CloudMotion>,
+}
+
+/// What the photos contributed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhotoReport {
+    /// Per stone, in the order of the pairs.
+    pub stones: Vec<StonePhotoReport>,
+    /// Factor on the formal standard deviations of matches, from their residuals.
+    pub sigma_factor: f64,
+    /// Standard deviation of a stone's appearance bias between the epochs, metres.
+    pub appearance_m: f64,
+    /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
+    pub poses_px: Vec<(String, f64)>,
+}
+
+/// What the photos say of a stone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StonePhotoReport {
+    /// Whether they measure it, or why not.
+    pub status: PhotoStatus,
+    /// Photos that show it, per epoch.
+    pub photos: [usize; 2],
+    /// Least correlation of a photo with the template.
+    pub correlation: f64,
+    /// Displacement along and up the face by the photos alone, metres.
+    pub shift_m: Option<[f64; 2]>,
+    /// Its standard deviations, appearance bias included, errors of the poses not.
+    pub sd_m: Option<[f64; 2]>,
+}
+
+impl PhotoModel {
+    /// Of tracked stones, before the poses are adjusted.
+    pub fn new(params: PhotoParams, photos: &[Photo], stones: &[StoneInPhotos], tracks: Vec<Track>) -> Self {
+        let centres: Vec<Point3<f64>> = photos.iter().map(|p| p.camera.centre()).collect();
+        let scales = (0..photos.len()).map(|i| scale(i, photos, stones, &tracks)).collect();
+        Self {
+            params,
+            names: photos.iter().map(|p| p.name.clone()).collect(),
+            epochs: photos.iter().map(|p| p.epoch).collect(),
+            centres,
+            scales,
+            stones: vec![None; tracks.len()],
+            tracks,
+            factor: 1.0,
+            poses_px: vec![0.0; photos.len()],
+        }
+    }
+
+    /// Adjusts the poses to where the clouds put the stones, and takes from the photos what they say with these poses.
+    pub fn update(&mut self, stones: &[StoneInPhotos], bias_m: f64) {
+        let factors = self.bias_factors();
+        let used: Vec<usize> = (0..stones.len())
+            .filter(|&i| self.tracks[i].status == PhotoStatus::Tracked && stones[i].clouds.is_some())
+            .collect();
+        let places = used.iter().map(|&i| stones[i].centroid);
+        let Some(bounds) = Bounds::of(places) else { return };
+        let problem = PoseProblem {
+            centres: &self.centres,
+            epochs: &self.epochs,
+            scales: &self.scales,
+            pose_error_px: self.params.pose_error_px,
+            stones: used
+                .iter()
+                .filter_map(|&i| {
+                    Some(PoseStone {
+                        track: &self.tracks[i],
+                        centroid: stones[i].centroid,
+                        face_from_world: &stones[i].face_from_world,
+                        clouds: stones[i].clouds?,
+                    })
+                })
+                .collect(),
+            middle: nalgebra::center(&bounds.min, &bounds.max),
+            extent_m: (0.5 * (bounds.max - bounds.min).norm()).max(1.0),
+        };
+        let of_used: Vec<f64> = used.iter().map(|&i| factors[i]).collect();
+        let Some(poses) = problem.solve(bias_m, &of_used) else { return };
+        let mut found = vec![None; stones.len()];
+        for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
+            let system = problem.system(stone, &poses.weights[k], poses.factor);
+            found[i] = system.displacement(&poses).map(|(information, vector, common)| StonePhotos {
+                information,
+                vector,
+                place: self.tracks[i].place,
+                bias_factor: factors[i],
+                common,
+            });
+        }
+        let px = |i: usize| {
+            let correction = poses.corrections.rows(6 * i, 6);
+            self.params.pose_error_px * (correction.norm_squared() / 6.0).sqrt()
+        };
+        self.poses_px = (0..self.centres.len()).map(px).collect();
+        self.factor = poses.factor.sqrt();
+        self.stones = found;
+    }
+
+    /// What the photos say of a stone.
+    pub fn stone(&self, i: usize) -> Option<&StonePhotos> {
+        self.stones[i].as_ref()
+    }
+
+    /// Place on a stone's face whose displacement its photos show.
+    pub fn place(&self, i: usize) -> [f64; 2] {
+        self.tracks[i].place
+    }
+
+    /// Factors on the variance of the stones' appearance bias, from their strains: what strains a face by chance also shifts it. One
+    /// on average.
+    fn bias_factors(&self) -> Vec<f64> {
+        let strains: Vec<Option<[f64; STRAINS]>> = self.tracks.iter().map(|t| self.strain_m(t)).collect();
+        let known: Vec<[f64; STRAINS]> = strains.iter().flatten().copied().collect();
+        let middle = |pick: &dyn Fn(&[f64; STRAINS]) -> f64| {
+            let mut values: Vec<f64> = known.iter().map(pick).collect();
+            upper_median(&mut values).unwrap_or(0.0)
+        };
+        let centre: [f64; STRAINS] = std::array::from_fn(|c| middle(&|s| s[c]));
+        // The median of a normal variable's size is 0.674 standard deviations.
+        let spread: [f64; STRAINS] =
+            std::array::from_fn(|c| (middle(&|s| (s[c] - centre[c]).abs()) / 0.674).max(LEAST_STRAIN_M));
+        strains
+            .iter()
+            .map(|strain| {
+                strain.map_or(1.0, |s| {
+                    let square: f64 = (0..STRAINS).map(|c| ((s[c] - centre[c]) / spread[c]).powi(2)).sum();
+                    (PRIOR_STRAINS + square) / (PRIOR_STRAINS + STRAINS as f64)
+                })
+            })
+            .collect()
+    }
+
+    /// Strain of a stone's face from one epoch to the other, times its reach, metres.
+    fn strain_m(&self, track: &Track) -> Option<[f64; STRAINS]> {
+        if track.status != PhotoStatus::Tracked {
+            return None;
+        }
+        let mean = |epoch: usize, c: usize| {
+            let of_epoch = track.sights.iter().filter(|s| self.epochs[s.photo] == epoch);
+            let (sum, count) = of_epoch.fold((0.0, 0.0), |(sum, n), s| (sum + s.strain[c], n + 1.0));
+            sum / f64::max(count, 1.0)
+        };
+        let [u, v] = track.reach;
+        let reach = [u, v, (u * v).sqrt()];
+        Some(std::array::from_fn(|c| (mean(1, c) - mean(0, c)) * reach[c]))
+    }
+
+    /// What the photos contributed. `bias_m`: appearance bias.
+    pub fn report(&self, bias_m: f64) -> PhotoReport {
+        let of_stone = |(i, track): (usize, &Track)| {
+            let count = |epoch| track.sights.iter().filter(|s| self.epochs[s.photo] == epoch).count();
+            let correlations = track.sights.iter().map(|s| s.correlation);
+            let found = self.stones[i].as_ref();
+            let variance = found.and_then(|s| s.with_bias(bias_m).0.try_inverse());
+            StonePhotoReport {
+                status: track.status,
+                photos: [count(0), count(1)],
+                correlation: correlations.reduce(f64::min).unwrap_or(0.0),
+                shift_m: found.and_then(StonePhotos::displacement).map(|d| [d.x, d.y]).filter(is_finite),
+                sd_m: variance.map(|c| [c[(0, 0)].max(0.0).sqrt(), c[(1, 1)].max(0.0).sqrt()]).filter(is_finite),
+            }
+        };
+        let poses = self.names.iter().cloned().zip(self.poses_px.iter().copied());
+        PhotoReport {
+            stones: self.tracks.iter().enumerate().map(of_stone).collect(),
+            sigma_factor: self.factor,
+            appearance_m: bias_m,
+            poses_px: poses.collect(),
+        }
+    }
+}
+
+/// Median size of a pixel on the stones that a photo shows, and median distance of these, metres.
+fn scale(photo: usize, photos: &[Photo], stones: &[StoneInPhotos], tracks: &[Track]) -> [f64; 2] {
+    let (mut sizes, mut distances) = (Vec::new(), Vec::new());
+    let camera = &photos[photo];
+    for (stone, track) in stones.iter().zip(tracks) {
+        if track.sights.iter().any(|s| s.photo == photo) {
+            let axis = |r: usize| stone.face_from_world.row(r).transpose();
+            let axes: [Vector3<f64>; 2] = [axis(0), axis(1)];
+            sizes.extend(camera.pixel_m(&stone.centroid, &axes[0], &axes[1]));
+            distances.push((stone.centroid - camera.camera.centre()).norm());
+        }
+    }
+    [
+        upper_median(&mut sizes).unwrap_or(0.0),
+        upper_median(&mut distances).unwrap_or(USUAL_DISTANCE_M),
+    ]
+}
+
+fn is_finite(pair: &[f64; 2]) -> bool {
+    pair.iter().all(|v| v.is_finite())
+}
