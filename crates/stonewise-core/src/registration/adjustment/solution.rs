@@ -2,8 +2,8 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Field, FieldProblem, FieldStone, PhotoTerms, estimate_components, find_crack, posterior, probabilities_with_field,
-    reweight_ties, solve,
+    Field, FieldProblem, FieldStone, PhotoTerms, estimate_components, find_crack, posterior,
+    probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;

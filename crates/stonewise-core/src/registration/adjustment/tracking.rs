@@ -52,14 +52,21 @@ impl Adjustment {
             progress.advance(range.len() as u64);
         }
         let stones = self.stones_in_photos(|i| tracks[i].place);
-        self.photos = Some(PhotoModel::new(photos.params().clone(), photos.photos(), &stones, tracks));
+        self.photos = Some(PhotoModel::new(
+            photos.params().clone(),
+            photos.photos(),
+            &stones,
+            tracks,
+        ));
         self.components.appearance_m = Some(START_APPEARANCE_M);
         Ok(())
     }
 
     /// Adjusts the photos' poses to where the clouds now put the stones.
     pub fn update_photos(&mut self) {
-        let Some(mut photos) = self.photos.take() else { return };
+        let Some(mut photos) = self.photos.take() else {
+            return;
+        };
         let stones = self.stones_in_photos(|i| photos.place(i));
         photos.update(&stones, self.components.appearance_m());
         self.photos = Some(photos);
@@ -91,7 +98,9 @@ impl Adjustment {
         };
         let clouds = self.cloud_motion(i, [0.0; 2]);
         let (information, _, _) = stone.with_bias(self.components.appearance_m());
-        let by_clouds = clouds.and_then(|c| c.covariance.try_inverse()).unwrap_or_else(Matrix3::zeros);
+        let by_clouds = clouds
+            .and_then(|c| c.covariance.try_inverse())
+            .unwrap_or_else(Matrix3::zeros);
         let Some(inverse) = (by_clouds + information).try_inverse() else {
             return Matrix3::zeros();
         };
@@ -124,7 +133,9 @@ impl Adjustment {
         let turn = OPEN[0].powi(-2);
         let bend = OPEN[1].powi(-2);
         let open = Vector9::from([shift, shift, shift, turn, turn, turn, bend, bend, bend]);
-        let inverse = (equations.information + Matrix9::from_diagonal(&open)).cholesky()?.inverse();
+        let inverse = (equations.information + Matrix9::from_diagonal(&open))
+            .cholesky()?
+            .inverse();
         let lever = StonePhotos::lever(place);
         let mean: Vector3<f64> = lever * (inverse * equations.vector + self.common_in(i).unknowns());
         let covariance = lever * inverse * lever.transpose();

@@ -9,9 +9,9 @@ use super::surface::Surface;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// Most steps: each halves the error at least where the start lies within the grain of the stone.
-const STEPS: usize = 15;
-/// A step below this ends the iteration, cells: a tenth of what is matched at best.
-const SETTLED: f64 = 0.004;
+const STEPS: usize = 20;
+/// A step below this ends the iteration, cells: a fifth of what is matched at best.
+const SETTLED: f64 = 0.01;
 /// Residuals beyond so many standard deviations lose weight (Huber 1964).
 const HUBER: f64 = 2.0;
 /// Cells that determine an affine match; fewer determine a shift.
@@ -39,7 +39,10 @@ impl Template {
                     return [0.0; 2];
                 }
                 let v = &patch.values;
-                [0.5 * (v[k + 1] - v[k - 1]), 0.5 * (v[k + columns] - v[k - columns])]
+                [
+                    0.5 * (v[k + 1] - v[k - 1]),
+                    0.5 * (v[k + columns] - v[k - columns]),
+                ]
             })
             .collect();
         Self { patch, gradients }
@@ -138,7 +141,8 @@ impl FaceCells {
             .collect()
     }
 
-    /// Matches a photo from a start; `None` where it does not settle, leaves `reach` cells, or does not show the face.
+    /// Matches a photo from a start: a shift first, then, where there are cells enough and it settles, an affine warp from there.
+    /// `None` where the shift does not settle, leaves `reach` cells, or where the photo does not show the face.
     pub fn matched(
         &self,
         template: &Template,
@@ -147,7 +151,23 @@ impl FaceCells {
         start: Warp,
         reach: f64,
     ) -> Option<Match> {
-        let is_affine = self.count() >= AFFINE_CELLS;
+        let shifted = self.settled(template, patch, surface, start, reach, false)?;
+        let affine = match self.count() >= AFFINE_CELLS {
+            true => self.settled(template, patch, surface, shifted.warp, reach, true),
+            false => None,
+        };
+        Some(affine.unwrap_or(shifted))
+    }
+
+    fn settled(
+        &self,
+        template: &Template,
+        patch: &Patch,
+        surface: &Surface,
+        start: Warp,
+        reach: f64,
+        is_affine: bool,
+    ) -> Option<Match> {
         let mut warp = start;
         for _ in 0..STEPS {
             let pairs = self.pairs(template, patch, surface, &warp);
@@ -173,7 +193,13 @@ impl FaceCells {
     }
 
     /// Correlation of a photo with the template at a shift of whole cells; `None` where it does not show the face.
-    fn correlation_at(&self, template: &Template, patch: &Patch, surface: &Surface, shift: [isize; 2]) -> Option<f64> {
+    fn correlation_at(
+        &self,
+        template: &Template,
+        patch: &Patch,
+        surface: &Surface,
+        shift: [isize; 2],
+    ) -> Option<f64> {
         let offset = shift[1] * surface.columns as isize + shift[0];
         let (mut tt, mut tp, mut pp, mut count) = (0.0, 0.0, 0.0, 0);
         for (k, _) in self.cells.iter().filter(|(k, _)| template.patch.valid[*k]) {
@@ -196,9 +222,17 @@ impl FaceCells {
     }
 
     /// The shift of whole cells, within `reach`, at which photos that share a motion agree best with the template.
-    pub fn best_shift(&self, template: &Template, patches: &[&Patch], surface: &Surface, reach: isize) -> Option<Vector2<f64>> {
+    pub fn best_shift(
+        &self,
+        template: &Template,
+        patches: &[&Patch],
+        surface: &Surface,
+        reach: isize,
+    ) -> Option<Vector2<f64>> {
         let score = |shift: [isize; 2]| {
-            let of_photos = patches.iter().filter_map(|p| self.correlation_at(template, p, surface, shift));
+            let of_photos = patches
+                .iter()
+                .filter_map(|p| self.correlation_at(template, p, surface, shift));
             let (sum, count) = of_photos.fold((0.0, 0usize), |(s, n), c| (s + c, n + 1));
             (count > 0).then(|| sum / count as f64)
         };
@@ -239,7 +273,11 @@ fn correlation(pairs: &[Pair]) -> f64 {
         tp += t * q;
         pp += q * q;
     }
-    if tt > 0.0 && pp > 0.0 { tp / (tt * pp).sqrt() } else { 0.0 }
+    if tt > 0.0 && pp > 0.0 {
+        tp / (tt * pp).sqrt()
+    } else {
+        0.0
+    }
 }
 
 type Normal = SMatrix<f64, 8, 8>;
@@ -250,7 +288,11 @@ type Row = SVector<f64, 8>;
 fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
     let row = |p: &Pair| {
         let [x, y] = p.gradient;
-        let (u, v) = if is_affine { (p.place.x, p.place.y) } else { (0.0, 0.0) };
+        let (u, v) = if is_affine {
+            (p.place.x, p.place.y)
+        } else {
+            (0.0, 0.0)
+        };
         Row::from([1.0, p.template, x, y, x * u, x * v, y * u, y * v])
     };
     let mut weights = vec![1.0; pairs.len()];
@@ -287,7 +329,10 @@ fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
         shift: Vector2::new(x[2], x[3]) / gain,
         matrix: Matrix2::identity() + if is_affine { matrix } else { Matrix2::zeros() },
     };
-    Some((step, covariance.fixed_view::<2, 2>(2, 2).into_owned() / (gain * gain)))
+    Some((
+        step,
+        covariance.fixed_view::<2, 2>(2, 2).into_owned() / (gain * gain),
+    ))
 }
 
 #[cfg(test)]
@@ -296,7 +341,13 @@ mod tests {
 
     /// Grain of two to six cells, everywhere.
     fn texture(x: f64, y: f64) -> f64 {
-        let waves = [[0.9, 0.3, 0.1], [-0.4, 1.1, 2.0], [0.6, -0.8, 0.7], [1.3, 0.7, 1.3], [-1.0, 0.5, 0.4]];
+        let waves = [
+            [0.9, 0.3, 0.1],
+            [-0.4, 1.1, 2.0],
+            [0.6, -0.8, 0.7],
+            [1.3, 0.7, 1.3],
+            [-1.0, 0.5, 0.4],
+        ];
         waves.iter().map(|[a, b, c]| (a * x + b * y + c).sin()).sum()
     }
 
@@ -364,7 +415,13 @@ mod tests {
     #[test]
     fn dirt_on_a_part_of_the_face_moves_the_match_little() {
         let warp = Warp::shift(Vector2::new(1.4, 0.6));
-        let dirt = |x: f64, y: f64| if x < 18.0 && y < 20.0 { 6.0 * (0.35 * x - 0.2 * y).sin() } else { 0.0 };
+        let dirt = |x: f64, y: f64| {
+            if x < 18.0 && y < 20.0 {
+                6.0 * (0.35 * x - 0.2 * y).sin()
+            } else {
+                0.0
+            }
+        };
         let m = found(50, &warp, dirt).unwrap();
         assert!((m.warp.shift - warp.shift).norm() < 0.1, "{:?}", m.warp);
         assert!(m.correlation < 0.95);

@@ -67,7 +67,10 @@ fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64) -> Patch {
     let over = |values: &[f64], reach: f64| -> Vec<f64> {
         let sums = blur(values, columns, rows, reach);
         let weights = blur(&weight, columns, rows, reach);
-        sums.iter().zip(weights).map(|(s, w)| if w > 1e-6 { s / w } else { 0.0 }).collect()
+        sums.iter()
+            .zip(weights)
+            .map(|(s, w)| if w > 1e-6 { s / w } else { 0.0 })
+            .collect()
     };
     let raw: Vec<f64> = grey.iter().map(|g| g.map_or(0.0, f64::from)).collect();
     let zeroed = |values: Vec<f64>| -> Vec<f64> { values.iter().zip(&weight).map(|(v, w)| v * w).collect() };

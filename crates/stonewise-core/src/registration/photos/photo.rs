@@ -50,7 +50,11 @@ impl Photo {
     }
 
     /// Shift in the face of what stands a metre out of it, in a frame (along, up, out): the photo's parallax at this point.
-    pub(crate) fn parallax(&self, at: &Point3<f64>, face_from_world: &nalgebra::Matrix3<f64>) -> Option<[f64; 2]> {
+    pub(crate) fn parallax(
+        &self,
+        at: &Point3<f64>,
+        face_from_world: &nalgebra::Matrix3<f64>,
+    ) -> Option<[f64; 2]> {
         let ray = face_from_world * (at - self.camera.centre());
         (ray.z < 0.0).then(|| [-ray.x / ray.z, -ray.y / ray.z])
     }
@@ -118,7 +122,9 @@ mod tests {
             corner: [100, 40],
             width: 20,
             height: 10,
-            grey: (0..200).map(|k| (value(f64::from(k % 20), f64::from(k / 20)) * 4.0).round() as u8).collect(),
+            grey: (0..200)
+                .map(|k| (value(f64::from(k % 20), f64::from(k / 20)) * 4.0).round() as u8)
+                .collect(),
         };
         // Middles of pixels lie at halves.
         let at = chip.sample([100.0 + 7.5, 40.0 + 4.5]).unwrap();
@@ -150,7 +156,10 @@ mod tests {
         let raised = photo.camera.project(&(at + normal * 1e-4)).unwrap();
         let shifted = at + turn.transpose() * Vector3::new(q[0], q[1], 0.0) * 1e-4;
         let seen = photo.camera.project(&shifted).unwrap();
-        assert!((raised[0] - seen[0]).abs() + (raised[1] - seen[1]).abs() < 1e-5, "{raised:?} {seen:?}");
+        assert!(
+            (raised[0] - seen[0]).abs() + (raised[1] - seen[1]).abs() < 1e-5,
+            "{raised:?} {seen:?}"
+        );
         let axis = |r: usize| turn.row(r).transpose();
         let pixel_m = photo.pixel_m(&at, &axis(0), &axis(1)).unwrap();
         // A pixel on a surface across the ray is distance / focal length; the face is oblique and takes more.

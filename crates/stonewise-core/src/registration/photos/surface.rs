@@ -93,7 +93,10 @@ impl Surface {
         }
         for a in 0..2 {
             self.middle[a] = places.iter().map(|p| p[a]).sum::<f64>() / count;
-            let square = places.iter().map(|p| (p[a] - self.middle[a]).powi(2)).sum::<f64>();
+            let square = places
+                .iter()
+                .map(|p| (p[a] - self.middle[a]).powi(2))
+                .sum::<f64>();
             self.reach[a] = (square / count).sqrt();
         }
         Some(())
@@ -115,7 +118,10 @@ pub(crate) fn bounds(points: &[Vector3<f64>]) -> Option<([f64; 2], [f64; 2])> {
             .iter()
             .fold([start; 2], |c, p| [pick(c[0], p.x), pick(c[1], p.y)])
     };
-    let (low, high) = (corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY));
+    let (low, high) = (
+        corner(f64::min, f64::INFINITY),
+        corner(f64::max, f64::NEG_INFINITY),
+    );
     (low[0] < high[0] && low[1] < high[1]).then_some((low, high))
 }
 
@@ -190,8 +196,13 @@ impl HeightMap {
     }
 
     fn at(&self, u: f64, v: f64) -> f64 {
-        let cell = |x: f64, low: f64, count: usize| ((x - low) / HEIGHT_CELL_M).clamp(0.0, (count - 1) as f64 - 1e-6);
-        let (x, y) = (cell(u, self.low[0], self.columns), cell(v, self.low[1], self.rows));
+        let cell = |x: f64, low: f64, count: usize| {
+            ((x - low) / HEIGHT_CELL_M).clamp(0.0, (count - 1) as f64 - 1e-6)
+        };
+        let (x, y) = (
+            cell(u, self.low[0], self.columns),
+            cell(v, self.low[1], self.rows),
+        );
         let (c, r) = (x as usize, y as usize);
         let (s, t) = (x - c as f64, y - r as f64);
         let h = |dc: usize, dr: usize| self.heights[(r + dr) * self.columns + c + dc];

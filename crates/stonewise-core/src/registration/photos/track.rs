@@ -63,6 +63,8 @@ pub(crate) struct Track {
     pub place: [f64; 2],
     /// Root mean square reach of the face around that place, metres.
     pub reach: [f64; 2],
+    /// Area of the face without its rim, m^2.
+    pub area_m2: f64,
     /// The motion about which patches of the second epoch were taken.
     pub start: FaceMotion,
 }
@@ -87,6 +89,7 @@ impl Tracker<'_> {
             sights: Vec::new(),
             place: [0.0; 2],
             reach: [0.0; 2],
+            area_m2: 0.0,
             start: self.start,
         };
         if let Err(status) = self.run(&mut track) {
@@ -98,7 +101,11 @@ impl Tracker<'_> {
 
     fn run(&self, track: &mut Track) -> Result<(), PhotoStatus> {
         let chips = [0, 1].map(|epoch| -> Vec<&Chip> {
-            let is_of = |c: &&Chip| self.photos.get(c.photo as usize).is_some_and(|p| p.epoch == epoch);
+            let is_of = |c: &&Chip| {
+                self.photos
+                    .get(c.photo as usize)
+                    .is_some_and(|p| p.epoch == epoch)
+            };
             self.chips.iter().filter(is_of).collect()
         });
         if chips.iter().any(|c| c.len() < self.params.min_photos) {
@@ -112,6 +119,7 @@ impl Tracker<'_> {
         let face = FaceCells::new(&surface);
         track.place = surface.middle;
         track.reach = surface.reach;
+        track.area_m2 = face.count() as f64 * surface.cell_m * surface.cell_m;
         let placed = Placed {
             surface: &surface,
             centroid: self.pair.centroid,
@@ -159,7 +167,9 @@ impl Tracker<'_> {
         }
         for (epoch, matches) in [ones, twos].iter().enumerate() {
             for (chip, found) in chips[epoch].iter().zip(matches) {
-                track.sights.extend(found.and_then(|m| self.sight(&surface, chip.photo as usize, epoch, &track.start, &m)));
+                track.sights.extend(
+                    found.and_then(|m| self.sight(&surface, chip.photo as usize, epoch, &track.start, &m)),
+                );
             }
         }
         Ok(())
@@ -171,31 +181,48 @@ impl Tracker<'_> {
         let mut sizes: Vec<f64> = self
             .chips
             .iter()
-            .filter_map(|c| self.photos.get(c.photo as usize)?.pixel_m(&self.pair.centroid, &axis(0), &axis(1)))
+            .filter_map(|c| {
+                self.photos
+                    .get(c.photo as usize)?
+                    .pixel_m(&self.pair.centroid, &axis(0), &axis(1))
+            })
             .collect();
         crate::statistics::upper_median(&mut sizes)
     }
 
     /// The mean of the first epoch's photos brought onto each other, and how each lies on it.
-    fn template(&self, patches: &[Patch], face: &FaceCells, surface: &Surface) -> Option<(Template, Vec<Option<Match>>)> {
-        let shown = |p: &Patch| (0..p.valid.len()).filter(|&k| surface.inside[k] && p.valid[k]).count();
-        let reference = (0..patches.len()).max_by_key(|&i| (shown(&patches[i]), patches.len() - i))?;
-        let mut template = Template::new(face.warped(&patches[reference], surface, &Warp::shift(Vector2::zeros())), surface);
-        let reach = POSE_REACH_PX.ceil() as isize;
-        let mut matches: Vec<Option<Match>> = Vec::new();
-        for round in 0..TEMPLATES {
-            matches = patches
-                .iter()
-                .enumerate()
-                .map(|(i, patch)| {
-                    let start = match matches.get(i).copied().flatten() {
-                        Some(found) => found.warp,
-                        None => Warp::shift(face.best_shift(&template, &[patch], surface, reach)?),
-                    };
-                    let found = face.matched(&template, patch, surface, start, PULL_IN)?;
-                    (found.correlation >= self.params.min_correlation).then_some(found)
-                })
-                .collect();
+    fn template(
+        &self,
+        patches: &[Patch],
+        face: &FaceCells,
+        surface: &Surface,
+    ) -> Option<(Template, Vec<Option<Match>>)> {
+        let shown = |i: usize| -> usize {
+            let valid = &patches[i].valid;
+            (0..valid.len())
+                .filter(|&k| surface.inside[k] && valid[k])
+                .count()
+        };
+        // The photo that most others agree with comes first; among equals the one that shows most of the face.
+        let mut references: Vec<usize> = (0..patches.len()).collect();
+        references.sort_by_key(|&i| (std::cmp::Reverse(shown(i)), i));
+        let mut best: Option<Vec<Option<Match>>> = None;
+        for reference in references {
+            let still = Warp::shift(Vector2::zeros());
+            let template = Template::new(face.warped(&patches[reference], surface, &still), surface);
+            let found = self.matches(&template, patches, &[], face, surface);
+            let count = |m: &[Option<Match>]| m.iter().flatten().count();
+            if best.as_ref().is_none_or(|b| count(&found) > count(b)) {
+                best = Some(found);
+            }
+            if best.as_ref().is_some_and(|b| count(b) == patches.len()) {
+                break;
+            }
+        }
+        let mut matches = best?;
+        let mut template = Template::new(mean(patches, &matches, face, surface)?, surface);
+        for round in 1..TEMPLATES {
+            matches = self.matches(&template, patches, &matches, face, surface);
             if round + 1 < TEMPLATES {
                 template = Template::new(mean(patches, &matches, face, surface)?, surface);
             }
@@ -203,7 +230,39 @@ impl Tracker<'_> {
         Some((template, matches))
     }
 
-    fn sight(&self, surface: &Surface, photo: usize, epoch: usize, start: &FaceMotion, found: &Match) -> Option<Sight> {
+    /// Matches photos of one epoch with a template, from where they lay on it before.
+    fn matches(
+        &self,
+        template: &Template,
+        patches: &[Patch],
+        before: &[Option<Match>],
+        face: &FaceCells,
+        surface: &Surface,
+    ) -> Vec<Option<Match>> {
+        let one = |(i, patch): (usize, &Patch)| {
+            let start = match before.get(i).copied().flatten() {
+                Some(found) => found.warp,
+                None => Warp::shift(face.best_shift(
+                    template,
+                    &[patch],
+                    surface,
+                    POSE_REACH_PX.ceil() as isize,
+                )?),
+            };
+            let found = face.matched(template, patch, surface, start, PULL_IN)?;
+            (found.correlation >= self.params.min_correlation).then_some(found)
+        };
+        patches.iter().enumerate().map(one).collect()
+    }
+
+    fn sight(
+        &self,
+        surface: &Surface,
+        photo: usize,
+        epoch: usize,
+        start: &FaceMotion,
+        found: &Match,
+    ) -> Option<Sight> {
         let cell = surface.cell_m;
         let moved = match epoch {
             0 => nalgebra::Vector3::zeros(),
@@ -213,14 +272,19 @@ impl Tracker<'_> {
         let at = self.pair.centroid + self.face_from_world.transpose() * local;
         let parallax = self.photos[photo].parallax(&at, self.face_from_world)?;
         let apart = found.warp.matrix - Matrix2::identity();
-        let shift = found.warp.shift * cell + Vector2::new(moved.x, moved.y) + Vector2::from(parallax) * moved.z;
+        let shift =
+            found.warp.shift * cell + Vector2::new(moved.x, moved.y) + Vector2::from(parallax) * moved.z;
         let turned = if epoch == 0 { 0.0 } else { start.rotation.z };
         Some(Sight {
             photo,
             shift,
             covariance: found.covariance * (cell * cell),
             turn: 0.5 * (apart[(1, 0)] - apart[(0, 1)]) + turned,
-            strain: [apart[(0, 0)], apart[(1, 1)], 0.5 * (apart[(0, 1)] + apart[(1, 0)])],
+            strain: [
+                apart[(0, 0)],
+                apart[(1, 1)],
+                0.5 * (apart[(0, 1)] + apart[(1, 0)]),
+            ],
             parallax,
             correlation: found.correlation,
         })
@@ -247,11 +311,17 @@ fn mean(patches: &[Patch], matches: &[Option<Match>], face: &FaceCells, surface:
     }
     let count = surface.heights.len();
     let of_cell = |k: usize| -> (f32, u16) {
-        warped.iter().filter(|w| w.valid[k]).fold((0.0, 0), |(s, n), w| (s + w.values[k], n + 1))
+        warped
+            .iter()
+            .filter(|w| w.valid[k])
+            .fold((0.0, 0), |(s, n), w| (s + w.values[k], n + 1))
     };
     let cells: Vec<(f32, u16)> = (0..count).map(of_cell).collect();
     Some(Patch {
-        values: cells.iter().map(|(s, n)| if *n > 0 { s / f32::from(*n) } else { 0.0 }).collect(),
+        values: cells
+            .iter()
+            .map(|(s, n)| if *n > 0 { s / f32::from(*n) } else { 0.0 })
+            .collect(),
         valid: cells.iter().map(|(_, n)| *n > 0).collect(),
     })
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use stonewise_core::registration::observers::{EpochErrors, ObserverComponents, SensorClass};
 use stonewise_core::registration::photos::PhotoStatus;
 use stonewise_core::registration::{AdjustmentReport, Break, StonePhotoReport, VarianceComponents};
+use stonewise_core::stone::PairResult;
 
 /// What is known about the motions of one pair of epochs as a whole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -106,7 +107,17 @@ pub struct PhotosRecord {
     /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
     /// Each stone of the first epoch, ascending.
-    pub stones: BTreeMap<u32, StonePhotoReport>,
+    pub stones: Vec<StoneInPhotosRecord>,
+}
+
+/// What the photos say of one stone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoneInPhotosRecord {
+    /// Stone of the first epoch.
+    pub stone_id: u32,
+    /// What the photos say.
+    #[serde(flatten)]
+    pub photos: StonePhotoReport,
 }
 
 impl PhotosRecord {
@@ -117,13 +128,19 @@ impl PhotosRecord {
         for stone in &photos.stones {
             *statuses.entry(stone.status).or_default() += 1;
         }
-        let stones = report.results.iter().zip(&photos.stones);
+        let of_stone = |(pair, photos): (&PairResult, &StonePhotoReport)| StoneInPhotosRecord {
+            stone_id: pair.first.0,
+            photos: *photos,
+        };
+        let stones = report.results.iter().zip(&photos.stones).map(of_stone);
+        let mut stones: Vec<StoneInPhotosRecord> = stones.collect();
+        stones.sort_by_key(|s| s.stone_id);
         Some(Self {
             statuses,
             sigma_factor: photos.sigma_factor,
             appearance_m: photos.appearance_m,
             poses_px: photos.poses_px.clone(),
-            stones: stones.map(|(pair, photos)| (pair.first.0, *photos)).collect(),
+            stones,
         })
     }
 }

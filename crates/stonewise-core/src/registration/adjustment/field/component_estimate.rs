@@ -102,7 +102,10 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
         Some(photos) => {
             let joined = photos.join(problem, components);
             let constant = joined.iter().map(|e| e.constant).sum();
-            (eliminate_own_motions(&problem.with_equations(&joined), &own), constant)
+            (
+                eliminate_own_motions(&problem.with_equations(&joined), &own),
+                constant,
+            )
         }
     };
     let normal = assemble(problem, prior, eliminated)?;
@@ -123,9 +126,9 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
 mod tests {
     use super::*;
     use crate::linalg::BlockMatrix;
+    use crate::registration::adjustment::field::PhotoTerms;
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::observation::NormalEquations;
-    use crate::registration::adjustment::field::PhotoTerms;
     use crate::registration::adjustment::observation::photo::StonePhotos;
     use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
     use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -246,16 +249,26 @@ mod tests {
                 let mut block = motion.view_mut((9 * i, 9 * i), (9, 9));
                 block += Matrix9::from_diagonal(&Vector9::from(components.own_variances()));
                 observe.view_mut((12 * i, 9 * i), (9, 9)).fill_with_identity();
-                observe.view_mut((12 * i + 9, 9 * i), (3, 9)).copy_from(&StonePhotos::lever(photos.place));
+                observe
+                    .view_mut((12 * i + 9, 9 * i), (3, 9))
+                    .copy_from(&StonePhotos::lever(photos.place));
                 let of_clouds = stone.equations.information.try_inverse().unwrap();
-                observed.rows_mut(12 * i, 9).copy_from(&(of_clouds * stone.equations.vector));
+                observed
+                    .rows_mut(12 * i, 9)
+                    .copy_from(&(of_clouds * stone.equations.vector));
                 let error = Matrix9::from_diagonal(&Vector9::from(clouds_own));
-                noise.view_mut((12 * i, 12 * i), (9, 9)).copy_from(&(of_clouds + error));
+                noise
+                    .view_mut((12 * i, 12 * i), (9, 9))
+                    .copy_from(&(of_clouds + error));
                 let of_photos = photos.information.try_inverse().unwrap();
-                observed.rows_mut(12 * i + 9, 3).copy_from(&(of_photos * photos.vector));
+                observed
+                    .rows_mut(12 * i + 9, 3)
+                    .copy_from(&(of_photos * photos.vector));
                 let bias = components.appearance_m().powi(2) * photos.bias_factor;
                 let bias = Matrix3::from_diagonal(&Vector3::new(bias, bias, 0.0));
-                noise.view_mut((12 * i + 9, 12 * i + 9), (3, 3)).copy_from(&(of_photos + bias));
+                noise
+                    .view_mut((12 * i + 9, 12 * i + 9), (3, 3))
+                    .copy_from(&(of_photos + bias));
             }
             let covariance = &observe * motion * observe.transpose() + noise;
             let factor = covariance.cholesky().unwrap();

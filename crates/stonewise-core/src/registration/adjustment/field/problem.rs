@@ -68,7 +68,9 @@ impl<'a> FieldProblem<'a> {
         let stones = self.stones.iter().zip(equations);
         FieldProblem {
             graph: self.graph,
-            stones: stones.map(|(stone, equations)| FieldStone { equations, ..*stone }).collect(),
+            stones: stones
+                .map(|(stone, equations)| FieldStone { equations, ..*stone })
+                .collect(),
             ties: self.ties.clone(),
             components: self.components,
             loose: self.loose,

@@ -75,7 +75,9 @@ impl DiskPhotos {
         }
         let shown = choose(&boxes, &list, &paths, &params);
         let mut spill = Spill::new(&step.file("chips"), |k: &u32| format!("c{k}"))?;
-        context.progress.begin("cut stones out of photos", list.len() as u64);
+        context
+            .progress
+            .begin("cut stones out of photos", list.len() as u64);
         for (number, (path, _)) in paths.iter().enumerate() {
             context.progress.check()?;
             if let Some(stones) = shown.get(&number) {
@@ -194,7 +196,11 @@ impl Boxed {
     /// Size of a photo's pixel on the stone, and the part of the photo that shows it with a margin; `None` where the photo shows it
     /// from behind, too obliquely or not wholly.
     fn seen_by(&self, photo: &Photo, view: &View, margin_m: f64) -> Option<(f64, Corners)> {
-        let shift = if photo.epoch == 1 { self.shift } else { Vector3::zeros() };
+        let shift = if photo.epoch == 1 {
+            self.shift
+        } else {
+            Vector3::zeros()
+        };
         let centre = self.centroid + shift;
         let ray = self.frame.face_from_world() * (centre - photo.camera.centre());
         if ray.z >= 0.0 || ray.xy().norm() > -LARGEST_TANGENT * ray.z {
@@ -224,7 +230,10 @@ impl Boxed {
         let size = [view.camera.width, view.camera.height];
         let clip = |v: f64, axis: usize| v.clamp(0.0, f64::from(size[axis])) as u32;
         let first = [clip(low[0] - BORDER_PX, 0), clip(low[1] - BORDER_PX, 1)];
-        let end = [clip(high[0] + BORDER_PX + 1.0, 0), clip(high[1] + BORDER_PX + 1.0, 1)];
+        let end = [
+            clip(high[0] + BORDER_PX + 1.0, 0),
+            clip(high[1] + BORDER_PX + 1.0, 1),
+        ];
         Some((pixel_m, [first, end]))
     }
 }
@@ -268,7 +277,9 @@ impl PhotoSource<Error> for DiskPhotos {
         let bytes = self.chips.read(&key)?;
         let mut rest = bytes.as_slice();
         while rest.len() >= HEADER {
-            let number = |k: usize| u32::from_le_bytes([rest[4 * k], rest[4 * k + 1], rest[4 * k + 2], rest[4 * k + 3]]);
+            let number = |k: usize| {
+                u32::from_le_bytes([rest[4 * k], rest[4 * k + 1], rest[4 * k + 2], rest[4 * k + 3]])
+            };
             let [slot, photo, x, y, width, height] = [0, 1, 2, 3, 4, 5].map(number);
             let end = HEADER + width as usize * height as usize;
             let Some(grey) = rest.get(HEADER..end) else { break };

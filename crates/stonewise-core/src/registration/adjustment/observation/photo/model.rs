@@ -3,18 +3,27 @@
 use super::poses::{CloudMotion, PoseProblem, PoseStone};
 use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
-use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
+use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Sight, Track};
 use crate::statistics::upper_median;
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Strains that stand for as many more before those of a stone count by themselves: four known degrees of freedom hold a factor on a
 /// variance within a half and three.
 const PRIOR_STRAINS: f64 = 4.0;
+/// Error of an entry of a warp's matrix: a third of a cell at the rim of a face of a hundred cells.
+const WARP_SD: f64 = 0.005;
+/// Tilt of a face against its cloud, radians: that of a loose stone whose tilt the clouds do not show.
+const TILT_SD: f64 = 0.03;
+/// Information on a warp before any photo, as good as none.
+const OPEN_WARP: f64 = 1e-6;
 /// Components of a strain.
 const STRAINS: usize = 3;
 /// Least strain that counts as usual, so that a survey without any keeps factors of one.
 const LEAST_STRAIN_M: f64 = 2e-5;
+/// Least and most of the factor on the variance of the appearance bias that a face's area makes: light that falls on all of a face does
+/// not average out, and six is two and a half in the standard deviation.
+const AREA_FACTORS: [f64; 2] = [0.7, 6.0];
 /// Distance from the wall where no stone shows one, metres; nothing depends on it then.
 const USUAL_DISTANCE_M: f64 = 10.0;
 
@@ -71,7 +80,9 @@ impl PhotoModel {
     /// Of tracked stones, before the poses are adjusted.
     pub fn new(params: PhotoParams, photos: &[Photo], stones: &[StoneInPhotos], tracks: Vec<Track>) -> Self {
         let centres: Vec<Point3<f64>> = photos.iter().map(|p| p.camera.centre()).collect();
-        let scales = (0..photos.len()).map(|i| scale(i, photos, stones, &tracks)).collect();
+        let scales = (0..photos.len())
+            .map(|i| scale(i, photos, stones, &tracks))
+            .collect();
         Self {
             params,
             names: photos.iter().map(|p| p.name.clone()).collect(),
@@ -113,17 +124,21 @@ impl PhotoModel {
             extent_m: (0.5 * (bounds.max - bounds.min).norm()).max(1.0),
         };
         let of_used: Vec<f64> = used.iter().map(|&i| factors[i]).collect();
-        let Some(poses) = problem.solve(bias_m, &of_used) else { return };
+        let Some(poses) = problem.solve(bias_m, &of_used) else {
+            return;
+        };
         let mut found = vec![None; stones.len()];
         for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
             let system = problem.system(stone, &poses.weights[k], poses.factor);
-            found[i] = system.displacement(&poses).map(|(information, vector, common)| StonePhotos {
-                information,
-                vector,
-                place: self.tracks[i].place,
-                bias_factor: factors[i],
-                common,
-            });
+            found[i] = system
+                .displacement(&poses)
+                .map(|(information, vector, common)| StonePhotos {
+                    information,
+                    vector,
+                    place: self.tracks[i].place,
+                    bias_factor: factors[i],
+                    common,
+                });
         }
         let px = |i: usize| {
             let correction = poses.corrections.rows(6 * i, 6);
@@ -144,8 +159,8 @@ impl PhotoModel {
         self.tracks[i].place
     }
 
-    /// Factors on the variance of the stones' appearance bias, from their strains: what strains a face by chance also shifts it. One
-    /// on average.
+    /// Factors on the variance of the stones' appearance bias. What strains a face by chance also shifts it, and what changes over a few
+    /// centimetres averages out over large faces. About one for the median stone.
     fn bias_factors(&self) -> Vec<f64> {
         let strains: Vec<Option<[f64; STRAINS]>> = self.tracks.iter().map(|t| self.strain_m(t)).collect();
         let known: Vec<[f64; STRAINS]> = strains.iter().flatten().copied().collect();
@@ -157,15 +172,23 @@ impl PhotoModel {
         // The median of a normal variable's size is 0.674 standard deviations.
         let spread: [f64; STRAINS] =
             std::array::from_fn(|c| (middle(&|s| (s[c] - centre[c]).abs()) / 0.674).max(LEAST_STRAIN_M));
-        strains
+        let mut areas: Vec<f64> = self
+            .tracks
             .iter()
-            .map(|strain| {
-                strain.map_or(1.0, |s| {
-                    let square: f64 = (0..STRAINS).map(|c| ((s[c] - centre[c]) / spread[c]).powi(2)).sum();
-                    (PRIOR_STRAINS + square) / (PRIOR_STRAINS + STRAINS as f64)
-                })
+            .map(|t| t.area_m2)
+            .filter(|a| *a > 0.0)
+            .collect();
+        let usual_m2 = upper_median(&mut areas).unwrap_or(0.0);
+        let of_stone = |(track, strain): (&Track, &Option<[f64; STRAINS]>)| {
+            strain.map_or(1.0, |s| {
+                let square: f64 = (0..STRAINS)
+                    .map(|c| ((s[c] - centre[c]) / spread[c]).powi(2))
+                    .sum();
+                let of_area = (usual_m2 / track.area_m2).clamp(AREA_FACTORS[0], AREA_FACTORS[1]);
+                of_area * (PRIOR_STRAINS + square) / (PRIOR_STRAINS + STRAINS as f64)
             })
-            .collect()
+        };
+        self.tracks.iter().zip(&strains).map(of_stone).collect()
     }
 
     /// Strain of a stone's face from one epoch to the other, times its reach, metres.
@@ -173,20 +196,26 @@ impl PhotoModel {
         if track.status != PhotoStatus::Tracked {
             return None;
         }
-        let mean = |epoch: usize, c: usize| {
+        let [before, after] = [0, 1].map(|epoch| {
             let of_epoch = track.sights.iter().filter(|s| self.epochs[s.photo] == epoch);
-            let (sum, count) = of_epoch.fold((0.0, 0.0), |(sum, n), s| (sum + s.strain[c], n + 1.0));
-            sum / f64::max(count, 1.0)
-        };
+            untilted_strain(of_epoch)
+        });
         let [u, v] = track.reach;
         let reach = [u, v, (u * v).sqrt()];
-        Some(std::array::from_fn(|c| (mean(1, c) - mean(0, c)) * reach[c]))
+        let (before, after) = (before?, after?);
+        Some(std::array::from_fn(|c| (after[c] - before[c]) * reach[c]))
     }
 
     /// What the photos contributed. `bias_m`: appearance bias.
     pub fn report(&self, bias_m: f64) -> PhotoReport {
         let of_stone = |(i, track): (usize, &Track)| {
-            let count = |epoch| track.sights.iter().filter(|s| self.epochs[s.photo] == epoch).count();
+            let count = |epoch| {
+                track
+                    .sights
+                    .iter()
+                    .filter(|s| self.epochs[s.photo] == epoch)
+                    .count()
+            };
             let correlations = track.sights.iter().map(|s| s.correlation);
             let found = self.stones[i].as_ref();
             let variance = found.and_then(|s| s.with_bias(bias_m).0.try_inverse());
@@ -194,8 +223,13 @@ impl PhotoModel {
                 status: track.status,
                 photos: [count(0), count(1)],
                 correlation: correlations.reduce(f64::min).unwrap_or(0.0),
-                shift_m: found.and_then(StonePhotos::displacement).map(|d| [d.x, d.y]).filter(is_finite),
-                sd_m: variance.map(|c| [c[(0, 0)].max(0.0).sqrt(), c[(1, 1)].max(0.0).sqrt()]).filter(is_finite),
+                shift_m: found
+                    .and_then(StonePhotos::displacement)
+                    .map(|d| [d.x, d.y])
+                    .filter(is_finite),
+                sd_m: variance
+                    .map(|c| [c[(0, 0)].max(0.0).sqrt(), c[(1, 1)].max(0.0).sqrt()])
+                    .filter(is_finite),
             }
         };
         let poses = self.names.iter().cloned().zip(self.poses_px.iter().copied());
@@ -206,6 +240,33 @@ impl PhotoModel {
             poses_px: poses.collect(),
         }
     }
+}
+
+/// Strain of a stone's face in the photos of one epoch, less what a tilt of the face makes: that is the parallax of each photo times the
+/// tilt, and differs from photo to photo.
+fn untilted_strain<'a>(sights: impl Iterator<Item = &'a Sight>) -> Option<[f64; STRAINS]> {
+    // Unknowns: the warp's matrix row by row, then the tilt along and up, each over its standard deviation.
+    let mut normal = SMatrix::<f64, 6, 6>::identity() * OPEN_WARP;
+    let mut right = SVector::<f64, 6>::zeros();
+    (4..6).for_each(|k| normal[(k, k)] = 1.0);
+    let mut add = |row: SVector<f64, 6>, value: f64| {
+        normal += row * row.transpose() / (WARP_SD * WARP_SD);
+        right += row * (value / (WARP_SD * WARP_SD));
+    };
+    for sight in sights {
+        let [x, y, across] = sight.strain;
+        let values = [[x, across - sight.turn], [across + sight.turn, y]];
+        for (r, row_values) in values.iter().enumerate() {
+            for (c, value) in row_values.iter().enumerate() {
+                let mut row = SVector::<f64, 6>::zeros();
+                row[2 * r + c] = 1.0;
+                row[4 + c] = sight.parallax[r] * TILT_SD;
+                add(row, *value);
+            }
+        }
+    }
+    let warp = normal.cholesky()?.solve(&right);
+    Some([warp[0], warp[3], 0.5 * (warp[1] + warp[2])])
 }
 
 /// Median size of a pixel on the stones that a photo shows, and median distance of these, metres.
@@ -228,4 +289,37 @@ fn scale(photo: usize, photos: &[Photo], stones: &[StoneInPhotos], tracks: &[Tra
 
 fn is_finite(pair: &[f64; 2]) -> bool {
     pair.iter().all(|v| v.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Vector2};
+
+    #[test]
+    fn a_tilted_face_is_not_taken_for_a_strained_one() {
+        let (tilt, strain) = (
+            Vector2::new(0.02, -0.03),
+            Matrix2::new(0.004, 0.001, 0.001, -0.002),
+        );
+        let parallaxes = [[0.4, 0.1], [-0.5, 0.2], [0.1, -0.4], [0.3, 0.5]];
+        let sights: Vec<Sight> = parallaxes
+            .iter()
+            .map(|q| {
+                let m = strain + Vector2::from(*q) * tilt.transpose();
+                Sight {
+                    photo: 0,
+                    shift: Vector2::zeros(),
+                    covariance: Matrix2::identity(),
+                    turn: 0.5 * (m[(1, 0)] - m[(0, 1)]),
+                    strain: [m[(0, 0)], m[(1, 1)], 0.5 * (m[(0, 1)] + m[(1, 0)])],
+                    parallax: *q,
+                    correlation: 0.9,
+                }
+            })
+            .collect();
+        let [x, y, across] = untilted_strain(sights.iter()).unwrap();
+        let found = [x - 0.004, y + 0.002, across - 0.001];
+        assert!(found.iter().all(|d| d.abs() < 6e-4), "{found:?}");
+    }
 }

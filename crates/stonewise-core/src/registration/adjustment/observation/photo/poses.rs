@@ -88,7 +88,15 @@ impl PoseProblem<'_> {
     }
 
     /// What a sight's shift changes by: with the stone's unknowns, with its pose, with the second epoch as a whole.
-    fn rows(&self, stone: &PoseStone, sight: &Sight) -> (SMatrix<f64, 2, STONE>, SMatrix<f64, 2, POSE>, SMatrix<f64, 2, WHOLE>) {
+    fn rows(
+        &self,
+        stone: &PoseStone,
+        sight: &Sight,
+    ) -> (
+        SMatrix<f64, 2, STONE>,
+        SMatrix<f64, 2, POSE>,
+        SMatrix<f64, 2, WHOLE>,
+    ) {
         let q = Vector2::from(sight.parallax);
         let f = SMatrix::<f64, 2, 3>::new(1.0, 0.0, q.x, 0.0, 1.0, q.y);
         let second = f64::from(u8::from(self.epochs[sight.photo] == 1));
@@ -104,13 +112,20 @@ impl PoseProblem<'_> {
         let mut pose = SMatrix::<f64, 2, POSE>::zeros();
         pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(-to_face * shift_m));
         let turned = -to_face * (at - self.centres[sight.photo]).cross_matrix();
-        pose.fixed_view_mut::<2, 3>(0, 3).copy_from(&(turned * (shift_m / distance_m)));
+        pose.fixed_view_mut::<2, 3>(0, 3)
+            .copy_from(&(turned * (shift_m / distance_m)));
         let mut whole = SMatrix::<f64, 2, WHOLE>::zeros();
         let arm = at - self.middle;
         let reach = WHOLE_M / self.extent_m;
-        whole.fixed_view_mut::<2, 3>(0, 0).copy_from(&(to_face * (second * WHOLE_M)));
-        whole.fixed_view_mut::<2, 3>(0, 3).copy_from(&(-to_face * arm.cross_matrix() * (second * reach)));
-        whole.fixed_view_mut::<2, 1>(0, 6).copy_from(&(to_face * arm * (second * reach)));
+        whole
+            .fixed_view_mut::<2, 3>(0, 0)
+            .copy_from(&(to_face * (second * WHOLE_M)));
+        whole
+            .fixed_view_mut::<2, 3>(0, 3)
+            .copy_from(&(-to_face * arm.cross_matrix() * (second * reach)));
+        whole
+            .fixed_view_mut::<2, 1>(0, 6)
+            .copy_from(&(to_face * arm * (second * reach)));
         (own, pose, whole)
     }
 
@@ -126,7 +141,10 @@ impl PoseProblem<'_> {
     pub fn system(&self, stone: &PoseStone, weights: &[f64], factor: f64) -> StoneSystem {
         let sights = &stone.track.sights;
         let count = POSE * sights.len() + WHOLE;
-        let mut columns: Vec<usize> = sights.iter().flat_map(|s| POSE * s.photo..POSE * (s.photo + 1)).collect();
+        let mut columns: Vec<usize> = sights
+            .iter()
+            .flat_map(|s| POSE * s.photo..POSE * (s.photo + 1))
+            .collect();
         columns.extend(POSE * self.centres.len()..self.unknowns());
         let mut system = StoneSystem {
             own: StoneMatrix::zeros(),
@@ -142,7 +160,8 @@ impl PoseProblem<'_> {
             let weight = self.weight(sight, factor) * *w;
             let mut row = DMatrix::zeros(2, count);
             row.view_mut((0, POSE * k), (2, POSE)).copy_from(&pose);
-            row.view_mut((0, POSE * sights.len()), (2, WHOLE)).copy_from(&whole);
+            row.view_mut((0, POSE * sights.len()), (2, WHOLE))
+                .copy_from(&whole);
             system.own += own.transpose() * weight * own;
             system.right += own.transpose() * weight * sight.shift;
             system.cross += own.transpose() * weight * &row;
@@ -154,7 +173,11 @@ impl PoseProblem<'_> {
 
     /// Adjusts the poses; `bias_m`: appearance bias, `None` where the equations cannot be solved. `weights`: start.
     pub fn solve(&self, bias_m: f64, factors: &[f64]) -> Option<Poses> {
-        let mut weights: Vec<Vec<f64>> = self.stones.iter().map(|s| vec![1.0; s.track.sights.len()]).collect();
+        let mut weights: Vec<Vec<f64>> = self
+            .stones
+            .iter()
+            .map(|s| vec![1.0; s.track.sights.len()])
+            .collect();
         let mut trust = vec![1.0; self.stones.len()];
         let mut factor = START_FACTOR;
         let mut found = None;
@@ -179,7 +202,8 @@ impl PoseProblem<'_> {
                 let r2 = spread.try_inverse().map_or(0.0, |i| apart.dot(&(i * apart)));
                 trust[k] = ((FREEDOM + 3.0) / (FREEDOM + r2)).min(1.0);
             }
-            factor = (factor * square / f64::max(redundancy - POSE as f64 * self.centres.len() as f64, 1.0)).max(1.0);
+            factor = (factor * square / f64::max(redundancy - POSE as f64 * self.centres.len() as f64, 1.0))
+                .max(1.0);
             found = Some(Poses {
                 corrections,
                 covariance,
@@ -212,7 +236,9 @@ impl PoseProblem<'_> {
             let mut system = self.system(stone, &weights[k], factor);
             let prior = self.prior(stone, trust[k], bias_m, factors[k]);
             system.add_prior(&prior, &stone.clouds.mean);
-            let Some(own) = system.own.cholesky() else { continue };
+            let Some(own) = system.own.cholesky() else {
+                continue;
+            };
             let reduced = &system.poses - system.cross.transpose() * own.solve(&system.cross);
             let reduced_right = &system.poses_right - system.cross.transpose() * own.solve(&system.right);
             for (r, &row) in system.columns.iter().enumerate() {
@@ -280,11 +306,17 @@ impl StoneSystem {
         let vector = right.fixed_rows::<3>(3) - solved.transpose() * right.fixed_rows::<3>(0);
         let sensitivity = self.cross.rows(3, 3) - solved.transpose() * self.cross.rows(0, 3);
         let count = self.columns.len();
-        let covariance = DMatrix::from_fn(count, count, |r, c| poses.covariance[(self.columns[r], self.columns[c])]);
+        let covariance = DMatrix::from_fn(count, count, |r, c| {
+            poses.covariance[(self.columns[r], self.columns[c])]
+        });
         let spread = &sensitivity * covariance * sensitivity.transpose();
         let inverse = information.try_inverse()?;
         let spread = Matrix3::from_fn(|r, c| spread[(r, c)]);
-        Some((0.5 * (information + information.transpose()), vector, inverse * spread * inverse.transpose()))
+        Some((
+            0.5 * (information + information.transpose()),
+            vector,
+            inverse * spread * inverse.transpose(),
+        ))
     }
 }
 
@@ -316,6 +348,7 @@ mod tests {
                 sights: sights.collect(),
                 place: [0.0; 2],
                 reach: [0.05; 2],
+                area_m2: 0.03,
                 start: FaceMotion {
                     translation: Vector3::zeros(),
                     rotation: Vector3::zeros(),
@@ -328,8 +361,12 @@ mod tests {
     #[test]
     fn poses_and_displacements_are_those_of_dense_least_squares() {
         let turn = FaceFrame::from_normal(&Vector3::x()).face_from_world();
-        let centres: Vec<Point3<f64>> = (0..5).map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3))).collect();
-        let places: Vec<Point3<f64>> = (0..9).map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3))).collect();
+        let centres: Vec<Point3<f64>> = (0..5)
+            .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
+            .collect();
+        let places: Vec<Point3<f64>> = (0..9)
+            .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
+            .collect();
         let tracks = tracks(&centres, &places, &turn);
         let clouds = CloudMotion {
             mean: Vector3::new(1e-3, 2e-3, -1e-3),
@@ -401,7 +438,10 @@ mod tests {
         let prior = (clouds.covariance + bias).try_inverse().unwrap();
         let joined = (information + prior).try_inverse().unwrap() * (vector + prior * clouds.mean);
         let expected = solution.fixed_rows::<3>(count + STONE * 4 + 3);
-        assert!((joined - expected).norm() < 1e-6 * expected.norm(), "{joined} {expected}");
+        assert!(
+            (joined - expected).norm() < 1e-6 * expected.norm(),
+            "{joined} {expected}"
+        );
         assert!(common.symmetric_eigenvalues().min() > -1e-12 * common.trace());
     }
 }

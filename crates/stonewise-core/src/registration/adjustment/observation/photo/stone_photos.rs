@@ -47,7 +47,11 @@ impl StonePhotos {
         let inverse = root * factor.inverse() * root;
         let information = self.information - self.information * inverse * self.information;
         let vector = self.vector - self.information * (inverse * self.vector);
-        (0.5 * (information + information.transpose()), vector, factor.determinant().ln())
+        (
+            0.5 * (information + information.transpose()),
+            vector,
+            factor.determinant().ln(),
+        )
     }
 
     /// The most likely displacement of the place.
@@ -121,6 +125,9 @@ mod tests {
         };
         let difference = value(1e-3) - value(3e-4);
         let expected = density(1e-3) - density(3e-4);
-        assert!((difference - expected).abs() < 1e-5 * expected.abs().max(1.0), "{difference} {expected}");
+        assert!(
+            (difference - expected).abs() < 1e-5 * expected.abs().max(1.0),
+            "{difference} {expected}"
+        );
     }
 }
