@@ -18,6 +18,7 @@ use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
 use stonewise_core::registration::observers::EpochErrorParams;
+use stonewise_core::registration::photos::PhotoParams;
 use stonewise_core::registration::{AdjustmentParams, GicpParams};
 use stonewise_core::transfer::{StoneParams, TransferParams};
 use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
@@ -195,6 +196,8 @@ pub struct RegistrationParams {
     /// Parameters of the adjustment of all stones together.
     #[serde(alias = "network")]
     pub adjustment: AdjustmentParams,
+    /// Stones tracked from photo to photo, as part of the adjustment.
+    pub photos: PhotoParams,
     /// Parameters of plane-to-plane ICP.
     pub gicp: GicpParams,
     /// How the errors of stations, strips and whole epochs are found.
@@ -210,6 +213,7 @@ impl Default for RegistrationParams {
             auto_stable: false,
             border_noises: 3.0,
             adjustment: AdjustmentParams::default(),
+            photos: PhotoParams::default(),
             gicp: GicpParams::default(),
             observers: EpochErrorParams::default(),
         }

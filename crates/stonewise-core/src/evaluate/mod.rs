@@ -14,6 +14,7 @@ mod motion_field;
 mod moved_tiles;
 mod sample;
 mod score;
+mod seen_before_motion;
 mod statistics;
 
 pub use calibration::{Calibration, Coverage};
@@ -31,4 +32,5 @@ pub use motion_field::{MotionField, MotionFieldError};
 pub use moved_tiles::MovedTiles;
 pub use sample::{EvaluationParams, EvaluationParamsError, MotionSample, StoneOutcome};
 pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};
+pub use seen_before_motion::SeenBeforeMotion;
 pub use statistics::ErrorStatistics;

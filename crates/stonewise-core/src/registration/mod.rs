@@ -7,9 +7,13 @@ pub(crate) mod adjustment;
 mod gicp;
 mod moved;
 pub mod observers;
+pub mod photos;
 pub(crate) mod points;
 
-pub use adjustment::{AdjustError, AdjustmentParams, AdjustmentReport, Break, VarianceComponents, adjust};
+pub use adjustment::{
+    AdjustError, AdjustmentParams, AdjustmentReport, Break, PhotoReport, StonePhotoReport,
+    VarianceComponents, adjust, adjust_with_photos,
+};
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;
 pub use points::{

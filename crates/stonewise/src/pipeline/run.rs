@@ -231,13 +231,13 @@ pub(super) struct Measured {
 /// Measures the matched stones of a later epoch; the outlines are written.
 pub(super) fn measured(
     context: &Context,
-    first: &Labelled,
-    second: &Labelled,
+    photos: [&Segmented; 2],
+    [first, second]: [&Labelled; 2],
     matched: &Matched,
     facade: &Facade,
     number: usize,
 ) -> Result<Measured> {
-    let registered = register(context, first, second, matched, number)?;
+    let registered = register(context, photos, [first, second], matched, number)?;
     let common = motion_in_common(first, &registered);
     let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
     let rows = stone_rows([first, second], matched, &registered, &datum, facade);
@@ -248,15 +248,30 @@ pub(super) fn measured(
     })
 }
 
-/// All epochs with their stones, as a person corrected them, and what the corrections did.
-pub(super) fn corrected(context: &Context) -> Result<(Vec<Labelled>, Option<Edited>)> {
+/// All epochs.
+pub(super) struct Corrected {
+    /// Their photos.
+    pub photos: Vec<Segmented>,
+    /// Their stones, as a person corrected them.
+    pub labelled: Vec<Labelled>,
+    /// What the corrections did.
+    pub edited: Option<Edited>,
+}
+
+/// All epochs with their stones, as a person corrected them.
+pub(super) fn corrected(context: &Context) -> Result<Corrected> {
     let epochs = 1..=context.project.epochs.len();
     let photos = epochs
         .clone()
         .map(|n| segment(context, n))
         .collect::<Result<Vec<_>>>()?;
     let labelled = epochs.map(|n| labelled(context, n)).collect::<Result<Vec<_>>>()?;
-    edit(context, &photos, labelled)
+    let (labelled, edited) = edit(context, &photos, labelled)?;
+    Ok(Corrected {
+        photos,
+        labelled,
+        edited,
+    })
 }
 
 /// Writes the outlines of the first epoch's stones; where each stone lies on the unrolled wall.
@@ -296,7 +311,14 @@ fn measure(
         registered,
         datum,
         rows,
-    } = measured(context, first, second, &matched, facade, number)?;
+    } = measured(
+        context,
+        [&photos[0], &photos[number - 1]],
+        [first, second],
+        &matched,
+        facade,
+        number,
+    )?;
     if datum.state == DatumState::Unknown {
         let epoch = &context.project.epochs[number - 1].name;
         context.warnings.notice("register", epoch, &datum.note);

@@ -89,11 +89,13 @@ pub(crate) fn registration_record() -> RegistrationRecord {
             error_m: 5e-4,
             own_rad: 2e-3,
             bending_per_m: 0.01,
+            appearance_m: None,
         },
         common_motion_m: [0.001, 0.0, -0.002],
         common_motion_covariance_m2: [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]],
         loose: 1,
         breaks: Vec::new(),
+        photos: None,
     };
     RegistrationRecord {
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),

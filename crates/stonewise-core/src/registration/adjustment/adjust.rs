@@ -7,6 +7,7 @@ use super::solution::Solution;
 use super::state::Adjustment;
 use super::survey::survey;
 use crate::progress::Progress;
+use crate::registration::photos::PhotoSource;
 use crate::registration::points::PairSource;
 
 /// Iterations of the alignment: the first two bring stones within reach of their relief, the others let noise
@@ -39,6 +40,20 @@ pub fn adjust<S: PairSource>(
     params: &AdjustmentParams,
     progress: &dyn Progress,
 ) -> Result<AdjustmentReport, AdjustError<S::Error>> {
+    adjust_with_photos(source, None, params, progress)
+}
+
+/// The same with photos, where there are any: once the clouds have brought the stones about where they are, each is tracked from photo
+/// to photo, and what the photos show joins what the points show.
+///
+/// # Errors
+/// As [`adjust`], and where parts of photos cannot be read.
+pub fn adjust_with_photos<S: PairSource>(
+    source: &S,
+    photos: Option<&dyn PhotoSource<S::Error>>,
+    params: &AdjustmentParams,
+    progress: &dyn Progress,
+) -> Result<AdjustmentReport, AdjustError<S::Error>> {
     let survey = survey(source, params)?;
     let stones = survey.stones.len();
     let adjustment = Adjustment::new(survey, params).ok_or(AdjustError::Unsolvable { stones })?;
@@ -54,6 +69,9 @@ pub fn adjust<S: PairSource>(
     if !settled {
         run.align()?;
         run.probe()?;
+        if let Some(photos) = photos {
+            run.adjustment.track(source, photos, progress)?;
+        }
         loop {
             run.estimate_variance_components()?;
             settled = run.settle()?;
@@ -116,6 +134,7 @@ impl<S: PairSource> Run<'_, S> {
                 break;
             }
             self.adjustment.evaluate(self.source, self.progress)?;
+            self.adjustment.update_photos();
             if COMPONENTS_IN.contains(&round) {
                 self.adjustment.estimate_components();
             }

@@ -40,6 +40,17 @@ impl Adjustment {
 
     /// The sum over all types of observation of a stone at one of its motions.
     fn observed(&self, i: usize, candidate: &CandidateMotion, error_m: f64) -> NormalEquations {
+        let mut sum = self.observed_by_clouds(i, candidate, error_m);
+        if self.stones[i].info.usable
+            && let Some(photos) = self.photos.as_ref().and_then(|p| p.stone(i))
+        {
+            sum += photos.normal_equations(&self.common_in(i), self.components.appearance_m());
+        }
+        sum
+    }
+
+    /// What a stone's own points say at one of its motions.
+    pub fn observed_by_clouds(&self, i: usize, candidate: &CandidateMotion, error_m: f64) -> NormalEquations {
         let stone = &self.stones[i];
         let mut sum = NormalEquations::nothing();
         if stone.info.usable {

@@ -21,8 +21,10 @@ mod state;
 mod step;
 pub(crate) mod stone_vector;
 mod survey;
+mod tracking;
 
-pub use adjust::adjust;
+pub use adjust::{adjust, adjust_with_photos};
 pub use error::AdjustError;
 pub use field::VarianceComponents;
+pub use observation::photo::{PhotoReport, StonePhotoReport};
 pub use params::{AdjustmentParams, AdjustmentReport, Break};

@@ -57,6 +57,7 @@ pub(crate) fn report(
         iterations,
         converged,
         breaks,
+        photos: adjustment.photo_report(),
     }
 }
 
@@ -157,6 +158,8 @@ fn motion(
     for (k, variance) in shared.iter().enumerate() {
         local[(k, k)] += variance;
     }
+    let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
+    of_poses += adjustment.pose_covariance(i);
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];
     let common = adjustment.common_in(i).translation();

@@ -1,6 +1,7 @@
 //! Parameters and results of the adjustment.
 
 use super::field::VarianceComponents;
+use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
 use crate::stone::PairResult;
 use nalgebra::{Matrix3, Vector3};
@@ -109,6 +110,8 @@ pub struct AdjustmentReport {
     pub loose: usize,
     /// Neighbours between which the field broke.
     pub breaks: Vec<Break>,
+    /// What photos contributed, where they took part.
+    pub photos: Option<PhotoReport>,
 }
 
 /// Two neighbouring stones between which the field of motion is broken.

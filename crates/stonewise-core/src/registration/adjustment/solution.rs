@@ -2,8 +2,8 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Field, FieldProblem, FieldStone, estimate_components, find_crack, posterior, probabilities_with_field,
-    reweight_ties, solve,
+    Field, FieldProblem, FieldStone, PhotoTerms, estimate_components, find_crack, posterior,
+    probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
@@ -26,8 +26,19 @@ pub(crate) struct Solution {
 impl Adjustment {
     /// Estimates the variance components from the stones' equations; from parts of large walls.
     pub fn estimate_components(&mut self) {
-        let equations = self.equations_with_field(0.0);
-        let problem = self.problem(equations.iter());
+        let equations = match &self.photos {
+            None => self.equations_with_field(0.0),
+            Some(_) => self.cloud_equations(0.0),
+        };
+        let mut problem = self.problem(equations.iter());
+        problem.photos = self.photos.as_ref().map(|photos| PhotoTerms {
+            stones: (0..self.stones.len())
+                .map(|i| {
+                    let is_usable = self.stones[i].info.usable;
+                    (photos.stone(i).filter(|_| is_usable), self.common_in(i))
+                })
+                .collect(),
+        });
         self.components = match &self.subgraph {
             None => estimate_components(&problem),
             Some(part) => estimate_components(&part.restrict(&problem)),
@@ -84,6 +95,7 @@ impl Adjustment {
             ties: self.ties.clone(),
             components: self.components,
             loose: self.loose,
+            photos: None,
         }
     }
 

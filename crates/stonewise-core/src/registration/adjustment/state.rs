@@ -3,6 +3,7 @@
 use super::candidate::CandidateMotion;
 use super::field::{Crack, Graph, LoosePrior, Place, Subgraph, Tie, VarianceComponents};
 use super::hypothesis::LikelihoodRatio;
+use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
 use super::params::AdjustmentParams;
 use super::stone_vector::StoneVector;
@@ -27,6 +28,8 @@ pub(crate) struct Adjustment {
     /// Common translation about which the field is solved, world.
     pub common: Vector3<f64>,
     pub surface: SurfaceModel,
+    /// What photos show of the stones, where they are used.
+    pub photos: Option<PhotoModel>,
     /// Pairs kept in memory for the noise estimate, with their index.
     pub sample: Vec<(usize, PairPoints)>,
     /// The stones of each batch.
@@ -79,6 +82,7 @@ impl Adjustment {
             cracks: Vec::new(),
             common: component_median(&start),
             surface: SurfaceModel::start(layout),
+            photos: None,
             sample: survey.sample,
             batches: survey.batches,
             params: params.clone(),

@@ -81,8 +81,9 @@ impl Adjustment {
             &self.components.own_variances(),
         );
         // What counts as an error might be a motion after all.
+        let slide_m = self.undetected_slide_m(i);
         for k in 0..2 {
-            tied.covariance[(k, k)] += self.components.error_m * self.components.error_m;
+            tied.covariance[(k, k)] += slide_m * slide_m;
         }
         let Some(own) = &equations.on_own else {
             return Estimate {

@@ -12,7 +12,9 @@ use crate::pipeline::context::Context;
 use crate::pipeline::look::look;
 use crate::pipeline::outputs::clouds::write_clouds;
 use crate::pipeline::outputs::outlines::write_stone_outlines;
-use crate::pipeline::run::{Until, check_overlap, corrected, labelled, matched, measured, outlined, run_in};
+use crate::pipeline::run::{
+    Corrected, Until, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
+};
 use crate::pipeline::steps::ingest::ingest;
 use crate::pipeline::steps::label::gather_labels;
 use crate::pipeline::steps::label_batch::LabelBatches;
@@ -115,15 +117,22 @@ fn do_stage(context: &Context, unit: &Unit, forced: bool) -> Result<Option<Summa
         Stage::Segment => segment(context, epoch).map(drop)?,
         Stage::LabelPrepare | Stage::LabelTiles | Stage::Label => labels(context, epoch, unit)?,
         Stage::Stones => labelled(context, epoch).map(drop)?,
-        Stage::Outlines => write_stone_outlines(context, &corrected(context)?.0[0])?,
+        Stage::Outlines => write_stone_outlines(context, &corrected(context)?.labelled[0])?,
         Stage::Match => pair(context, epoch)?,
         Stage::Offsets | Stage::Register => {
-            let (labelled, _) = corrected(context)?;
+            let Corrected { photos, labelled, .. } = corrected(context)?;
             let (first, second) = (&labelled[0], &labelled[epoch - 1]);
             let matched = matched(context, first, second, epoch)?;
             match unit.stage {
                 Stage::Offsets => label_offsets(context, first, second, &matched, epoch).map(drop)?,
-                _ => register(context, first, second, &matched, epoch).map(drop)?,
+                _ => register(
+                    context,
+                    [&photos[0], &photos[epoch - 1]],
+                    [first, second],
+                    &matched,
+                    epoch,
+                )
+                .map(drop)?,
             }
         }
         Stage::M3c2Tiles | Stage::M3c2 => compare(context, epoch, unit)?,
@@ -148,7 +157,7 @@ fn labels(context: &Context, epoch: usize, unit: &Unit) -> Result<()> {
 }
 
 fn pair(context: &Context, epoch: usize) -> Result<()> {
-    let (labelled, _) = corrected(context)?;
+    let Corrected { labelled, .. } = corrected(context)?;
     let (first, second) = (&labelled[0], &labelled[epoch - 1]);
     check_overlap(context, &[(&first.ingested, 1), (&second.ingested, epoch)])?;
     matched(context, first, second, epoch).map(drop)
@@ -167,13 +176,24 @@ fn compare(context: &Context, epoch: usize, unit: &Unit) -> Result<()> {
 }
 
 fn clouds(context: &Context, epoch: usize) -> Result<()> {
-    let (labelled, edited) = corrected(context)?;
+    let Corrected {
+        photos,
+        labelled,
+        edited,
+    } = corrected(context)?;
     let own = &labelled[epoch - 1];
     if epoch > 1 {
         return write_clouds(context, epoch, own, None);
     }
     let (_, facade) = outlined(context, own, edited)?;
     let matched = matched(context, own, &labelled[1], 2)?;
-    let measured = measured(context, own, &labelled[1], &matched, &facade, 2)?;
+    let measured = measured(
+        context,
+        [&photos[0], &photos[1]],
+        [own, &labelled[1]],
+        &matched,
+        &facade,
+        2,
+    )?;
     write_clouds(context, epoch, own, Some(&measured.rows))
 }

@@ -7,7 +7,9 @@ mod timestamp;
 mod verdict;
 
 pub use datum::{Datum, DatumState, SourceError};
-pub use registration::{AdjustmentRecord, EstimatorRecord, GicpRecord, ObserversRecord, RegistrationRecord};
+pub use registration::{
+    AdjustmentRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord, RegistrationRecord,
+};
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
 pub use verdict::{

@@ -2,8 +2,11 @@
 
 use super::Datum;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use stonewise_core::registration::observers::{EpochErrors, ObserverComponents, SensorClass};
-use stonewise_core::registration::{Break, VarianceComponents};
+use stonewise_core::registration::photos::PhotoStatus;
+use stonewise_core::registration::{AdjustmentReport, Break, StonePhotoReport, VarianceComponents};
+use stonewise_core::stone::PairResult;
 
 /// What is known about the motions of one pair of epochs as a whole.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -87,6 +90,59 @@ pub struct AdjustmentRecord {
     pub loose: usize,
     /// Neighbours between which the field of motion broke.
     pub breaks: Vec<Break>,
+    /// What photos contributed; absent where they took no part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photos: Option<PhotosRecord>,
+}
+
+/// What photos contributed to the adjustment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PhotosRecord {
+    /// How many stones have which status.
+    pub statuses: BTreeMap<PhotoStatus, usize>,
+    /// Factor on the formal standard deviations of matches, from their residuals.
+    pub sigma_factor: f64,
+    /// Standard deviation of a stone's appearance bias between the epochs, metres.
+    pub appearance_m: f64,
+    /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
+    pub poses_px: Vec<(String, f64)>,
+    /// Each stone of the first epoch, ascending.
+    pub stones: Vec<StoneInPhotosRecord>,
+}
+
+/// What the photos say of one stone.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoneInPhotosRecord {
+    /// Stone of the first epoch.
+    pub stone_id: u32,
+    /// What the photos say.
+    #[serde(flatten)]
+    pub photos: StonePhotoReport,
+}
+
+impl PhotosRecord {
+    /// From what the adjustment says; `None` where photos took no part.
+    pub fn of(report: &AdjustmentReport) -> Option<Self> {
+        let photos = report.photos.as_ref()?;
+        let mut statuses = BTreeMap::new();
+        for stone in &photos.stones {
+            *statuses.entry(stone.status).or_default() += 1;
+        }
+        let of_stone = |(pair, photos): (&PairResult, &StonePhotoReport)| StoneInPhotosRecord {
+            stone_id: pair.first.0,
+            photos: *photos,
+        };
+        let stones = report.results.iter().zip(&photos.stones).map(of_stone);
+        let mut stones: Vec<StoneInPhotosRecord> = stones.collect();
+        stones.sort_by_key(|s| s.stone_id);
+        Some(Self {
+            statuses,
+            sigma_factor: photos.sigma_factor,
+            appearance_m: photos.appearance_m,
+            poses_px: photos.poses_px.clone(),
+            stones,
+        })
+    }
 }
 
 /// Plane-to-plane ICP of every stone.

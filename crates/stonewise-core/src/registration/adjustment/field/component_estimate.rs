@@ -32,14 +32,15 @@ const UNSOLVABLE: f64 = f64::MAX / 1e6;
 /// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 21
 /// factorisations.
 pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents {
+    let count = problem.components.count();
     let value = |log: &[f64; COUNT]| {
-        let components = VarianceComponents::from_log(*log);
+        let components = VarianceComponents::from_log(*log, count);
         deviance(problem, &components).map_or(UNSOLVABLE, |d| d + components.penalty())
     };
     let mut log = clamp(problem.components.to_log());
     for _ in 0..STEPS {
         let mut probes = vec![log];
-        for k in 0..COUNT {
+        for k in 0..count {
             for sign in [-1.0, 1.0] {
                 let mut l = log;
                 l[k] += sign * WIDTH;
@@ -47,7 +48,7 @@ pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents 
             }
         }
         let values: Vec<f64> = probes.par_iter().map(value).collect();
-        let step = newton_step(&values);
+        let step = newton_step(&values, count);
         let candidates = STEP_SHARES.map(|share| clamp(std::array::from_fn(|k| log[k] + share * step[k])));
         let trial: Vec<f64> = candidates.par_iter().map(value).collect();
         let best = (0..trial.len())
@@ -58,12 +59,15 @@ pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents 
         }
         log = candidates[best];
     }
-    VarianceComponents::from_log(log)
+    VarianceComponents::from_log(log, count)
 }
 
-/// `values`: here, then below and above in each logarithm.
-fn newton_step(values: &[f64]) -> [f64; COUNT] {
+/// `values`: here, then below and above in each logarithm that counts.
+fn newton_step(values: &[f64], count: usize) -> [f64; COUNT] {
     std::array::from_fn(|k| {
+        if k >= count {
+            return 0.0;
+        }
         let (below, above) = (values[1 + 2 * k], values[2 + 2 * k]);
         let curvature = below + above - 2.0 * values[0];
         let slope = 0.5 * (below - above);
@@ -90,9 +94,22 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
         components.own_variances(),
         problem.loose.own_variances(components),
     ];
-    let own = own.map(|own| components.with_error(own));
-    let normal = assemble(problem, prior, eliminate_own_motions(problem, &own))?;
-    let (mut quadratic, mut evidence) = (0.0, 0.0);
+    let (eliminated, mut evidence) = match &problem.photos {
+        None => {
+            let own = own.map(|own| components.with_error(own));
+            (eliminate_own_motions(problem, &own), 0.0)
+        }
+        Some(photos) => {
+            let joined = photos.join(problem, components);
+            let constant = joined.iter().map(|e| e.constant).sum();
+            (
+                eliminate_own_motions(&problem.with_equations(&joined), &own),
+                constant,
+            )
+        }
+    };
+    let normal = assemble(problem, prior, eliminated)?;
+    let mut quadratic = 0.0;
     for ((state, stone), node) in normal
         .state
         .iter()
@@ -109,10 +126,12 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
 mod tests {
     use super::*;
     use crate::linalg::BlockMatrix;
+    use crate::registration::adjustment::field::PhotoTerms;
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::observation::NormalEquations;
-    use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
-    use nalgebra::{DMatrix, DVector};
+    use crate::registration::adjustment::observation::photo::StonePhotos;
+    use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
+    use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
@@ -175,6 +194,91 @@ mod tests {
         let expected = by_definition(&other) - by_definition(&start);
         assert!(
             (difference - expected).abs() < 1e-5 * expected.abs(),
+            "{difference} {expected}"
+        );
+    }
+
+    #[test]
+    fn the_deviance_with_photos_is_that_of_both_observations() {
+        let mut wall = SmallWall::new(3, 2, 4);
+        // Without correlation between the face and what is across it an error in the face is plainly an error there.
+        for equations in &mut wall.equations {
+            for (r, c) in (0..9).flat_map(|r| (0..9).map(move |c| (r, c))) {
+                if [0, 1, 5].contains(&r) != [0, 1, 5].contains(&c) {
+                    equations.information[(r, c)] = 0.0;
+                }
+            }
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let photos: Vec<StonePhotos> = (0..6)
+            .map(|k| {
+                let m = Matrix3::from_fn(|_, _| rng.random_range(-1.0..1.0));
+                let information = (m * m.transpose() + Matrix3::identity()) * 1e6;
+                StonePhotos {
+                    information,
+                    vector: information * Vector3::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
+                    place: [0.01 * f64::from(k), -0.02],
+                    bias_factor: 1.0 + 0.2 * f64::from(k),
+                    common: Matrix3::zeros(),
+                }
+            })
+            .collect();
+        let origin = StoneVector::zeros();
+        let mut problem = wall.problem(1.0);
+        problem.photos = Some(PhotoTerms {
+            stones: photos.iter().map(|p| (Some(p), origin)).collect(),
+        });
+        let (n, a) = (problem.stones.len(), frames(&problem));
+        let start = VarianceComponents {
+            appearance_m: Some(7e-4),
+            ..VarianceComponents::start()
+        };
+        let other = VarianceComponents {
+            error_m: 2e-4,
+            appearance_m: Some(2e-4),
+            ..start
+        };
+        let by_definition = |components: &VarianceComponents| {
+            let field = dense(&prior(problem.graph, components, &problem.ties), &problem);
+            let mut motion = &a * field.try_inverse().unwrap() * a.transpose();
+            let mut observe = DMatrix::<f64>::zeros(12 * n, 9 * n);
+            let mut noise = DMatrix::<f64>::zeros(12 * n, 12 * n);
+            let mut observed = DVector::<f64>::zeros(12 * n);
+            let clouds_own = components.with_error([0.0; 9]);
+            for (i, (stone, photos)) in problem.stones.iter().zip(&photos).enumerate() {
+                let mut block = motion.view_mut((9 * i, 9 * i), (9, 9));
+                block += Matrix9::from_diagonal(&Vector9::from(components.own_variances()));
+                observe.view_mut((12 * i, 9 * i), (9, 9)).fill_with_identity();
+                observe
+                    .view_mut((12 * i + 9, 9 * i), (3, 9))
+                    .copy_from(&StonePhotos::lever(photos.place));
+                let of_clouds = stone.equations.information.try_inverse().unwrap();
+                observed
+                    .rows_mut(12 * i, 9)
+                    .copy_from(&(of_clouds * stone.equations.vector));
+                let error = Matrix9::from_diagonal(&Vector9::from(clouds_own));
+                noise
+                    .view_mut((12 * i, 12 * i), (9, 9))
+                    .copy_from(&(of_clouds + error));
+                let of_photos = photos.information.try_inverse().unwrap();
+                observed
+                    .rows_mut(12 * i + 9, 3)
+                    .copy_from(&(of_photos * photos.vector));
+                let bias = components.appearance_m().powi(2) * photos.bias_factor;
+                let bias = Matrix3::from_diagonal(&Vector3::new(bias, bias, 0.0));
+                noise
+                    .view_mut((12 * i + 9, 12 * i + 9), (3, 3))
+                    .copy_from(&(of_photos + bias));
+            }
+            let covariance = &observe * motion * observe.transpose() + noise;
+            let factor = covariance.cholesky().unwrap();
+            let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+            log_det + observed.dot(&factor.solve(&observed))
+        };
+        let difference = deviance(&problem, &other).unwrap() - deviance(&problem, &start).unwrap();
+        let expected = by_definition(&other) - by_definition(&start);
+        assert!(
+            (difference - expected).abs() < 1e-4 * expected.abs(),
             "{difference} {expected}"
         );
     }

@@ -20,13 +20,14 @@ mod variance_components;
 
 pub(crate) use component_estimate::estimate_components;
 pub(crate) use cracks::{Crack, find_crack};
-pub(crate) use graph::{Edge, Graph, Place};
+pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::LoosePrior;
 pub(crate) use mixture::probabilities_with_field;
 pub(crate) use posterior::{Posterior, posterior};
 pub(crate) use prior::Tie;
-pub(crate) use problem::{FieldProblem, FieldStone};
+pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
 pub(crate) use solve::{Field, solve};
 pub(crate) use subgraph::Subgraph;
 pub(crate) use ties::reweight_ties;
+pub(crate) use variance_components::START_APPEARANCE_M;
 pub use variance_components::VarianceComponents;

@@ -1,7 +1,7 @@
 //! Parts of a large wall that stand for the whole where the whole would cost too much.
 
 use super::graph::{Edge, Graph};
-use super::problem::FieldProblem;
+use super::problem::{FieldProblem, PhotoTerms};
 use std::collections::{BTreeSet, VecDeque};
 
 /// Walls up to this number of stones are used whole: below it an estimate of the variance components costs
@@ -57,6 +57,9 @@ impl Subgraph {
             ties: self.edges.iter().map(|&e| whole.ties[e]).collect(),
             components: whole.components,
             loose: whole.loose,
+            photos: whole.photos.as_ref().map(|photos| PhotoTerms {
+                stones: self.stones.iter().map(|&i| photos.stones[i]).collect(),
+            }),
         }
     }
 }

@@ -68,6 +68,7 @@ impl SmallWall {
             ties: vec![Tie::WHOLE; self.graph.edges.len()],
             components: VarianceComponents::start(),
             loose: LOOSE,
+            photos: None,
         }
     }
 }

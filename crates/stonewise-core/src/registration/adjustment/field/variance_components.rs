@@ -21,6 +21,10 @@ pub struct VarianceComponents {
     pub own_rad: f64,
     /// Bending of a stone's face, 1/m.
     pub bending_per_m: f64,
+    /// Appearance bias of a stone between the epochs in the photos, metres, along each axis of the face: light, moisture and moss move
+    /// what all photos of an epoch show alike. Absent where photos take no part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub appearance_m: Option<f64>,
 }
 
 /// Minus twice the log of the probability, one in a hundred, with which a component exceeds its rare size.
@@ -31,8 +35,10 @@ const RARE_M: f64 = 5e-4;
 /// The same for rotations, radians: half a millimetre at the edge of a stone of 20 cm.
 const RARE_RAD: f64 = 5e-3;
 
-/// Number of components.
-pub(crate) const COUNT: usize = 8;
+/// Number of components; the last one counts where photos take part.
+pub(crate) const COUNT: usize = 9;
+/// Appearance bias before it is estimated, metres: a fifth of a pixel.
+pub(crate) const START_APPEARANCE_M: f64 = 7e-4;
 
 impl VarianceComponents {
     /// A moderate start, neighbours about a millimetre apart: from a stiff one, fields that bend end as loose
@@ -45,7 +51,18 @@ impl VarianceComponents {
             error_m: 5e-4,
             own_rad: 2e-3,
             bending_per_m: 0.01,
+            appearance_m: None,
         }
+    }
+
+    /// Appearance bias in the photos, metres; zero where they take no part.
+    pub(crate) fn appearance_m(&self) -> f64 {
+        self.appearance_m.unwrap_or(0.0)
+    }
+
+    /// How many components count.
+    pub(crate) fn count(&self) -> usize {
+        COUNT - usize::from(self.appearance_m.is_none())
     }
 
     pub(crate) fn to_log(self) -> [f64; COUNT] {
@@ -58,11 +75,13 @@ impl VarianceComponents {
             self.own_m,
             self.own_rad,
             self.bending_per_m,
+            self.appearance_m.unwrap_or(START_APPEARANCE_M),
         ]
         .map(f64::ln)
     }
 
-    pub(crate) fn from_log(log: [f64; COUNT]) -> Self {
+    /// `count`: how many of them count.
+    pub(crate) fn from_log(log: [f64; COUNT], count: usize) -> Self {
         let v = log.map(f64::exp);
         Self {
             drift: [v[0], v[1]],
@@ -71,6 +90,7 @@ impl VarianceComponents {
             own_m: v[5],
             own_rad: v[6],
             bending_per_m: v[7],
+            appearance_m: (count == COUNT).then_some(v[8]),
         }
     }
 
@@ -108,6 +128,7 @@ pub(crate) const BOUNDS: [[f64; 2]; COUNT] = [
     [NONE_M, 6e-3],
     [1e-5, 1.5e-2],
     [1e-4, 0.5],
+    [1e-4, 6e-3],
 ];
 
 #[cfg(test)]
@@ -118,7 +139,7 @@ mod tests {
     fn logarithms_go_there_and_back_and_lie_within_their_bounds() {
         let start = VarianceComponents::start();
         let log = start.to_log();
-        let back = VarianceComponents::from_log(log).to_log();
+        let back = VarianceComponents::from_log(log, COUNT).to_log();
         for k in 0..COUNT {
             assert!((back[k] - log[k]).abs() < 1e-12);
             assert!(log[k] > BOUNDS[k][0].ln() && log[k] < BOUNDS[k][1].ln(), "{k}");

@@ -2,6 +2,7 @@
 //! equations.
 
 mod normal_equations;
+pub(crate) mod photo;
 pub(crate) mod surface;
 
 pub(crate) use normal_equations::NormalEquations;

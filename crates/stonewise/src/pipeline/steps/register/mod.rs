@@ -3,21 +3,24 @@
 mod datum;
 mod off_wall;
 mod pairs;
+mod photos;
 mod sights;
 mod windows;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
+use crate::pipeline::steps::segment::Segmented;
 use crate::pipeline::storage::step::Key;
 use crate::project::Estimator;
-use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord};
+use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord, PhotosRecord};
 pub use datum::datum;
 use nalgebra::Point3;
 use off_wall::OffWall;
 use pairs::DiskPairs;
+use photos::DiskPhotos;
 use serde::{Deserialize, Serialize};
 use sights::Sights;
 use std::collections::BTreeMap;
@@ -25,7 +28,8 @@ use stonewise_core::id::StoneId;
 use stonewise_core::registration::observers::{
     self, EpochErrorParams, EpochErrors, EpochPair, ErrorAt, epoch_errors,
 };
-use stonewise_core::registration::{AdjustmentReport, adjust};
+use stonewise_core::registration::photos::PhotoSource;
+use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 use windows::align_windows;
 
@@ -51,14 +55,20 @@ pub struct Registered {
 /// Measures the motion of every matched stone.
 pub fn register(
     context: &Context,
-    first: &Labelled,
-    second: &Labelled,
+    photos: [&Segmented; 2],
+    [first, second]: [&Labelled; 2],
     matched: &Matched,
     number: usize,
 ) -> Result<Registered> {
     let params = &context.project.settings.registration;
     // The pairs themselves, not how they were found: other parameters of the matching that find the same pairs cost nothing.
     let matches = matched.pairs();
+    let mut inputs = vec![first.key.as_str().to_owned(), second.key.as_str().to_owned()];
+    if params.photos.enabled {
+        for photo in photos.iter().flat_map(|epoch| &epoch.photos) {
+            inputs.push(context.digest(&photo.path)?);
+        }
+    }
     let key = Key::new(
         STEP,
         &(
@@ -66,9 +76,9 @@ pub fn register(
             &matches,
             context.project.epochs[number - 1].same_survey_as,
         ),
-        &[first.key.as_str(), second.key.as_str()],
+        &inputs.iter().map(String::as_str).collect::<Vec<_>>(),
     );
-    let step = context.step(&format!("{STEP}-{number}"), key, |step, _| {
+    let step = context.step(&format!("{STEP}-{number}"), key, |step, warnings| {
         let mut registered = match params.estimator {
             Estimator::Adjustment => {
                 let pairs = DiskPairs::gather(
@@ -79,7 +89,12 @@ pub fn register(
                     step,
                     context.progress,
                 )?;
-                let report = adjust(&pairs, &params.adjustment, context.progress)?;
+                let photos = match params.photos.enabled {
+                    true => DiskPhotos::gather(context, photos, [first, second], &pairs, step, warnings)?,
+                    false => None,
+                };
+                let photos = photos.as_ref().map(|p| p as &dyn PhotoSource<Error>);
+                let report = adjust_with_photos(&pairs, photos, &params.adjustment, context.progress)?;
                 pairs.remove()?;
                 of_adjustment(report)
             }
@@ -234,6 +249,7 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
 }
 
 fn of_adjustment(mut report: AdjustmentReport) -> Registered {
+    let photos = PhotosRecord::of(&report);
     report.results.sort_by_key(|r| r.first);
     let finite = |v: f64| v.is_finite().then_some(v);
     let c = report.common_covariance;
@@ -249,6 +265,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
         common_motion_covariance_m2: std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)])),
         loose: report.loose,
         breaks: report.breaks,
+        photos,
     };
     Registered {
         results: report.results,

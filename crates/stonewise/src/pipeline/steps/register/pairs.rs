@@ -77,6 +77,11 @@ impl DiskPairs {
         Ok(pairs)
     }
 
+    /// How the stones around each pair of a batch moved, metres.
+    pub fn shifts(&self, batch: usize) -> Vec<Vector3<f64>> {
+        self.batches[batch].iter().map(|p| p.shift).collect()
+    }
+
     /// Removes the files: once the motions are known nobody needs them.
     pub fn remove(self) -> Result<()> {
         (0..self.batches.len()).try_for_each(|batch| {

@@ -22,25 +22,38 @@ const RIDGE: f64 = 1e-12;
 /// With A, B, D the blocks of the information (in the face, both, across), S = A - B D^-1 B' is what is known
 /// of the motion in the face alone; the log likelihood is its quadratic form plus one that depends on the
 /// others given it. S becomes (factor S^-1 + E)^-1, E the covariance of the error.
-pub(crate) fn discounted(mut equations: NormalEquations, factor: f64, error_m: f64) -> NormalEquations {
+pub(crate) fn discounted(equations: NormalEquations, factor: f64, error_m: f64) -> NormalEquations {
+    with_log_det(equations, factor, error_m).0
+}
+
+/// The same for an error alone, as a log likelihood in the error too: the constant holds the log determinant by which the
+/// density of the optimum spreads.
+pub(crate) fn with_error_likelihood(equations: NormalEquations, error_m: f64) -> NormalEquations {
+    let (mut equations, log_det) = with_log_det(equations, 1.0, error_m);
+    equations.constant -= 0.5 * log_det;
+    equations
+}
+
+/// The discounted equations, and the log determinant of the covariance with the error over that without.
+fn with_log_det(mut equations: NormalEquations, factor: f64, error_m: f64) -> (NormalEquations, f64) {
     let a = Matrix3::from_fn(|r, c| equations.information[(INSIDE[r], INSIDE[c])]);
     let b = Matrix3x6::from_fn(|r, c| equations.information[(INSIDE[r], ACROSS[c])]);
     let d = Matrix6::from_fn(|r, c| equations.information[(ACROSS[r], ACROSS[c])]);
     let of_inside = Vector3::from_fn(|r, _| equations.vector[INSIDE[r]]);
     let of_across = Vector6::from_fn(|r, _| equations.vector[ACROSS[r]]);
     let Some(inverse) = inverted(d) else {
-        return equations;
+        return (equations, 0.0);
     };
     let known = a - b * inverse * b.transpose();
     let pull = of_inside - b * inverse * of_across;
     let Some(optimum) = inverted(known).map(|i| i * pull) else {
-        return equations;
+        return (equations, 0.0);
     };
     let scaled = known / factor.max(1.0);
     let error = Matrix3::from_diagonal(&Vector3::new(error_m, error_m, 0.0));
     // (S^-1 + E)^-1 = S - S e (I + e S e)^-1 e S with E = e e, which holds for a singular S too.
     let Some(inner) = (Matrix3::identity() + error * scaled * error).try_inverse() else {
-        return equations;
+        return (equations, 0.0);
     };
     let left = scaled - scaled * error * inner * error * scaled;
     let taken = known - 0.5 * (left + left.transpose());
@@ -52,7 +65,7 @@ pub(crate) fn discounted(mut equations: NormalEquations, factor: f64, error_m: f
         }
     }
     equations.constant += 0.5 * pull_taken.dot(&optimum);
-    equations
+    (equations, -inner.determinant().ln())
 }
 
 /// Inverse of a positive semi-definite matrix whose rows have different units.

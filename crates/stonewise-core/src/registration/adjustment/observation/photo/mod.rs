@@ -1,0 +1,10 @@
+//! What photos show of the stones' motions.
+
+mod model;
+mod poses;
+mod stone_photos;
+
+pub(crate) use model::{PhotoModel, StoneInPhotos};
+pub use model::{PhotoReport, StonePhotoReport};
+pub(crate) use poses::CloudMotion;
+pub(crate) use stone_photos::StonePhotos;

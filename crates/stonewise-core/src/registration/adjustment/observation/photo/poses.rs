@@ -1,0 +1,447 @@
+//! Adjustment of the photos' poses, from what they show of all stones and from where the clouds put these.
+//!
+//! For photo i of stone k, with the parallax q_i (shift in the face per height):
+//!
+//! s_ki = o_k + q_i h_k + [second epoch] F_i d_k + F_i E (w_i x r - c_i) + e,   F_i = (1, q_i)
+//!
+//! o_k: place of the stone's template, h_k: error of the height of its face, d_k: its displacement, E: world to face, r: from the
+//! camera to the stone, c_i and w_i: corrections of the camera's position and attitude. All photos of the second epoch share a
+//! similarity transformation beside that, of any size: photos show motions relative to each other.
+
+use crate::registration::photos::{Sight, Track};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Point3, SMatrix, Vector2, Vector3};
+
+/// Unknowns of a pose.
+const POSE: usize = 6;
+/// Unknowns of the second epoch as a whole: translation, rotation, scale.
+const WHOLE: usize = 7;
+/// Unknowns of a stone: place of the template (2), height of the face, displacement (3).
+const STONE: usize = 6;
+/// Standard deviation of the second epoch as a whole at the wall's end, metres: as good as free.
+const WHOLE_M: f64 = 0.1;
+/// Error of the height of a stone's face, metres: that of a noisy drone cloud and of relief between its points.
+const HEIGHT_M: f64 = 0.01;
+/// Share of a pixel below which no match is trusted, whatever its formal error: interpolation and lens model.
+const LEAST_PX: f64 = 0.02;
+/// Rounds in which the weights of outlying photos and stones follow.
+const ROUNDS: usize = 6;
+/// Degrees of freedom of the law of errors: photos with leaves or shadows on a stone lose weight (Lange et al. 1989).
+const FREEDOM: f64 = 4.0;
+/// Start of the factor on the formal variances of matches: pixels of one patch are correlated.
+const START_FACTOR: f64 = 4.0;
+
+/// The displacement of a stone's place on the face, as the clouds show it, in its frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CloudMotion {
+    pub mean: Vector3<f64>,
+    pub covariance: Matrix3<f64>,
+}
+
+/// A stone with its photos and its clouds.
+pub(super) struct PoseStone<'a> {
+    pub track: &'a Track,
+    pub centroid: Point3<f64>,
+    pub face_from_world: &'a Matrix3<f64>,
+    pub clouds: CloudMotion,
+}
+
+/// Cameras and what is known of them.
+pub(super) struct PoseProblem<'a> {
+    pub centres: &'a [Point3<f64>],
+    pub epochs: &'a [usize],
+    /// Size of a pixel on the wall and distance from it, metres, per photo.
+    pub scales: &'a [[f64; 2]],
+    pub pose_error_px: f64,
+    pub stones: Vec<PoseStone<'a>>,
+    /// Middle of the wall, and its extent, metres.
+    pub middle: Point3<f64>,
+    pub extent_m: f64,
+}
+
+/// Adjusted poses.
+#[derive(Clone)]
+pub(super) struct Poses {
+    /// Corrections in units of their standard deviations before.
+    pub corrections: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Factor on the formal variances of matches.
+    pub factor: f64,
+    /// Weight of each sight, in the order of stones and sights.
+    pub weights: Vec<Vec<f64>>,
+}
+
+type StoneMatrix = SMatrix<f64, STONE, STONE>;
+
+/// The equations of a stone: its own unknowns, and the columns of poses that they meet.
+pub(super) struct StoneSystem {
+    own: StoneMatrix,
+    right: SMatrix<f64, STONE, 1>,
+    cross: DMatrix<f64>,
+    poses: DMatrix<f64>,
+    poses_right: DVector<f64>,
+    columns: Vec<usize>,
+}
+
+impl PoseProblem<'_> {
+    pub fn unknowns(&self) -> usize {
+        POSE * self.centres.len() + WHOLE
+    }
+
+    /// What a sight's shift changes by: with the stone's unknowns, with its pose, with the second epoch as a whole.
+    fn rows(
+        &self,
+        stone: &PoseStone,
+        sight: &Sight,
+    ) -> (
+        SMatrix<f64, 2, STONE>,
+        SMatrix<f64, 2, POSE>,
+        SMatrix<f64, 2, WHOLE>,
+    ) {
+        let q = Vector2::from(sight.parallax);
+        let f = SMatrix::<f64, 2, 3>::new(1.0, 0.0, q.x, 0.0, 1.0, q.y);
+        let second = f64::from(u8::from(self.epochs[sight.photo] == 1));
+        let mut own = SMatrix::<f64, 2, STONE>::zeros();
+        own.fixed_view_mut::<2, 2>(0, 0).fill_with_identity();
+        own.fixed_view_mut::<2, 1>(0, 2).copy_from(&q);
+        own.fixed_view_mut::<2, 3>(0, 3).copy_from(&(f * second));
+        let [u, v] = stone.track.place;
+        let at = stone.centroid + stone.face_from_world.transpose() * Vector3::new(u, v, 0.0);
+        let to_face = f * stone.face_from_world;
+        let [pixel_m, distance_m] = self.scales[sight.photo];
+        let shift_m = self.pose_error_px * pixel_m;
+        let mut pose = SMatrix::<f64, 2, POSE>::zeros();
+        pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(-to_face * shift_m));
+        let turned = -to_face * (at - self.centres[sight.photo]).cross_matrix();
+        pose.fixed_view_mut::<2, 3>(0, 3)
+            .copy_from(&(turned * (shift_m / distance_m)));
+        let mut whole = SMatrix::<f64, 2, WHOLE>::zeros();
+        let arm = at - self.middle;
+        let reach = WHOLE_M / self.extent_m;
+        whole
+            .fixed_view_mut::<2, 3>(0, 0)
+            .copy_from(&(to_face * (second * WHOLE_M)));
+        whole
+            .fixed_view_mut::<2, 3>(0, 3)
+            .copy_from(&(-to_face * arm.cross_matrix() * (second * reach)));
+        whole
+            .fixed_view_mut::<2, 1>(0, 6)
+            .copy_from(&(to_face * arm * (second * reach)));
+        (own, pose, whole)
+    }
+
+    /// Inverse covariance of a sight's shift.
+    fn weight(&self, sight: &Sight, factor: f64) -> Matrix2<f64> {
+        let floor = LEAST_PX * self.scales[sight.photo][0];
+        (sight.covariance * factor + Matrix2::identity() * (floor * floor))
+            .try_inverse()
+            .unwrap_or_else(Matrix2::zeros)
+    }
+
+    /// The equations of a stone without what the clouds say.
+    pub fn system(&self, stone: &PoseStone, weights: &[f64], factor: f64) -> StoneSystem {
+        let sights = &stone.track.sights;
+        let count = POSE * sights.len() + WHOLE;
+        let mut columns: Vec<usize> = sights
+            .iter()
+            .flat_map(|s| POSE * s.photo..POSE * (s.photo + 1))
+            .collect();
+        columns.extend(POSE * self.centres.len()..self.unknowns());
+        let mut system = StoneSystem {
+            own: StoneMatrix::zeros(),
+            right: SMatrix::zeros(),
+            cross: DMatrix::zeros(STONE, count),
+            poses: DMatrix::zeros(count, count),
+            poses_right: DVector::zeros(count),
+            columns,
+        };
+        system.own[(2, 2)] = HEIGHT_M.powi(-2);
+        for (k, (sight, w)) in sights.iter().zip(weights).enumerate() {
+            let (own, pose, whole) = self.rows(stone, sight);
+            let weight = self.weight(sight, factor) * *w;
+            let mut row = DMatrix::zeros(2, count);
+            row.view_mut((0, POSE * k), (2, POSE)).copy_from(&pose);
+            row.view_mut((0, POSE * sights.len()), (2, WHOLE))
+                .copy_from(&whole);
+            system.own += own.transpose() * weight * own;
+            system.right += own.transpose() * weight * sight.shift;
+            system.cross += own.transpose() * weight * &row;
+            system.poses += row.transpose() * weight * &row;
+            system.poses_right += row.transpose() * (weight * sight.shift);
+        }
+        system
+    }
+
+    /// Adjusts the poses; `bias_m`: appearance bias, `None` where the equations cannot be solved. `weights`: start.
+    pub fn solve(&self, bias_m: f64, factors: &[f64]) -> Option<Poses> {
+        let mut weights: Vec<Vec<f64>> = self
+            .stones
+            .iter()
+            .map(|s| vec![1.0; s.track.sights.len()])
+            .collect();
+        let mut trust = vec![1.0; self.stones.len()];
+        let mut factor = START_FACTOR;
+        let mut found = None;
+        for _ in 0..ROUNDS {
+            let (corrections, covariance) = self.solve_weighted(&weights, &trust, factor, bias_m, factors)?;
+            let (mut square, mut redundancy) = (0.0, 0.0);
+            for (k, stone) in self.stones.iter().enumerate() {
+                let prior = self.prior(stone, trust[k], bias_m, factors[k]);
+                let Some(own) = self.own(stone, &weights[k], factor, &prior, &corrections) else {
+                    continue;
+                };
+                for (sight, w) in stone.track.sights.iter().zip(&mut weights[k]) {
+                    let r = self.residual(stone, sight, &own, &corrections);
+                    let r2 = r.dot(&(self.weight(sight, factor) * r));
+                    square += *w * r2;
+                    redundancy += 2.0;
+                    *w = (FREEDOM + 2.0) / (FREEDOM + r2);
+                }
+                redundancy -= 5.0;
+                let apart = own.fixed_rows::<3>(3) - stone.clouds.mean;
+                let spread = prior.try_inverse().unwrap_or_else(Matrix3::zeros) * trust[k];
+                let r2 = spread.try_inverse().map_or(0.0, |i| apart.dot(&(i * apart)));
+                trust[k] = ((FREEDOM + 3.0) / (FREEDOM + r2)).min(1.0);
+            }
+            factor = (factor * square / f64::max(redundancy - POSE as f64 * self.centres.len() as f64, 1.0))
+                .max(1.0);
+            found = Some(Poses {
+                corrections,
+                covariance,
+                factor,
+                weights: weights.clone(),
+            });
+        }
+        found
+    }
+
+    /// Information of the clouds on a stone's displacement as the photos see it.
+    fn prior(&self, stone: &PoseStone, trust: f64, bias_m: f64, bias_factor: f64) -> Matrix3<f64> {
+        let bias = bias_m * bias_m * bias_factor;
+        let covariance = stone.clouds.covariance + Matrix3::from_diagonal(&Vector3::new(bias, bias, 0.0));
+        covariance.try_inverse().unwrap_or_else(Matrix3::zeros) * trust
+    }
+
+    fn solve_weighted(
+        &self,
+        weights: &[Vec<f64>],
+        trust: &[f64],
+        factor: f64,
+        bias_m: f64,
+        factors: &[f64],
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let count = self.unknowns();
+        let mut normal = DMatrix::<f64>::identity(count, count);
+        let mut right = DVector::<f64>::zeros(count);
+        for (k, stone) in self.stones.iter().enumerate() {
+            let mut system = self.system(stone, &weights[k], factor);
+            let prior = self.prior(stone, trust[k], bias_m, factors[k]);
+            system.add_prior(&prior, &stone.clouds.mean);
+            let Some(own) = system.own.cholesky() else {
+                continue;
+            };
+            let reduced = &system.poses - system.cross.transpose() * own.solve(&system.cross);
+            let reduced_right = &system.poses_right - system.cross.transpose() * own.solve(&system.right);
+            for (r, &row) in system.columns.iter().enumerate() {
+                right[row] += reduced_right[r];
+                for (c, &column) in system.columns.iter().enumerate() {
+                    normal[(row, column)] += reduced[(r, c)];
+                }
+            }
+        }
+        let cholesky = normal.cholesky()?;
+        Some((cholesky.solve(&right), cholesky.inverse()))
+    }
+
+    /// A stone's own unknowns, given the poses.
+    fn own(
+        &self,
+        stone: &PoseStone,
+        weights: &[f64],
+        factor: f64,
+        prior: &Matrix3<f64>,
+        corrections: &DVector<f64>,
+    ) -> Option<SMatrix<f64, STONE, 1>> {
+        let mut system = self.system(stone, weights, factor);
+        system.add_prior(prior, &stone.clouds.mean);
+        let right = system.right - &system.cross * system.of(corrections);
+        Some(system.own.cholesky()?.solve(&right))
+    }
+
+    /// What a sight's shift is off by.
+    fn residual(
+        &self,
+        stone: &PoseStone,
+        sight: &Sight,
+        own: &SMatrix<f64, STONE, 1>,
+        corrections: &DVector<f64>,
+    ) -> Vector2<f64> {
+        let (a, pose, whole) = self.rows(stone, sight);
+        let of_pose = corrections.fixed_rows::<POSE>(POSE * sight.photo);
+        let of_whole = corrections.fixed_rows::<WHOLE>(POSE * self.centres.len());
+        sight.shift - a * own - pose * of_pose - whole * of_whole
+    }
+}
+
+impl StoneSystem {
+    fn add_prior(&mut self, information: &Matrix3<f64>, mean: &Vector3<f64>) {
+        let mut block = self.own.fixed_view_mut::<3, 3>(3, 3);
+        block += information;
+        let mut right = self.right.fixed_rows_mut::<3>(3);
+        right += information * mean;
+    }
+
+    /// The pose corrections that this stone meets.
+    fn of(&self, corrections: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|&c| corrections[c]))
+    }
+
+    /// What the photos alone say of the displacement, template and height eliminated: information, information times displacement,
+    /// and the covariance that the poses' errors give it.
+    pub fn displacement(&self, poses: &Poses) -> Option<(Matrix3<f64>, Vector3<f64>, Matrix3<f64>)> {
+        let right = self.right - &self.cross * self.of(&poses.corrections);
+        let inner = self.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;
+        let mixed = self.own.fixed_view::<3, 3>(0, 3).into_owned();
+        let solved = inner.solve(&mixed);
+        let information = self.own.fixed_view::<3, 3>(3, 3) - mixed.transpose() * solved;
+        let vector = right.fixed_rows::<3>(3) - solved.transpose() * right.fixed_rows::<3>(0);
+        let sensitivity = self.cross.rows(3, 3) - solved.transpose() * self.cross.rows(0, 3);
+        let count = self.columns.len();
+        let covariance = DMatrix::from_fn(count, count, |r, c| {
+            poses.covariance[(self.columns[r], self.columns[c])]
+        });
+        let spread = &sensitivity * covariance * sensitivity.transpose();
+        let inverse = information.try_inverse()?;
+        let spread = Matrix3::from_fn(|r, c| spread[(r, c)]);
+        Some((
+            0.5 * (information + information.transpose()),
+            vector,
+            inverse * spread * inverse.transpose(),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::FaceFrame;
+    use crate::registration::photos::{FaceMotion, PhotoStatus};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn tracks(centres: &[Point3<f64>], places: &[Point3<f64>], turn: &Matrix3<f64>) -> Vec<Track> {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut track = |at: &Point3<f64>| {
+            let sights = centres.iter().enumerate().map(|(photo, centre)| {
+                let ray = turn * (at - centre);
+                Sight {
+                    photo,
+                    shift: Vector2::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
+                    covariance: Matrix2::new(2.0, 0.4, 0.4, 1.0) * 1e-8,
+                    turn: 0.0,
+                    strain: [0.0; 3],
+                    parallax: [-ray.x / ray.z, -ray.y / ray.z],
+                    correlation: 0.9,
+                }
+            });
+            Track {
+                status: PhotoStatus::Tracked,
+                sights: sights.collect(),
+                place: [0.0; 2],
+                reach: [0.05; 2],
+                area_m2: 0.03,
+                start: FaceMotion {
+                    translation: Vector3::zeros(),
+                    rotation: Vector3::zeros(),
+                },
+            }
+        };
+        places.iter().map(&mut track).collect()
+    }
+
+    #[test]
+    fn poses_and_displacements_are_those_of_dense_least_squares() {
+        let turn = FaceFrame::from_normal(&Vector3::x()).face_from_world();
+        let centres: Vec<Point3<f64>> = (0..5)
+            .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
+            .collect();
+        let places: Vec<Point3<f64>> = (0..9)
+            .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
+            .collect();
+        let tracks = tracks(&centres, &places, &turn);
+        let clouds = CloudMotion {
+            mean: Vector3::new(1e-3, 2e-3, -1e-3),
+            covariance: Matrix3::from_diagonal(&Vector3::new(9e-6, 4e-6, 1e-6)),
+        };
+        let problem = PoseProblem {
+            centres: &centres,
+            epochs: &[0, 1, 0, 1, 1],
+            scales: &[[0.003, 6.0]; 5],
+            pose_error_px: 0.5,
+            stones: tracks
+                .iter()
+                .zip(&places)
+                .map(|(track, at)| PoseStone {
+                    track,
+                    centroid: *at,
+                    face_from_world: &turn,
+                    clouds,
+                })
+                .collect(),
+            middle: Point3::new(0.0, 0.0, 1.0),
+            extent_m: 2.0,
+        };
+        let weights: Vec<Vec<f64>> = vec![vec![1.0, 0.5, 1.0, 0.8, 1.0]; 9];
+        let (bias_m, factor) = (5e-4, 3.0);
+        let (corrections, covariance) = problem
+            .solve_weighted(&weights, &[1.0; 9], factor, bias_m, &[1.0; 9])
+            .unwrap();
+        // All unknowns side by side.
+        let count = problem.unknowns();
+        let all = count + STONE * 9;
+        let mut normal = DMatrix::<f64>::zeros(all, all);
+        let mut right = DVector::<f64>::zeros(all);
+        (0..count).for_each(|k| normal[(k, k)] = 1.0);
+        for (k, stone) in problem.stones.iter().enumerate() {
+            let at = count + STONE * k;
+            normal[(at + 2, at + 2)] += HEIGHT_M.powi(-2);
+            for a in 0..3 {
+                let bias = if a < 2 { bias_m * bias_m } else { 0.0 };
+                let w = 1.0 / (clouds.covariance[(a, a)] + bias);
+                normal[(at + 3 + a, at + 3 + a)] += w;
+                right[at + 3 + a] += w * clouds.mean[a];
+            }
+            for (sight, w) in stone.track.sights.iter().zip(&weights[k]) {
+                let (own, pose, whole) = problem.rows(stone, sight);
+                let mut row = DMatrix::<f64>::zeros(2, all);
+                row.view_mut((0, at), (2, STONE)).copy_from(&own);
+                row.view_mut((0, POSE * sight.photo), (2, POSE)).copy_from(&pose);
+                row.view_mut((0, POSE * 5), (2, WHOLE)).copy_from(&whole);
+                let weight = problem.weight(sight, factor) * *w;
+                normal += row.transpose() * weight * &row;
+                right += row.transpose() * (weight * sight.shift);
+            }
+        }
+        let inverse = normal.clone().try_inverse().unwrap();
+        let solution = &inverse * &right;
+        assert!((&corrections - solution.rows(0, count)).norm() < 1e-7 * corrections.norm());
+        assert!((&covariance - inverse.view((0, 0), (count, count))).norm() < 1e-6 * covariance.norm());
+        // A stone's displacement with the poses as they are.
+        let poses = Poses {
+            corrections,
+            covariance,
+            factor,
+            weights: weights.clone(),
+        };
+        let system = problem.system(&problem.stones[4], &weights[4], factor);
+        let (information, vector, common) = system.displacement(&poses).unwrap();
+        let bias = Matrix3::from_diagonal(&Vector3::new(bias_m * bias_m, bias_m * bias_m, 0.0));
+        let prior = (clouds.covariance + bias).try_inverse().unwrap();
+        let joined = (information + prior).try_inverse().unwrap() * (vector + prior * clouds.mean);
+        let expected = solution.fixed_rows::<3>(count + STONE * 4 + 3);
+        assert!(
+            (joined - expected).norm() < 1e-6 * expected.norm(),
+            "{joined} {expected}"
+        );
+        assert!(common.symmetric_eigenvalues().min() > -1e-12 * common.trace());
+    }
+}

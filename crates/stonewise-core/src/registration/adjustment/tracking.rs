@@ -1,0 +1,163 @@
+//! Stones tracked in the photos from where the clouds put them.
+
+use super::error::AdjustError;
+use super::field::START_APPEARANCE_M;
+use super::observation::NormalEquations;
+use super::observation::photo::{CloudMotion, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos};
+use super::state::Adjustment;
+use super::stone_vector::{Matrix9, StoneVector, Vector9};
+use crate::progress::Progress;
+use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
+use crate::registration::points::PairSource;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// Rotation and bending of a stone before its points are looked at, radians and 1/m: ten times what loose stones do.
+const OPEN: [f64; 2] = [0.2, 1.0];
+/// Standard deviations of the clouds' place within which a stone is sought.
+const SEARCH_SDS: f64 = 3.0;
+
+impl Adjustment {
+    /// Tracks every stone, batch by batch.
+    pub fn track<S: PairSource>(
+        &mut self,
+        source: &S,
+        photos: &dyn PhotoSource<S::Error>,
+        progress: &dyn Progress,
+    ) -> Result<(), AdjustError<S::Error>> {
+        let mut tracks: Vec<Track> = Vec::with_capacity(self.stones.len());
+        progress.begin("track stones in photos", self.stones.len() as u64);
+        for (batch, range) in self.batches.clone().into_iter().enumerate() {
+            progress.check()?;
+            let pairs = source.load(batch).map_err(AdjustError::Source)?;
+            let chips = photos.load(batch).map_err(AdjustError::Source)?;
+            let found: Vec<Track> = pairs
+                .par_iter()
+                .zip(&chips)
+                .zip(range.clone())
+                .map(|((pair, chips), i)| {
+                    let tracker = Tracker {
+                        pair,
+                        face_from_world: &self.graph.nodes[i].face_from_world,
+                        start: self.face_motion(i),
+                        search_m: self.search_m(i, photos),
+                        photos: photos.photos(),
+                        chips,
+                        params: photos.params(),
+                    };
+                    tracker.track()
+                })
+                .collect();
+            tracks.extend(found);
+            progress.advance(range.len() as u64);
+        }
+        let stones = self.stones_in_photos(|i| tracks[i].place);
+        self.photos = Some(PhotoModel::new(
+            photos.params().clone(),
+            photos.photos(),
+            &stones,
+            tracks,
+        ));
+        self.components.appearance_m = Some(START_APPEARANCE_M);
+        Ok(())
+    }
+
+    /// Adjusts the photos' poses to where the clouds now put the stones.
+    pub fn update_photos(&mut self) {
+        let Some(mut photos) = self.photos.take() else {
+            return;
+        };
+        let stones = self.stones_in_photos(|i| photos.place(i));
+        photos.update(&stones, self.components.appearance_m());
+        self.photos = Some(photos);
+    }
+
+    /// What the stones' own points say, moving with the field.
+    pub fn cloud_equations(&self, error_m: f64) -> Vec<NormalEquations> {
+        let stones = self.stones.iter().enumerate();
+        stones
+            .map(|(i, s)| self.observed_by_clouds(i, &s.with_field, error_m))
+            .collect()
+    }
+
+    /// How far a stone that moves with the field may have slid in the face without being found out, metres: what passes for an error
+    /// of the clouds may be a slide, and so may what passes for an appearance bias; it is both where both are there.
+    pub fn undetected_slide_m(&self, i: usize) -> f64 {
+        let error_m = self.components.error_m;
+        match self.photos.as_ref().and_then(|p| p.stone(i)) {
+            Some(photos) => error_m.min(self.components.appearance_m() * photos.bias_factor.sqrt()),
+            None => error_m,
+        }
+    }
+
+    /// Covariance of a stone's displacement that errors of the poses cause, in its frame. The stones share these errors, so no number
+    /// of stones averages them away; they count by the share that the photos have in a stone's motion.
+    pub fn pose_covariance(&self, i: usize) -> Matrix3<f64> {
+        let Some(stone) = self.photos.as_ref().and_then(|p| p.stone(i)) else {
+            return Matrix3::zeros();
+        };
+        let clouds = self.cloud_motion(i, [0.0; 2]);
+        let (information, _, _) = stone.with_bias(self.components.appearance_m());
+        let by_clouds = clouds
+            .and_then(|c| c.covariance.try_inverse())
+            .unwrap_or_else(Matrix3::zeros);
+        let Some(inverse) = (by_clouds + information).try_inverse() else {
+            return Matrix3::zeros();
+        };
+        let share = inverse * information;
+        share * stone.common * share.transpose()
+    }
+
+    /// What photos contributed.
+    pub fn photo_report(&self) -> Option<PhotoReport> {
+        let photos = self.photos.as_ref()?;
+        Some(photos.report(self.components.appearance_m()))
+    }
+
+    fn stones_in_photos(&self, place: impl Fn(usize) -> [f64; 2]) -> Vec<StoneInPhotos> {
+        let of_stone = |(i, node): (usize, &super::field::Node)| StoneInPhotos {
+            centroid: node.centroid,
+            face_from_world: node.face_from_world,
+            clouds: self.cloud_motion(i, place(i)),
+        };
+        self.graph.nodes.iter().enumerate().map(of_stone).collect()
+    }
+
+    /// The displacement of a place on a stone's face by its own points alone; `None` where they show none.
+    fn cloud_motion(&self, i: usize, place: [f64; 2]) -> Option<CloudMotion> {
+        let equations = self.observed_by_clouds(i, &self.stones[i].with_field, self.components.error_m);
+        if equations.information.trace() <= 0.0 {
+            return None;
+        }
+        let shift = self.loose.move_m.max(self.params.max_sd_m).powi(-2);
+        let turn = OPEN[0].powi(-2);
+        let bend = OPEN[1].powi(-2);
+        let open = Vector9::from([shift, shift, shift, turn, turn, turn, bend, bend, bend]);
+        let inverse = (equations.information + Matrix9::from_diagonal(&open))
+            .cholesky()?
+            .inverse();
+        let lever = StonePhotos::lever(place);
+        let mean: Vector3<f64> = lever * (inverse * equations.vector + self.common_in(i).unknowns());
+        let covariance = lever * inverse * lever.transpose();
+        Some(CloudMotion {
+            mean,
+            covariance: 0.5 * (covariance + covariance.transpose()),
+        })
+    }
+
+    fn face_motion(&self, i: usize) -> FaceMotion {
+        let motion: &StoneVector = &self.stones[i].more_probable().motion;
+        FaceMotion {
+            translation: motion.translation(),
+            rotation: motion.rotation(),
+        }
+    }
+
+    fn search_m<E>(&self, i: usize, photos: &dyn PhotoSource<E>) -> f64 {
+        let params = photos.params();
+        let sd = self.cloud_motion(i, [0.0; 2]).map_or(params.max_search_m, |c| {
+            c.covariance[(0, 0)].max(c.covariance[(1, 1)]).sqrt()
+        });
+        (params.search_m + SEARCH_SDS * sd).min(params.max_search_m)
+    }
+}

@@ -1,0 +1,31 @@
+//! Stones tracked from photo to photo.
+//!
+//! Each photo's part that shows a stone is brought onto the stone's face, its contrast normalised, and matched with one template per
+//! stone. What comes out are shifts in the face, one for each photo; the adjustment makes motions of them.
+
+mod blur;
+mod matching;
+mod params;
+mod patch;
+mod photo;
+mod surface;
+mod track;
+
+pub use params::PhotoParams;
+pub(crate) use patch::FaceMotion;
+pub use photo::{Chip, Photo, PhotoCamera};
+pub use track::PhotoStatus;
+pub(crate) use track::{Sight, Track, Tracker};
+
+/// Photos of both epochs, and the parts of them that show each pair of stones, batch by batch.
+pub trait PhotoSource<E>: Sync {
+    /// Photos of both epochs.
+    fn photos(&self) -> &[Photo];
+    /// How stones are tracked.
+    fn params(&self) -> &PhotoParams;
+    /// The chips of each pair of a batch, in the order of the pairs.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    fn load(&self, batch: usize) -> Result<Vec<Vec<Chip>>, E>;
+}

@@ -1,0 +1,169 @@
+//! Photos as the tracking sees them: cameras, and the parts that show a stone.
+
+use crate::geometry::View;
+use nalgebra::{Point3, Vector3};
+
+/// Where a photo shows a point of the world.
+///
+/// A trait, so that a self-check can hand over a camera that sees moved points where they were.
+pub trait PhotoCamera: Send + Sync {
+    /// Pixel of a world point, which may lie outside the image; `None` behind the camera.
+    fn project(&self, world: &Point3<f64>) -> Option<[f64; 2]>;
+    /// Centre of projection, world.
+    fn centre(&self) -> Point3<f64>;
+}
+
+impl PhotoCamera for View {
+    fn project(&self, world: &Point3<f64>) -> Option<[f64; 2]> {
+        View::project(self, world).map(|p| p.pixel)
+    }
+
+    fn centre(&self) -> Point3<f64> {
+        View::centre(self)
+    }
+}
+
+/// A posed photo.
+pub struct Photo {
+    /// Its name, for reports.
+    pub name: String,
+    /// 0: of the first epoch, 1: of the second.
+    pub epoch: usize,
+    /// Its camera.
+    pub camera: Box<dyn PhotoCamera>,
+}
+
+/// Distance over which a camera's scale is measured, metres: far below a pixel on the wall, far above rounding.
+const STEP_M: f64 = 1e-4;
+
+impl Photo {
+    /// Size of a pixel on a face at this point, metres: square root of its area there. `None` where the photo does not see the point.
+    pub fn pixel_m(&self, at: &Point3<f64>, along: &Vector3<f64>, up: &Vector3<f64>) -> Option<f64> {
+        let here = self.camera.project(at)?;
+        let step = |axis: &Vector3<f64>| {
+            let there = self.camera.project(&(at + axis * STEP_M))?;
+            Some([(there[0] - here[0]) / STEP_M, (there[1] - here[1]) / STEP_M])
+        };
+        let (a, b) = (step(along)?, step(up)?);
+        let area = (a[0] * b[1] - a[1] * b[0]).abs();
+        (area > 0.0).then(|| area.sqrt().recip())
+    }
+
+    /// Shift in the face of what stands a metre out of it, in a frame (along, up, out): the photo's parallax at this point.
+    pub(crate) fn parallax(
+        &self,
+        at: &Point3<f64>,
+        face_from_world: &nalgebra::Matrix3<f64>,
+    ) -> Option<[f64; 2]> {
+        let ray = face_from_world * (at - self.camera.centre());
+        (ray.z < 0.0).then(|| [-ray.x / ray.z, -ray.y / ray.z])
+    }
+}
+
+/// The part of a photo that shows a stone, grey values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chip {
+    /// Which of the photos.
+    pub photo: u32,
+    /// Pixel of its corner in the photo.
+    pub corner: [u32; 2],
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Grey values, row by row.
+    pub grey: Vec<u8>,
+}
+
+impl Chip {
+    /// Grey value at a pixel coordinate of the photo, by cubic convolution (Keys 1981); `None` within two pixels of the chip's edge.
+    pub(crate) fn sample(&self, pixel: [f64; 2]) -> Option<f32> {
+        let x = pixel[0] - f64::from(self.corner[0]) - 0.5;
+        let y = pixel[1] - f64::from(self.corner[1]) - 0.5;
+        let inside = |v: f64, size: u32| v >= 1.0 && v < f64::from(size) - 2.0;
+        if !(inside(x, self.width) && inside(y, self.height)) {
+            return None;
+        }
+        let (column, row) = (x as usize, y as usize);
+        let (wx, wy) = (cubic((x - column as f64) as f32), cubic((y - row as f64) as f32));
+        let mut sum = 0.0;
+        for (j, wy) in wy.iter().enumerate() {
+            let start = (row + j - 1) * self.width as usize + column - 1;
+            let line = self.grey.get(start..start + 4)?;
+            let of_line: f32 = line.iter().zip(&wx).map(|(g, w)| f32::from(*g) * w).sum();
+            sum += wy * of_line;
+        }
+        Some(sum)
+    }
+}
+
+/// Weights of four neighbours for a place `t` between the second and the third (Keys 1981, a = -1/2).
+pub(super) fn cubic(t: f32) -> [f32; 4] {
+    let (t2, t3) = (t * t, t * t * t);
+    [
+        -0.5 * t3 + t2 - 0.5 * t,
+        1.5 * t3 - 2.5 * t2 + 1.0,
+        -1.5 * t3 + 2.0 * t2 + 0.5 * t,
+        0.5 * t3 - 0.5 * t2,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Camera, FaceFrame, Rigid3};
+    use crate::id::ImageId;
+
+    #[test]
+    fn cubic_convolution_reproduces_parabolas() {
+        let value = |x: f64, y: f64| 3.0 + 0.5 * x + 0.25 * y + 0.125 * x * x;
+        let chip = Chip {
+            photo: 0,
+            corner: [100, 40],
+            width: 20,
+            height: 10,
+            grey: (0..200)
+                .map(|k| (value(f64::from(k % 20), f64::from(k / 20)) * 4.0).round() as u8)
+                .collect(),
+        };
+        // Middles of pixels lie at halves.
+        let at = chip.sample([100.0 + 7.5, 40.0 + 4.5]).unwrap();
+        assert!((f64::from(at) / 4.0 - value(7.0, 4.0)).abs() < 0.13);
+        let at = chip.sample([100.0 + 7.9, 40.0 + 4.75]).unwrap();
+        assert!((f64::from(at) / 4.0 - value(7.4, 4.25)).abs() < 0.13);
+        assert_eq!(chip.sample([100.2, 44.0]), None);
+        assert_eq!(chip.sample([119.5, 44.0]), None);
+    }
+
+    #[test]
+    fn parallax_is_how_a_raised_point_seems_to_shift() {
+        let normal = Vector3::new(0.9, 0.1, 0.3).normalize();
+        let turn = FaceFrame::from_normal(&normal).face_from_world();
+        let at = Point3::new(1.0, 2.0, 3.0);
+        let centre = at + normal * 7.0 + Vector3::new(0.0, 2.0, -1.0);
+        let look = Rigid3::face_towards(&centre, &at, &Vector3::z()).inverse();
+        let photo = Photo {
+            name: "a".to_owned(),
+            epoch: 0,
+            camera: Box::new(View {
+                image: ImageId(0),
+                name: "a".to_owned(),
+                camera: Camera::pinhole(2000, 1500, 1800.0),
+                cam_from_world: look,
+            }),
+        };
+        let q = photo.parallax(&at, &turn).unwrap();
+        let raised = photo.camera.project(&(at + normal * 1e-4)).unwrap();
+        let shifted = at + turn.transpose() * Vector3::new(q[0], q[1], 0.0) * 1e-4;
+        let seen = photo.camera.project(&shifted).unwrap();
+        assert!(
+            (raised[0] - seen[0]).abs() + (raised[1] - seen[1]).abs() < 1e-5,
+            "{raised:?} {seen:?}"
+        );
+        let axis = |r: usize| turn.row(r).transpose();
+        let pixel_m = photo.pixel_m(&at, &axis(0), &axis(1)).unwrap();
+        // A pixel on a surface across the ray is distance / focal length; the face is oblique and takes more.
+        let across = (at - centre).norm() / 1800.0;
+        assert!(pixel_m > across && pixel_m < 1.2 * across, "{pixel_m} {across}");
+    }
+}
