@@ -347,7 +347,7 @@ fn a_stone_is_deleted_in_a_photo_and_drawn_anew_and_an_edit_without_effect_is_na
         (added["photos"].as_str(), number(added, "confidence")),
         ("0", 0.0)
     );
-    assert!(added["points_2"] != "", "it is drawn in both epochs");
+    assert!(!added["points_2"].is_empty(), "it is drawn in both epochs");
 }
 
 #[test]

@@ -49,7 +49,7 @@ pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, La
     let mut query = file
         .prepare(&format!("SELECT rowid, * FROM \"{table}\" ORDER BY rowid"))
         .map_err(sqlite)?;
-    let names: Vec<String> = query.column_names().into_iter().map(str::to_owned).collect();
+    let names: Vec<String> = query.column_names().map(str::to_owned).collect();
     let mut rows = query.query([]).map_err(sqlite)?;
     let mut features = Vec::new();
     while let Some(row) = rows.next().map_err(sqlite)? {

@@ -166,8 +166,8 @@ mod tests {
         let point = |i: u32| ChangePoint {
             position: Point3::new(4.5e6 + 1e-9 * f64::from(i), -0.1, 1.0 / 3.0),
             normal: Vector3::new(0.6, -0.0, 0.8),
-            distance_m: (i % 2 == 0).then_some(1e-3 / f64::from(i + 1)),
-            detection_limit_m: (i % 3 == 0).then_some(f64::MIN_POSITIVE),
+            distance_m: i.is_multiple_of(2).then_some(1e-3 / f64::from(i + 1)),
+            detection_limit_m: i.is_multiple_of(3).then_some(f64::MIN_POSITIVE),
             spread_m: [Some(f64::from(i).sqrt()), (i > 5).then_some(0.0)],
             counts: [i, u32::MAX - i],
         };
