@@ -91,14 +91,10 @@ impl Surface {
         if places.is_empty() {
             return None;
         }
-        for a in 0..2 {
-            self.middle[a] = places.iter().map(|p| p[a]).sum::<f64>() / count;
-            let square = places
-                .iter()
-                .map(|p| (p[a] - self.middle[a]).powi(2))
-                .sum::<f64>();
-            self.reach[a] = (square / count).sqrt();
-        }
+        let mean = |value: &dyn Fn(&[f64; 2]) -> f64| places.iter().map(value).sum::<f64>() / count;
+        let middle: [f64; 2] = std::array::from_fn(|a| mean(&|p| p[a]));
+        self.reach = std::array::from_fn(|a| mean(&|p| (p[a] - middle[a]).powi(2)).sqrt());
+        self.middle = middle;
         Some(())
     }
 }

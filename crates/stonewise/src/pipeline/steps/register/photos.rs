@@ -210,7 +210,7 @@ impl Boxed {
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for k in 0..8 {
             let corner = |margin: f64| {
-                let pick = |axis: usize, by: f64| match k >> axis & 1 {
+                let pick = |axis: usize, by: f64| match (k >> axis) & 1 {
                     0 => self.low[axis] - by,
                     _ => self.high[axis] + by,
                 };
