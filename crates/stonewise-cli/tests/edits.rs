@@ -56,7 +56,7 @@ fn finished() -> PathBuf {
     base().join("results")
 }
 
-/// A copy of survey and results.
+/// A copy of the survey, and where its results go: they belong to the project file of the copy.
 struct Copy {
     _dir: TempDir,
     survey: PathBuf,
@@ -66,8 +66,8 @@ struct Copy {
 impl Copy {
     fn new() -> Self {
         let dir = tempfile::tempdir().unwrap();
-        copy_tree(base(), dir.path());
         let (survey, out) = (dir.path().join("survey"), dir.path().join("results"));
+        copy_tree(&base().join("survey"), &survey);
         Self {
             _dir: dir,
             survey,
@@ -149,7 +149,6 @@ fn edits_change_what_they_name_and_leave_the_rest_alone() {
         format!("{{\"do\": \"split\", \"line\": {}, {SIGNED}}}", line(split)),
         format!("{{\"do\": \"delete\", \"at\": [{}], {SIGNED}}}", spot(gone)),
     ];
-    // Photos are known by their paths: the copy needs a run of its own before steps can be taken over.
     let copy = Copy::new();
     assert_eq!(copy.run().0, 0);
     copy.edit(&edits);
@@ -473,13 +472,13 @@ fn the_layer_of_the_geopackage_comes_back_as_edits() {
 fn polygons_of_a_coco_editor_are_edits_and_mistakes_are_named() {
     let dir = tempfile::tempdir().unwrap();
     let coco = dir.path().join("drawn.json");
-    let text = r#"{"images": [{"id": 1, "file_name": "IMG_1001.jpg"}],
+    let drawn = r#"{"images": [{"id": 1, "file_name": "IMG_1001.jpg"}],
         "categories": [{"id": 1, "name": "stone"}, {"id": 2, "name": "Merge"}, {"id": 3, "name": "ignore"}],
         "annotations": [
           {"id": 1, "image_id": 1, "category_id": 1, "segmentation": [[0, 0, 9, 0, 9, 9]]},
           {"id": 2, "image_id": 1, "category_id": 2, "segmentation": [[10, 10, 90, 10, 90, 50]], "attributes": {"why": "one block"}},
           {"id": 3, "image_id": 1, "category_id": 3, "segmentation": [[0, 0, 9, 0, 9, 9], [20, 0, 29, 0, 29, 9]]}]}"#;
-    fs::write(&coco, text).unwrap();
+    fs::write(&coco, drawn).unwrap();
     let file = dir.path().join("edits.json");
     let import = |source: &Path, out: &Path| {
         let mut command = stonewise();
@@ -506,7 +505,7 @@ fn polygons_of_a_coco_editor_are_edits_and_mistakes_are_named() {
         (Some("plants"), Some("epoch 2"))
     );
     assert!(edits.iter().all(|e| e["photo"] == "IMG_1001.jpg"));
-    let bow_tie = text.replace("20, 0, 29, 0, 29, 9", "20, 0, 29, 9, 29, 0, 20, 9");
+    let bow_tie = drawn.replace("20, 0, 29, 0, 29, 9", "20, 0, 29, 9, 29, 0, 20, 9");
     fs::write(&coco, bow_tie).unwrap();
     let (code, text) = import(&coco, &dir.path().join("other.json"));
     assert!(

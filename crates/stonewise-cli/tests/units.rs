@@ -135,9 +135,12 @@ fn units_in_any_order_killed_and_repeated_give_the_bytes_of_a_run() {
         }
         done.insert(id);
     }
+    let (found, expected) = (results(out.path()), reference());
+    let differ = |name: &&PathBuf| found.get(*name) != expected.get(*name);
+    let differing: Vec<&PathBuf> = found.keys().chain(expected.keys()).filter(differ).collect();
     assert!(
-        results(out.path()) == *reference(),
-        "other bytes than those of a run"
+        differing.is_empty(),
+        "other bytes than those of a run: {differing:?}"
     );
     let record: Value = serde_json::from_slice(&fs::read(out.path().join("run.json")).unwrap()).unwrap();
     for step in record["steps"].as_array().unwrap() {

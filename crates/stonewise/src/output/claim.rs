@@ -28,8 +28,14 @@ impl OutputFolder {
         let folders = result_folders(project);
         refuse_overwriting(path, &project.inputs(), &folders, &is_result)?;
         let claimed = Self::claim(path, &Owner::project(&project.path, &project.name), force)?;
-        sweep(path, &|below| folders.iter().any(|f| below.starts_with(f)));
+        claimed.sweep(project);
         Ok(claimed)
+    }
+
+    /// Removes temporary files that killed commands left among the results of a project. Only where no other command works in the folder.
+    pub(crate) fn sweep(&self, project: &Project) {
+        let folders = result_folders(project);
+        sweep(&self.path, &|below| folders.iter().any(|f| below.starts_with(f)));
     }
 
     /// Claims a folder for anything else. `inputs`: what must not be replaced; `written`: names of files and folders that

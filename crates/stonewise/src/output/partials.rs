@@ -19,7 +19,7 @@ pub(super) fn sweep(folder: &Path, is_ours: &dyn Fn(&Path) -> bool) {
             let is_partial = is_partial(&entry.file_name().to_string_lossy());
             match (is_dir, is_partial) {
                 // The folder of a step whose work was not finished, in the folder of all steps.
-                (true, true) if !below.parent().is_none_or(|p| p == Path::new("")) && is_ours(below) => {
+                (true, true) if below.parent().is_some_and(|p| p != Path::new("")) && is_ours(below) => {
                     let _ = fs::remove_dir_all(&path);
                 }
                 (true, _) if is_ours(below) => open.push(path),

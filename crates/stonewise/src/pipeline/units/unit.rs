@@ -87,6 +87,8 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         do_stage(&context, unit, plan.forced)?
     };
     if summary.is_some() {
+        // The last unit: all others are done, and what they left unfinished when they were killed is of no use.
+        folder.sweep(&project);
         folder.finish_results(true)?;
     }
     Receipt::write(out, &plan.id, id, &clock)?;

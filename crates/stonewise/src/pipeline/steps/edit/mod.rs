@@ -90,7 +90,7 @@ fn edit_epoch(
             place: &place,
             stones: &facing(&labelled, wall),
             min_points: context.project.settings.label.min_points,
-            first_new: labelled.stones.last().map_or(0, |s| s.id.0) + 1,
+            first_new: last_number(&labelled) + 1,
         };
         let report = edit_labels(
             tiles,
@@ -134,6 +134,13 @@ fn edit_epoch(
         ..tabulated
     };
     Ok((tabulated, effects))
+}
+
+/// The last number in use, also by stones of the vote that too few points show to be in the list.
+fn last_number(labelled: &Labelled) -> u32 {
+    let listed = labelled.stones.iter().map(|s| s.id.0);
+    let voted = labelled.transfer.stones.iter().map(|s| s.stone.0);
+    listed.chain(voted).max().unwrap_or(0)
 }
 
 /// What the step says about its edits.
