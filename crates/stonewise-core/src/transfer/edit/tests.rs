@@ -168,6 +168,7 @@ fn a_deleted_stone_comes_back_as_an_added_one_within_its_outline() {
         "neighbours keep their points"
     );
     assert_eq!(report.gone, BTreeSet::from([5]));
+    assert!(report.origins[&10].is_empty(), "no photo voted for it");
     let added = labels.iter().flat_map(|t| t.stone.iter().zip(&t.confidence));
     assert!(added.filter(|a| *a.0 == 10).all(|a| *a.1 == 0.0));
     let (report, ..) = edited(&[LabelEdit::Add(boxed([0.1, 0.3], [0.05, 0.15]))]);

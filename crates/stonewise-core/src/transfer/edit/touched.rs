@@ -126,7 +126,8 @@ impl Touched {
         by_stone
     }
 
-    /// Stones as labelled whose points each stone has that differs from how it was labelled.
+    /// Stones as labelled whose points each stone has that differs from how it was labelled. Points of added stones come from none: what
+    /// was voted for there was not this stone.
     pub(super) fn origins(&self) -> BTreeMap<u32, BTreeSet<u32>> {
         let mut changed: BTreeSet<u32> = BTreeSet::new();
         let mut all: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
@@ -136,7 +137,8 @@ impl Touched {
             }
             if p.stone != 0 {
                 let origins = all.entry(p.stone).or_default();
-                origins.extend((p.labelled != 0).then_some(p.labelled));
+                let is_voted = p.labelled != 0 && !p.added;
+                origins.extend(is_voted.then_some(p.labelled));
             }
         }
         all.retain(|stone, _| changed.contains(stone));
