@@ -1,13 +1,13 @@
 //! The list of steps that a run announces before it begins.
 
-use crate::pipeline::run::Until;
+use crate::pipeline::until::Until;
 use crate::project::{Estimator, Project};
 use stonewise_core::progress::Progress;
 
 /// Name of the steps that edit labels, before their numbers.
 const EDITS: &str = "edit";
 
-/// The steps of a run in order: each under the name by which the runner knows it, and in words. Work that is not on the
+/// The steps of a run in order: each under the name that the runner gives it, and in words. Work that is not on the
 /// list counts as part of the step before it.
 #[derive(Debug, Default)]
 pub struct Agenda(Vec<(String, String)>);

@@ -14,10 +14,11 @@ mod sources;
 mod steps;
 pub(crate) mod storage;
 mod units;
+mod until;
 
 pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
-pub use run::{PairSummary, Summary, Until, run};
+pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
 pub use sources::SourceRule;
 pub(crate) use steps::segment::segment;
@@ -25,3 +26,4 @@ pub(crate) use storage::step::Key;
 pub use storage::step::set_program;
 pub(crate) use storage::store::{Keeps, StepStore};
 pub use units::{Coordinator, Plan, PlanOptions, Stage, Unit, UnitDone, do_unit, plan};
+pub use until::Until;

@@ -30,6 +30,7 @@ use crate::pipeline::steps::offsets::label_offsets;
 use crate::pipeline::steps::register::{Registered, datum, register};
 use crate::pipeline::steps::segment::{Segmented, segment};
 use crate::pipeline::units::forget;
+use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::report::write_report;
 use crate::results::names::PairFile;
@@ -44,23 +45,6 @@ use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::{Bounds, View};
 use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
-
-/// How far to go.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Until {
-    /// Masks of every photo.
-    Segmented,
-    /// Stones in the clouds.
-    Labelled,
-    /// Stones across epochs.
-    Matched,
-    /// Motions of stones.
-    Registered,
-    /// Every table of results, M3C2 and evaluation too, but no copies of the clouds and no report.
-    Compared,
-    /// Everything.
-    Reported,
-}
 
 /// What a run did.
 #[derive(Clone, Debug)]
@@ -120,19 +104,11 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
     check_overlap(context, &ingested.iter().zip(1..).collect::<Vec<_>>())?;
-    let photos = epochs
-        .clone()
-        .map(|n| segment(context, n))
-        .collect::<Result<Vec<_>>>()?;
+    let photos = all_photos(context)?;
     if until == Until::Segmented {
         return Ok(summary(context, Vec::new()));
     }
-    let labelled = ingested
-        .into_iter()
-        .zip(&photos)
-        .zip(1..)
-        .map(|((ingested, photos), number)| label(context, number, ingested, photos))
-        .collect::<Result<Vec<_>>>()?;
+    let labelled = all_labelled(context, ingested, &photos)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
     write_edits_audit(context, edited.as_ref())?;
     for number in epochs.clone() {
@@ -189,6 +165,20 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
 /// Stones of the first epoch, before any known motion is asked for.
 pub(crate) fn first_stones(context: &Context) -> Result<Vec<Stone>> {
     Ok(labelled(context, 1)?.stones)
+}
+
+/// The photos of all epochs.
+fn all_photos(context: &Context) -> Result<Vec<Segmented>> {
+    let epochs = 1..=context.project.epochs.len();
+    epochs.map(|n| segment(context, n)).collect()
+}
+
+/// All epochs with their stones.
+fn all_labelled(context: &Context, ingested: Vec<Ingested>, photos: &[Segmented]) -> Result<Vec<Labelled>> {
+    let epochs = ingested.into_iter().zip(photos).zip(1..);
+    epochs
+        .map(|((ingested, photos), number)| label(context, number, ingested, photos))
+        .collect()
 }
 
 /// An epoch with its stones.
@@ -260,12 +250,11 @@ pub(super) struct Corrected {
 
 /// All epochs with their stones, as a person corrected them.
 pub(super) fn corrected(context: &Context) -> Result<Corrected> {
-    let epochs = 1..=context.project.epochs.len();
-    let photos = epochs
-        .clone()
-        .map(|n| segment(context, n))
+    let photos = all_photos(context)?;
+    let ingested = (1..=photos.len())
+        .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
-    let labelled = epochs.map(|n| labelled(context, n)).collect::<Result<Vec<_>>>()?;
+    let labelled = all_labelled(context, ingested, &photos)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
     Ok(Corrected {
         photos,

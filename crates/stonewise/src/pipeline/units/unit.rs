@@ -13,7 +13,7 @@ use crate::pipeline::look::look;
 use crate::pipeline::outputs::clouds::write_clouds;
 use crate::pipeline::outputs::outlines::write_stone_outlines;
 use crate::pipeline::run::{
-    Corrected, Until, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
+    Corrected, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
 };
 use crate::pipeline::steps::ingest::ingest;
 use crate::pipeline::steps::label::gather_labels;
@@ -24,6 +24,7 @@ use crate::pipeline::steps::register::register;
 use crate::pipeline::steps::segment::{segment, segment_photo};
 use crate::pipeline::storage::step::code_version;
 use crate::pipeline::storage::store::Scope;
+use crate::pipeline::until::Until;
 use crate::project::Project;
 use std::path::Path;
 use stonewise_core::change::OutwardReference;
