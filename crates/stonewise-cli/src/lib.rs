@@ -4,6 +4,7 @@
 
 mod args;
 mod commands;
+mod note;
 mod printer;
 mod screen;
 mod steps;
@@ -44,7 +45,7 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(commands::Outcome::InDoubt) => IN_DOUBT,
         Ok(commands::Outcome::Verdict) => VERDICT,
         Err(error) => {
-            printer::note(&format!("error: {}", explain(&error)));
+            note::note(&format!("error: {}", explain(&error)));
             if is_wrong_usage(&error) {
                 WRONG_USAGE
             } else {
@@ -60,7 +61,7 @@ fn say_panics_once() {
     std::panic::set_hook(Box::new(move |panic| {
         if !stonewise_io::wall::is_behind_wall() {
             usual(panic);
-            printer::note("error: this is a defect of stonewise; please report it with the lines above");
+            note::note("error: this is a defect of stonewise; please report it with the lines above");
         }
     }));
 }

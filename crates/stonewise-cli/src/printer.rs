@@ -1,8 +1,9 @@
 //! The log and the progress: all of it on stderr.
 
+use crate::note::note;
 use crate::screen::Screen;
 use crate::steps::{Ended, Steps, wrapped};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::time::Instant;
@@ -14,7 +15,7 @@ const FIRST_WAIT_S: f64 = 5.0;
 /// The longest such wait: within it a reader of the log sees that the run is alive.
 const LONGEST_WAIT_S: f64 = 600.0;
 
-/// Shows progress as a list of steps with a bar on a terminal, as lines elsewhere; Ctrl-C asks the work to stop.
+/// Shows progress as a list of steps with a bar on a terminal, as lines elsewhere; Ctrl-C stops the work.
 pub struct Printer {
     shown: Mutex<Shown>,
     quiet: bool,
@@ -269,9 +270,4 @@ impl Progress for Printer {
     fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
     }
-}
-
-/// Writes one line to stderr; a closed stderr is no reason to fail.
-pub fn note(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
 }

@@ -1,6 +1,6 @@
 //! The list of steps on a terminal: finished ones ticked and timed, the one at work with its count.
 
-use crate::printer::note;
+use crate::note::note;
 use crate::steps::{Ended, cut, span, time_to_go};
 use console::Term;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
@@ -66,7 +66,7 @@ impl Screen {
         self.part(step, "", 0, 0);
     }
 
-    /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a total of 0 where nobody knows.
+    /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a total of 0 where it is unknown.
     pub fn part(&self, step: &str, words: &str, total: u64, done: u64) {
         self.bar.set_style(self.style(words, total > 0));
         self.bar.set_message(step.to_owned());

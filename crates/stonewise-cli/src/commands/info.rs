@@ -2,7 +2,7 @@
 
 use crate::args::InfoArgs;
 use crate::commands::Outcome;
-use crate::printer::note;
+use crate::note::note;
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
 use std::io::Write;

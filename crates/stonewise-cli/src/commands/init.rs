@@ -2,7 +2,7 @@
 
 use crate::args::InitArgs;
 use crate::commands::Outcome;
-use crate::printer::note;
+use crate::note::note;
 use anyhow::Result;
 
 /// Writes a project file; says what was chosen and what was left out.

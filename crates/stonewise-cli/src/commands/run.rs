@@ -2,7 +2,8 @@
 
 use crate::args::{ExitOn, ProjectArgs, RunArgs};
 use crate::commands::Outcome;
-use crate::printer::{Printer, note};
+use crate::note::note;
+use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::results::records::{EpochVerdict, State};
