@@ -64,22 +64,23 @@ fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64) -> Patch {
     let (columns, rows) = (surface.columns, surface.rows);
     let valid: Vec<bool> = grey.iter().map(Option::is_some).collect();
     let weight: Vec<f64> = valid.iter().map(|v| f64::from(u8::from(*v))).collect();
-    let over = |values: &[f64], reach: f64| -> Vec<f64> {
-        let sums = blur(values, columns, rows, reach);
-        let weights = blur(&weight, columns, rows, reach);
+    let window = |values: &[f64], reach: f64| blur(values, columns, rows, reach);
+    let over = |values: &[f64], reach: f64, weights: &[f64]| -> Vec<f64> {
+        let sums = window(values, reach);
         sums.iter()
             .zip(weights)
-            .map(|(s, w)| if w > 1e-6 { s / w } else { 0.0 })
+            .map(|(s, w)| if *w > 1e-6 { s / w } else { 0.0 })
             .collect()
     };
     let raw: Vec<f64> = grey.iter().map(|g| g.map_or(0.0, f64::from)).collect();
     let zeroed = |values: Vec<f64>| -> Vec<f64> { values.iter().zip(&weight).map(|(v, w)| v * w).collect() };
-    let smooth = zeroed(over(&raw, PIXEL_BLUR));
+    let smooth = zeroed(over(&raw, PIXEL_BLUR, &window(&weight, PIXEL_BLUR)));
     let reach = window_m / surface.cell_m;
-    let mean = over(&smooth, reach);
+    let weights = window(&weight, reach);
+    let mean = over(&smooth, reach, &weights);
     let apart = zeroed(smooth.iter().zip(&mean).map(|(v, m)| v - m).collect());
     let squares: Vec<f64> = apart.iter().map(|a| a * a).collect();
-    let variance = over(&squares, reach);
+    let variance = over(&squares, reach, &weights);
     let values = apart
         .iter()
         .zip(variance)

@@ -12,7 +12,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use stonewise_core::evaluate::SeenBeforeMotion;
-use stonewise_core::geometry::{FaceFrame, View};
+use stonewise_core::geometry::{Bounds, FaceFrame, View};
 use stonewise_core::raster::RgbImage;
 use stonewise_core::registration::PairSource;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoCamera, PhotoParams, PhotoSource};
@@ -40,8 +40,7 @@ struct Boxed {
     slot: u32,
     centroid: Point3<f64>,
     frame: FaceFrame,
-    low: Vector3<f64>,
-    high: Vector3<f64>,
+    bounds: Bounds,
     /// How its surroundings moved, metres.
     shift: Vector3<f64>,
 }
@@ -131,18 +130,14 @@ fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
                 let frame = FaceFrame::from_normal(&pair.normal);
                 let turn = frame.face_from_world();
                 let points = &pair.points_first;
-                let local = (0..points.len()).map(|i| turn * (points.world(i) - pair.centroid));
-                let (low, high) = local.fold(None, |found: Option<(Vector3<f64>, Vector3<f64>)>, p| {
-                    let (low, high) = found.unwrap_or((p, p));
-                    Some((low.inf(&p), high.sup(&p)))
-                })?;
+                let local = (0..points.len()).map(|i| Point3::from(turn * (points.world(i) - pair.centroid)));
+                let bounds = Bounds::of(local)?;
                 Some(Boxed {
                     batch: batch as u32,
                     slot: slot as u32,
                     centroid: pair.centroid,
                     frame,
-                    low,
-                    high,
+                    bounds,
                     shift: *shift,
                 })
             })
@@ -211,8 +206,8 @@ impl Boxed {
         for k in 0..8 {
             let corner = |margin: f64| {
                 let pick = |axis: usize, by: f64| match (k >> axis) & 1 {
-                    0 => self.low[axis] - by,
-                    _ => self.high[axis] + by,
+                    0 => self.bounds.min[axis] - by,
+                    _ => self.bounds.max[axis] + by,
                 };
                 let local = Vector3::new(pick(0, margin), pick(1, margin), pick(2, 0.0));
                 let world = centre + self.frame.face_from_world().transpose() * local;
