@@ -229,16 +229,18 @@ fn wall(errors: &[Vector3<f64>], noise_m: f64, seed: u64) -> Vec<SeenStone> {
         .collect()
 }
 
+/// Errors of two sources in each of two epochs, metres.
+const ERRORS: [Vector3<f64>; 4] = [
+    Vector3::new(0.001, 0.0, -0.001),
+    Vector3::new(-0.001, 0.001, 0.0),
+    Vector3::new(0.004, -0.003, 0.002),
+    Vector3::new(0.002, -0.002, 0.004),
+];
+
 #[test]
 fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
-    let errors = [
-        Vector3::new(0.001, 0.0, -0.001),
-        Vector3::new(-0.001, 0.001, 0.0),
-        Vector3::new(0.004, -0.003, 0.002),
-        Vector3::new(0.002, -0.002, 0.004),
-    ];
-    let stones = wall(&errors, 0.002, 1);
-    let stable = stable_points(&errors, 0.002);
+    let stones = wall(&ERRORS, 0.002, 1);
+    let stable = stable_points(&ERRORS, 0.002);
     let sources = sources(2);
     let found = |stable: &[StablePoints]| {
         let pair = EpochPair {
@@ -250,7 +252,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };
-    let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
+    let truth = 0.5 * (ERRORS[2] + ERRORS[3] - ERRORS[0] - ERRORS[1]);
     let with = found(&stable);
     assert_eq!(with.datum, Datum::Stable);
     for at in &with.at {
@@ -321,21 +323,15 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
 
 #[test]
 fn an_area_that_moved_is_named_and_left_out() {
-    let errors = [
-        Vector3::new(0.001, 0.0, -0.001),
-        Vector3::new(-0.001, 0.001, 0.0),
-        Vector3::new(0.004, -0.003, 0.002),
-        Vector3::new(0.002, -0.002, 0.004),
-    ];
-    let stones = wall(&errors, 0.002, 1);
+    let stones = wall(&ERRORS, 0.002, 1);
     let sources = sources(2);
     let found = |motion: Vector3<f64>| {
         let moved: Vec<Vector3<f64>> = (0..4)
-            .map(|s| errors[s] + if s < 2 { Vector3::zeros() } else { motion })
+            .map(|s| ERRORS[s] + if s < 2 { Vector3::zeros() } else { motion })
             .collect();
         let mut stable = stable_area(4, &Vector3::new(5.0, 0.0, 0.0), &moved, 0.002);
-        stable.extend(stable_area(1, &Vector3::new(0.0, 4.0, 0.0), &errors, 0.002));
-        stable.extend(stable_area(2, &Vector3::new(5.0, 4.0, 0.0), &errors, 0.002));
+        stable.extend(stable_area(1, &Vector3::new(0.0, 4.0, 0.0), &ERRORS, 0.002));
+        stable.extend(stable_area(2, &Vector3::new(5.0, 4.0, 0.0), &ERRORS, 0.002));
         let pair = EpochPair {
             sources: &sources,
             same_as: &[0, 1, 2, 3],
@@ -382,13 +378,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
 
 #[test]
 fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
-    let errors = [
-        Vector3::new(0.001, 0.0, -0.001),
-        Vector3::new(-0.001, 0.001, 0.0),
-        Vector3::new(0.004, -0.003, 0.002),
-        Vector3::new(0.002, -0.002, 0.004),
-    ];
-    let mut stones = wall(&errors, 0.002, 1);
+    let mut stones = wall(&ERRORS, 0.002, 1);
     // A stone that only the first source of each epoch shows has all of its own error, the others half of the variance.
     let mut alone = stones[7].clone();
     alone.sights.retain(|s| s.source % 2 == 0);

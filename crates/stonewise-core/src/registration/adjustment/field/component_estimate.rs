@@ -160,6 +160,13 @@ mod tests {
         all
     }
 
+    /// Minus twice the log likelihood of a normal variable about zero, up to a constant.
+    fn normal_deviance(covariance: DMatrix<f64>, observed: &DVector<f64>) -> f64 {
+        let factor = covariance.cholesky().unwrap();
+        let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        log_det + observed.dot(&factor.solve(observed))
+    }
+
     #[test]
     fn the_deviance_is_that_of_a_multivariate_normal_variable() {
         let wall = SmallWall::new(4, 3, 11);
@@ -186,9 +193,7 @@ mod tests {
                     .rows_mut(9 * i, 9)
                     .copy_from(&(noise * stone.equations.vector));
             }
-            let factor = covariance.cholesky().unwrap();
-            let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-            log_det + observed.dot(&factor.solve(&observed))
+            normal_deviance(covariance, &observed)
         };
         let difference = deviance(&problem, &other).unwrap() - deviance(&problem, &start).unwrap();
         let expected = by_definition(&other) - by_definition(&start);
@@ -271,9 +276,7 @@ mod tests {
                     .copy_from(&(of_photos + bias));
             }
             let covariance = &observe * motion * observe.transpose() + noise;
-            let factor = covariance.cholesky().unwrap();
-            let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
-            log_det + observed.dot(&factor.solve(&observed))
+            normal_deviance(covariance, &observed)
         };
         let difference = deviance(&problem, &other).unwrap() - deviance(&problem, &start).unwrap();
         let expected = by_definition(&other) - by_definition(&start);
