@@ -30,7 +30,7 @@ impl Listeners {
 
 /// Does the work on a thread of its own, with the interpreter's lock released.
 ///
-/// The calling thread tells the listeners, and asks the work to stop on Ctrl-C or when a listener fails; that exception is raised once
+/// The calling thread tells the listeners, and stops the work on Ctrl-C or when a listener fails; that exception is raised once
 /// the work has come to its end.
 pub fn attended<T: Send>(
     py: Python<'_>,

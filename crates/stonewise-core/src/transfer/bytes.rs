@@ -69,7 +69,7 @@ impl Reader<'_> {
         mut each: impl FnMut(&mut Self) -> Result<T, TransferError>,
     ) -> Result<Vec<T>, TransferError> {
         let count = self.u32()? as usize;
-        // No entry is shorter than a byte: a wrong length asks for no memory.
+        // No entry is shorter than a byte: a wrong length takes no memory.
         if count > self.0.len() {
             return Err(TransferError::Damaged);
         }

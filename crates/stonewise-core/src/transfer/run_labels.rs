@@ -20,7 +20,7 @@ pub(super) struct RunLabels {
 const PART_PX: usize = 64;
 
 impl RunLabels {
-    /// Those of a photo that nobody asks.
+    /// Those of a photo that is not read.
     pub(super) fn none() -> Self {
         Self {
             width: 0,

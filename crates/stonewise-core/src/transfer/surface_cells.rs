@@ -71,7 +71,7 @@ impl SurfaceCells {
         }
     }
 
-    /// The points of the tile, cell by cell. Neighbours are then asked about together, whose pixels lie in the
+    /// The points of the tile, cell by cell. Neighbours then come one after the other, whose pixels lie in the
     /// processor's cache.
     pub(super) fn groups(&self, cloud: &Cloud) -> Vec<SurfaceGroup> {
         self.groups_of(cloud, &(0..cloud.len() as u32).collect::<Vec<u32>>())

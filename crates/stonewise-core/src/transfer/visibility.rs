@@ -105,7 +105,7 @@ impl<'a> Observer<'a> {
     /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the order of
     /// `chosen`.
     ///
-    /// Points are asked about cell by cell: their surface is looked up once, and the photos show them side by side.
+    /// Points come cell by cell: their surface is looked up once, and the photos show them side by side.
     pub(super) fn sight_all<R: Clone + Default + Send>(
         &self,
         tile: usize,

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
 use stonewise_io::atomic::write_atomically;
 
-/// A comment behind the end of the file, by which a later call knows that it may replace it.
+/// A comment behind the end of the file, that tells a later call that it may replace the file.
 const MARK: &str = "% made by stonewise report\n";
 
 /// A report as PDF: the browser that prints it, and the file that it may become.

@@ -71,7 +71,7 @@ impl StepStore {
         })
     }
 
-    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan knows them.
+    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan lists them.
     pub fn of_unit(folder: &Path, scope: Scope, digests: BTreeMap<PathBuf, String>) -> Result<Self> {
         Ok(Self {
             scope: Some(scope),
