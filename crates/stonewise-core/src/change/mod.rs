@@ -12,6 +12,7 @@ mod m3c2;
 mod mesh;
 mod normals;
 mod params;
+mod registration_error;
 mod spread;
 mod survey;
 mod triangle;

@@ -24,7 +24,7 @@ use crate::pipeline::steps::edit::{Edited, edit};
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::label::{Labelled, label};
-use crate::pipeline::steps::m3c2::m3c2;
+use crate::pipeline::steps::m3c2::{m3c2, with_datum};
 use crate::pipeline::steps::r#match::{Matched, r#match};
 use crate::pipeline::steps::offsets::label_offsets;
 use crate::pipeline::steps::register::{Registered, datum, register};
@@ -324,6 +324,8 @@ fn measure(
         let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
         let outward = OutwardReference::Towards(&centres);
         let change = m3c2(context, [&first.ingested, &second.ingested], number, &outward)?;
+        let params = &context.project.settings.m3c2;
+        let change = with_datum(change, params, &datum, registered.epoch_errors.as_ref());
         let crs = coordinate_system(context.project)?;
         context.timed("write m3c2", || {
             write_m3c2(&context.out, pair, crs.as_ref(), &change)

@@ -73,6 +73,14 @@ pub struct RigidError {
     pub covariance: Matrix6<f64>,
 }
 
+impl RigidError {
+    /// The error at a place, world, metres.
+    pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
+        let turn: Vector3<f64> = self.error.fixed_rows::<3>(3).into_owned();
+        self.error.fixed_rows::<3>(0) + turn.cross(&(place - self.centre))
+    }
+}
+
 /// Result of [`epoch_errors`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpochErrors {

@@ -5,11 +5,13 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::steps::label_batch::batch_name;
 use crate::pipeline::storage::step::{Key, StepDir};
-use nalgebra::{Point3, Vector3};
+use crate::results::records::Datum;
+use nalgebra::{Matrix3, Point3, Vector3};
 use std::ops::Range;
 use std::path::Path;
-use stonewise_core::change::{ChangeField, ChangePoint, OutwardReference, m3c2_tiles};
+use stonewise_core::change::{ChangeField, ChangePoint, M3c2Params, OutwardReference, m3c2_tiles};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::registration::observers::EpochErrors;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
 
 /// The comparison, one row of about 100 bytes a core point; as JSON it took 295, 1.3 GB for the 4.3 million of a dam.
@@ -28,6 +30,31 @@ pub fn m3c2(
         write_field(&step.file(FIELD), &comparison.field(all)?)
     })?;
     read_field(&step.file(FIELD))
+}
+
+/// The comparison with detection limits that hold the registration error of the epochs, point by point.
+///
+/// Distances stay those of the clouds as they lie, so what the datum shows to be an error counts beside what stays uncertain of it:
+/// reg^2 = n' C n + (n' e)^2, with the error `e` and its covariance `C` at the core point, as registration.json has them. Nothing
+/// changes where the project states an error for M3C2. Where the datum is unknown, only the few points of a cylinder are accounted for.
+pub fn with_datum(
+    change: ChangeField,
+    params: &M3c2Params,
+    datum: &Datum,
+    errors: Option<&EpochErrors>,
+) -> ChangeField {
+    if params.registration_error_m > 0.0 {
+        return change;
+    }
+    let rigid = errors.filter(|_| datum.is_estimated()).map(|e| &e.rigid);
+    change.with_registration_errors(|point| {
+        let covariance = datum
+            .covariance_at(&point.position)
+            .unwrap_or_else(Matrix3::zeros);
+        let error = rigid.map_or_else(Vector3::zeros, |r| r.at(&point.position));
+        let variance = point.normal.dot(&(covariance * point.normal)).max(0.0);
+        variance.sqrt().hypot(point.normal.dot(&error))
+    })
 }
 
 /// The comparison of two epochs, for processes that share it.
@@ -160,6 +187,43 @@ fn read_field(path: &Path) -> Result<ChangeField> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::records::DatumState;
+    use nalgebra::Matrix6;
+
+    fn flat() -> ChangeField {
+        let point = |x: f64| ChangePoint {
+            position: Point3::new(x, 0.0, 0.0),
+            normal: Vector3::y(),
+            distance_m: Some(0.0),
+            detection_limit_m: Some(0.0),
+            spread_m: [Some(0.0); 2],
+            counts: [500; 2],
+        };
+        ChangeField {
+            points: vec![point(0.0), point(10.0)],
+        }
+    }
+
+    #[test]
+    fn a_turned_epoch_is_less_certain_far_from_the_middle() {
+        // 2 mm along the normal, and 0.1 mrad about z: 1 mm at an arm of 10 m.
+        let covariance = Matrix6::from_diagonal(&[0.0, 4e-6, 0.0, 0.0, 0.0, 1e-8].into());
+        let datum = Datum::known(DatumState::Stated, &Point3::origin(), &covariance, String::new());
+        let limits = |params: &M3c2Params, datum: &Datum| {
+            let field = with_datum(flat(), params, datum, None);
+            [0, 1].map(|k| field.points[k].detection_limit_m.unwrap())
+        };
+        let found = limits(&M3c2Params::default(), &datum);
+        assert!((found[0] - 1.96 * 0.002).abs() < 1e-6, "{found:?}");
+        assert!((found[1] - 1.96 * 5e-6_f64.sqrt()).abs() < 1e-6, "{found:?}");
+        let stated = M3c2Params {
+            registration_error_m: 0.01,
+            ..M3c2Params::default()
+        };
+        assert_eq!(limits(&stated, &datum), [0.0; 2]);
+        let unknown = Datum::unknown(&Point3::origin(), String::new());
+        assert_eq!(limits(&M3c2Params::default(), &unknown), [0.0; 2]);
+    }
 
     #[test]
     fn a_field_reads_back_to_the_bit() {

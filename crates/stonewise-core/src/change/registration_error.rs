@@ -1,0 +1,147 @@
+//! Detection limits of M3C2 under a registration error that differs from place to place.
+
+use super::{ChangeField, ChangePoint};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+
+/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 1e-5 of its size; below, it
+/// is sought numerically, which takes longer.
+const EXPANDED_FROM: f64 = 12.0;
+/// Cumulative probability at the upper end of a 95 % interval.
+const UPPER_95: f64 = 0.975;
+
+impl ChangeField {
+    /// The same distances, with limits for a registration error of each core point:
+    /// LoD95 = t(nu) sqrt(s1^2 / n1 + s2^2 / n2) + 1.96 reg. Student's quantile t takes the place of 1.96 because the spreads come
+    /// from few points; nu after Welch (1947).
+    ///
+    /// `error_m`: standard deviation of the error along the normal, metres. Points without a limit stay without one.
+    /// Source: Lague, Brodu & Leroux (2013), equation 1.
+    #[must_use]
+    pub fn with_registration_errors(mut self, error_m: impl Fn(&ChangePoint) -> f64 + Sync) -> Self {
+        let z95 = Normal::standard().inverse_cdf(UPPER_95);
+        self.points.par_iter_mut().for_each(|point| {
+            let [Some(s1), Some(s2)] = point.spread_m else {
+                return;
+            };
+            if point.detection_limit_m.is_some() {
+                let [n1, n2] = point.counts.map(f64::from);
+                let of_means = [s1 * s1 / n1, s2 * s2 / n2];
+                let quantile = student_95(freedom(of_means, [n1, n2]), z95);
+                let random = quantile * (of_means[0] + of_means[1]).sqrt();
+                point.detection_limit_m = Some(random + z95 * error_m(point));
+            }
+        });
+        self
+    }
+}
+
+/// Degrees of freedom of a difference of means with these variances.
+fn freedom(of_means: [f64; 2], counts: [f64; 2]) -> f64 {
+    let sum = of_means[0] + of_means[1];
+    let of_each = |k: usize| of_means[k] * of_means[k] / (counts[k] - 1.0).max(1.0);
+    match sum > 0.0 {
+        true => sum * sum / (of_each(0) + of_each(1)),
+        false => f64::INFINITY,
+    }
+}
+
+/// Student's 97.5 % quantile; `z`: the normal one. The expansion is Abramowitz & Stegun (1964), 26.7.5.
+fn student_95(freedom: f64, z: f64) -> f64 {
+    if freedom < EXPANDED_FROM {
+        return StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(UPPER_95));
+    }
+    let terms = [
+        (z.powi(3) + z) / 4.0,
+        (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
+        (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
+    ];
+    terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom) + z
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Point3, Vector3};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn point(spread_m: [f64; 2], counts: [u32; 2]) -> ChangePoint {
+        ChangePoint {
+            position: Point3::new(1.0, 2.0, 3.0),
+            normal: Vector3::x(),
+            distance_m: Some(0.0),
+            detection_limit_m: Some(1.0),
+            spread_m: spread_m.map(Some),
+            counts,
+        }
+    }
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        let z = Normal::standard().inverse_cdf(UPPER_95);
+        // Published two-sided 95 % points of Student's law.
+        for (freedom, expected) in [
+            (4.0, 2.776),
+            (10.0, 2.228),
+            (12.0, 2.179),
+            (30.0, 2.042),
+            (120.0, 1.980),
+        ] {
+            let found = student_95(freedom, z);
+            assert!((found - expected).abs() < 6e-4, "{freedom}: {found}");
+        }
+        assert_eq!(student_95(f64::INFINITY, z), z);
+        let exact = StudentsT::new(0.0, 1.0, EXPANDED_FROM)
+            .unwrap()
+            .inverse_cdf(UPPER_95);
+        assert!((student_95(EXPANDED_FROM, z) / exact - 1.0).abs() < 2e-5);
+    }
+
+    #[test]
+    fn few_points_hold_their_share_where_the_normal_quantile_does_not() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut draw = |n: u32, sd: f64| {
+            let law = Normal::standard();
+            let values: Vec<f64> = (0..n)
+                .map(|_| sd * law.inverse_cdf(rng.random_range(1e-12..1.0)))
+                .collect();
+            let mean = values.iter().sum::<f64>() / f64::from(n);
+            let square: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+            (mean, (square / f64::from(n - 1)).sqrt())
+        };
+        let (mut outside, mut outside_normal) = (0, 0);
+        let trials = 20_000;
+        for _ in 0..trials {
+            let ((m1, s1), (m2, s2)) = (draw(5, 0.01), draw(7, 0.02));
+            let field = ChangeField {
+                points: vec![point([s1, s2], [5, 7])],
+            };
+            let limit = field.with_registration_errors(|_| 0.0).points[0]
+                .detection_limit_m
+                .unwrap();
+            let normal = 1.96 * (s1 * s1 / 5.0 + s2 * s2 / 7.0).sqrt();
+            outside += usize::from((m2 - m1).abs() > limit);
+            outside_normal += usize::from((m2 - m1).abs() > normal);
+        }
+        let [share, share_normal] = [outside, outside_normal].map(|n| n as f64 / f64::from(trials));
+        assert!((0.043..0.057).contains(&share), "{share}");
+        assert!(share_normal > 0.075, "{share_normal}");
+    }
+
+    #[test]
+    fn the_error_counts_at_each_place_and_no_limit_stays_none() {
+        let mut without = point([0.0, 0.0], [9, 9]);
+        without.detection_limit_m = None;
+        let mut far = point([0.0, 0.0], [9, 9]);
+        far.position.x = 5.0;
+        let field = ChangeField {
+            points: vec![point([0.0, 0.0], [9, 9]), far, without],
+        };
+        let found = field.with_registration_errors(|p| 1e-3 * p.position.x);
+        let limits: Vec<Option<f64>> = found.points.iter().map(|p| p.detection_limit_m).collect();
+        assert!((limits[0].unwrap() - 1.96e-3).abs() < 1e-6);
+        assert!((limits[1].unwrap() - 9.8e-3).abs() < 1e-6);
+        assert_eq!(limits[2], None);
+    }
+}
