@@ -1,7 +1,7 @@
 //! Joints between neighbouring stones, and how they open, slide and step.
 
-use super::ResultSet;
 use super::statistics::Sorted;
+use super::{ResultSet, RowMotion, StoneRow};
 use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
 
@@ -43,8 +43,8 @@ pub struct JointMotion {
     pub sliding_m: f64,
     /// Out of the face, metres; positive: the second stone stands out.
     pub step_m: f64,
-    /// Standard deviation of the opening, metres. The stones' covariances are added as if they were independent;
-    /// neighbours share most of their error, so this is an upper bound.
+    /// Standard deviation of the opening, metres. The registration error of the epochs drops out; the rest of both covariances is added
+    /// as if it were independent. Neighbours share a part of it, so this is an upper bound.
     pub opening_sigma_m: f64,
 }
 
@@ -131,14 +131,33 @@ fn motion(results: &ResultSet, stones: [usize; 2], across: &Vector2<f64>) -> Opt
     let [a, b] = stones.map(|i| &results.stones[i]);
     let (first, second) = (a.motion.as_ref()?, b.motion.as_ref()?);
     let difference = second.face - first.face;
-    let covariance: Matrix3<f64> = results.face_covariance(a, first) + results.face_covariance(b, second);
     let direction = Vector3::new(across.x, across.y, 0.0);
+    let variance =
+        variance_apart(results, a, first, &direction) + variance_apart(results, b, second, &direction);
     Some(JointMotion {
         opening_m: difference.xy().dot(across),
         sliding_m: difference.xy().dot(&Vector2::new(-across.y, across.x)),
         step_m: difference.z,
-        opening_sigma_m: direction.dot(&(covariance * direction)).max(0.0).sqrt(),
+        opening_sigma_m: variance.sqrt(),
     })
+}
+
+/// Variance of a stone's motion in a direction (along, up, out), without the registration error of the epochs, which neighbours share
+/// and which drops out between them; at least that of its motion against its neighbours.
+fn variance_apart(
+    results: &ResultSet,
+    stone: &StoneRow,
+    motion: &RowMotion,
+    direction: &Vector3<f64>,
+) -> f64 {
+    let world = results.world_from_face(stone) * direction;
+    let along = |covariance: &Matrix3<f64>| world.dot(&(covariance * world));
+    let datum = results.datum().and_then(|d| d.covariance_at(&stone.centroid));
+    let registration = datum.map_or(0.0, |covariance| along(&covariance));
+    let against_neighbours = along(&motion.relative_covariance);
+    (along(&motion.covariance) - registration)
+        .max(against_neighbours)
+        .max(0.0)
 }
 
 /// A point of an outline.
@@ -225,7 +244,9 @@ impl Samples {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::testing::{folder, rows};
+    use crate::results::records::{Datum, DatumState};
+    use crate::results::testing::{folder, registration_record, rows};
+    use nalgebra::Matrix6;
 
     #[test]
     fn a_bonded_wall_has_its_bed_and_head_joints() {
@@ -258,6 +279,35 @@ mod tests {
             all.iter()
                 .filter(|j| j.stones.contains(&2))
                 .all(|j| j.motion.is_none())
+        );
+    }
+
+    #[test]
+    fn the_error_of_the_registration_drops_out_of_an_opening() {
+        let folder = folder(&rows());
+        let mut results = ResultSet::read(folder.path()).unwrap();
+        let sigma = |results: &ResultSet| {
+            let all = joints(results);
+            all.iter()
+                .find(|j| j.stones == [6, 7])
+                .unwrap()
+                .motion
+                .unwrap()
+                .opening_sigma_m
+        };
+        let alone = sigma(&results);
+        // The same stones, measured in a survey that lies somewhere within 4 mm.
+        let shared = Matrix6::from_diagonal(&[1.6e-5, 1.6e-5, 1.6e-5, 0.0, 0.0, 0.0].into());
+        let mut record = registration_record();
+        record.datum = Datum::known(DatumState::Sources, &Point3::origin(), &shared, String::new());
+        results.registration = Some(record);
+        for motion in results.stones.iter_mut().filter_map(|s| s.motion.as_mut()) {
+            motion.covariance += Matrix3::identity() * 1.6e-5;
+        }
+        assert!(
+            (sigma(&results) / alone - 1.0).abs() < 1e-9,
+            "{} {alone}",
+            sigma(&results)
         );
     }
 }

@@ -122,8 +122,15 @@ impl ResultSet {
 
     /// Covariance of a stone's displacement as (along, up, out), m^2.
     pub fn face_covariance(&self, stone: &StoneRow, motion: &RowMotion) -> Matrix3<f64> {
-        let face = FaceFrame::from_normal(&self.normal(stone)).face_from_world();
-        face * motion.covariance * face.transpose()
+        let world = self.world_from_face(stone);
+        world.transpose() * motion.covariance * world
+    }
+
+    /// Takes (along, up, out) of a stone's face to world axes.
+    pub fn world_from_face(&self, stone: &StoneRow) -> Matrix3<f64> {
+        FaceFrame::from_normal(&self.normal(stone))
+            .face_from_world()
+            .transpose()
     }
 
     /// Outline of a stone in the unrolled facade, metres; a square of its area where the outline is missing.
