@@ -9,6 +9,7 @@ mod breaks;
 mod candidate;
 mod equations;
 mod error;
+mod estimate;
 mod evaluate;
 mod field;
 mod hypothesis;

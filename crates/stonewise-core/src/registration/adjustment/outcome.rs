@@ -22,6 +22,8 @@ const BAD_CELLS: usize = 2;
 /// The same share where the stone is probably loose: at its own optimum, remaining disagreement means a wrong
 /// mask.
 const BAD_SHARE_LOOSE: f64 = 0.2;
+/// Sum of 4^-k: what all octaves of length together leave in the mean over the wall, in variances of one.
+const OCTAVES_IN_MEAN: f64 = 4.0 / 3.0;
 /// Information that keeps rotations and bendings solvable which no point determines; far below any that
 /// counts.
 const RIDGE: f64 = 1e-9;
@@ -61,18 +63,22 @@ pub(crate) fn report(
     }
 }
 
-/// Covariance of the mean motion: of the field's mean, and of the mean of the stones' own motions and shared
-/// errors.
+/// Covariance of the mean motion: of the field's mean, of the mean of what stones do and err on their own, and of errors that
+/// points share over whole octaves of length. Of these the longest is one error of the whole wall, the next has four patches, and so
+/// on: 1 + 1/4 + 1/16 + ... of an octave's variance is left in the mean.
 fn common_covariance(adjustment: &Adjustment, solution: &Solution) -> Matrix3<f64> {
-    let shared = adjustment.shared_variances(adjustment.octaves());
-    let own = adjustment.components.own_variances();
-    let variance: f64 = (0..3).map(|k| own[k] + shared[k]).fold(0.0, f64::max);
+    let (own, shared) = (
+        adjustment.components.own_variances(),
+        adjustment.shared_variances(1.0),
+    );
+    let octave = shared[0];
+    let of_stone = (0..3).map(|k| own[k] + shared[k] - octave).fold(0.0, f64::max);
     let stones = adjustment.stones.len().max(1) as f64;
-    solution.field.mean_covariance + Matrix3::identity() * (variance / stones)
+    solution.field.mean_covariance + Matrix3::identity() * (of_stone / stones + OCTAVES_IN_MEAN * octave)
 }
 
 fn results(adjustment: &Adjustment, solution: &Solution, tested: &[Tested]) -> Vec<PairResult> {
-    let shared = adjustment.shared_variances(adjustment.octaves());
+    let shared = [1.0, adjustment.octaves()].map(|octaves| adjustment.shared_variances(octaves));
     let stones = adjustment.stones.iter().zip(tested).enumerate();
     stones
         .map(|(i, (stone, tested))| PairResult {
@@ -138,24 +144,24 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
-/// `shared`: variances of errors that all points of a stone share.
+/// `shared`: variances of errors that all points of a stone share, against its neighbours and against the other epoch.
 fn motion(
     adjustment: &Adjustment,
     i: usize,
     solution: &Solution,
     tested: Tested,
-    shared: &[f64; 9],
+    shared: &[[f64; 9]; 2],
 ) -> StoneMotion {
     let node = &adjustment.graph.nodes[i];
     let world = node.face_from_world.transpose();
-    let estimate = adjustment.estimate(i, solution);
+    let estimate = adjustment.estimate(i, solution, &shared[0]);
     let x = estimate.mean + adjustment.common_in(i);
     let displacement = world * x.translation();
     let rotation = world * x.rotation();
     let turned = UnitQuaternion::from_scaled_axis(rotation);
     let arm = node.centroid.coords;
     let mut local = estimate.covariance;
-    for (k, variance) in shared.iter().enumerate() {
+    for (k, variance) in shared[1].iter().enumerate() {
         local[(k, k)] += variance;
     }
     let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
@@ -164,7 +170,6 @@ fn motion(
     let prediction = &solution.field.from_others[i];
     let common = adjustment.common_in(i).translation();
     let expected = world * (prediction.mean.fixed_rows::<3>(0) + common);
-    let spread = world * prediction.covariance.fixed_view::<3, 3>(0, 0) * world.transpose();
     let equations = adjustment.stones[i].more_probable().surface.equations();
     StoneMotion {
         second_from_first: Rigid3::from_parts(Translation3::from(arm + displacement - turned * arm), turned),
@@ -172,10 +177,10 @@ fn motion(
         rotation,
         covariance,
         relative: displacement - expected,
-        relative_covariance: covariance.fixed_view::<3, 3>(0, 0) + spread,
+        relative_covariance: world * estimate.relative_covariance * world.transpose(),
         own_motion_p: tested.p_value,
         loose: tested.is_loose,
-        p_loose: Some(1.0 - adjustment.stones[i].p_with_field),
+        p_loose: Some(adjustment.p_loose(&adjustment.stones[i])),
         observability: observability(&solution.equations[i].with_field),
         rmse_m: equations.map_or(f64::NAN, |e| e.rms_m),
     }

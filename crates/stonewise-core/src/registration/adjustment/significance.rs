@@ -3,7 +3,6 @@
 use super::field::posterior;
 use super::solution::Solution;
 use super::state::Adjustment;
-use crate::statistics::discoveries;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Factor by which the bending's variance is raised in the test for loose stones: a bent face is not a loose
@@ -19,24 +18,18 @@ pub(crate) struct Tested {
     pub is_loose: bool,
 }
 
-/// Tests each stone against its neighbours, with the false discovery rate controlled.
+/// Finds the stones that moved unlike their neighbours, with the false discovery rate controlled.
 ///
-/// Significance alone is not enough: scans show departures of tenths of a millimetre that come from how
-/// stations overlap. A stone is loose if it also moved as loose stones do more probably than as its
-/// neighbours.
+/// The test is the probability that a stone moved with its neighbours, against that of a motion as loose stones make. A p-value
+/// alone is no test: scans show departures of tenths of a millimetre that come from how stations overlap.
 pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<Tested> {
-    let rate = adjustment.params.false_discovery_rate;
-    let p_values = p_values(adjustment, solution);
-    let followed: Vec<Option<f64>> = adjustment
+    let p_with_field: Vec<Option<f64>> = adjustment
         .stones
         .iter()
         .map(|s| s.on_own.as_ref().map(|_| s.p_with_field))
         .collect();
-    let mut loose = within_error_rate(&followed, rate);
-    for i in discoveries(&p_values, rate) {
-        loose[i] |= adjustment.stones[i].is_probably_loose();
-    }
-    p_values
+    let loose = within_error_rate(&p_with_field, adjustment.params.false_discovery_rate);
+    p_values(adjustment, solution)
         .iter()
         .zip(loose)
         .map(|(p, is_loose)| Tested {

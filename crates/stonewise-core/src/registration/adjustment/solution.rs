@@ -119,7 +119,8 @@ impl Adjustment {
             let loose = posterior(at_optimum, prediction, &own);
             let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
             let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
-            if largest_m > UNCERTAIN_SHARE * self.loose.move_m || stone.ratio.is_contradicted {
+            stone.is_undecided = largest_m > UNCERTAIN_SHARE * self.loose.move_m;
+            if stone.is_undecided || stone.ratio.is_contradicted {
                 stone.p_with_field = 1.0;
             }
         }

@@ -48,6 +48,8 @@ pub(crate) struct StoneState {
     pub ratio: LikelihoodRatio,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
+    /// Whether its observations are too weak to tell a loose stone from one that moves with the field.
+    pub is_undecided: bool,
     /// Whether its last step exceeded the uncertainty of its motion.
     pub swings: bool,
     /// Effective degrees of freedom: how many unknowns the stone's own points determine.
@@ -104,6 +106,7 @@ impl StoneState {
             on_own: None,
             ratio: LikelihoodRatio::default(),
             p_with_field: 1.0,
+            is_undecided: false,
             swings: false,
             effective_freedom: 0.0,
         }

@@ -5,7 +5,7 @@ use super::equations::StoneEquations;
 use super::field::{Field, Posterior, posterior};
 use super::solution::Solution;
 use super::state::Adjustment;
-use super::stone_vector::{Matrix9, StoneVector};
+use super::stone_vector::StoneVector;
 
 /// One stone in so many may still swing between two optima of its own when the adjustment has settled.
 const RESTLESS: usize = 50;
@@ -16,13 +16,6 @@ const SUSPECT: f64 = 1.5;
 const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
-
-/// A stone's motion with its looseness averaged out.
-pub(crate) struct Estimate {
-    /// In the stone's frame, about the common translation.
-    pub mean: StoneVector,
-    pub covariance: Matrix9,
-}
 
 impl Adjustment {
     /// Moves every stone to its posterior mean; whether the adjustment has settled.
@@ -67,37 +60,6 @@ impl Adjustment {
         Step {
             counts: is_suspect,
             swings: false,
-        }
-    }
-
-    /// A stone's motion about the common translation, looseness averaged out.
-    pub fn estimate(&self, i: usize, solution: &Solution) -> Estimate {
-        let p = self.stones[i].p_with_field;
-        let equations = &solution.equations[i];
-        let prediction = &solution.field.from_others[i];
-        let mut tied = posterior(
-            &equations.with_field,
-            prediction,
-            &self.components.own_variances(),
-        );
-        // What counts as an error might be a motion after all.
-        let slide_m = self.undetected_slide_m(i);
-        for k in 0..2 {
-            tied.covariance[(k, k)] += slide_m * slide_m;
-        }
-        let Some(own) = &equations.on_own else {
-            return Estimate {
-                mean: tied.mean,
-                covariance: tied.covariance,
-            };
-        };
-        let loose = posterior(own, prediction, &self.loose.own_variances(&self.components));
-        let apart = (tied.mean - loose.mean).unknowns().to_owned();
-        Estimate {
-            mean: tied.mean.scaled(p) + loose.mean.scaled(1.0 - p),
-            covariance: tied.covariance * p
-                + loose.covariance * (1.0 - p)
-                + apart * apart.transpose() * (p * (1.0 - p)),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::registration::adjustment::observation::NormalEquations;
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector6};
 
 /// A stone's motion as all other stones predict it, in its frame: translation and rotation.
 #[derive(Clone, Debug)]
@@ -67,6 +67,36 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
     }
 }
 
+/// Covariance of the stone's translation against the prediction (posterior mean less predicted mean), as an estimate of what the
+/// stone did beside the field.
+///
+/// Prediction and posterior are correlated: with C the covariance of the posterior, P that of the motion before the stone's own
+/// observations and S that of the prediction, the error of their difference has C + S - C P^-1 S - S P^-1 C. `shared`: variances of
+/// errors of the observations that their equations leave out; of these the difference takes up I - C P^-1. `posterior`: of the same
+/// `prediction` and `own`.
+pub(crate) fn covariance_against(
+    posterior: &Posterior,
+    prediction: &Prediction,
+    own: &[f64; 9],
+    shared: &[f64; 9],
+) -> Matrix3<f64> {
+    let root = root_of_spread(prediction, own);
+    let of_prior = root
+        .solve_lower_triangular(&posterior.covariance)
+        .and_then(|half| root.transpose().solve_upper_triangular(&half))
+        .unwrap_or_else(Matrix9::zeros)
+        .transpose();
+    let mut of_prediction = Matrix9::zeros();
+    of_prediction
+        .fixed_view_mut::<6, 6>(0, 0)
+        .copy_from(&prediction.covariance);
+    let cross = of_prior * of_prediction;
+    let gain = Matrix9::identity() - of_prior;
+    let left_out = gain * Matrix9::from_diagonal(&Vector9::from(*shared)) * gain.transpose();
+    let whole = posterior.covariance + of_prediction - cross - cross.transpose() + left_out;
+    whole.fixed_view::<3, 3>(0, 0).into_owned()
+}
+
 /// Square root of the covariance of the stone's motion before its own observations: prediction and own
 /// motion.
 fn root_of_spread(prediction: &Prediction, own: &[f64; 9]) -> Matrix9 {
@@ -89,16 +119,55 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    #[test]
-    fn prediction_and_observations_join_as_two_gaussians_do() {
-        let mut rng = ChaCha8Rng::seed_from_u64(7);
+    /// Random information and prediction, about a millimetre each.
+    fn random(rng: &mut ChaCha8Rng) -> (Matrix9, Prediction) {
         let m = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
-        let information = m * m.transpose() * 1e6 + Matrix9::identity() * 1e6;
         let p = Matrix6::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let prediction = Prediction {
             mean: Vector6::from_fn(|_, _| rng.random_range(-0.01..0.01)),
             covariance: p * p.transpose() * 1e-6 + Matrix6::identity() * 1e-6,
         };
+        (m * m.transpose() * 1e6 + Matrix9::identity() * 1e6, prediction)
+    }
+
+    #[test]
+    fn the_error_against_the_prediction_is_that_of_its_independent_parts() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let (information, prediction) = random(&mut rng);
+        let shared = [1e-7, 2e-7, 3e-7, 1e-6, 1e-6, 1e-6, 0.0, 0.0, 0.0];
+        for own in [1e-12, 1e-6, 1e-2] {
+            let own = [own; 9];
+            let equations = NormalEquations {
+                information,
+                vector: information * Vector9::from_element(1e-3),
+                constant: 0.0,
+            };
+            let posterior = posterior(&equations, &prediction, &own);
+            // The difference takes up the share G = C H of the prediction's error, of the own motion and of the observations' error;
+            // the own motion is what it should show.
+            let gain = posterior.covariance * information;
+            let missed = gain - Matrix9::identity();
+            let mut of_prediction = Matrix9::zeros();
+            of_prediction
+                .fixed_view_mut::<6, 6>(0, 0)
+                .copy_from(&prediction.covariance);
+            let of_observations =
+                information.try_inverse().unwrap() + Matrix9::from_diagonal(&Vector9::from(shared));
+            let expected = missed * Matrix9::from_diagonal(&Vector9::from(own)) * missed.transpose()
+                + gain * (of_prediction + of_observations) * gain.transpose();
+            let expected = expected.fixed_view::<3, 3>(0, 0).into_owned();
+            let found = covariance_against(&posterior, &prediction, &own, &shared);
+            assert!(
+                (found - expected).norm() < 1e-6 * expected.norm(),
+                "{found} {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn prediction_and_observations_join_as_two_gaussians_do() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let (information, prediction) = random(&mut rng);
         let equations = NormalEquations {
             information,
             vector: information * Vector9::from_fn(|_, _| rng.random_range(-0.01..0.01)),

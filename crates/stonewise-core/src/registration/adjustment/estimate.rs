@@ -1,0 +1,102 @@
+//! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
+
+use super::field::{covariance_against, posterior};
+use super::solution::Solution;
+use super::state::{Adjustment, StoneState};
+use super::stone_vector::{Matrix9, StoneVector};
+use nalgebra::Matrix3;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Share of the results that intervals of 1.96 standard deviations leave outside.
+const OUTSIDE: f64 = 0.05;
+
+/// A stone's motion with its looseness averaged out, in its frame.
+pub(crate) struct Estimate {
+    /// About the common translation.
+    pub mean: StoneVector,
+    pub covariance: Matrix9,
+    /// Covariance of the translation against what the neighbours predict, m^2.
+    pub relative_covariance: Matrix3<f64>,
+}
+
+impl Adjustment {
+    /// A stone's motion about the common translation.
+    ///
+    /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is widened for the
+    /// chance that it does not ([`widening`]). Otherwise mean and covariance are those of the mixture of both motions.
+    ///
+    /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the relative covariance.
+    pub fn estimate(&self, i: usize, solution: &Solution, shared: &[f64; 9]) -> Estimate {
+        let (stone, equations) = (&self.stones[i], &solution.equations[i]);
+        let prediction = &solution.field.from_others[i];
+        let own = self.components.own_variances();
+        let tied = posterior(&equations.with_field, prediction, &own);
+        let mut covariance = tied.covariance;
+        let mut relative_covariance = covariance_against(&tied, prediction, &own, shared);
+        // What counts as an error might be a motion after all.
+        let slide_m = self.undetected_slide_m(i);
+        for k in 0..2 {
+            covariance[(k, k)] += slide_m * slide_m;
+            relative_covariance[(k, k)] += slide_m * slide_m;
+        }
+        let p_loose = self.p_loose(stone);
+        let Some(at_own) = &equations.on_own else {
+            let factor = widening(p_loose);
+            return Estimate {
+                mean: tied.mean,
+                covariance: covariance * factor,
+                relative_covariance: relative_covariance * factor,
+            };
+        };
+        let wide = self.loose.own_variances(&self.components);
+        let loose = posterior(at_own, prediction, &wide);
+        let p = 1.0 - p_loose;
+        let apart = (tied.mean - loose.mean).unknowns().to_owned();
+        let between = apart * apart.transpose() * (p * p_loose);
+        let loose_relative = covariance_against(&loose, prediction, &wide, shared);
+        Estimate {
+            mean: tied.mean.scaled(p) + loose.mean.scaled(p_loose),
+            covariance: covariance * p + loose.covariance * p_loose + between,
+            relative_covariance: relative_covariance * p
+                + loose_relative * p_loose
+                + between.fixed_view::<3, 3>(0, 0),
+        }
+    }
+
+    /// Probability that a stone is loose; what is expected of any stone where its own observations cannot tell.
+    pub fn p_loose(&self, stone: &StoneState) -> f64 {
+        match stone.is_undecided {
+            true => self.loose.share,
+            false => 1.0 - stone.p_with_field,
+        }
+    }
+}
+
+/// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose` that it
+/// does not: 1.96 standard deviations then hold the motion in 95 of 100 cases even if they miss every loose one.
+///
+/// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own; the factor grows no
+/// further there.
+fn widening(p_loose: f64) -> f64 {
+    let missed = p_loose.clamp(0.0, 0.9 * OUTSIDE);
+    let outside = (OUTSIDE - missed) / (1.0 - missed);
+    let quantile = |outside: f64| Normal::standard().inverse_cdf(1.0 - 0.5 * outside);
+    (quantile(outside) / quantile(OUTSIDE)).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn widened_intervals_hold_their_share_of_a_mixture() {
+        let law = Normal::standard();
+        for p_loose in [0.0, 1e-4, 0.01, 0.03, 0.045] {
+            let reach = law.inverse_cdf(0.975) * widening(p_loose).sqrt();
+            let held = (1.0 - p_loose) * (1.0 - 2.0 * law.sf(reach));
+            assert!((held - 0.95).abs() < 1e-9, "{p_loose}: {held}");
+        }
+        assert!((widening(0.0) - 1.0).abs() < 1e-12);
+        assert_eq!(widening(0.5), widening(0.045));
+    }
+}
