@@ -65,7 +65,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
     let combo = match case {
         Case::Combo | Case::Datum => true,
         Case::Still | Case::Translation | Case::Bulge | Case::Crack => false,
-        Case::Settlement | Case::Loose => return None,
+        Case::Edge | Case::Settlement | Case::Loose => return None,
     };
     let folder = folder().join(if combo { "combo" } else { "split" }).join("truth");
     let first = read_stones(&folder.join(format!("epoch1_cloud_{sensor}_truth.laz")));

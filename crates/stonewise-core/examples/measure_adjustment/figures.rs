@@ -36,6 +36,9 @@ pub struct Figures {
     pub normalised: [f64; 2],
     /// Tests of stones that are not loose with p below 0.05, and stones of these called loose.
     pub alarms: [f64; 2],
+    /// Motion against the neighbours of stones that are not loose, in units of its covariance: mean square over its expectation, and
+    /// share beyond the 95 % point.
+    pub against: [f64; 2],
     /// Medians of the bounds: stone in the face, out of it, window in the face, out of it.
     pub bounds: [f64; 4],
     /// In-plane 2D error near the crack; breaks across it and elsewhere; share of its height that breaks
@@ -55,6 +58,8 @@ struct Row {
     loose: bool,
     called: bool,
     p: f64,
+    /// Square of the motion against the neighbours in units of its covariance.
+    against: f64,
     spoilt: bool,
 }
 
@@ -104,6 +109,10 @@ pub fn figures(trial: &Trial, results: &[PairResult], breaks: &[Break], seconds:
         alarms: [
             share(still.len(), |i| still[i].p < 0.05),
             share(still.len(), |i| still[i].called),
+        ],
+        against: [
+            still.iter().map(|r| r.against).sum::<f64>() / still.len() as f64 / 3.0,
+            share(still.len(), |i| still[i].against > 7.815),
         ],
         bounds: bounds(trial),
         crack: crack(trial, &rows, breaks),
@@ -176,7 +185,10 @@ pub fn print_loose(trial: &Trial, pairs: &[PairPoints], results: &[PairResult]) 
 fn row(trial: &Trial, result: &PairResult) -> Option<Row> {
     let truth = trial.truth.get(&result.first.0)?;
     let motion = result.motion.as_ref().ok()?;
-    truth.countable.then(|| Row {
+    if !truth.countable {
+        return None;
+    }
+    Some(Row {
         centroid: mean(&trial.stones[0][&result.first.0]),
         face: FaceFrame::from_normal(&truth.normal).face_from_world(),
         error: motion.displacement - truth.displacement,
@@ -184,6 +196,9 @@ fn row(trial: &Trial, result: &PairResult) -> Option<Row> {
         loose: truth.loose,
         called: motion.loose,
         p: motion.own_motion_p,
+        against: motion
+            .relative
+            .dot(&motion.relative_covariance.cholesky()?.solve(&motion.relative)),
         spoilt: truth.spoilt,
     })
 }

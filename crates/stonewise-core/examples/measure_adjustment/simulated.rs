@@ -117,6 +117,11 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
         depth_m: 0.05,
         diameter_m: 2.25,
     };
+    let edge = WallMotion::Bulge {
+        centre_m: [0.5 * width_m - 0.7, 0.8],
+        depth_m: 0.02,
+        diameter_m: 2.25,
+    };
     let loose = WallMotion::Loose {
         share: 0.03,
         at_least: 6,
@@ -132,6 +137,7 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
         },
         motions: match case {
             Case::Still | Case::Translation | Case::Bulge | Case::Datum => Vec::new(),
+            Case::Edge => vec![edge],
             Case::Crack => vec![crack],
             Case::Settlement => vec![settlement],
             Case::Loose => vec![loose],
