@@ -2,11 +2,12 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Field, FieldProblem, FieldStone, PhotoTerms, estimate_components, find_crack, posterior,
+    Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components, find_crack, posterior,
     probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
+use nalgebra::Vector3;
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
 /// is expensive.
@@ -39,10 +40,18 @@ impl Adjustment {
                 })
                 .collect(),
         });
-        self.components = match &self.subgraph {
+        self.components = match Subgraph::new(&self.graph, &self.displacements()) {
             None => estimate_components(&problem),
             Some(part) => estimate_components(&part.restrict(&problem)),
         };
+    }
+
+    /// Where the stones are so far, moving with the field: displacements, world.
+    fn displacements(&self) -> Vec<Vector3<f64>> {
+        let stones = self.stones.iter().zip(&self.graph.nodes);
+        stones
+            .map(|(stone, node)| node.face_from_world.transpose() * stone.with_field.motion.translation())
+            .collect()
     }
 
     /// Solves for the field with the present weights. `None` where the equations cannot be factored.
@@ -54,7 +63,11 @@ impl Adjustment {
     /// again.
     pub fn solve_and_reweight(&mut self, equations: &[StoneEquations]) -> Option<Field> {
         let mut field = self.solve(equations)?;
-        let rounds = if self.subgraph.is_some() { 1 } else { REWEIGHTINGS };
+        let rounds = if Subgraph::is_needed(&self.graph) {
+            1
+        } else {
+            REWEIGHTINGS
+        };
         for _ in 0..rounds {
             self.reweight_stones(equations, &field);
             reweight_ties(

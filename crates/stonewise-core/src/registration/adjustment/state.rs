@@ -1,7 +1,7 @@
 //! The state of the adjustment between iterations.
 
 use super::candidate::CandidateMotion;
-use super::field::{Crack, Graph, LoosePrior, Place, Subgraph, Tie, VarianceComponents};
+use super::field::{Crack, Graph, LoosePrior, Place, Tie, VarianceComponents};
 use super::hypothesis::LikelihoodRatio;
 use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
@@ -18,8 +18,6 @@ pub(crate) struct Adjustment {
     /// In the order of the source; one per node of the graph.
     pub stones: Vec<StoneState>,
     pub graph: Graph,
-    /// The part of a large wall on which the variance components are estimated.
-    pub subgraph: Option<Subgraph>,
     /// One per edge of the graph.
     pub ties: Vec<Tie>,
     pub components: VarianceComponents,
@@ -73,7 +71,6 @@ impl Adjustment {
             stones: stones
                 .map(|((info, node), shift)| StoneState::new(info, node.face_from_world * shift))
                 .collect(),
-            subgraph: Subgraph::new(&graph),
             ties: vec![Tie::WHOLE; graph.edges.len()],
             components: VarianceComponents::start(),
             loose: LoosePrior {

@@ -2,14 +2,19 @@
 
 use super::graph::{Edge, Graph};
 use super::problem::{FieldProblem, PhotoTerms};
+use crate::statistics::upper_median;
+use nalgebra::Vector3;
 use std::collections::{BTreeSet, VecDeque};
 
 /// Walls up to this number of stones are used whole: below it an estimate of the variance components costs
 /// less than the stones' own equations (about a second on two cores).
 const WHOLE: usize = 600;
-/// Connected parts. They lie apart, so that one odd corner of the wall does not decide.
-const PARTS: usize = 4;
-/// Stones in each part: 480 in all determine the components to a tenth.
+/// Connected parts at fixed places. They lie apart, so that one odd corner of the wall does not decide.
+const SPREAD_PARTS: usize = 3;
+/// Parts where neighbours move most unlike each other: components from places at rest alone would make ties so stiff that a bulge
+/// elsewhere ends as loose stones.
+const STRAINED_PARTS: usize = 2;
+/// Stones in each part: 600 in all determine the components to a tenth.
 const PART_STONES: usize = 120;
 
 /// Some connected parts of a graph, with their place in the whole.
@@ -22,12 +27,17 @@ pub(crate) struct Subgraph {
 }
 
 impl Subgraph {
-    /// `None` where the graph is small enough to be used whole.
-    pub fn new(graph: &Graph) -> Option<Self> {
-        if graph.nodes.len() <= WHOLE {
+    /// Whether a graph is too large to be used whole.
+    pub fn is_needed(graph: &Graph) -> bool {
+        graph.nodes.len() > WHOLE
+    }
+
+    /// `displacements`: of the stones as they are known so far, world, metres. `None` where the graph is small enough to be used whole.
+    pub fn new(graph: &Graph, displacements: &[Vector3<f64>]) -> Option<Self> {
+        if !Self::is_needed(graph) {
             return None;
         }
-        let stones = chosen(graph);
+        let stones = chosen(graph, displacements);
         let place = |i: usize| stones.binary_search(&i).ok();
         let mut edges = Vec::new();
         let mut inner = Vec::new();
@@ -65,20 +75,48 @@ impl Subgraph {
 }
 
 /// Stones of all parts, ascending: each part grows from a stone along the edges, breadth first.
-fn chosen(graph: &Graph) -> Vec<usize> {
+fn chosen(graph: &Graph, displacements: &[Vector3<f64>]) -> Vec<usize> {
     let count = graph.nodes.len();
     let next = graph.neighbours();
     let mut chosen = BTreeSet::new();
-    for part in 0..PARTS {
-        let seed = count * (2 * part + 1) / (2 * PARTS);
-        let mut queue = VecDeque::from([seed]);
-        let mut reached = BTreeSet::from([seed]);
-        while let Some(i) = queue.pop_front().filter(|_| reached.len() < PART_STONES) {
-            queue.extend(next[i].iter().copied().filter(|&j| reached.insert(j)));
+    for part in 0..SPREAD_PARTS {
+        chosen.extend(grown(&next, count * (2 * part + 1) / (2 * SPREAD_PARTS)));
+    }
+    let departures = departures(&next, displacements);
+    for _ in 0..STRAINED_PARTS {
+        let free = (0..count).filter(|i| !chosen.contains(i));
+        if let Some(seed) = free.max_by(|a, b| departures[*a].total_cmp(&departures[*b])) {
+            chosen.extend(grown(&next, seed));
         }
-        chosen.extend(reached);
     }
     chosen.into_iter().collect()
+}
+
+fn grown(next: &[Vec<usize>], seed: usize) -> BTreeSet<usize> {
+    let mut queue = VecDeque::from([seed]);
+    let mut reached = BTreeSet::from([seed]);
+    while let Some(i) = queue.pop_front().filter(|_| reached.len() < PART_STONES) {
+        queue.extend(next[i].iter().copied().filter(|&j| reached.insert(j)));
+    }
+    reached
+}
+
+/// By how much stones depart from the mean of their neighbours, metres: the median over each stone and its neighbours, so that a
+/// single stone that is loose or wrong does not count.
+fn departures(next: &[Vec<usize>], displacements: &[Vector3<f64>]) -> Vec<f64> {
+    let own: Vec<f64> = next
+        .iter()
+        .zip(displacements)
+        .map(|(neighbours, here)| {
+            let sum: Vector3<f64> = neighbours.iter().map(|&j| displacements[j]).sum();
+            (here - sum / neighbours.len().max(1) as f64).norm()
+        })
+        .collect();
+    let around = |(i, neighbours): (usize, &Vec<usize>)| {
+        let mut values: Vec<f64> = neighbours.iter().map(|&j| own[j]).chain([own[i]]).collect();
+        upper_median(&mut values).unwrap_or(0.0)
+    };
+    next.iter().enumerate().map(around).collect()
 }
 
 #[cfg(test)]
@@ -88,19 +126,62 @@ mod tests {
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::field::variance_components::VarianceComponents;
 
+    fn at_rest(wall: &SmallWall) -> Vec<Vector3<f64>> {
+        vec![Vector3::zeros(); wall.graph.nodes.len()]
+    }
+
     #[test]
     fn a_small_wall_is_used_whole() {
-        assert!(Subgraph::new(&SmallWall::new(30, 20, 1).graph).is_none());
+        let wall = SmallWall::new(30, 20, 1);
+        assert!(Subgraph::new(&wall.graph, &at_rest(&wall)).is_none());
+    }
+
+    #[test]
+    fn a_bulge_anywhere_is_among_the_parts_and_a_loose_stone_draws_none() {
+        let wall = SmallWall::new(60, 30, 1);
+        for centre in [[0.6, 0.6], [17.0, 5.2], [9.0, 0.3]] {
+            let depth = |p: &nalgebra::Point3<f64>| {
+                let r = (p.y - centre[0]).hypot(p.z - centre[1]);
+                if r < 1.0 {
+                    0.01 * (0.5 * std::f64::consts::PI * r).cos().powi(2)
+                } else {
+                    0.0
+                }
+            };
+            let mut displacements: Vec<Vector3<f64>> = wall
+                .graph
+                .nodes
+                .iter()
+                .map(|n| Vector3::new(depth(&n.centroid), 0.0, 0.0))
+                .collect();
+            displacements[900].z += 0.03;
+            let part = Subgraph::new(&wall.graph, &displacements).unwrap();
+            let bulged: Vec<usize> = (0..1800)
+                .filter(|&i| depth(&wall.graph.nodes[i].centroid) > 0.002)
+                .collect();
+            let covered = bulged.iter().filter(|i| part.stones.contains(i)).count();
+            assert!(
+                2 * covered > bulged.len(),
+                "{centre:?}: {covered} of {}",
+                bulged.len()
+            );
+        }
+        let mut displacements = at_rest(&wall);
+        displacements[900].z = 0.03;
+        let next = wall.graph.neighbours();
+        let around = departures(&next, &displacements);
+        let most = around.iter().copied().fold(0.0, f64::max);
+        assert!(most < 0.01, "{most}");
     }
 
     #[test]
     fn a_large_wall_is_represented_by_connected_parts_of_itself() {
         let wall = SmallWall::new(40, 30, 1);
         let whole = wall.problem(0.9);
-        let part = Subgraph::new(&wall.graph).unwrap();
+        let part = Subgraph::new(&wall.graph, &at_rest(&wall)).unwrap();
         let count = part.stones.len();
         assert!(
-            (PART_STONES..=PARTS * (PART_STONES + 8)).contains(&count),
+            (PART_STONES..=(SPREAD_PARTS + STRAINED_PARTS) * (PART_STONES + 8)).contains(&count),
             "{count}"
         );
         let restricted = part.restrict(&whole);
@@ -131,7 +212,7 @@ mod tests {
     fn the_parts_prefer_the_same_components_as_the_whole() {
         let wall = SmallWall::new(36, 20, 5);
         let whole = wall.problem(1.0);
-        let part = Subgraph::new(&wall.graph).unwrap();
+        let part = Subgraph::new(&wall.graph, &at_rest(&wall)).unwrap();
         let restricted = part.restrict(&whole);
         let start = VarianceComponents::start();
         let wide = VarianceComponents {
