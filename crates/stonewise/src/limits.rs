@@ -1,6 +1,6 @@
 //! Which values parameters can have.
 
-use crate::project::Settings;
+use crate::settings::Settings;
 use serde_json::Value;
 
 /// Parameters that zero makes useless: sizes, radii, counts, steps.

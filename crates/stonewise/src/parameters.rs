@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::limits::impossible;
-use crate::project::{Project, RENAMED, Settings};
+use crate::project::Project;
 use crate::report_params::logo_type;
+use crate::settings::{RENAMED, Settings};
 use serde_json::{Map, Value};
 use std::path::Path;
 use stonewise_segment::Weights;
@@ -111,7 +112,7 @@ fn todays_name(table: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::project::Estimator;
+    use crate::settings::Estimator;
     use serde_json::json;
 
     fn with(parameters: Value) -> Result<Settings> {

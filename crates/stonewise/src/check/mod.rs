@@ -3,6 +3,7 @@
 mod alignment;
 mod cameras;
 mod clouds;
+mod depth;
 mod edges;
 mod finding;
 mod page;
@@ -10,6 +11,7 @@ mod photos;
 mod resources;
 mod sample;
 
+pub use depth::Depth;
 pub use finding::{Finding, Report, Verdict};
 pub(crate) use resources::is_about_this_machine;
 
@@ -17,15 +19,6 @@ use crate::error::Result;
 use crate::project::Project;
 use std::path::Path;
 use stonewise_core::progress::Progress;
-
-/// How closely to look.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Depth {
-    /// At the first 500,000 points of each epoch, without pictures: what a run affords before it works.
-    Quick,
-    /// At the first six million points of each epoch and the edges in three photos, with pictures.
-    Full,
-}
 
 /// Looks at everything that a project names.
 ///

@@ -1,9 +1,10 @@
 //! Halves of one epoch, made once an experiment.
 
 use crate::error::Result;
-use crate::pipeline::{Key, StepStore};
 use crate::project::{Epoch, Project};
 use crate::split;
+use crate::storage::step::Key;
+use crate::storage::store::StepStore;
 use stonewise_core::progress::Progress;
 use stonewise_io::cameras::find_photos;
 

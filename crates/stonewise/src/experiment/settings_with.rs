@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::limits::impossible;
-use crate::project::Settings;
+use crate::settings::Settings;
 
 /// The settings with each parameter (`section.key`, as in the project file) set to its value.
 ///
@@ -89,7 +89,7 @@ fn unknown(settings: &Settings, key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::project::Estimator;
+    use crate::settings::Estimator;
 
     fn value(text: &str) -> toml::Value {
         format!("x = {text}").parse::<toml::Table>().unwrap()["x"].clone()

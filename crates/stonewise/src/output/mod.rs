@@ -14,5 +14,6 @@ mod result_names;
 
 pub use claim::OutputFolder;
 pub use marker::Owner;
-pub use previous::{PREVIOUS_DIR, UNFINISHED_FILE};
+pub use previous::UNFINISHED_FILE;
+pub use result_names::PREVIOUS_DIR;
 pub(crate) use result_names::cloud_names;

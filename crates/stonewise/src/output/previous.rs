@@ -3,7 +3,7 @@
 //! A run that begins moves the results of the last one into `previous/`; a run that finishes removes them. What lies
 //! under its final name is so always the current run's, and `UNFINISHED.txt` says where that is not finished.
 
-use super::result_names::{cloud_names, is_result};
+use super::result_names::{PREVIOUS_DIR, cloud_names, is_result};
 use crate::error::{Error, Result};
 use crate::files::write_text;
 use crate::project::Project;
@@ -11,8 +11,6 @@ use crate::results::names::{EVIDENCE_DIR, REPORT_DIR};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the results of the last finished run lie until the next one has finished.
-pub const PREVIOUS_DIR: &str = "previous";
 /// Says that the results beside it are not finished.
 pub const UNFINISHED_FILE: &str = "UNFINISHED.txt";
 

@@ -4,6 +4,8 @@ use crate::project::Project;
 use crate::results::names::{EVIDENCE_DIR, REPORT_DIR, WORK_DIR};
 use std::path::{Path, PathBuf};
 
+/// Where the results of the last finished run lie until the next one has finished.
+pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
 const STEMS: [&str; 16] = [
     "stones",
@@ -33,7 +35,7 @@ const EVIDENCE: [&str; 6] = ["crops", "crop_outlines", "sections", "cloud", "cam
 /// Folders in an output folder that a run of the project writes into.
 pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
     let epochs = (1..=project.epochs.len()).map(|n| PathBuf::from(format!("epoch{n}")));
-    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, super::PREVIOUS_DIR];
+    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, PREVIOUS_DIR];
     epochs.chain(others.map(PathBuf::from)).collect()
 }
 

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::segment::listing;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 
 /// Name of the step.
 const STEP: &str = "check";

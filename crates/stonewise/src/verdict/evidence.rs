@@ -1,6 +1,7 @@
 //! What the verdict needs, from result files.
 
-use super::assess::{Case, JointCase, StoneCase, StoneMeasured, assess};
+use super::assess::assess;
+use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
 use crate::report_params::Language;
 use crate::results::records::{DatumState, EpochVerdict};

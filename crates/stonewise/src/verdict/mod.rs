@@ -5,8 +5,10 @@
 
 mod area;
 mod assess;
+mod case;
 mod evidence;
 mod interval;
+mod judged;
 mod sentence;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -1,7 +1,7 @@
 //! The verdict in words.
 
-use super::area::Judged;
-use super::assess::{Case, Level};
+use super::case::Case;
+use super::judged::{Judged, Level};
 use crate::figure::count;
 use crate::report_params::Language;
 use crate::results::records::{Area, Largest, Reason, ReasonCode, State};

@@ -1,6 +1,6 @@
 //! Figure 5: a photo with its stones.
 
-use super::Example;
+use super::case::Example;
 use crate::error::Result;
 use crate::files::read_bytes;
 use crate::pipeline::{Context, segment};

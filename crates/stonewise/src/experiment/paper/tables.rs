@@ -1,6 +1,6 @@
 //! The paper's tables beside ours.
 
-use super::{Case, Method};
+use super::case::{Case, Method};
 use crate::error::Result;
 use crate::figure::number;
 use std::fmt::Write;

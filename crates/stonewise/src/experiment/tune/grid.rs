@@ -1,6 +1,6 @@
 //! Which values of which parameters are tried.
 
-use crate::project::{Estimator, Settings};
+use crate::settings::{Estimator, Settings};
 use std::str::FromStr;
 
 /// One parameter and the values that are tried.

@@ -5,7 +5,7 @@ use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,11 @@
 //! The units of a project: what each is, what it needs, and what it will take.
 
 use crate::error::Result;
-use crate::pipeline::steps::label_batch::{PREPARE, batch_name};
+use crate::pipeline::steps::label::batches::{PREPARE, batch_name};
 use crate::pipeline::steps::segment::{part_name, photos_to_segment};
-use crate::pipeline::storage::tiles::most_records;
 use crate::pipeline::units::receipt::receipt_file;
 use crate::project::{Epoch, Project};
+use crate::storage::tiles::most_records;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

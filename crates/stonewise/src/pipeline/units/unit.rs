@@ -16,16 +16,16 @@ use crate::pipeline::run::{
     Corrected, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
 };
 use crate::pipeline::steps::ingest::ingest;
+use crate::pipeline::steps::label::batches::LabelBatches;
 use crate::pipeline::steps::label::gather_labels;
-use crate::pipeline::steps::label_batch::LabelBatches;
 use crate::pipeline::steps::m3c2::Comparison;
 use crate::pipeline::steps::offsets::label_offsets;
 use crate::pipeline::steps::register::register;
 use crate::pipeline::steps::segment::{segment, segment_photo};
-use crate::pipeline::storage::step::code_version;
-use crate::pipeline::storage::store::Scope;
 use crate::pipeline::until::Until;
 use crate::project::Project;
+use crate::storage::step::code_version;
+use crate::storage::store::Scope;
 use std::path::Path;
 use stonewise_core::change::OutwardReference;
 use stonewise_core::geometry::View;

@@ -5,7 +5,7 @@
 
 use super::block::Block;
 use super::excerpts;
-use super::{epoch_names, known_translation_mm};
+use super::pair::{epoch_names, known_translation_mm};
 use crate::error::Error;
 use crate::figure::{colours, nice_above};
 use crate::report::summary::Summary;

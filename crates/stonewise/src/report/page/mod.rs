@@ -12,6 +12,7 @@ mod html;
 mod maps;
 mod method;
 mod overview;
+mod pair;
 mod survey;
 
 use super::summary::Summary;
@@ -23,6 +24,7 @@ use crate::results::records::RunRecord;
 use crate::results::{Comparison, Joint, ResultSet, compare, joints};
 use crate::texts::{Texts, fill};
 use html::with_decimals;
+use pair::{epoch_names, known_translation_mm};
 use std::fmt::Write;
 
 #[cfg(test)]
@@ -207,13 +209,7 @@ fn title(results: &ResultSet, texts: &Texts) -> String {
     escape(name.filter(|n| !n.is_empty()).unwrap_or(texts.sections.survey))
 }
 
-/// Names of the first and of the compared epoch, as far as run.json has them.
-fn epoch_names(run: &RunRecord, pair: usize) -> Option<[String; 2]> {
-    let name = |epoch: usize| Some(run.epochs.get(epoch)?.name.clone());
-    Some([name(0)?, name(pair)?])
-}
-
-/// The same as one line of HTML.
+/// Names of the first and of the compared epoch as one line of HTML.
 fn epochs(run: &RunRecord, pair: usize) -> Option<String> {
     epoch_names(run, pair).map(|[first, second]| format!("{} \u{2192} {}", escape(&first), escape(&second)))
 }
@@ -243,13 +239,4 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
         format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
     };
     format!("{line}{}", survey::survey(results, texts))
-}
-
-/// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.
-fn known_translation_mm(results: &ResultSet) -> Option<[f64; 2]> {
-    let epoch = results.run.as_ref()?.epochs.get(results.pair)?;
-    let d = epoch.motion.as_ref()?.common_displacement()?;
-    let stone = results.stones.get(results.stones.len() / 2)?;
-    let frame = results.facade.frame_at(&stone.centroid);
-    Some([d.dot(&frame.along) * 1e3, d.dot(&frame.up) * 1e3])
 }

@@ -1,6 +1,6 @@
 //! Photo crops of stones, rectified to their faces, side by side in a few pictures.
 
-use super::{make_dir, path, read_table};
+use super::files::{make_dir, path, read_table};
 use crate::error::Error;
 use crate::results::names::EVIDENCE_DIR;
 use std::path::{Path, PathBuf};

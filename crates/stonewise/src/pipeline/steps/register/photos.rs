@@ -1,12 +1,13 @@
 //! The parts of the photos that show matched stones, cut out once and read back batch by batch.
 
 use super::pairs::DiskPairs;
+use super::registered::STEP;
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::spill::{Spill, SpillBins};
-use crate::pipeline::storage::step::StepDir;
+use crate::storage::spill::{Spill, SpillBins};
+use crate::storage::step::StepDir;
 use crate::warnings::Warnings;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -89,7 +90,7 @@ impl DiskPhotos {
                         }
                     }
                     Err(error) => warnings.notice(
-                        super::STEP,
+                        STEP,
                         path.to_string_lossy(),
                         format!("{error}: it does not help to measure stones"),
                     ),

@@ -2,9 +2,9 @@
 
 use super::off_wall::OffWall;
 use crate::error::Result;
-use crate::pipeline::sources::EpochSources;
 use crate::pipeline::steps::label::Labelled;
 use crate::project::Project;
+use crate::sources::EpochSources;
 use crate::stable::StableArea;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;

@@ -6,9 +6,9 @@
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
-use crate::pipeline::sources::{PointSource, RawSource, SourceList, SourceRule};
-use crate::pipeline::storage::spill::Spill;
-use crate::pipeline::storage::step::StepDir;
+use crate::sources::{PointSource, RawSource, SourceList, SourceRule};
+use crate::storage::spill::Spill;
+use crate::storage::step::StepDir;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
