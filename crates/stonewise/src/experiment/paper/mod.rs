@@ -1,4 +1,5 @@
-//! The paper's experiment, section 4 and 5: one epoch split into halves, the second moved, every figure and table again.
+//! The paper's experiment, section 4 and 5: one epoch split into halves, the second moved, every figure and
+//! table again.
 
 mod case;
 mod figures;
@@ -40,12 +41,14 @@ pub struct PaperSurvey {
 
 /// Does the whole experiment and writes `index.html`, `tables.md`, `table2.csv` and `figures/` into `out`.
 ///
-/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points and photos; each
-/// half is labelled on its own; the points of the second are moved by the paper's translation, or by its bulge, after
-/// labelling; stones are matched and measured with the project's settings and again in the paper's way; M3C2 runs on the same
-/// clouds. The folder of each run holds its tables. An interrupted experiment goes on where it stopped.
+/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points
+/// and photos; each half is labelled on its own; the points of the second are moved by the paper's
+/// translation, or by its bulge, after labelling; stones are matched and measured with the project's settings
+/// and again in the paper's way; M3C2 runs on the same clouds. The folder of each run holds its tables. An
+/// interrupted experiment goes on where it stopped.
 ///
-/// Errors: no survey, no such epoch, or what stops a run.
+/// # Errors
+/// No survey, no such epoch, or what stops a run.
 pub fn paper(
     surveys: &[PaperSurvey],
     epoch: Option<&str>,
@@ -61,6 +64,10 @@ pub fn paper(
         let halves = halves_of(&survey.project, epoch, seed, &store, progress)?;
         let folder = out.join(file_name(&survey.name));
         let context = Context::with_store(&halves, &folder, Arc::clone(&store), progress)?;
+        let split = SplitSurvey {
+            survey,
+            halves: &halves,
+        };
         let motions = paper_motions(&first_stones(&context)?)?;
         if example.is_none() {
             example = segmentation::example(&context)?;
@@ -69,9 +76,7 @@ pub fn paper(
             for method in Method::ALL {
                 progress.begin(&format!("{}: {}, {}", survey.name, motion.name, method.name()), 1);
                 let folder = folder.join(format!("{}-{}", motion.name, method.folder()));
-                cases.extend(measure(
-                    survey, &halves, motion, method, &folder, &store, progress,
-                )?);
+                cases.extend(measure(&split, motion, method, &folder, &store, progress)?);
                 progress.advance(1);
             }
         }
@@ -99,16 +104,22 @@ fn epoch_of<'a>(project: &'a Project, name: Option<&str>) -> Result<&'a Epoch> {
     })
 }
 
+/// A survey and the project of its halves.
+struct SplitSurvey<'a> {
+    survey: &'a PaperSurvey,
+    halves: &'a Project,
+}
+
 /// Measures one case; `None` where the method finds no stone of the first half in the second.
 fn measure(
-    survey: &PaperSurvey,
-    halves: &Project,
+    split: &SplitSurvey,
     motion: &KnownMotion,
     method: Method,
     folder: &Path,
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<Option<Case>> {
+    let SplitSurvey { survey, halves } = *split;
     let mut project = halves.clone();
     project.settings = method.settings(&project.settings);
     if method == Method::Paper && survey.paper_part.is_some() {

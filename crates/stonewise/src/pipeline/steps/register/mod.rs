@@ -40,7 +40,8 @@ pub fn register(
     number: usize,
 ) -> Result<Registered> {
     let params = &context.project.settings.registration;
-    // The pairs themselves, not how they were found: other parameters of the matching that find the same pairs cost nothing.
+    // The pairs themselves, not how they were found: other parameters of the matching that find the same
+    // pairs cost nothing.
     let matches = matched.pairs();
     let mut inputs = vec![first.key.as_str().to_owned(), second.key.as_str().to_owned()];
     if params.photos.enabled {
@@ -102,7 +103,6 @@ pub fn register(
             number,
             &matches,
             params.auto_stable.then_some(&off_wall),
-            params.observers.contrasts.max_stones,
             context.progress,
         )?;
         let pair = EpochPair {

@@ -19,7 +19,8 @@ use stonewise_core::registration::PairSource;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoCamera, PhotoParams, PhotoSource};
 use stonewise_io::image_io::read_rgb;
 
-/// Largest tangent of the angle between a photo's ray and the face's normal: beyond 63 degrees a stone shows its joints.
+/// Largest tangent of the angle between a photo's ray and the face's normal: beyond 63 degrees a stone shows
+/// its joints.
 const LARGEST_TANGENT: f64 = 2.0;
 /// Pixels around a stone that interpolation needs.
 const BORDER_PX: f64 = 3.0;
@@ -47,7 +48,8 @@ struct Boxed {
 }
 
 impl DiskPhotos {
-    /// Cuts out what the photos of both epochs show of the matched stones, one photo at a time. `None` where an epoch has none.
+    /// Cuts out what the photos of both epochs show of the matched stones, one photo at a time. `None` where
+    /// an epoch has none.
     pub fn gather(
         context: &Context,
         photos: [&Segmented; 2],
@@ -151,7 +153,8 @@ fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
 /// The part of an image: lowest pixel, and one beyond the highest.
 type Corners = [[u32; 2]; 2];
 
-/// For each photo the stones that it shows, with the part of it: for each stone the sharpest photos of either epoch.
+/// For each photo the stones that it shows, with the part of it: for each stone the sharpest photos of either
+/// epoch.
 fn choose(
     boxes: &[Boxed],
     photos: &[Photo],
@@ -189,8 +192,8 @@ fn choose(
 }
 
 impl Boxed {
-    /// Size of a photo's pixel on the stone, and the part of the photo that shows it with a margin; `None` where the photo shows it
-    /// from behind, too obliquely or not wholly.
+    /// Size of a photo's pixel on the stone, and the part of the photo that shows it with a margin; `None`
+    /// where the photo shows it from behind, too obliquely or not wholly.
     fn seen_by(&self, photo: &Photo, view: &View, margin_m: f64) -> Option<(f64, Corners)> {
         let shift = if photo.epoch == 1 {
             self.shift
