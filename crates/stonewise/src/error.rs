@@ -195,8 +195,8 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder that belongs to
-    /// something else.
+    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder
+    /// that belongs to something else.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,

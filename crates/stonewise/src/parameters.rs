@@ -10,8 +10,8 @@ use std::path::Path;
 use stonewise_segment::Weights;
 
 impl Project {
-    /// The project with other parameters: tables as in the project file, such as `{"registration": {"estimator": "gicp"}}`. What
-    /// is not named stays; a path is relative to the project file.
+    /// The project with other parameters: tables as in the project file, such as `{"registration":
+    /// {"estimator": "gicp"}}`. What is not named stays; a path is relative to the project file.
     ///
     /// # Errors
     /// No such parameter, a value of the wrong kind, an impossible value, a file that does not exist.

@@ -102,21 +102,24 @@ pub enum Estimator {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RegistrationParams {
-    /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move singly.
+    /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move
+    /// singly.
     pub estimator: Estimator,
-    /// Standard deviation of the registration of an epoch, per axis, metres, as the user states it; 0 states that there is none.
-    /// Absent: not stated, and without stable areas uncertainties hold for motions against the common motion of the stones.
+    /// Standard deviation of the registration of an epoch, per axis, metres, as the user states it; 0 states
+    /// that there is none. Absent: not stated, and without stable areas uncertainties hold for motions
+    /// against the common motion of the stones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub epoch_error_m: Option<f64>,
-    /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs' registration.
-    /// It is reported apart and enters absolute uncertainty. Default: none.
+    /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs'
+    /// registration. It is reported apart and enters absolute uncertainty. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable: Vec<StableArea>,
-    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false: only a person knows what did not move.
+    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false: only a person
+    /// knows what did not move.
     pub auto_stable: bool,
-    /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its place and not by
-    /// its label. 3: farther inside, noise does not change a label; with 0 (labels alone) the whole wall of a UAV survey
-    /// seems to move by 1 to 2 mm.
+    /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its
+    /// place and not by its label. 3: farther inside, noise does not change a label; with 0 (labels alone)
+    /// the whole wall of a UAV survey seems to move by 1 to 2 mm.
     pub border_noises: f64,
     /// Parameters of the adjustment of all stones together.
     #[serde(alias = "network")]

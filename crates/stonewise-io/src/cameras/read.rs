@@ -14,6 +14,18 @@ const MAX_PIXELS: u64 = 1 << 30;
 ///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
 /// - OpenSfM: reconstruction.json.
 ///
+/// ```
+/// use stonewise_io::cameras::read_cameras;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path();
+/// std::fs::write(path.join("cameras.txt"), "1 SIMPLE_PINHOLE 4000 3000 3200 2000 1500\n")?;
+/// std::fs::write(path.join("images.txt"), "1 1 0 0 0 0 0 5 1 wall.jpg\n\n")?;
+/// let file = read_cameras(path)?;
+/// // World to camera is a shift by 5 m along the viewing direction: the camera lies 5 m behind the origin.
+/// assert_eq!((file.views[0].name.as_str(), file.views[0].centre().z), ("wall.jpg", -5.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// The file cannot be read or is none of these, a value is missing or impossible, a lens model or reference
 /// system is not supported, or no photo has a pose.

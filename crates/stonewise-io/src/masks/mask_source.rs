@@ -15,6 +15,18 @@ pub enum MaskSource {
 impl MaskSource {
     /// Opens a .json file or a folder.
     ///
+    /// ```
+    /// use stonewise_core::raster::LabelImage;
+    /// use stonewise_io::masks::{MaskSource, write_label_png};
+    /// # let folder = tempfile::tempdir()?;
+    /// let labels = LabelImage::from_vec(3, 1, vec![0, 7, 7]).expect("as many labels as pixels");
+    /// write_label_png(&folder.path().join("wall.png"), &labels)?;
+    /// let masks = MaskSource::open(folder.path())?;
+    /// let photo = masks.labels_for("wall.jpg", 3, 1)?.expect("the photo has masks");
+    /// assert_eq!((photo.labels, photo.instances[0].id), (labels, 7));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// It cannot be read, is neither, or holds no photo's masks.
     pub fn open(path: &Path) -> Result<Self, MaskError> {

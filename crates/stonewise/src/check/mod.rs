@@ -22,10 +22,11 @@ use stonewise_core::progress::Progress;
 
 /// Looks at everything that a project names.
 ///
-/// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk, memory and time.
-/// `out`: where the results are to go, for the disk's free space.
+/// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk,
+/// memory and time. `out`: where the results are to go, for the disk's free space.
 ///
-/// Errors: a cloud or a camera file cannot be read, or the caller stopped it.
+/// # Errors
+/// A cloud or a camera file cannot be read, or the caller stopped it.
 pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progress) -> Result<Report> {
     progress.begin("check", project.epochs.len() as u64);
     let mut report = Report::default();

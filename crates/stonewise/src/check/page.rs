@@ -10,7 +10,8 @@ use std::path::Path;
 impl Report {
     /// Writes the table with its pictures as one HTML page.
     ///
-    /// Errors: the page cannot be written.
+    /// # Errors
+    /// The page cannot be written.
     pub fn write_page(&self, path: &Path, project: &Project) -> Result<()> {
         let mut page = Page::new(&format!("{}: a look at the survey", project.name));
         page.note(match self.verdict() {

@@ -6,7 +6,8 @@ use crate::settings::Settings;
 
 /// The settings with each parameter (`section.key`, as in the project file) set to its value.
 ///
-/// Errors: no parameter of this name, a value of the wrong kind, an impossible value.
+/// # Errors
+/// No parameter of this name, a value of the wrong kind, an impossible value.
 pub(super) fn settings_with(settings: &Settings, changes: &[(&str, &toml::Value)]) -> Result<Settings> {
     let bad = |message: String| Error::Survey(message);
     let mut all = toml::Value::try_from(settings).map_err(|e| bad(e.to_string()))?;

@@ -1,8 +1,8 @@
 //! The folder that a command writes into: whose it is, who works in it, what in it is current.
 //!
-//! No command writes over a file that it did not make. [`OutputFolder::claim`] looks before the first byte: inputs
-//! must not lie where results go, and a folder that holds anything must carry stonewise's marker of the same
-//! project. A lock that the system releases with the process keeps a second run out.
+//! No command writes over a file that it did not make. [`OutputFolder::claim`] looks before the first byte:
+//! inputs must not lie where results go, and a folder that holds anything must carry stonewise's marker of
+//! the same project. A lock that the system releases with the process keeps a second run out.
 
 mod claim;
 mod inputs;

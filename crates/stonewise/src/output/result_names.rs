@@ -39,7 +39,8 @@ pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
     epochs.chain(others.map(PathBuf::from)).collect()
 }
 
-/// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see [`cloud_names`].
+/// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see
+/// [`cloud_names`].
 pub(super) fn is_result(file: &Path) -> bool {
     let name = file
         .file_name()
@@ -64,8 +65,8 @@ pub(super) fn is_result(file: &Path) -> bool {
     }
 }
 
-/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs that share a
-/// stem are told apart by a number.
+/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs
+/// that share a stem are told apart by a number.
 pub(crate) fn cloud_names(number: usize, clouds: &[PathBuf]) -> Vec<PathBuf> {
     let stem = |p: &PathBuf| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = |(i, cloud): (usize, &PathBuf)| {

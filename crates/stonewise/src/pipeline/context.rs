@@ -27,7 +27,8 @@ pub struct Context<'a> {
     pub out: PathBuf,
     /// Where steps keep their files.
     pub store: Arc<StepStore>,
-    /// The folder that results go to, claimed for this run; `None` within an experiment, which claims its own.
+    /// The folder that results go to, claimed for this run; `None` within an experiment, which claims its
+    /// own.
     pub output: Option<&'a OutputFolder>,
     /// Whom to tell, and who may stop the run.
     pub progress: &'a dyn Progress,
@@ -130,7 +131,8 @@ impl<'a> Context<'a> {
         Ok(dir)
     }
 
-    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another process may have done.
+    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another
+    /// process may have done.
     pub fn part(
         &self,
         whole: (&str, &Key),

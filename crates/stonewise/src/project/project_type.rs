@@ -20,11 +20,13 @@ pub struct Project {
     pub path: PathBuf,
     /// Name of the structure.
     pub name: String,
-    /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in time order.
+    /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in
+    /// time order.
     pub epochs: Vec<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
-    /// What a user should know about how the file was read, one sentence each: keys with a new name, another numbering of epochs.
+    /// What a user should know about how the file was read, one sentence each: keys with a new name, another
+    /// numbering of epochs.
     pub notes: Vec<String>,
     /// Corrections by hand; absent where the project names none.
     pub edits: Option<EditsFile>,
@@ -53,7 +55,8 @@ pub struct Epoch {
     pub motion: Option<MotionField>,
     /// What counts as one station or strip.
     pub sources: SourceRule,
-    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same error in both.
+    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same
+    /// error in both.
     pub same_survey_as: Option<usize>,
     /// What the project file says about where the clouds lie on the map.
     pub map: MapFrame,
@@ -61,6 +64,9 @@ pub struct Epoch {
 
 impl Epoch {
     /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
+    ///
+    /// # Errors
+    /// A cloud's header or the camera file cannot be read; the system of the cameras is not supported.
     pub fn read_cameras(&self) -> Result<CameraFile> {
         let mut map = self.map.clone();
         for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {

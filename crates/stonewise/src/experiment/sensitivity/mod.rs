@@ -1,4 +1,5 @@
-//! How the results depend on masks, noise, spacing, motion, poses and overlap: what the paper left for future work.
+//! How the results depend on masks, noise, spacing, motion, poses and overlap: what the paper left for future
+//! work.
 
 mod cases;
 mod inputs;
@@ -24,12 +25,15 @@ use stonewise_core::matching::MatchParams;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
-/// Measures all curves on simulated walls and writes `sensitivity.csv`, `index.html` and one SVG a plot into `out`.
+/// Measures all curves on simulated walls and writes `sensitivity.csv`, `index.html` and one SVG a plot into
+/// `out`.
 ///
-/// The base is a wall that moves by the paper's translation between two surveys, without any error of registration; one thing
-/// is changed at a time. Truth is the simulator's. An interrupted experiment goes on where it stopped.
+/// The base is a wall that moves by the paper's translation between two surveys, without any error of
+/// registration; one thing is changed at a time. Truth is the simulator's. An interrupted experiment goes on
+/// where it stopped.
 ///
-/// Errors: what stops a simulation or a run. A variant in which nothing can be measured is a point with no stones.
+/// # Errors
+/// What stops a simulation or a run. A variant in which nothing can be measured is a point with no stones.
 pub fn sensitivity(
     options: &SensitivityOptions,
     out: &Path,
@@ -129,7 +133,8 @@ fn point(
     }
 }
 
-/// The same variant on several walls: counts are added, squares and shares weighted by the stones that were measured.
+/// The same variant on several walls: counts are added, squares and shares weighted by the stones that were
+/// measured.
 fn pooled(walls: &[Vec<SensitivityPoint>]) -> Vec<SensitivityPoint> {
     let Some(first) = walls.first() else {
         return Vec::new();

@@ -24,14 +24,18 @@ use stonewise_core::evaluate::MotionScore;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
-/// Tries every combination of parameters and writes `tune.csv`, `index.html`, `tune.svg` and `recommended.toml` into `out`.
+/// Tries every combination of parameters and writes `tune.csv`, `index.html`, `tune.svg` and
+/// `recommended.toml` into `out`.
 ///
-/// Truth is the project's known motion. A project without one is split: epoch 1 into halves ([`crate::split()`]), the points
-/// of the second moved once by the paper's translation and once by its bulge; errors are pooled over both, because the
-/// translation alone would favour any amount of smoothing. Points of the grid run in parallel; steps are kept in `out/work`,
-/// one version for each set of parameters, so that points share what they have in common and an interrupted grid goes on.
+/// Truth is the project's known motion. A project without one is split: epoch 1 into halves
+/// ([`crate::split()`]), the points of the second moved once by the paper's translation and once by its
+/// bulge; errors are pooled over both, because the translation alone would favour any amount of smoothing.
+/// Points of the grid run in parallel; steps are kept in `out/work`, one version for each set of parameters,
+/// so that points share what they have in common and an interrupted grid goes on.
 ///
-/// Errors: a parameter or value that cannot be, no stones, files. A grid point that cannot be measured is a row that says why.
+/// # Errors
+/// A parameter or value that cannot be, no stones, files. A grid point that cannot be measured is a row that
+/// says why.
 pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn Progress) -> Result<Tuned> {
     let grid = match options.grid.as_slice() {
         [] => default_grid(&project.settings),

@@ -53,7 +53,8 @@ pub struct Tuned {
     pub grid: Vec<Dimension>,
     /// All points, the last dimension changing fastest.
     pub points: Vec<TunedPoint>,
-    /// Indices of the points that no other beats in error and number of stones, ascending by number of stones.
+    /// Indices of the points that no other beats in error and number of stones, ascending by number of
+    /// stones.
     pub front: Vec<usize>,
     /// The point on the front with the lowest error among those with at least 95 % of the most stones.
     pub recommended: Option<usize>,

@@ -32,7 +32,8 @@ pub fn write_clouds(
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
     context.step_publishing(&format!("clouds-{number}"), key, &outputs, |_, _| {
-        // Of two processes that do the same unit the slower one must not take away what the other has finished.
+        // Of two processes that do the same unit the slower one must not take away what the other has
+        // finished.
         let removes = !context.store.is_of_unit();
         for stale in outputs.iter().filter(|o| removes && o.exists()) {
             fs::remove_file(stale).map_err(Error::io("removing a cloud of an earlier run", stale))?;

@@ -43,12 +43,12 @@ pub struct UnitDone {
 
 /// Does one unit of the plan in a results folder.
 ///
-/// A unit that is done is left as it is. Any number of processes may do units at the same time, also the same one; their files appear
-/// whole or not at all.
+/// A unit that is done is left as it is. Any number of processes may do units at the same time, also the same
+/// one; their files appear whole or not at all.
 ///
 /// # Errors
-/// No such unit; a unit that it needs is not done; the plan is that of other inputs, or of another program; a run works in the folder;
-/// whatever the step may fail with.
+/// No such unit; a unit that it needs is not done; the plan is that of other inputs, or of another program; a
+/// run works in the folder; whatever the step may fail with.
 pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone> {
     let file = plan_file(out);
     let stale = |message: &str| Error::Plan {
@@ -88,7 +88,8 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         do_stage(&context, unit, plan.forced)?
     };
     if summary.is_some() {
-        // The last unit: all others are done, and what they left unfinished when they were killed is of no use.
+        // The last unit: all others are done, and what they left unfinished when they were killed is of no
+        // use.
         folder.sweep(&project);
         folder.finish_results(true)?;
     }

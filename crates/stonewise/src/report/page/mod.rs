@@ -49,8 +49,8 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 8] {
 
 /// The whole report as one HTML document. The same results give the same bytes.
 ///
-/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be fetched: markup
-/// that a name from an input might smuggle in would stay dead.
+/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be
+/// fetched: markup that a name from an input might smuggle in would stay dead.
 ///
 /// # Errors
 /// None in practice: compressing in memory does not fail.
@@ -182,7 +182,8 @@ fn head(title: &str, texts: &Texts, scripts: &str, style: &str) -> String {
     )
 }
 
-/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without one.
+/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without
+/// one.
 fn footer(results: &ResultSet, page: &str) -> String {
     let Some(run) = &results.run else {
         return String::new();

@@ -1,7 +1,7 @@
 //! What the report shows of the survey itself: photo crops, sections, thinned clouds, cameras.
 //!
-//! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the survey. Files
-//! are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
+//! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the
+//! survey. Files are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
 
 mod cameras;
 mod cloud;

@@ -1,7 +1,7 @@
 //! The labels of an epoch in batches of tiles, for processes that share the step `label`.
 //!
-//! `prepare` keeps what all batches need; each batch labels its tiles; the step itself gathers them. The files are those that one
-//! process makes, to the byte.
+//! `prepare` keeps what all batches need; each batch labels its tiles; the step itself gathers them. The
+//! files are those that one process makes, to the byte.
 
 use super::disk_labels::DiskLabels;
 use super::step_key::{label_key, label_name};
