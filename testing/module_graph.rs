@@ -1,7 +1,8 @@
 //! Which source files of a crate use which, for the tests of layers of all crates.
 //!
-//! A use is a path through `crate`, `super` or `self`, or an import from a child module, outside comments and
-//! outside the tests at the end of a file. It points at the file that owns the item: re-exports are followed.
+//! A use is a path through `crate`, `super`, `self` or a child module, outside comments and outside the tests at the
+//! end of a file. It points at the file that owns the item: re-exports are followed. A module inside a file counts
+//! as the file, so `super` must not be used in one outside tests.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,19 +11,35 @@ use std::path::Path;
 /// Names of the modules from the crate's root to a file.
 type Module = Vec<String>;
 
+/// Fails unless every top-level module of a crate is listed and uses only modules of lines above its own, and no files
+/// use each other in a circle.
+///
+/// `manifest_dir`: the crate's folder. `layers`: the modules from the bottom up; those on one line do not use each
+/// other.
+pub fn assert_layers(manifest_dir: &str, layers: &[&[&str]]) {
+    let graph = ModuleGraph::read(&Path::new(manifest_dir).join("src"));
+    let uses: usize = graph.uses.values().map(Vec::len).sum();
+    assert!(
+        uses >= graph.uses.len(),
+        "only {uses} uses found: the search is broken"
+    );
+    graph.assert_layers(layers);
+    graph.assert_no_circle();
+}
+
 /// The source files of a crate, and the files that each uses.
-pub struct ModuleGraph {
+struct ModuleGraph {
     uses: BTreeMap<Module, Vec<Module>>,
 }
 
 impl ModuleGraph {
     /// Reads all source files below a crate's `src`.
-    pub fn read(src: &Path) -> Self {
+    fn read(src: &Path) -> Self {
         let mut texts = BTreeMap::new();
         collect(src, &[], &mut texts);
         let paths: BTreeMap<Module, Vec<Module>> = texts
             .iter()
-            .map(|(module, text)| (module.clone(), paths(text)))
+            .map(|(module, text)| (module.clone(), paths(text, &children(module, &texts))))
             .collect();
         let uses = paths.iter().map(|(module, list)| {
             let used = list.iter().filter_map(|path| owner(module, path, &paths));
@@ -34,15 +51,17 @@ impl ModuleGraph {
         Self { uses: uses.collect() }
     }
 
-    /// Number of uses found.
-    pub fn use_count(&self) -> usize {
-        self.uses.values().map(Vec::len).sum()
-    }
-
     /// Fails where a top-level module is not listed, or uses one that is neither itself nor listed before its
     /// line. Modules on one line do not see each other.
-    pub fn assert_layers(&self, layers: &[&[&str]]) {
+    fn assert_layers(&self, layers: &[&[&str]]) {
         let level = |module: &str| layers.iter().position(|line| line.contains(&module));
+        for listed in layers.iter().flat_map(|line| line.iter()) {
+            let exists = self
+                .uses
+                .keys()
+                .any(|m| m.first().is_some_and(|top| top == listed));
+            assert!(exists, "the list of layers names {listed}, which does not exist");
+        }
         for (module, used) in &self.uses {
             let Some(top) = module.first() else { continue };
             let own = level(top);
@@ -58,7 +77,7 @@ impl ModuleGraph {
     }
 
     /// Fails where files use each other in a circle, and names one.
-    pub fn assert_no_circle(&self) {
+    fn assert_no_circle(&self) {
         let mut done = Vec::new();
         for module in self.uses.keys() {
             if let Some(circle) = self.circle(module, &mut Vec::new(), &mut done) {
@@ -85,7 +104,7 @@ impl ModuleGraph {
     }
 }
 
-/// Texts of the files below a folder by module path, without comments, strings and tests.
+/// Texts of the files below a folder by module path, without comments and tests.
 fn collect(folder: &Path, module: &[String], texts: &mut BTreeMap<Module, String>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -102,24 +121,37 @@ fn collect(folder: &Path, module: &[String], texts: &mut BTreeMap<Module, String
     }
 }
 
+/// Names of the modules directly below a module that are files.
+fn children(module: &Module, texts: &BTreeMap<Module, String>) -> Vec<String> {
+    let below = texts
+        .keys()
+        .filter(|m| m.len() == module.len() + 1 && m.starts_with(module));
+    below.filter_map(|m| m.last().cloned()).collect()
+}
+
+/// A file's text without comments and tests; names that are keywords lose their `r#`.
 fn code(text: &str) -> String {
-    let end = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
+    let end = text.find("\nmod tests {").unwrap_or(text.len());
     let without_comment = |line: &str| line.split("//").next().unwrap_or("").to_owned();
     text[..end]
         .lines()
         .map(without_comment)
         .collect::<Vec<_>>()
         .join("\n")
+        .replace("r#", "")
 }
 
-/// All paths in a file that begin with `crate`, `super` or `self`, and all imports; trees are expanded.
-fn paths(code: &str) -> Vec<Module> {
+/// All paths in a file that begin with `crate`, `super`, `self` or a child module, and all imports; trees are
+/// expanded.
+fn paths(code: &str, children: &[String]) -> Vec<Module> {
     let mut found = Vec::new();
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
-    for keyword in ["crate::", "super::", "self::"] {
-        for (at, _) in code.match_indices(keyword) {
+    let starts = ["crate", "super", "self"].into_iter();
+    for start in starts.chain(children.iter().map(String::as_str)) {
+        for (at, _) in code.match_indices(&format!("{start}::")) {
             let before = &code[..at];
-            if !before.ends_with("::") && !before.ends_with(is_name) {
+            // The path of `pub(in path)` says who may see an item.
+            if !before.ends_with("::") && !before.ends_with(is_name) && !before.ends_with("(in ") {
                 tree(&code[at..], &[], &mut found);
             }
         }

@@ -14,8 +14,8 @@ pub struct Args {
     /// Number of threads (default: all cores). Results do not depend on it.
     #[arg(long, global = true, value_name = "N")]
     pub threads: Option<usize>,
-    /// Write into a folder that already holds other files (files of the same name are replaced, inputs never),
-    /// and run a survey even where the check found an error.
+    /// Write into a folder that already holds other files (files of the same name are replaced, inputs
+    /// never), and run a survey even where the check found an error.
     #[arg(long, global = true)]
     pub force: bool,
     /// The command.
@@ -46,12 +46,13 @@ pub enum Command {
     /// Simulate a small survey with known motion, and measure it.
     #[command(after_help = "Example:\n  stonewise demo --out demo")]
     Demo(DemoArgs),
-    /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and disk
-    /// space.
+    /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and
+    /// disk space.
     #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
         The table goes to stdout; a page with pictures is written beside the project file. Exit code 3 if anything is doubtful or wrong.")]
     Check(CheckArgs),
-    /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of edits.
+    /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of
+    /// edits.
     #[command(subcommand)]
     Edits(EditsCommand),
     /// Write a project file from the surveys found in a folder.
@@ -60,12 +61,14 @@ pub enum Command {
     /// Split one epoch into two disjoint halves, to test the method against a known motion.
     #[command(after_help = "Example:\n  stonewise split survey/stonewise.toml --seed 1 --out halves/")]
     Split(SplitArgs),
-    /// Find the stones in photos. For a project, write one label image per photo, from its masks or from the detector.
+    /// Find the stones in photos. For a project, write one label image per photo, from its masks or from the
+    /// detector.
     #[command(after_help = "Examples:\n  stonewise segment photos/ --out stones/\n  \
         stonewise segment photos/ --out stones/ --model training/model.safetensors --reference masks.json\n  \
         stonewise segment survey/stonewise.toml --out results/")]
     Segment(SegmentArgs),
-    /// Train the stone detector: on a few labelled photos of a wall, or on rendered photos of masonry in general.
+    /// Train the stone detector: on a few labelled photos of a wall, or on rendered photos of masonry in
+    /// general.
     #[command(
         after_help = "Examples:\n  stonewise train --rendered --from none --minutes 60 --out training/\n\n\
         Give the same command again to continue an interrupted training."
@@ -152,7 +155,8 @@ pub struct PlanArgs {
     /// Only units of this rank: they need units of lower ranks only.
     #[arg(long, value_name = "N", requires = "ids")]
     pub rank: Option<usize>,
-    /// Points of a cloud in a unit that labels a batch of its tiles (default: 4 million). Results do not depend on it.
+    /// Points of a cloud in a unit that labels a batch of its tiles (default: 4 million). Results do not
+    /// depend on it.
     #[arg(long, value_name = "N")]
     pub batch_points: Option<u64>,
 }
@@ -193,8 +197,8 @@ pub struct CheckArgs {
 /// What to do with edits.
 #[derive(Debug, Subcommand)]
 pub enum EditsCommand {
-    /// Write a file of edits: what a person changed in the layer stones_facade of stones.gpkg, or the polygons of a COCO file whose
-    /// categories are merge, split, delete, add and ignore.
+    /// Write a file of edits: what a person changed in the layer stones_facade of stones.gpkg, or the
+    /// polygons of a COCO file whose categories are merge, split, delete, add and ignore.
     #[command(
         after_help = "Examples:\n  stonewise edits import results/stones.gpkg --who \"A. Keller\" --why \"seen on site\" --out edits.json\n  \
         stonewise edits import drawn.json --epoch 2025-04 --who \"A. Keller\" --why \"hidden joint\" --out edits.json\n\n\
@@ -329,7 +333,8 @@ pub struct TrainArgs {
     /// Folder of the photos that the masks name.
     #[arg(long, value_name = "DIR")]
     pub images: Option<PathBuf>,
-    /// Regions in which the masks are complete (default: everywhere). Outside them, unmasked pixels are ignored.
+    /// Regions in which the masks are complete (default: everywhere). Outside them, unmasked pixels are
+    /// ignored.
     #[arg(long, value_name = "FILE", requires = "data")]
     pub valid: Option<PathBuf>,
     /// Weights to start from: `built-in`, a file that `train` wrote, or `none`.
@@ -341,7 +346,8 @@ pub struct TrainArgs {
     /// Stop after this many minutes; the same command continues.
     #[arg(long, value_name = "M")]
     pub minutes: Option<f64>,
-    /// Length of the whole training, minutes (default: --minutes, or else 30). The learning rate falls towards its end.
+    /// Length of the whole training, minutes (default: --minutes, or else 30). The learning rate falls
+    /// towards its end.
     #[arg(long, value_name = "M")]
     pub total_minutes: Option<f64>,
     /// Parameters (TOML, every key optional).
@@ -375,13 +381,15 @@ pub struct ReportArgs {
 /// Which experiment.
 #[derive(Debug, Subcommand)]
 pub enum ExperimentCommand {
-    /// Split one epoch into halves, move the second, and reproduce Table 1, Table 2 and figures 5 to 9 of the paper.
+    /// Split one epoch into halves, move the second, and reproduce Table 1, Table 2 and figures 5 to 9 of the
+    /// paper.
     #[command(
         after_help = "Examples:\n  stonewise experiment paper --size 10x5 --out paper/       # simulates a section first\n  \
         stonewise experiment paper TLS=survey/stonewise.toml UAV=survey/stonewise_uav.toml --out paper/"
     )]
     Paper(PaperArgs),
-    /// Plot the error and the number of stones measured against mask quality, noise, spacing, motion, pose error and overlap.
+    /// Plot the error and the number of stones measured against mask quality, noise, spacing, motion, pose
+    /// error and overlap.
     #[command(
         after_help = "Examples:\n  stonewise experiment sensitivity --out curves/\n  \
         stonewise experiment sensitivity --influence masks --influence pose --seeds 3 --out curves/"
@@ -427,8 +435,9 @@ pub struct PaperArgs {
     /// Width and height of the simulated section, metres.
     #[arg(long, value_name = "WxH", default_value = "10x5", value_parser = parse_size)]
     pub size: [f64; 2],
-    /// Run the paper's estimator, which is slow, only in a part of the wall: x0,y0,z0,x1,y1,z1 (metres, world frame), or
-    /// WIDTHxHEIGHT in the middle of the wall, such as 3x3. Its rows count only the stones in that part.
+    /// Run the paper's estimator, which is slow, only in a part of the wall: x0,y0,z0,x1,y1,z1 (metres, world
+    /// frame), or WIDTHxHEIGHT in the middle of the wall, such as 3x3. Its rows count only the stones in that
+    /// part.
     #[arg(long, value_name = "PART")]
     pub paper_part: Option<String>,
 }
@@ -454,7 +463,8 @@ pub struct SimulateArgs {
     /// Folder of the survey; created if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Parameters of the simulation (TOML, every key optional); those used are written to simulation.toml in the folder.
+    /// Parameters of the simulation (TOML, every key optional); those used are written to simulation.toml in
+    /// the folder.
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
     /// Seed of the wall; overrides the parameter file.
@@ -465,16 +475,19 @@ pub struct SimulateArgs {
 /// Arguments of `tune`.
 #[derive(Debug, ClapArgs)]
 pub struct TuneArgs {
-    /// The project file. If no epoch has a known motion, the first epoch is split into halves and the second is moved.
+    /// The project file. If no epoch has a known motion, the first epoch is split into halves and the second
+    /// is moved.
     pub project: PathBuf,
     /// Folder of the table, the plot and the steps; created if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// A parameter and its values, key=a,b,c or key=from..to..step; may be repeated. Default: ratio threshold,
-    /// area ratio and buffer, as in the paper (with the adjustment, border_noises instead of the buffer).
+    /// A parameter and its values, key=a,b,c or key=from..to..step; may be repeated. Default: ratio
+    /// threshold, area ratio and buffer, as in the paper (with the adjustment, border_noises instead of the
+    /// buffer).
     #[arg(long, value_name = "KEY=VALUES")]
     pub grid: Vec<Dimension>,
-    /// Use only a part of the wall: x0,y0,z0,x1,y1,z1 (metres, world frame), or WIDTHxHEIGHT in the middle of the wall, such as 5x5.
+    /// Use only a part of the wall: x0,y0,z0,x1,y1,z1 (metres, world frame), or WIDTHxHEIGHT in the middle of
+    /// the wall, such as 5x5.
     #[arg(long, allow_hyphen_values = true)]
     pub part: Option<String>,
     /// Seed of the random split into halves.

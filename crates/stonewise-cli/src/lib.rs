@@ -55,7 +55,8 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
     }
 }
 
-/// Panics of decoders become errors that name the file, so nothing is said of them; any other is a defect of this program.
+/// Panics of decoders become errors that name the file, so nothing is said of them; any other is a defect of
+/// this program.
 fn say_panics_once() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
@@ -74,7 +75,8 @@ fn is_wrong_usage(error: &anyhow::Error) -> bool {
     error.chain().any(known)
 }
 
-/// The error and its causes in one line, as the command prints it; a cause that is part of the text already is not said twice.
+/// The error and its causes in one line, as the command prints it; a cause that is part of the text already
+/// is not said twice.
 pub fn explain(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |text, cause| {
         let cause = cause.to_string();

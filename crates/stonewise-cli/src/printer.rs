@@ -9,8 +9,8 @@ use std::sync::{Arc, Mutex, MutexGuard, Once, PoisonError};
 use std::time::Instant;
 use stonewise_core::progress::Progress;
 
-/// Seconds until a step of a log that is not a terminal says again where it stands; doubled each time, so that a step of a second and one of
-/// a day both leave a few lines.
+/// Seconds until a step of a log that is not a terminal says again where it stands; doubled each time, so
+/// that a step of a second and one of a day both leave a few lines.
 const FIRST_WAIT_S: f64 = 5.0;
 /// The longest such wait: within it a reader of the log sees that the run is alive.
 const LONGEST_WAIT_S: f64 = 600.0;

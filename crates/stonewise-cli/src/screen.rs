@@ -66,7 +66,8 @@ impl Screen {
         self.part(step, "", 0, 0);
     }
 
-    /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a total of 0 where it is unknown.
+    /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a
+    /// total of 0 where it is unknown.
     pub fn part(&self, step: &str, words: &str, total: u64, done: u64) {
         self.bar.set_style(self.style(words, total > 0));
         self.bar.set_message(step.to_owned());
@@ -107,7 +108,8 @@ impl Screen {
             true => format!("\u{1b}[{colour}m{mark}\u{1b}[0m"),
             false => mark.to_owned(),
         };
-        // Before the name are the mark and a space, behind it a space and at most thirteen characters of time.
+        // Before the name are the mark and a space, behind it a space and at most thirteen characters of
+        // time.
         let width = NAMES.min(self.width().saturating_sub(2 + 1 + 13 + 1));
         let step = cut(step, width);
         self.bar

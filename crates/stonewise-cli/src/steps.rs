@@ -121,7 +121,8 @@ pub fn span(seconds: f64) -> String {
 
 /// Time to go in words, no finer than it can be known; empty where it is not known yet.
 ///
-/// `elapsed` and `to_go`: seconds. Less than three seconds of work, or less than a fiftieth of it, say nothing about the rest.
+/// `elapsed` and `to_go`: seconds. Less than three seconds of work, or less than a fiftieth of it, say
+/// nothing about the rest.
 pub fn time_to_go(elapsed: f64, to_go: f64, done: u64, total: u64) -> String {
     let is_known = elapsed >= 3.0 && done > 0 && done.saturating_mul(50) >= total && to_go.is_finite();
     match to_go {
@@ -133,7 +134,8 @@ pub fn time_to_go(elapsed: f64, to_go: f64, done: u64, total: u64) -> String {
     }
 }
 
-/// A line in lines of at most `width` characters, broken between words; those after the first are indented by two.
+/// A line in lines of at most `width` characters, broken between words; those after the first are indented by
+/// two.
 pub fn wrapped(line: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     for word in line.split(' ') {

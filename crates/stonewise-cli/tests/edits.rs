@@ -1,4 +1,5 @@
-//! Corrections by hand on a small simulated survey: what they change, what they leave alone, and the ways into the file.
+//! Corrections by hand on a small simulated survey: what they change, what they leave alone, and the ways
+//! into the file.
 #![allow(clippy::unwrap_used)] // a test that cannot go on must stop
 
 mod support;
@@ -15,7 +16,8 @@ use tempfile::TempDir;
 
 const SIGNED: &str = r#""who": "A. Keller", "when": "2026-11-20", "why": "seen on site""#;
 
-/// Rows of a CSV file by the cell of its first column, each by the names of the columns; cells hold no commas.
+/// Rows of a CSV file by the cell of its first column, each by the names of the columns; cells hold no
+/// commas.
 fn rows(path: &Path) -> BTreeMap<u32, BTreeMap<String, String>> {
     let text = fs::read_to_string(path).unwrap();
     let mut lines = text.lines();

@@ -46,8 +46,8 @@ fn kill_after(out: &Path, wait: Duration) -> bool {
     at_work
 }
 
-/// Flips a bit of, cuts, or removes a random file of a random step. The stamp of a step stays: a folder without one is not stonewise's, and
-/// a run refuses to empty it.
+/// Flips a bit of, cuts, or removes a random file of a random step. The stamp of a step stays: a folder
+/// without one is not stonewise's, and a run refuses to empty it.
 fn damage(out: &Path, dice: &mut Dice) {
     let files = contents(&out.join("work"), &["lock", "marker.json"]);
     if files.is_empty() {

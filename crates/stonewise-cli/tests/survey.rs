@@ -109,8 +109,8 @@ fn mask_places(out: &Path, epoch: usize) -> BTreeMap<u32, [f64; 2]> {
     boxes.into_iter().map(place).collect()
 }
 
-/// The photos did not move, the points of the second half did: in its crops, which show where the first half's stones
-/// were, every mask must lie farther by the motion.
+/// The photos did not move, the points of the second half did: in its crops, which show where the first
+/// half's stones were, every mask must lie farther by the motion.
 fn check_crops_show_the_motion(out: &Path) {
     let (first, second) = (mask_places(out, 1), mask_places(out, 2));
     let moved = |axis: usize| {
@@ -152,7 +152,8 @@ fn a_known_motion_is_found_again_and_scored() {
     let evaluation: serde_json::Value = serde_json::from_str(&text).unwrap();
     let errors = &evaluation["stones"]["errors"];
     let stones = errors["in_plane_per_axis"]["rmse_m"].as_f64().unwrap();
-    // The points moved by 2 cm and 5 cm. With one photo a half, and over 1 cm between points, a tenth of that is asked.
+    // The points moved by 2 cm and 5 cm. With one photo a half, and over 1 cm between points, a tenth of that
+    // is asked.
     assert!(stones < 2e-3, "{stones} m");
     let m3c2 = evaluation["m3c2"]["errors"]["in_plane_per_axis"]["rmse_m"]
         .as_f64()

@@ -1,7 +1,9 @@
-//! Measures what the sources of two epochs and stable areas show of the epochs' common error, against the truth.
+//! Measures what the sources of two epochs and stable areas show of the epochs' common error, against the
+//! truth.
 //!
-//! `cargo run --release -p stonewise-core --example measure_epoch_errors -- FOLDER [tls|uav] [stable]`, FOLDER with
-//! `truth/epochN_cloud_SENSOR_truth.laz` (stone_id, point_source_id, gps_time) and `truth/stones.csv`.
+//! `cargo run --release -p stonewise-core --example measure_epoch_errors -- FOLDER [tls|uav] [stable]`,
+//! FOLDER with `truth/epochN_cloud_SENSOR_truth.laz` (stone_id, point_source_id, gps_time) and
+//! `truth/stones.csv`.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -19,56 +21,23 @@ use stonewise_core::registration::{
     AdjustmentParams, MemoryPairs, NearPoint, PairPoints, adjust, local_shifts, stone_points,
 };
 
-struct Point {
-    place: Point3<f64>,
-    source: u16,
-    time_s: f64,
-}
+#[allow(dead_code)] // rotations and shared motions are for another example
+#[path = "shared/dam_small.rs"]
+mod dam_small;
 
-type Epoch = BTreeMap<u32, Vec<Point>>;
+use dam_small::{SurveyPoint, read_points, read_stones};
+
+type Epoch = BTreeMap<u32, Vec<SurveyPoint>>;
 
 fn read(path: &Path) -> Epoch {
     let mut epoch = Epoch::new();
-    let mut reader = las::Reader::from_path(path).unwrap();
-    for p in reader.read_all().unwrap().points() {
-        let p = p.unwrap();
-        let id = u32::from_le_bytes(p.extra_bytes[..4].try_into().unwrap());
-        epoch.entry(id).or_default().push(Point {
-            place: Point3::new(p.x, p.y, p.z),
-            source: p.point_source_id,
-            time_s: p.gps_time.unwrap_or(0.0),
-        });
+    for p in read_points(path) {
+        epoch.entry(p.stone).or_default().push(p);
     }
     epoch
 }
 
-struct Truth {
-    normal: Vector3<f64>,
-    displacement: Vector3<f64>,
-    countable: bool,
-}
-
-fn truth(path: &Path, sensor: &str) -> BTreeMap<u32, Truth> {
-    let text = std::fs::read_to_string(path).unwrap();
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    lines
-        .map(|line| {
-            let f: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
-            let vector = |a: &str, b: &str, c: &str| Vector3::new(f[column(a)], f[column(b)], f[column(c)]);
-            let seen = f[column(&format!("vis_{sensor}"))] >= 0.35 && f[column("edge")] < 0.5;
-            let row = Truth {
-                normal: vector("nx", "ny", "nz"),
-                displacement: vector("dx", "dy", "dz"),
-                countable: seen,
-            };
-            (f[column("stone_id")] as u32, row)
-        })
-        .collect()
-}
-
-fn mean(points: &[Point]) -> Point3<f64> {
+fn mean(points: &[SurveyPoint]) -> Point3<f64> {
     Point3::from(points.iter().map(|p| p.place.coords).sum::<Vector3<f64>>() / points.len() as f64)
 }
 
@@ -78,7 +47,7 @@ fn main() {
     let sensor = args.get(1).map_or("tls", String::as_str);
     let with_stable = args.iter().any(|a| a == "stable");
     let epochs = [1, 2].map(|n| read(&folder.join(format!("epoch{n}_cloud_{sensor}_truth.laz"))));
-    let truth = truth(&folder.join("stones.csv"), sensor);
+    let truth = read_stones(&folder.join("stones.csv"), sensor);
     let ids: Vec<u32> = truth
         .keys()
         .copied()
@@ -115,13 +84,13 @@ fn main() {
         .zip(&centroids)
         .zip(&normals)
         .map(|((id, centroid), normal)| {
-            let mut sights: BTreeMap<usize, Vec<&Point>> = BTreeMap::new();
+            let mut sights: BTreeMap<usize, Vec<&SurveyPoint>> = BTreeMap::new();
             for epoch in [0, 1] {
                 for p in &epochs[epoch][id] {
                     sights.entry(index(epoch, p.source)).or_default().push(p);
                 }
             }
-            let sight = |(source, points): (usize, Vec<&Point>)| SourcePoints {
+            let sight = |(source, points): (usize, Vec<&SurveyPoint>)| SourcePoints {
                 source,
                 count: points.len() as u64,
                 time_s: points.iter().map(|p| p.time_s).sum::<f64>() / points.len() as f64,
@@ -137,7 +106,7 @@ fn main() {
     let mut stable: Vec<StablePoints> = Vec::new();
     if with_stable {
         for epoch in [0, 1] {
-            let mut parts: BTreeMap<usize, Vec<&Point>> = BTreeMap::new();
+            let mut parts: BTreeMap<usize, Vec<&SurveyPoint>> = BTreeMap::new();
             for p in epochs[epoch]
                 .get(&0)
                 .into_iter()

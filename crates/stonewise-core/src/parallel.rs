@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Does independent pieces of work, as many at a time as rayon has threads, each on a thread of its own, which may wait for
-/// others; results in order. The first error stops what has not begun.
+/// Does independent pieces of work, as many at a time as rayon has threads, each on a thread of its own,
+/// which may wait for others; results in order. The first error stops what has not begun.
 ///
 /// # Errors
 /// A piece of work failed; of several errors the first in order.

@@ -11,9 +11,11 @@ pub trait Progress: Sync {
     fn begin(&self, what: &str, total: u64);
     /// `units` more are done.
     fn advance(&self, units: u64);
-    /// The steps of the work that begins now, in order, in words. What follows belongs to one of them, until the next list.
+    /// The steps of the work that begins now, in order, in words. What follows belongs to one of them, until
+    /// the next list.
     fn agenda(&self, _steps: &[String]) {}
-    /// Work on the step with this place in the list, counted from 0, begins or goes on; steps before it have ended.
+    /// Work on the step with this place in the list, counted from 0, begins or goes on; steps before it have
+    /// ended.
     fn enter(&self, _step: usize) {}
     /// The step with this place in the list, or a part of it, was done earlier.
     fn take_over(&self, _step: usize) {}
@@ -25,6 +27,9 @@ pub trait Progress: Sync {
     fn is_cancelled(&self) -> bool;
 
     /// `Err(Interrupted)` once the caller wants the work to stop.
+    ///
+    /// # Errors
+    /// The caller wants the work to stop.
     fn check(&self) -> Result<(), Interrupted> {
         if self.is_cancelled() {
             Err(Interrupted)

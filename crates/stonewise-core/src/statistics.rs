@@ -56,11 +56,12 @@ pub fn split_mix(counter: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The smallest false discovery rate at which each test counts as a discovery, in the order given; p values that are no numbers count as 1.
+/// The smallest false discovery rate at which each test counts as a discovery, in the order given; p values
+/// that are no numbers count as 1.
 ///
-/// Source: Benjamini & Hochberg 1995, "Controlling the false discovery rate"; as adjusted values by Yekutieli & Benjamini 1999:
-/// q of the k-th smallest of n is the least of n p / j over all j >= k. Holds where tests are independent or positively dependent, such as those
-/// of stones that share an error. Cost: O(n log n).
+/// Source: Benjamini & Hochberg 1995, "Controlling the false discovery rate"; as adjusted values by Yekutieli
+/// & Benjamini 1999: q of the k-th smallest of n is the least of n p / j over all j >= k. Holds where tests
+/// are independent or positively dependent, such as those of stones that share an error. Cost: O(n log n).
 pub fn q_values(p_values: &[f64]) -> Vec<f64> {
     let p = |i: usize| if p_values[i].is_nan() { 1.0 } else { p_values[i] };
     let mut order: Vec<usize> = (0..p_values.len()).collect();
@@ -74,7 +75,8 @@ pub fn q_values(p_values: &[f64]) -> Vec<f64> {
     q
 }
 
-/// Tests that count as discoveries when the false discovery rate is to be at most `rate`, ascending. `None`: no test was made.
+/// Tests that count as discoveries when the false discovery rate is to be at most `rate`, ascending. `None`:
+/// no test was made.
 pub fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
     let tested: Vec<usize> = (0..p_values.len()).filter(|&i| p_values[i].is_some()).collect();
     let q = q_values(&p_values.iter().flatten().copied().collect::<Vec<f64>>());

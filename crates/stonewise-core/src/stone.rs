@@ -1,9 +1,10 @@
 //! What is known of a stone within one epoch, and of its motion between two.
 
-use crate::geometry::Rigid3;
+use crate::geometry::{DisplacementSample, Rigid3, SmallMotion};
 use crate::id::StoneId;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A stone of one epoch, as the labelled points show it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,7 +60,8 @@ pub struct StoneMotion {
     pub displacement: Vector3<f64>,
     /// Rotation vector, radians.
     pub rotation: Vector3<f64>,
-    /// Covariance of (displacement, rotation), absolute, m^2, m rad, rad^2; without registration error of the epochs.
+    /// Covariance of (displacement, rotation), absolute, m^2, m rad, rad^2; without registration error of the
+    /// epochs.
     pub covariance: Matrix6<f64>,
     /// Displacement against what the neighbours predict, metres.
     pub relative: Vector3<f64>,
@@ -113,4 +115,21 @@ pub struct PairResult {
     pub second: StoneId,
     /// The motion.
     pub motion: Result<StoneMotion, MotionFailure>,
+}
+
+/// The common rigid motion of the measured stones that are not loose; `None` where three stones or fewer show
+/// none.
+///
+/// `stones`: of the first epoch. `motions`: by stone of the first epoch.
+pub fn common_motion(stones: &[Stone], motions: &BTreeMap<StoneId, &PairResult>) -> Option<SmallMotion> {
+    let sample = |stone: &Stone| {
+        let motion = motions.get(&stone.id)?.motion.as_ref().ok();
+        let motion = motion.filter(|m| !m.loose)?;
+        Some(DisplacementSample {
+            place: stone.centroid,
+            displacement: motion.displacement,
+            covariance: motion.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
+        })
+    };
+    SmallMotion::fit(&stones.iter().filter_map(sample).collect::<Vec<_>>())
 }

@@ -66,7 +66,8 @@ fn m3c2_sees_a_bulge_but_not_a_shift_in_the_plane() {
     let shift = MotionField::translation(Vector3::new(0.0, 0.02, 0.05)).unwrap();
     let shifted = score(&folder, &shift);
     let in_plane = shifted.errors.in_plane_2d.unwrap();
-    // Another implementation gave 52.5 mm on sections like this one; the shift itself is 53.0 mm in the plane.
+    // Another implementation gave 52.5 mm on sections like this one; the shift itself is 53.0 mm in the
+    // plane.
     assert!((in_plane.rmse_m - 0.0525).abs() < 0.001, "{in_plane:?}");
     assert!((in_plane.zero_predictor_rmse_m - 0.0530).abs() < 0.0001);
 

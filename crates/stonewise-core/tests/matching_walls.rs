@@ -22,7 +22,8 @@ fn stone(id: u32, centroid: Point3<f64>, area_m2: f64) -> Stone {
     }
 }
 
-/// Rubble: a grid whose centroids are off by up to a fifth of the pitch and whose faces differ by a factor of two.
+/// Rubble: a grid whose centroids are off by up to a fifth of the pitch and whose faces differ by a factor of
+/// two.
 fn rubble(seed: u64) -> Vec<Stone> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     (0..40 * 20)

@@ -1,4 +1,5 @@
-//! Stones tracked in photos, from a drawn wall to motions: noisy points, textured faces, wrong poses, changed appearance.
+//! Stones tracked in photos, from a drawn wall to motions: noisy points, textured faces, wrong poses, changed
+//! appearance.
 #![allow(clippy::unwrap_used, clippy::panic)] // tests stop where something is missing
 
 use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};

@@ -1,4 +1,5 @@
-//! Transfer of labels on a small scene whose answer is known: a wall of rectangular stones, and boxes in front.
+//! Transfer of labels on a small scene whose answer is known: a wall of rectangular stones, and boxes in
+//! front.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // helpers of tests
 
@@ -107,7 +108,8 @@ fn mask(view: &View, boxes: &[(Bounds, u32)], rename: impl Fn(u32, f64) -> u32) 
     LabelImage::from_vec(width, height, labels).unwrap()
 }
 
-/// Random points on the wall and on the faces of the boxes, with their truth: stones, and 1000 + label on boxes.
+/// Random points on the wall and on the faces of the boxes, with their truth: stones, and 1000 + label on
+/// boxes.
 fn scan(boxes: &[(Bounds, u32)]) -> (Vec<Point3<f64>>, Vec<u32>) {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut points = Vec::new();
@@ -187,7 +189,8 @@ fn run(points: &[Point3<f64>], views: &[View], masks: &BTreeMap<ImageId, LabelIm
     }
 }
 
-/// Share of the points of each true stone that carry its most frequent label, and how many labels serve two stones.
+/// Share of the points of each true stone that carry its most frequent label, and how many labels serve two
+/// stones.
 fn compare(found: &[u32], truth: &[u32]) -> (BTreeMap<u32, f64>, usize) {
     let mut counts: BTreeMap<u32, BTreeMap<u32, usize>> = BTreeMap::new();
     for (f, t) in found.iter().zip(truth) {
@@ -338,8 +341,8 @@ fn a_box_hides_what_is_behind_it() {
     );
 }
 
-/// Masks of five photos: photo 1 shows stones 8 and 9 as one, photo 2 shows stone 15 in two pieces, photo 3 misses
-/// stone 3.
+/// Masks of five photos: photo 1 shows stones 8 and 9 as one, photo 2 shows stone 15 in two pieces, photo 3
+/// misses stone 3.
 fn imperfect(views: &[View]) -> BTreeMap<ImageId, LabelImage> {
     views
         .iter()

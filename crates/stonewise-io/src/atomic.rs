@@ -46,8 +46,8 @@ impl Drop for Partial {
     }
 }
 
-/// A name beside `path` for what is not finished yet, `.NAME.DIGITS.partial`; another one at every call of any
-/// process on any machine.
+/// A name beside `path` for what is not finished yet, `.NAME.DIGITS.partial`; another one at every call of
+/// any process on any machine.
 ///
 /// # Errors
 /// `path` ends in no name.

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Steps of other libraries under way.
 static UNDER_WAY: AtomicUsize = AtomicUsize::new(0);
 
-/// Runs a step of another library; `None` where it panicked. Whatever the step left behind must not be used then.
+/// Runs a step of another library; `None` where it panicked. Whatever the step left behind must not be used
+/// then.
 pub(crate) fn behind_wall<T>(step: impl FnOnce() -> T) -> Option<T> {
     UNDER_WAY.fetch_add(1, Ordering::SeqCst);
     let done = catch_unwind(AssertUnwindSafe(step));
@@ -14,7 +15,8 @@ pub(crate) fn behind_wall<T>(step: impl FnOnce() -> T) -> Option<T> {
     done.ok()
 }
 
-/// Whether a step is under way whose panic becomes an error that names the file: no line about the panic itself is due.
+/// Whether a step is under way whose panic becomes an error that names the file: no line about the panic
+/// itself is due.
 pub fn is_behind_wall() -> bool {
     UNDER_WAY.load(Ordering::SeqCst) > 0
 }

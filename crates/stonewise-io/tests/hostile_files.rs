@@ -64,7 +64,8 @@ fn clouds_that_lie_about_their_sizes_are_refused_at_once() {
 #[test]
 fn layers_under_a_compressor_without_layers_are_refused_at_once() {
     let mut bytes = std::fs::read(testdata("hostile/layer_sizes.laz")).unwrap();
-    // The compressor is the first number of the compression record, which follows the header of 375 bytes and its own of 54.
+    // The compressor is the first number of the compression record, which follows the header of 375 bytes and
+    // its own of 54.
     let compressor = 375 + 54;
     assert_eq!(bytes[compressor..compressor + 2], [3, 0]);
     bytes[compressor] = 2;

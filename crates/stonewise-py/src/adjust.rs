@@ -14,14 +14,14 @@ use std::sync::Arc;
 use stonewise::Settings;
 use stonewise::results::{Reference, StoneRow, stone_table};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{Bounds, Camera, DisplacementSample, Plane, SmallMotion, View, cell_of};
+use stonewise_core::geometry::{Bounds, Camera, Plane, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::{
     AdjustmentReport, MemoryPairs, NearPoint, PairPoints, adjust as adjust_pairs, local_shifts, stone_points,
 };
-use stonewise_core::stone::{MatchOutcome, PairResult, Stone};
+use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
 use stonewise_core::transfer::{LabelStore, MemoryLabels, TileLabels, build_stones};
 use stonewise_io::table::{Column, Table};
 
@@ -38,7 +38,8 @@ const PLANE_POINTS: usize = 20_000;
 /// Columns of the stone table that this function has no photos or no facade to fill.
 const WITHOUT: [&str; 4] = ["photos", "confidence", "along_m", "up_m"];
 
-/// The stone table of two labelled clouds, `{name: (values, is_filled)}`, and what the adjustment says about itself.
+/// The stone table of two labelled clouds, `{name: (values, is_filled)}`, and what the adjustment says about
+/// itself.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn adjust<'py>(
@@ -189,8 +190,8 @@ impl Epoch {
     }
 }
 
-/// The stones as the steps of a run hand them over, in a file: reading its numbers changes some in the last bit, and one bit can decide
-/// whether a point at the border of a stone counts.
+/// The stones as the steps of a run hand them over, in a file: reading its numbers changes some in the last
+/// bit, and one bit can decide whether a point at the border of a stone counts.
 fn handed_over(stones: &[Stone]) -> Result<Vec<Stone>, stonewise::Error> {
     let failed = |e: serde_json::Error| stonewise::Error::Registration(e.to_string());
     serde_json::from_slice(&serde_json::to_vec(stones).map_err(failed)?).map_err(failed)
@@ -267,7 +268,8 @@ fn pairs(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f6
     pairs
 }
 
-/// For each pair its labelled points, and all others in its box; `place`: the stone in this epoch, and the shift of the box.
+/// For each pair its labelled points, and all others in its box; `place`: the stone in this epoch, and the
+/// shift of the box.
 fn near_points(
     epoch: &Epoch,
     pairs: &[Pair],
@@ -309,7 +311,8 @@ fn near_points(
     near
 }
 
-/// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of the epochs.
+/// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of
+/// the epochs.
 fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairResult]) -> Vec<StoneRow> {
     let partners: BTreeMap<StoneId, &Stone> = second.stones.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<StoneId, MatchOutcome> = matched.outcomes.iter().copied().collect();
@@ -338,24 +341,6 @@ fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairRes
         ))
     };
     first.stones.iter().filter_map(row).collect()
-}
-
-/// The common rigid motion of the measured stones that are not loose.
-fn common_motion(stones: &[Stone], motions: &BTreeMap<StoneId, &PairResult>) -> Option<SmallMotion> {
-    let sample = |stone: &Stone| {
-        let motion = motions
-            .get(&stone.id)?
-            .motion
-            .as_ref()
-            .ok()
-            .filter(|m| !m.loose)?;
-        Some(DisplacementSample {
-            place: stone.centroid,
-            displacement: motion.displacement,
-            covariance: motion.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
-        })
-    };
-    SmallMotion::fit(&stones.iter().filter_map(sample).collect::<Vec<_>>())
 }
 
 /// A photo that is nothing but a place from which the wall is seen.

@@ -30,8 +30,8 @@ impl Listeners {
 
 /// Does the work on a thread of its own, with the interpreter's lock released.
 ///
-/// The calling thread tells the listeners, and stops the work on Ctrl-C or when a listener fails; that exception is raised once
-/// the work has come to its end.
+/// The calling thread tells the listeners, and stops the work on Ctrl-C or when a listener fails; that
+/// exception is raised once the work has come to its end.
 pub fn attended<T: Send>(
     py: Python<'_>,
     listeners: &Listeners,

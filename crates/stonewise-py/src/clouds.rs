@@ -14,8 +14,8 @@ pub struct Tiled {
 }
 
 impl Tiled {
-    /// Cuts a cloud into cubes of `size_m`, as the step `ingest` does: the same offsets in the same order. Points that are not
-    /// finite are left out.
+    /// Cuts a cloud into cubes of `size_m`, as the step `ingest` does: the same offsets in the same order.
+    /// Points that are not finite are left out.
     pub fn new(points: &[Point3<f64>], size_m: f64) -> Self {
         let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
         for (i, point) in points.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! The Python module of stonewise: a thin mirror of the crates. `python/stonewise` wraps it for people.
 //!
-//! Work runs on a thread of its own with the interpreter's lock released, see `attended`. Arrays come contiguous, in the types that the
-//! signatures name; the Python side sees to that.
+//! Work runs on a thread of its own with the interpreter's lock released, see `attended`. Arrays come
+//! contiguous, in the types that the signatures name; the Python side sees to that.
 
 mod adjust;
 mod arrays;

@@ -24,8 +24,8 @@ type Columns<'py> = (
     Bound<'py, PyArray2<f64>>,
 );
 
-/// M3C2 at core points; normals that are not given are fitted to the first cloud and point at the nearest viewpoint, or along a
-/// direction.
+/// M3C2 at core points; normals that are not given are fitted to the first cloud and point at the nearest
+/// viewpoint, or along a direction.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub fn m3c2<'py>(

@@ -11,14 +11,15 @@ use stonewise_core::id::ImageId;
 
 /// A posed photo: what its camera shows, and from where.
 ///
-/// Camera frame: x right, y down, z along the view. Pixels: x right, y down, the first pixel's centre at (0.5, 0.5).
+/// Camera frame: x right, y down, z along the view. Pixels: x right, y down, the first pixel's centre at
+/// (0.5, 0.5).
 #[pyclass(frozen, module = "stonewise")]
 pub struct View(pub geometry::View);
 
 #[pymethods]
 impl View {
-    /// `rotation`: from world axes to those of the camera; `centre`: of projection, metres; `radial`: k1 to k4; `tangential`: p1, p2 in
-    /// OpenCV's order.
+    /// `rotation`: from world axes to those of the camera; `centre`: of projection, metres; `radial`: k1 to
+    /// k4; `tangential`: p1, p2 in OpenCV's order.
     #[new]
     #[pyo3(signature = (width, height, focal_px, rotation, centre, *, principal_point_px=None, radial=[0.0; 4], tangential=[0.0; 2], name=String::new()))]
     #[allow(clippy::too_many_arguments)]
@@ -85,7 +86,8 @@ impl View {
         self.0.centre().coords.into()
     }
 
-    /// Pixels (n, 2) of points (n, 3); NaN behind the camera and where the lens shows nothing. A pixel may lie outside the photo.
+    /// Pixels (n, 2) of points (n, 3); NaN behind the camera and where the lens shows nothing. A pixel may
+    /// lie outside the photo.
     fn project<'py>(
         &self,
         py: Python<'py>,

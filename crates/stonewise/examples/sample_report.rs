@@ -1,8 +1,9 @@
 //! Made-up results of a wall of any number of stones, for the browser tests of the report (`web/tests`).
 //!
-//! `cargo run --example sample_report -- STONES DIR [CASE [LANGUAGE]]` writes result files into DIR as `stonewise run` would, with
-//! names from inputs that try to be markup, and makes the report and the layers from them. CASE: `unknown` (the
-//! default: a moved wall whose datum is unknown), `moved`, `still`, `cannot-tell`, `unconverged`. LANGUAGE: `en` or `de`.
+//! `cargo run --example sample_report -- STONES DIR [CASE [LANGUAGE]]` writes result files into DIR as
+//! `stonewise run` would, with names from inputs that try to be markup, and makes the report and the layers
+//! from them. CASE: `unknown` (the default: a moved wall whose datum is unknown), `moved`, `still`,
+//! `cannot-tell`, `unconverged`. LANGUAGE: `en` or `de`.
 
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3};
 use std::collections::BTreeMap;
@@ -50,7 +51,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A battered wall in running bond, three times as long as high, that settles to the right and bulges in its middle.
+/// A battered wall in running bond, three times as long as high, that settles to the right and bulges in its
+/// middle.
 struct Wall {
     columns: usize,
     corner: Point3<f64>,

@@ -110,7 +110,7 @@ pub enum Error {
     Image(#[from] stonewise_io::image_io::ImageIoError),
     /// A simulated survey could not be made.
     #[error(transparent)]
-    Simulate(crate::simulate::SimulateError),
+    Simulate(crate::simulate_error::SimulateError),
     /// Labels could not be transferred to a cloud.
     #[error(transparent)]
     Transfer(TransferError),
@@ -166,10 +166,10 @@ impl From<TransferError> for Error {
     }
 }
 
-impl From<crate::simulate::SimulateError> for Error {
-    fn from(error: crate::simulate::SimulateError) -> Self {
+impl From<crate::simulate_error::SimulateError> for Error {
+    fn from(error: crate::simulate_error::SimulateError) -> Self {
         match error {
-            crate::simulate::SimulateError::Interrupted(_) => Self::Interrupted,
+            crate::simulate_error::SimulateError::Interrupted(_) => Self::Interrupted,
             error => Self::Simulate(error),
         }
     }
@@ -195,8 +195,8 @@ impl From<AdjustError<Error>> for Error {
 }
 
 impl Error {
-    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder that belongs to
-    /// something else.
+    /// Whether the command was used wrongly: an invalid project file, invalid parameters, or an output folder
+    /// that belongs to something else.
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,

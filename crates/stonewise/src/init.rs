@@ -31,12 +31,26 @@ const NO_EPOCHS: [&str; 8] = [
     "unfinished",
 ];
 
-/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in order of name.
+/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in
+/// order of name.
 ///
-/// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that stonewise made, and those
-/// of truth, are left out. An existing file is not overwritten.
+/// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that
+/// stonewise made, and those of truth, are left out. An existing file is not overwritten.
 ///
-/// Errors: there is a project file; no folder holds a cloud; a folder cannot be read.
+/// ```
+/// # let survey = tempfile::tempdir()?;
+/// # for epoch in ["2024", "2025"] {
+/// #     std::fs::create_dir(survey.path().join(epoch))?;
+/// #     std::fs::write(survey.path().join(epoch).join("wall.xyz"), "1 2 3\n")?;
+/// # }
+/// let made = stonewise::init(survey.path())?;
+/// let text = std::fs::read_to_string(&made.path)?;
+/// assert_eq!(text.matches("[[epochs]]").count(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// There is a project file; no folder holds a cloud; a folder cannot be read.
 pub fn init(dir: &Path) -> Result<Initialised> {
     let path = dir.join("stonewise.toml");
     if path.exists() {

@@ -19,9 +19,13 @@ pub mod report;
 mod report_params;
 pub mod results;
 pub mod segmentation;
+mod settings;
 pub mod simulate;
+mod simulate_error;
+mod sources;
 mod split;
 mod stable;
+mod storage;
 mod texts;
 mod thresholds;
 mod truth;
@@ -34,12 +38,14 @@ pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{
     Comparison, Coordinator, PairSummary, Plan, PlanOptions, Stage, Summary, Unit, UnitDone, Until,
-    compare_clouds, do_unit, plan, run, set_program, tile_clouds,
+    compare_clouds, do_unit, plan, run, tile_clouds,
 };
-pub use project::{Epoch, IngestParams, Project, RegistrationParams, SegmentParams, Settings};
+pub use project::{Epoch, Project};
 pub use report_params::{Language, ReportParams};
+pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 pub use split::split;
 pub use stable::StableArea;
+pub use storage::step::set_program;
 pub use thresholds::{Levels, Measures, Thresholds, Zone};
 pub use truth::evaluate_truth;
 pub use warnings::Warning;

@@ -1,6 +1,6 @@
 //! Which values parameters can have.
 
-use crate::project::Settings;
+use crate::settings::Settings;
 use serde_json::Value;
 
 /// Parameters that zero makes useless: sizes, radii, counts, steps.
@@ -27,8 +27,8 @@ const POSITIVE: [&str; 18] = [
 /// Parameters that are shares or rates without saying so in their names.
 const SHARES: [&str; 4] = ["min_iou", "min_area_ratio", "false_discovery_rate", "min_overlap"];
 
-/// Edges of tiles that can work, metres. Offsets in a tile are single precision: at 100 m they are exact to 3 micrometres.
-/// Below half a metre a wall of 200 m falls into more than 20,000 files.
+/// Edges of tiles that can work, metres. Offsets in a tile are single precision: at 100 m they are exact to 3
+/// micrometres. Below half a metre a wall of 200 m falls into more than 20,000 files.
 const TILE_SIZE_M: [f64; 2] = [0.5, 100.0];
 
 /// The first parameter whose value is impossible: its key, and what it must be.

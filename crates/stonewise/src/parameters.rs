@@ -2,15 +2,16 @@
 
 use crate::error::{Error, Result};
 use crate::limits::impossible;
-use crate::project::{Project, RENAMED, Settings};
+use crate::project::Project;
 use crate::report_params::logo_type;
+use crate::settings::{RENAMED, Settings};
 use serde_json::{Map, Value};
 use std::path::Path;
 use stonewise_segment::Weights;
 
 impl Project {
-    /// The project with other parameters: tables as in the project file, such as `{"registration": {"estimator": "gicp"}}`. What
-    /// is not named stays; a path is relative to the project file.
+    /// The project with other parameters: tables as in the project file, such as `{"registration":
+    /// {"estimator": "gicp"}}`. What is not named stays; a path is relative to the project file.
     ///
     /// # Errors
     /// No such parameter, a value of the wrong kind, an impossible value, a file that does not exist.
@@ -111,7 +112,7 @@ fn todays_name(table: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::project::Estimator;
+    use crate::settings::Estimator;
     use serde_json::json;
 
     fn with(parameters: Value) -> Result<Settings> {

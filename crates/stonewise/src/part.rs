@@ -38,8 +38,11 @@ impl Part {
 
     /// The section of this size in the middle of the wall that clouds show.
     ///
-    /// The middle is the median of the points in each axis. The wall runs along the direction in which the points' places
-    /// on the map spread most. Errors: a cloud cannot be read, or holds no points.
+    /// The middle is the median of the points in each axis. The wall runs along the direction in which the
+    /// points' places on the map spread most.
+    ///
+    /// # Errors
+    /// A cloud cannot be read, or there are no points.
     pub fn in_the_middle(clouds: &[PathBuf], size_m: [f64; 2]) -> Result<Self> {
         let mut points: Vec<Point3<f64>> = Vec::new();
         for path in clouds {

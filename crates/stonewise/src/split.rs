@@ -12,13 +12,17 @@ use stonewise_core::statistics::split_mix;
 use stonewise_io::cameras::find_photos;
 use stonewise_io::cloud::{claimed_records, select_points};
 
-/// Divides the points and the photos of an epoch at random into two halves, and writes them as a project of two epochs.
+/// Divides the points and the photos of an epoch at random into two halves, and writes them as a project of
+/// two epochs.
 ///
-/// Every point goes to one half by the toss of a coin; the photos are shuffled and dealt in turn, so that the halves differ by
-/// one photo at most. The camera file and the masks are used where they are. Same seed, same halves. Returns the new
-/// project file, which is written last.
+/// Every point goes to one half by the toss of a coin; the photos are shuffled and dealt in turn, so that the
+/// halves differ by one photo at most. The camera file and the masks are used where they are. Same seed, same
+/// halves. Returns the new project file, which is written last.
 ///
 /// Source: the experiment of the paper, section 4.
+///
+/// # Errors
+/// A cloud or the folder of photos cannot be read; the files of the halves cannot be written; interruption.
 pub fn split(
     project: &Project,
     epoch: &Epoch,

@@ -41,7 +41,8 @@ pub struct Levels {
 pub struct Zone {
     /// Name, as the verdict shows it.
     pub name: String,
-    /// Corners (along, up) in the facade frame, metres, as in `along_m` and `up_m` of the stone table; the last is joined to the first.
+    /// Corners (along, up) in the facade frame, metres, as in `along_m` and `up_m` of the stone table; the
+    /// last is joined to the first.
     pub polygon: Vec<[f64; 2]>,
     /// Its thresholds; those of the wall where it has none of its own.
     pub measures: Measures,

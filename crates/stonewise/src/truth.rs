@@ -18,11 +18,16 @@ const NEEDED: [&str; 11] = [
     "stone_id", "cx", "cy", "cz", "dx", "dy", "dz", "rx", "ry", "rz", "loose",
 ];
 
-/// Scores the stones of a finished run against true stones, and writes `evaluation_truth.json` beside its results.
+/// Scores the stones of a finished run against true stones, and writes `evaluation_truth.json` beside its
+/// results.
 ///
-/// `truth`: CSV with the columns `stone_id, cx, cy, cz` (centroid in epoch 1), `dx, dy, dz`, `rx, ry, rz`, `loose`, and, where
-/// known, `nx, ny, nz` (face normal), `edge` and `vis_tls` or `vis_uav` or `visible` (share of the face that both epochs
-/// measured). A row of the results belongs to the true stone whose centroid is nearest.
+/// `truth`: CSV with the columns `stone_id, cx, cy, cz` (centroid in epoch 1), `dx, dy, dz`, `rx, ry, rz`,
+/// `loose`, and, where known, `nx, ny, nz` (face normal), `edge` and `vis_tls` or `vis_uav` or `visible`
+/// (share of the face that both epochs measured). A row of the results belongs to the true stone whose
+/// centroid is nearest.
+///
+/// # Errors
+/// The results or the truth cannot be read, a column is missing, a value is no number.
 pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -> Result<Evaluation> {
     let set = ResultSet::read(results)?;
     let stones = read_truth(truth)?;

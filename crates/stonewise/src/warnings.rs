@@ -14,7 +14,8 @@ pub struct Warning {
     pub message: String,
     /// An input that was asked for was left out: the run ends with exit code 3.
     pub skipped_input: bool,
-    /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything else.
+    /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything
+    /// else.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub doubt: bool,
 }

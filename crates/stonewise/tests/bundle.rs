@@ -1,8 +1,8 @@
 //! The embedded bundle of the report is what its sources in `web/` make.
 //!
-//! The first line of the bundle holds two digests, of all sources and of the bundle itself; `web/build.mjs` writes them.
-//! Both are computed again here, so that no node is needed to see a source that was changed without a build, or a bundle
-//! that was changed by hand.
+//! The first line of the bundle holds two digests, of all sources and of the bundle itself; `web/build.mjs`
+//! writes them. Both are computed again here, so that no node is needed to see a source that was changed
+//! without a build, or a bundle that was changed by hand.
 
 use std::path::{Path, PathBuf};
 

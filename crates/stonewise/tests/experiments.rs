@@ -1,4 +1,5 @@
-//! Experiments on a small simulated survey: what they find, against single runs and against what is known beforehand.
+//! Experiments on a small simulated survey: what they find, against single runs and against what is known
+//! beforehand.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
 use nalgebra::Vector3;

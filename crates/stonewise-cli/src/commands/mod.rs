@@ -7,6 +7,7 @@ mod evaluate;
 mod experiment;
 mod info;
 mod init;
+mod outcome;
 mod part;
 mod report;
 mod run;
@@ -20,19 +21,9 @@ mod units;
 use crate::args::{Args, Command};
 use crate::printer::Printer;
 use anyhow::Result;
+pub use outcome::Outcome;
 pub use run::measure;
 use stonewise::Until;
-
-/// How a command ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// Everything that was asked for was done.
-    Done,
-    /// Done, but for inputs that were left out, or with a doubt about the whole.
-    InDoubt,
-    /// The verdict on the wall is one that the caller wanted to hear of.
-    Verdict,
-}
 
 /// Runs the command that was asked for.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {

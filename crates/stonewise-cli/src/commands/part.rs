@@ -3,7 +3,8 @@
 use anyhow::{Context, Result, bail};
 use stonewise::{Part, Project};
 
-/// Reads `x0,y0,z0,x1,y1,z1`, or `WIDTHxHEIGHT` for the middle of what the first epoch shows. `option`: its name, for messages.
+/// Reads `x0,y0,z0,x1,y1,z1`, or `WIDTHxHEIGHT` for the middle of what the first epoch shows. `option`: its
+/// name, for messages.
 pub fn part(option: &str, text: &str, project: &Project) -> Result<Part> {
     let numbers = |separator: char| -> Vec<f64> {
         let parsed = text

@@ -41,7 +41,8 @@ pub fn say_verdict(summary: &Summary, printer: &Printer) {
     }
 }
 
-/// Runs a project as far as asked, in a folder that is claimed already, and says what came out but for the verdict.
+/// Runs a project as far as asked, in a folder that is claimed already, and says what came out but for the
+/// verdict.
 pub fn run_to(
     folder: &OutputFolder,
     project: &Project,
@@ -75,6 +76,9 @@ fn outcome_of(summary: &Summary) -> Outcome {
 }
 
 /// Runs a project as far as asked; an error says where the results of the last finished run are.
+///
+/// # Errors
+/// What stops the run; the error says where the results of the last finished run are.
 pub fn measure(
     folder: &OutputFolder,
     project: &Project,

@@ -1,7 +1,7 @@
 //! The simulated dam section that lies beside the checkout, made by another simulator.
 
-use crate::Case;
 use crate::trial::{Crack, Stones, Trial, Truth, mean};
+use crate::{Case, dam_small};
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,50 +14,12 @@ pub fn folder() -> PathBuf {
     )
 }
 
-fn read_stones(path: &Path) -> Stones {
-    let mut reader = las::Reader::from_path(path).unwrap();
+fn read_points(path: &Path) -> Stones {
     let mut stones = Stones::new();
-    for point in reader.read_all().unwrap().points() {
-        let point = point.unwrap();
-        let id = u32::from_le_bytes(point.extra_bytes[..4].try_into().unwrap());
-        stones
-            .entry(id)
-            .or_default()
-            .push(Point3::new(point.x, point.y, point.z));
+    for p in dam_small::read_points(path) {
+        stones.entry(p.stone).or_default().push(p.place);
     }
     stones
-}
-
-struct Row {
-    truth: Truth,
-    centroid: Point3<f64>,
-    rotation: Vector3<f64>,
-}
-
-fn read_truth(path: &Path, sensor: &str) -> BTreeMap<u32, Row> {
-    let text = std::fs::read_to_string(path).unwrap();
-    let mut lines = text.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    lines
-        .map(|line| {
-            let f: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
-            let vector = |a: &str, b: &str, c: &str| Vector3::new(f[column(a)], f[column(b)], f[column(c)]);
-            let row = Row {
-                centroid: vector("cx", "cy", "cz").into(),
-                rotation: vector("rx", "ry", "rz"),
-                truth: Truth {
-                    normal: vector("nx", "ny", "nz"),
-                    displacement: vector("dx", "dy", "dz"),
-                    shared: vector("bgx", "bgy", "bgz"),
-                    loose: f[column("loose")] > 0.5,
-                    countable: f[column(&format!("vis_{sensor}"))] >= 0.35 && f[column("edge")] < 0.5,
-                    spoilt: false,
-                },
-            };
-            (f[column("stone_id")] as u32, row)
-        })
-        .collect()
 }
 
 /// `None` for the cases that this survey does not have.
@@ -68,8 +30,8 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         Case::Edge | Case::Settlement | Case::Loose => return None,
     };
     let folder = folder().join(if combo { "combo" } else { "split" }).join("truth");
-    let first = read_stones(&folder.join(format!("epoch1_cloud_{sensor}_truth.laz")));
-    let mut second = read_stones(&folder.join(format!("epoch2_cloud_{sensor}_truth.laz")));
+    let first = read_points(&folder.join(format!("epoch1_cloud_{sensor}_truth.laz")));
+    let mut second = read_points(&folder.join(format!("epoch2_cloud_{sensor}_truth.laz")));
     let crack = Crack {
         across: Vector3::y(),
         at: 0.2,
@@ -87,7 +49,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         None if case == Case::Crack && crack.distance(p) > 0.0 => Vector3::new(0.003, 0.008, 0.005),
         None => Vector3::zeros(),
     };
-    let rows = read_truth(&folder.join("stones.csv"), sensor);
+    let rows = dam_small::read_stones(&folder.join("stones.csv"), sensor);
     if !combo {
         // A crack runs along joints: a stone moves as one, what is no stone where it lies.
         for (id, points) in &mut second {
@@ -107,16 +69,24 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         let turn = Rotation3::new(row.rotation);
         if case == Case::Datum {
             for p in second.get_mut(&id).into_iter().flatten() {
-                *p = row.centroid + turn.inverse() * (*p - row.centroid - row.truth.displacement);
+                *p = row.centroid + turn.inverse() * (*p - row.centroid - row.displacement);
             }
-            row.truth.displacement = Vector3::zeros();
-            row.truth.loose = false;
+            row.displacement = Vector3::zeros();
+            row.loose = false;
         } else if combo {
-            row.truth.displacement += turn * (c - row.centroid) - (c - row.centroid);
+            row.displacement += turn * (c - row.centroid) - (c - row.centroid);
         } else {
-            row.truth.displacement = at(&c);
+            row.displacement = at(&c);
         }
-        truth.insert(id, row.truth);
+        let of_stone = Truth {
+            normal: row.normal,
+            displacement: row.displacement,
+            shared: row.shared,
+            loose: row.loose,
+            countable: row.countable,
+            spoilt: false,
+        };
+        truth.insert(id, of_stone);
     }
     Some(Trial {
         stones: [first, second],

@@ -15,6 +15,9 @@
 
 mod bound;
 mod dam;
+#[allow(dead_code)] // sources and times are for another example
+#[path = "../shared/dam_small.rs"]
+mod dam_small;
 mod figures;
 mod paper;
 mod scale;

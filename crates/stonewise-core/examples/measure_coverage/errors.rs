@@ -15,7 +15,8 @@ pub enum Sensor {
 /// How the truth departs from what the model of the errors holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Stations turned and shifted, strips shifted and drifting smoothly; the epoch shares the error that is assumed.
+    /// Stations turned and shifted, strips shifted and drifting smoothly; the epoch shares the error that is
+    /// assumed.
     Usual,
     /// Nothing that all sources of an epoch share.
     NothingShared,
@@ -125,7 +126,8 @@ pub fn size_m(sensor: Sensor, rng: &mut ChaCha8Rng) -> f64 {
     low * (high / low).powf(share)
 }
 
-/// The sources of one epoch. `shared_m`: what is assumed of the error that they share; `size_m`: of a source's own.
+/// The sources of one epoch. `shared_m`: what is assumed of the error that they share; `size_m`: of a
+/// source's own.
 pub fn draw(
     sensor: Sensor,
     count: u32,

@@ -23,7 +23,8 @@ pub struct Wall {
     square: [f64; 3],
     /// Squared error of the common motion over its claim, mean of the axes.
     common: f64,
-    /// Whether a stone of the wall, which stands still, is called moved: stone by stone, and with the false discovery rate controlled.
+    /// Whether a stone of the wall, which stands still, is called moved: stone by stone, and with the false
+    /// discovery rate controlled.
     called: [bool; 2],
 }
 

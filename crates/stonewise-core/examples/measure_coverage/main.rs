@@ -1,13 +1,15 @@
-//! Measures how often the intervals of absolute motions hold the truth, over many small surveys: the source of the table in
-//! docs/src/method/epoch-errors.md.
+//! Measures how often the intervals of absolute motions hold the truth, over many small surveys: the source
+//! of the table in docs/src/method/epoch-errors.md.
 //!
-//! `cargo run --release -p stonewise-core --example measure_coverage [WORD ...]`. Words: sensors `tls uav` (default both), kinds of
-//! error by their names (`usual walk jump ...`, see [`errors::Kind`]; default all), `sources=2,3` (numbers of stations or strips of an
-//! epoch), `stable=none,ground,building,moved` (default none), `walls=N` (of a row, default 200), `first=N` (seed of the first wall),
-//! `full` (walls of 3 x 2 m with a bulge, scanned and adjusted; minutes for a few walls; no stable areas).
+//! `cargo run --release -p stonewise-core --example measure_coverage [WORD ...]`. Words: sensors `tls uav`
+//! (default both), kinds of error by their names (`usual walk jump ...`, see [`errors::Kind`]; default all),
+//! `sources=2,3` (numbers of stations or strips of an epoch), `stable=none,ground,building,moved` (default
+//! none), `walls=N` (of a row, default 200), `first=N` (seed of the first wall), `full` (walls of 3 x 2 m
+//! with a bulge, scanned and adjusted; minutes for a few walls; no stable areas).
 //!
-//! A row pools the stones of its walls. Errors are shared by all stones of a wall, so ranges are those of walls drawn anew (percentile
-//! bootstrap, Efron 1979); the first row says between which figures the coverage of a perfect method would lie.
+//! A row pools the stones of its walls. Errors are shared by all stones of a wall, so ranges are those of
+//! walls drawn anew (percentile bootstrap, Efron 1979); the first row says between which figures the coverage
+//! of a perfect method would lie.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 mod errors;

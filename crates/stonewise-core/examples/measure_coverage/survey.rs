@@ -1,5 +1,5 @@
-//! A small wall and stable areas as the sources of two epochs show them: points enough for the comparison of sources; the motions that
-//! the adjustment would measure are drawn from the same errors.
+//! A small wall and stable areas as the sources of two epochs show them: points enough for the comparison of
+//! sources; the motions that the adjustment would measure are drawn from the same errors.
 
 use crate::errors::{Kind, STRETCH, Sensor, SourceError, Target, draw, size_m};
 use nalgebra::{Matrix3, Point3, Vector3};

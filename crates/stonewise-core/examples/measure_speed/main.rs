@@ -1,11 +1,11 @@
 //! Processor time of the searches, comparisons and transfers that other programs do too.
 //!
-//! `cargo run --release -p stonewise-core --example measure_speed -- FOLDER`, with FOLDER as `bench/speed.py` makes it. It
-//! reads the names of cases from standard input, one a line, runs each and answers `seconds processor_seconds units`;
-//! `bench/speed.py` runs a case and the same work of another program in turn.
+//! `cargo run --release -p stonewise-core --example measure_speed -- FOLDER`, with FOLDER as `bench/speed.py`
+//! makes it. It reads the names of cases from standard input, one a line, runs each and answers `seconds
+//! processor_seconds units`; `bench/speed.py` runs a case and the same work of another program in turn.
 //!
-//! Files of FOLDER are rows of three little-endian f64, metres: `first.f64` and `second.f64` (the clouds, a wall that
-//! looks along -y), `core.f64` (core points of M3C2), `stones.f64` (centres of stones).
+//! Files of FOLDER are rows of three little-endian f64, metres: `first.f64` and `second.f64` (the clouds, a
+//! wall that looks along -y), `core.f64` (core points of M3C2), `stones.f64` (centres of stones).
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 

@@ -73,8 +73,8 @@ impl Survey {
         (field.points.len(), values.collect())
     }
 
-    /// The stones by the paper's estimator, with everything within 60 cm; what all share included. Displacement,
-    /// standard deviation along each axis.
+    /// The stones by the paper's estimator, with everything within 60 cm; what all share included.
+    /// Displacement, standard deviation along each axis.
     pub fn gicp(&self, voxel_m: f64) -> (usize, Vec<f64>) {
         let params = GicpParams {
             buffer_m: BUFFER_M,

@@ -49,6 +49,9 @@ pub enum CloudCompareError {
 /// otherwise, as in CloudCompare). The divisor of the variance becomes n (`ddof` 0), as CloudCompare's. Normals
 /// are computed at the core points (NormalMode 0) and point out of the wall, so NormalPreferedOri does not count;
 /// neither do other keys, such as those about output.
+///
+/// # Errors
+/// A key is missing or no number, or an option is set that is not supported; the error names it.
 pub fn params_from_cloudcompare(text: &str) -> Result<M3c2Params, CloudCompareError> {
     let file = Settings::of(text);
     if !file.entries.contains_key("M3C2VER") {

@@ -18,6 +18,21 @@ const Z95: f64 = 1.96;
 ///
 /// Source: Lague, Brodu & Leroux (2013), equation 1. Cost: core points x points per cylinder. The cells of the
 /// indices are best as large as the cylinder's radius.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use stonewise_core::change::{M3c2Params, m3c2};
+/// use stonewise_core::cloud::GridIndex;
+///
+/// let plane = |x: f64| -> Vec<Point3<f64>> {
+///     (0..400).map(|i| Point3::new(x, 0.02 * f64::from(i % 20), 0.02 * f64::from(i / 20))).collect()
+/// };
+/// let params = M3c2Params::default();
+/// let index = |points: &[Point3<f64>]| GridIndex::new(points, params.cylinder_radius_m);
+/// let (first, second) = (index(&plane(0.0)), index(&plane(0.005)));
+/// let field = m3c2(&first, &second, &[Point3::new(0.0, 0.2, 0.2)], &[Vector3::x()], &params);
+/// assert!((field.points[0].distance_m.unwrap() - 0.005).abs() < 1e-12);
+/// ```
 pub fn m3c2(
     first: &GridIndex,
     second: &GridIndex,

@@ -33,6 +33,9 @@ impl TriangleMesh {
     /// A mesh from vertices, metres, world frame, and triangles of vertex indices.
     ///
     /// Triangles without a finite area are left out. Larger polygons must be cut into triangles before.
+    ///
+    /// # Errors
+    /// A triangle names a vertex that does not exist, or no triangle has an area.
     pub fn new(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         for (face, corners) in triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= vertices.len()) {

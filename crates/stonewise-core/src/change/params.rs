@@ -53,6 +53,9 @@ impl Default for M3c2Params {
 
 impl M3c2Params {
     /// Checks that every length is usable.
+    ///
+    /// # Errors
+    /// A length is not positive and finite, or the registration error is negative; the error names it.
     pub fn check(&self) -> Result<(), M3c2ParamsError> {
         for (key, value_m) in [
             ("normal_radius_m", self.normal_radius_m),

@@ -36,6 +36,9 @@ pub enum SurveyError {
 /// Normals are fitted to the first survey. A core point belongs to the tile that holds it, and every tile is
 /// read with as much surroundings as normals and cylinders need, so results do not depend on the tiles.
 /// Memory: one tile of either survey with its surroundings. Core points without a normal are left out.
+///
+/// # Errors
+/// A tile cannot be read, the parameters are not usable, `sink` fails, or the caller stopped the work.
 pub fn m3c2_survey<A: TileSource, B: TileSource>(
     first: &A,
     second: &B,
@@ -60,6 +63,9 @@ where
 }
 
 /// The same at the core points of some tiles of the first survey.
+///
+/// # Errors
+/// As [`m3c2_survey`].
 pub fn m3c2_tiles<A: TileSource, B: TileSource>(
     first: &A,
     second: &B,
@@ -117,6 +123,9 @@ where
 /// in the order of the tile's points.
 ///
 /// Memory: one tile of `compared`, and of `reference` what lies within `max_m` of it.
+///
+/// # Errors
+/// A tile cannot be read, `sink` fails, or the caller stopped the work.
 pub fn c2c_survey<A: TileSource, B: TileSource>(
     reference: &A,
     compared: &B,
@@ -137,6 +146,9 @@ where
 
 /// Signed distances of every point of `compared` to a mesh; `sink(tile, points, distances)` gets them in the order
 /// of the tile's points.
+///
+/// # Errors
+/// As [`c2c_survey`].
 pub fn c2m_survey<B: TileSource>(
     mesh: &MeshIndex,
     compared: &B,

@@ -87,7 +87,8 @@ impl Blocks {
         (k * self.dims[1] + j) * self.dims[0] + i
     }
 
-    /// Calls `visit` with the items of a box of cells, run by run in ascending order of cell (z, then y, then x).
+    /// Calls `visit` with the items of a box of cells, run by run in ascending order of cell (z, then y, then
+    /// x).
     #[inline]
     pub(super) fn for_each_run(&self, cells: &CellBox, mut visit: impl FnMut(Range<usize>)) {
         let (from, to) = (cells[0].0 / EDGE, cells[0].1 / EDGE);

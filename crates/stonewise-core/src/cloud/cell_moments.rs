@@ -5,13 +5,14 @@ use crate::geometry::Moments;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-/// Points of an occupied cell, on average, from which on sums over cells save time; below, they would take more
-/// memory than the points.
+/// Points of an occupied cell, on average, from which on sums over cells save time; below, they would take
+/// more memory than the points.
 const MIN_POINTS_PER_CELL: usize = 4;
 
 /// Moments of the points of every occupied cell of an index.
 ///
-/// What lies wholly in a sphere counts by its cell, and only cells on its border are looked at point by point.
+/// What lies wholly in a sphere counts by its cell, and only cells on its border are looked at point by
+/// point.
 pub struct CellMoments<'a> {
     index: &'a GridIndex,
     /// About the cell's middle; empty where cells hold too few points.

@@ -48,7 +48,8 @@ impl GridIndex {
         for layer in layers.0..=layers.1 {
             let mut cells = [(layer, layer); 3];
             let bottom = self.origin[main] + layer as f64 * self.cell_m - cylinder.centre[main];
-            // Stretch of the axis whose discs touch this layer; a border cell also holds what rounding put there.
+            // Stretch of the axis whose discs touch this layer; a border cell also holds what rounding put
+            // there.
             let slack = reach(main) + 1e-6 * self.cell_m;
             let ends = [bottom - slack, bottom + self.cell_m + slack]
                 .map(|z| (z / cylinder.axis[main]).clamp(-cylinder.half_length_m, cylinder.half_length_m));

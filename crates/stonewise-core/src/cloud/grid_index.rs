@@ -7,9 +7,9 @@ use std::ops::Range;
 /// Points sorted into cubic cells, for searches within a radius and for nearest neighbours.
 ///
 /// Built once and searched often; a search visits only the cells that its sphere touches. Best where the cell
-/// is about as large as the usual search radius. Results come in ascending order of point index within a
-/// cell and of cell, so they do not depend on threads. Memory: 28 bytes a point, 4 an occupied cell, 12 an occupied
-/// block of 4 x 4 x 4 cells and 4 a block of the box around the cloud.
+/// is about as large as the usual search radius. Results come in ascending order of point index within a cell
+/// and of cell, so they do not depend on threads. Memory: 28 bytes a point, 4 an occupied cell, 12 an
+/// occupied block of 4 x 4 x 4 cells and 4 a block of the box around the cloud.
 pub struct GridIndex {
     pub(super) points: Vec<Point3<f64>>,
     /// Index of each sorted point in the input.
@@ -20,16 +20,17 @@ pub struct GridIndex {
     pub(super) dims: [usize; 3],
 }
 
-/// First radius of a search for the nearest point, in cells: around a point of the same cloud it finds one in 96 of
-/// 100 cases where a cell holds four points of a surface, in at most eight cells.
+/// First radius of a search for the nearest point, in cells: around a point of the same cloud it finds one in
+/// 96 of 100 cases where a cell holds four points of a surface, in at most eight cells.
 const FIRST_RADIUS_CELLS: f64 = 0.5;
-/// Points of a surface that a cell holds where [`GridIndex::for_nearest`] chooses it: fewer cost more cells a search,
-/// more cost more distances.
+/// Points of a surface that a cell holds where [`GridIndex::for_nearest`] chooses it: fewer cost more cells a
+/// search, more cost more distances.
 const POINTS_PER_CELL: f64 = 4.0;
-/// Fewest and most points of the usual cell with which [`GridIndex::for_nearest`] is content; between them a search takes
-/// half as long again at most.
+/// Fewest and most points of the usual cell with which [`GridIndex::for_nearest`] is content; between them a
+/// search takes half as long again at most.
 const GOOD_CELL: std::ops::RangeInclusive<usize> = 2..=12;
-/// Most cells that [`GridIndex::for_nearest`] tries. Three follow a cloud in a box of a thousand times its area.
+/// Most cells that [`GridIndex::for_nearest`] tries. Three follow a cloud in a box of a thousand times its
+/// area.
 const TRIALS: usize = 5;
 /// Points whose cells show the usual one: the median of their numbers is then known to some percent.
 const CELL_SAMPLES: usize = 500;
@@ -37,8 +38,8 @@ const CELL_SAMPLES: usize = 500;
 const MIN_CELL_M: f64 = 1e-3;
 
 impl GridIndex {
-    /// Sorts the points into cells of about `cell_m` metres (positive); the cell grows where the box around the cloud
-    /// would take more than 30 million blocks.
+    /// Sorts the points into cells of about `cell_m` metres (positive); the cell grows where the box around
+    /// the cloud would take more than 30 million blocks.
     pub fn new(points: &[Point3<f64>], cell_m: f64) -> Self {
         let bounds = crate::geometry::Bounds::of(points.iter().copied());
         let (origin, extent) = bounds.map_or((Point3::origin(), nalgebra::Vector3::zeros()), |b| {
@@ -63,8 +64,8 @@ impl GridIndex {
         }
     }
 
-    /// An index for searches of the nearest point: the cell follows the density around the usual point, so that a
-    /// few stray points do not coarsen it.
+    /// An index for searches of the nearest point: the cell follows the density around the usual point, so
+    /// that a few stray points do not coarsen it.
     pub fn for_nearest(points: &[Point3<f64>]) -> Self {
         let mut index = Self::new(points, guessed_cell(points));
         for _ in 1..TRIALS {
@@ -151,7 +152,8 @@ impl GridIndex {
             match best {
                 Some((_, d2)) if d2 <= radius * radius => return best,
                 _ if radius >= max_m => return None,
-                // Something in a corner of the box: the nearest is no farther. The factor covers the root's rounding.
+                // Something in a corner of the box: the nearest is no farther. The factor covers the root's
+                // rounding.
                 Some((_, d2)) => radius = (d2.sqrt() * (1.0 + 1e-12)).min(max_m),
                 None => radius = (2.0 * radius).min(max_m),
             }
@@ -188,8 +190,8 @@ impl GridIndex {
         }
     }
 
-    /// Where in the index' order of blocks a point would lie: searches for points in this order find their cells in
-    /// the processor's cache.
+    /// Where in the index' order of blocks a point would lie: searches for points in this order find their
+    /// cells in the processor's cache.
     pub fn block_of(&self, p: &Point3<f64>) -> u32 {
         self.blocks.place_of(&self.cell_of(p)) as u32
     }
@@ -234,8 +236,8 @@ fn sort_nearest(found: &mut Vec<(usize, f64)>, k: usize) {
     found.sort_unstable_by(order);
 }
 
-/// By how much a radius that holds `found` of `wanted` points of a surface grows: half as many again as wanted are
-/// then to be expected.
+/// By how much a radius that holds `found` of `wanted` points of a surface grows: half as many again as
+/// wanted are then to be expected.
 fn growth(found: usize, wanted: usize) -> f64 {
     (1.5 * wanted as f64 / found.max(1) as f64).sqrt().clamp(1.2, 2.0)
 }

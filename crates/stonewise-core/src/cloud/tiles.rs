@@ -13,9 +13,15 @@ pub trait TileSource: Sync {
     /// Box around the points of a tile, world frame.
     fn bounds(&self, tile: usize) -> Bounds;
     /// The points of a tile, always in the same order.
+    ///
+    /// # Errors
+    /// The tile cannot be read.
     fn load(&self, tile: usize) -> Result<Cloud, Self::Error>;
 
     /// All points inside a box, tile by tile, relative to the middle of the box.
+    ///
+    /// # Errors
+    /// A tile cannot be read.
     fn load_region(&self, region: &Bounds) -> Result<Cloud, Self::Error> {
         let mut found = Cloud::new(region.centre(), Vec::new());
         for tile in (0..self.tile_count()).filter(|&t| self.bounds(t).intersects(region)) {

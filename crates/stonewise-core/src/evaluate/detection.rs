@@ -27,7 +27,8 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// Counts alarms among samples that say whether they are significant; still is what moves at most `still_m`.
+    /// Counts alarms among samples that say whether they are significant; still is what moves at most
+    /// `still_m`.
     pub(super) fn of(samples: &[MotionSample], still_m: f64) -> Self {
         let mut d = Self::default();
         for (sample, alarm) in samples.iter().filter_map(|s| Some((s, s.significant?))) {

@@ -98,8 +98,8 @@ pub fn owners_by_centroid(
 
 /// Scores result rows against a simulated survey; `owners` runs parallel to `outcomes`.
 ///
-/// The truth of a row is the rigid motion of its owner, evaluated at the row's centroid; directions are those of
-/// the true face. Loose stones are compared where both sides say.
+/// The truth of a row is the rigid motion of its owner, evaluated at the row's centroid; directions are those
+/// of the true face. Loose stones are compared where both sides say.
 pub fn score_against_truth(
     outcomes: &[StoneOutcome],
     owners: &[Owner],

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// How often each pair of (predicted, true) label occurs; 0 is no stone.
 ///
-/// Labels need not use the same numbers. Memory grows with the pairs, not with the points, so a survey is added
-/// tile by tile.
+/// Labels need not use the same numbers. Memory grows with the pairs, not with the points, so a survey is
+/// added tile by tile.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LabelConfusion {
     counts: BTreeMap<(u32, u32), u64>,
@@ -144,8 +144,8 @@ impl LabelConfusion {
 mod tests {
     use super::*;
 
-    /// Predicted, true, points: 7 merges stones 1 and 2; stone 3 is split into 8 and 9; 4 is right but for 2 points; 10
-    /// is invented.
+    /// Predicted, true, points: 7 merges stones 1 and 2; stone 3 is split into 8 and 9; 4 is right but for 2
+    /// points; 10 is invented.
     const SPOILT: [(u32, u32, u64); 7] = [
         (7, 1, 60),
         (7, 2, 40),

@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// A known displacement of every point, a function of where the point was.
 ///
-/// In files a table with `kind`: `{ kind = "translation", d = [x, y, z] }`, or
-/// `{ kind = "bulge", centre = [x, y, z], depth = m, diameter = m, direction = [x, y, z] }`; world frame, metres.
+/// In files a table with `kind`: `{ kind = "translation", d = [x, y, z] }`, or `{ kind = "bulge", centre =
+/// [x, y, z], depth = m, diameter = m, direction = [x, y, z] }`; world frame, metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Keys", into = "Keys")]
 pub struct MotionField(Kind);
@@ -39,6 +39,18 @@ pub enum MotionFieldError {
 
 impl MotionField {
     /// Every point moves by `d`, metres.
+    ///
+    /// ```
+    /// use nalgebra::{Point3, Vector3};
+    /// use stonewise_core::evaluate::MotionField;
+    ///
+    /// let field = MotionField::translation(Vector3::new(0.0, 0.02, 0.05))?;
+    /// assert_eq!(field.displacement_at(&Point3::origin()), Vector3::new(0.0, 0.02, 0.05));
+    /// # Ok::<(), stonewise_core::evaluate::MotionFieldError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A component is no finite number.
     pub fn translation(d: Vector3<f64>) -> Result<Self, MotionFieldError> {
         finite("d", d.iter())?;
         Ok(Self(Kind::Translation(d)))
@@ -52,10 +64,14 @@ impl MotionField {
         }
     }
 
-    /// A round bulge: depth * cos^2(pi r / diameter) along `direction` (any length but zero) for r < diameter / 2.
+    /// A round bulge: depth * cos^2(pi r / diameter) along `direction` (any length but zero) for r < diameter
+    /// / 2.
     ///
     /// r is measured from `centre`, perpendicular to `direction`; the bulge reaches through the whole wall.
     /// A negative depth is a dent.
+    ///
+    /// # Errors
+    /// A number is not finite, the diameter is not positive, or the direction is zero.
     pub fn bulge(
         centre: Point3<f64>,
         depth_m: f64,
@@ -183,7 +199,8 @@ mod tests {
         let json =
             r#"{"kind":"bulge","centre":[0.1,-0.3,1.4],"depth":0.05,"diameter":4.0,"direction":[2,0,0]}"#;
         let bulge = read(json).unwrap();
-        // Anywhere along the axis; half way out cos^2(pi / 4) = 1/2; at 2/3 of the radius cos^2(60 deg) = 1/4.
+        // Anywhere along the axis; half way out cos^2(pi / 4) = 1/2; at 2/3 of the radius cos^2(60 deg) =
+        // 1/4.
         let at = |x: f64, y: f64, z: f64| bulge.displacement_at(&Point3::new(x, y, z));
         assert!((at(-7.0, -0.3, 1.4) - Vector3::new(0.05, 0.0, 0.0)).norm() < 1e-15);
         assert!((at(0.0, 0.7, 1.4).x - 0.025).abs() < 1e-15);

@@ -37,6 +37,9 @@ impl Default for EvaluationParams {
 
 impl EvaluationParams {
     /// Checks that every limit is usable.
+    ///
+    /// # Errors
+    /// A limit is not usable; the error names it.
     pub fn check(&self) -> Result<(), EvaluationParamsError> {
         let limits = [
             ("outlier_m", self.outlier_m, f64::INFINITY),
@@ -79,8 +82,8 @@ pub struct StoneOutcome {
     pub covariance: Option<Matrix3<f64>>,
     /// The same without registration error of the epochs, m^2.
     pub covariance_without_datum: Option<Matrix3<f64>>,
-    /// Whether the registration error is known; else limits and alarms hold for motions against the common rigid motion of the
-    /// stones that are not reported as loose.
+    /// Whether the registration error is known; else limits and alarms hold for motions against the common
+    /// rigid motion of the stones that are not reported as loose.
     pub datum_known: bool,
     /// Smallest significant displacement at 95 %, metres.
     pub detection_limit_m: Option<f64>,
@@ -152,8 +155,8 @@ impl MotionSample {
 
     /// An M3C2 distance beside the truth at its core point; `None` where M3C2 has no distance.
     ///
-    /// The displacement is distance times normal; the detection limit is M3C2's claim out of the plane, and in
-    /// the plane it claims nothing.
+    /// The displacement is distance times normal; the detection limit is M3C2's claim out of the plane, and
+    /// in the plane it claims nothing.
     pub fn of_change(point: &ChangePoint, normal: &Vector3<f64>, truth: Vector3<f64>) -> Option<Self> {
         Some(Self {
             frame: FaceFrame::from_normal(normal),
@@ -171,8 +174,8 @@ impl MotionSample {
         })
     }
 
-    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the claims that hold without a
-    /// datum; samples without such a claim are left out.
+    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the
+    /// claims that hold without a datum; samples without such a claim are left out.
     pub(super) fn without_datum(samples: &[Self]) -> Vec<Self> {
         let claimed = samples.iter().filter(|s| s.covariance_without_datum.is_some());
         let common = |of: fn(&Self) -> Vector3<f64>| {

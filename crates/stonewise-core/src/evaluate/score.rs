@@ -18,9 +18,11 @@ pub struct MotionScore {
     pub errors: Directions,
     /// Share of estimates whose 3D error is beyond the outlier limit.
     pub outlier_rate: Option<f64>,
-    /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have no claim.
+    /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have
+    /// no claim.
     pub calibration: Option<Calibration>,
-    /// The same against the common rigid motion, registration error left out; `None` where nothing is claimed about it.
+    /// The same against the common rigid motion, registration error left out; `None` where nothing is claimed
+    /// about it.
     #[serde(default)]
     pub calibration_without_datum: Option<Calibration>,
     /// Alarms against truth; where no datum is known, of motions against the common rigid motion.
@@ -81,9 +83,10 @@ pub fn score_stones(
 
 /// Scores M3C2 against a known displacement, taken at each core point.
 ///
-/// M3C2's displacement vector is distance times normal. `face_normal` gives the wall's outward normal at a core
-/// point, which sets the directions that errors are counted in: the wall's own at the scale of stones and more,
-/// for out-of-plane to mean the same as for stones. The detection limit is M3C2's claim along its normal.
+/// M3C2's displacement vector is distance times normal. `face_normal` gives the wall's outward normal at a
+/// core point, which sets the directions that errors are counted in: the wall's own at the scale of stones
+/// and more, for out-of-plane to mean the same as for stones. The detection limit is M3C2's claim along its
+/// normal.
 pub fn score_change(
     field: &ChangeField,
     truth: impl Fn(&Point3<f64>) -> Vector3<f64>,

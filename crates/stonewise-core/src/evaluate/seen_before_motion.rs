@@ -5,8 +5,8 @@ use crate::geometry::View;
 use crate::registration::photos::PhotoCamera;
 use nalgebra::Point3;
 
-/// Rounds of the fixed point that undoes a motion: a motion changes by a tenth of itself at most over its own length, so that each
-/// round gains a digit.
+/// Rounds of the fixed point that undoes a motion: a motion changes by a tenth of itself at most over its own
+/// length, so that each round gains a digit.
 const ROUNDS: usize = 8;
 
 /// A camera that sees moved points where they were when the photo was taken.

@@ -11,8 +11,8 @@ pub fn cell_of(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
     [0, 1, 2].map(|axis| floor(point[axis] / size_m))
 }
 
-/// The largest whole number that is not above `value`; without the call that `f64::floor` is on processors of before
-/// 2008, which the program must run on.
+/// The largest whole number that is not above `value`; without the call that `f64::floor` is on processors of
+/// before 2008, which the program must run on.
 #[inline]
 pub fn floor(value: f64) -> i64 {
     let towards_zero = value as i64;
@@ -24,8 +24,9 @@ pub type CellMap<K, V> = HashMap<K, V, BuildHasherDefault<CellHasher>>;
 /// A set of cells.
 pub type CellSet<K> = HashSet<K, BuildHasherDefault<CellHasher>>;
 
-/// Hashes a few whole numbers in a few nanoseconds: each word is mixed in by a multiplication with an odd number whose bits
-/// look random, after Knuth (1973, section 6.4). No defence against keys chosen to collide, which coordinates are not.
+/// Hashes a few whole numbers in a few nanoseconds: each word is mixed in by a multiplication with an odd
+/// number whose bits look random, after Knuth (1973, section 6.4). No defence against keys chosen to collide,
+/// which coordinates are not.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CellHasher(u64);
 

@@ -42,8 +42,8 @@ impl Moments {
         Matrix3::new(d.x, m.z, m.y, m.z, d.y, m.x, m.y, m.x, d.z)
     }
 
-    /// Covariance (divisor n), square metres. The vectors' origin is best as near to them as they are to each other:
-    /// the square of its distance costs digits.
+    /// Covariance (divisor n), square metres. The vectors' origin is best as near to them as they are to each
+    /// other: the square of its distance costs digits.
     pub fn covariance(&self) -> Matrix3<f64> {
         let mean = self.sum / self.count;
         self.square() / self.count - mean * mean.transpose()

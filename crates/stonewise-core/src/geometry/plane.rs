@@ -14,8 +14,8 @@ pub struct Plane {
     pub spread_m: [f64; 3],
 }
 
-/// Points less wide than this part of their length lie on a line: what rounding feigns where products are summed about
-/// the mean.
+/// Points less wide than this part of their length lie on a line: what rounding feigns where products are
+/// summed about the mean.
 const LEAST_WIDTH: f64 = 1e-12;
 /// The same where they are summed about another point: the root of the rounding error.
 const LEAST_WIDTH_OF_MOMENTS: f64 = 1e-7;

@@ -22,7 +22,8 @@ pub fn is_simple(ring: &[Point2<f64>]) -> bool {
         })
 }
 
-/// Whether a point lies inside the polygon: a ray from it crosses an odd number of sides. A point on a side may be either.
+/// Whether a point lies inside the polygon: a ray from it crosses an odd number of sides. A point on a side
+/// may be either.
 pub fn ring_contains(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
     let crosses = |i: usize| {
         let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);

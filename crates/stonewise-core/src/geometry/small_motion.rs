@@ -28,12 +28,12 @@ pub struct SmallMotion {
 }
 
 impl SmallMotion {
-    /// The rigid motion nearest to the samples by least squares, weighted by their inverse covariances; samples count as
-    /// independent.
+    /// The rigid motion nearest to the samples by least squares, weighted by their inverse covariances;
+    /// samples count as independent.
     ///
-    /// Samples whose covariance is not positive definite are left out; `None` without any other. Motions that the samples do not
-    /// show, such as a rotation about a line that holds all of them, are zero with variance zero: they move no sample.
-    /// Cost: O(samples).
+    /// Samples whose covariance is not positive definite are left out; `None` without any other. Motions that
+    /// the samples do not show, such as a rotation about a line that holds all of them, are zero with
+    /// variance zero: they move no sample. Cost: O(samples).
     pub fn fit(samples: &[DisplacementSample]) -> Option<Self> {
         let weighted: Vec<(&DisplacementSample, Matrix3<f64>)> = samples
             .iter()
@@ -89,7 +89,8 @@ impl SmallMotion {
     }
 }
 
-/// The matrix that turns (shift, rotation vector) about a centre into the displacement of the place at `arm` from it.
+/// The matrix that turns (shift, rotation vector) about a centre into the displacement of the place at `arm`
+/// from it.
 pub fn lever(arm: &Vector3<f64>) -> SMatrix<f64, 3, 6> {
     let mut lever = SMatrix::<f64, 3, 6>::zeros();
     lever.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());

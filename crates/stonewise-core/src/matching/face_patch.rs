@@ -4,10 +4,11 @@ use crate::geometry::FaceFrame;
 use crate::statistics::upper_median;
 use nalgebra::{Point3, Vector3};
 
-/// Edge of a cell, metres: joints of 1 cm still show as a dip of a few millimetres, and clouds of a point every 15 mm fill
-/// the raster.
+/// Edge of a cell, metres: joints of 1 cm still show as a dip of a few millimetres, and clouds of a point
+/// every 15 mm fill the raster.
 pub(super) const CELL_M: f64 = 0.02;
-/// Half width of the window whose mean is taken off, cells: the shape of the wall has no part in the comparison.
+/// Half width of the window whose mean is taken off, cells: the shape of the wall has no part in the
+/// comparison.
 const WINDOW: usize = 12;
 /// Deviations beyond this many times the median one count as much as that: a plant or a railing is no relief.
 const LIMIT: f32 = 4.0;
@@ -68,7 +69,8 @@ impl FaceGrid {
     }
 }
 
-/// A raster of `side` x `side` cells, row by row from the lower left, along and up the face; NaN where no point lies.
+/// A raster of `side` x `side` cells, row by row from the lower left, along and up the face; NaN where no
+/// point lies.
 ///
 /// Values are deviations from their surroundings, divided by their median absolute deviation.
 #[derive(Clone, Debug)]

@@ -22,8 +22,8 @@ pub(super) struct Field {
 
 /// The field that grows from one common shift.
 ///
-/// Mutual nearest neighbours with similar areas are paired; each stone's shift becomes the median over the pairs
-/// nearest to it, component by component; again from there.
+/// Mutual nearest neighbours with similar areas are paired; each stone's shift becomes the median over the
+/// pairs nearest to it, component by component; again from there.
 pub(super) fn grow(
     first: &Centroids,
     second: &Centroids,

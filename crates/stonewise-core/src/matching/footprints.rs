@@ -18,7 +18,8 @@ type Voxel = [i32; 3];
 /// Memory: about 90 bytes a voxel; 5,000 m^2 of stones take some 0.6 GB.
 #[derive(Default)]
 pub struct Footprints {
-    /// Points of a stone in a voxel, with their sum about the voxel's corner; a voxel may hold several stones.
+    /// Points of a stone in a voxel, with their sum about the voxel's corner; a voxel may hold several
+    /// stones.
     voxels: CellMap<Voxel, Vec<(StoneId, u32, Vector3<f32>)>>,
 }
 
@@ -57,7 +58,8 @@ impl Footprints {
         found
     }
 
-    /// What a place has to do with a stone: the stone itself in its voxel or one beside it, else another stone, else none.
+    /// What a place has to do with a stone: the stone itself in its voxel or one beside it, else another
+    /// stone, else none.
     fn shows(&self, place: &Point3<f64>, stone: StoneId) -> Option<bool> {
         let [x, y, z] = voxel_of(place);
         let mut other = None;
@@ -77,11 +79,12 @@ impl Footprints {
     }
 }
 
-/// How far two stones of two epochs cover each other: intersection over union, counted only where both epochs show some
-/// stone, so that holes, shadows and parts that a mask leaves out do not count against a pair, but other stones do.
+/// How far two stones of two epochs cover each other: intersection over union, counted only where both epochs
+/// show some stone, so that holes, shadows and parts that a mask leaves out do not count against a pair, but
+/// other stones do.
 ///
-/// The result is made for [`Surroundings::overlap`](super::Surroundings::overlap): it takes a stone of each epoch and
-/// the shift of the first, and gives `None` where the two hardly meet.
+/// The result is made for [`Surroundings::overlap`](super::Surroundings::overlap): it takes a stone of each
+/// epoch and the shift of the first, and gives `None` where the two hardly meet.
 pub fn footprint_overlap<'a>(
     first: &'a Footprints,
     second: &'a Footprints,
@@ -145,7 +148,8 @@ mod tests {
     fn holes_do_not_count_but_other_stones_do() {
         let shift = Vector3::new(0.02, 0.31, -0.17);
         let (mut one, mut two) = (Footprints::new(), Footprints::new());
-        // The first epoch sees a quarter of stone 1, all of 2 and 3; the second has 1 whole and 2 and 3 as one.
+        // The first epoch sees a quarter of stone 1, all of 2 and 3; the second has 1 whole and 2 and 3 as
+        // one.
         patch(&mut one, 1, [0.0, 0.15], [0.0, 0.15], &Vector3::zeros());
         patch(&mut one, 2, [0.4, 0.7], [0.0, 0.3], &Vector3::zeros());
         patch(&mut one, 3, [0.73, 1.03], [0.0, 0.3], &Vector3::zeros());

@@ -46,23 +46,50 @@ pub struct MatchQuality {
 pub struct MatchReport {
     /// One entry a stone of the first epoch, ascending by id.
     pub outcomes: Vec<(StoneId, MatchOutcome)>,
-    /// The nearest candidate of each stone of the first epoch, matched or not, ascending by id; empty without candidates.
+    /// The nearest candidate of each stone of the first epoch, matched or not, ascending by id; empty without
+    /// candidates.
     pub qualities: Vec<MatchQuality>,
     /// Stones of the second epoch without a partner, ascending: new, or seen in the second epoch only.
     pub unmatched_second: Vec<StoneId>,
     /// The shift from which the local shifts grew, metres.
     pub common_shift: Vector3<f64>,
-    /// Expected displacement at each stone of the first epoch, in their order: the neighbours' median, metres.
+    /// Expected displacement at each stone of the first epoch, in their order: the neighbours' median,
+    /// metres.
     pub local_shifts: Vec<Vector3<f64>>,
 }
 
 /// Pairs the stones of two epochs.
 ///
-/// A stone's partner is the nearest centroid to where the local shift expects it, if that is much nearer than the second
-/// nearest (ratio test, Equation 2 of the paper, after Lowe 2004), the faces are about equally large, and each is the
-/// other's nearest. Of the stones that are left, those whose surfaces overlap are paired, best first, where the caller
-/// can tell the overlap. No stone is used twice. The result does not depend on the order of the tables.
-/// Cost: a few nearest-neighbour searches a stone for each of about a dozen trial shifts.
+/// A stone's partner is the nearest centroid to where the local shift expects it, if that is much nearer than
+/// the second nearest (ratio test, Equation 2 of the paper, after Lowe 2004), the faces are about equally
+/// large, and each is the other's nearest. Of the stones that are left, those whose surfaces overlap are
+/// paired, best first, where the caller can tell the overlap. No stone is used twice. The result does not
+/// depend on the order of the tables. Cost: a few nearest-neighbour searches a stone for each of about a
+/// dozen trial shifts.
+///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use stonewise_core::matching::{MatchParams, Surroundings, match_stones};
+/// use stonewise_core::{id::StoneId, stone::MatchOutcome, stone::Stone};
+///
+/// // Stones in courses of unequal length; in the second epoch they lie 2 cm lower and have other numbers.
+/// let wall = |first_id: u32, lower: f64| -> Vec<Stone> {
+///     let stone = |k: u32| Stone {
+///         id: StoneId(first_id + k),
+///         centroid: Point3::new(0.0, 0.3 * f64::from(k % 6) + 0.03 * f64::from(k * k % 7), 0.2 * f64::from(k / 6) - lower),
+///         normal: Vector3::x(),
+///         area_m2: 0.04 + 0.002 * f64::from(k % 5),
+///         points: 400,
+///         photos: 3,
+///         confidence: 1.0,
+///     };
+///     (0..24).map(stone).collect()
+/// };
+/// let surroundings = Surroundings { covered: &|_| true, overlap: None };
+/// let report = match_stones(&wall(1, 0.0), &wall(101, 0.02), &surroundings, &MatchParams::default());
+/// assert_eq!(report.outcomes[3], (StoneId(4), MatchOutcome::Matched { second: StoneId(104) }));
+/// assert!((report.common_shift.z + 0.02).abs() < 1e-9);
+/// ```
 pub fn match_stones(
     first: &[Stone],
     second: &[Stone],
@@ -78,13 +105,17 @@ pub fn match_stones(
     let (a, b) = (Centroids::new(&first), Centroids::new(&second));
     let (common_shift, field) = common_shift(&a, &b, params);
     let places = predict(&first, &field.shifts);
-    let back = Centroids::at(&first, &places);
+    let sides = Sides {
+        back: Centroids::at(&first, &places),
+        first: a,
+        second: b,
+    };
     let trials: Vec<Trial> = (0..first.len())
-        .map(|i| try_one(i, &places[i], &a, &b, &back, surroundings, params))
+        .map(|i| try_one(i, &places[i], &sides, surroundings, params))
         .collect();
     let mut outcomes = one_to_one(&first, &second, &trials);
     if let Some(overlap) = surroundings.overlap {
-        pair_by_overlap(&mut outcomes, &a, &b, &places, &field.shifts, overlap, params);
+        pair_by_overlap(&mut outcomes, &sides, &places, &field.shifts, overlap, params);
     }
     let mut used: Vec<StoneId> = outcomes.iter().filter_map(|o| partner(&o.1)).collect();
     used.sort_unstable();
@@ -107,12 +138,18 @@ struct Trial {
     quality: Option<MatchQuality>,
 }
 
+/// The stones of both epochs, to be searched by place.
+struct Sides<'a> {
+    first: Centroids<'a>,
+    second: Centroids<'a>,
+    /// Those of the first epoch where the second is expected to show them.
+    back: Centroids<'a>,
+}
+
 fn try_one(
     i: usize,
     place: &Point3<f64>,
-    first: &Centroids,
-    second: &Centroids,
-    back: &Centroids,
+    Sides { first, second, back }: &Sides,
     surroundings: &Surroundings,
     params: &MatchParams,
 ) -> Trial {
@@ -188,8 +225,7 @@ fn one_to_one(first: &[Stone], second: &[Stone], trials: &[Trial]) -> Vec<(Stone
 /// Pairs stones that are left over where their surfaces overlap, the best overlap first.
 fn pair_by_overlap(
     outcomes: &mut [(StoneId, MatchOutcome)],
-    first: &Centroids,
-    second: &Centroids,
+    Sides { first, second, .. }: &Sides,
     places: &[Point3<f64>],
     shifts: &[Vector3<f64>],
     overlap: &Overlap,

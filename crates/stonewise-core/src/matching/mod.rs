@@ -1,7 +1,8 @@
 //! Which stone of the second epoch is which stone of the first.
 //!
-//! A common shift is found first by a vote over centroid differences, so that motions larger than a stone still match;
-//! then a smooth field of local shifts follows settlements and bulges. Distances in the ratio test are what remains.
+//! A common shift is found first by a vote over centroid differences, so that motions larger than a stone
+//! still match; then a smooth field of local shifts follows settlements and bulges. Distances in the ratio
+//! test are what remains.
 
 mod centroids;
 mod face_patch;

@@ -1,8 +1,8 @@
 //! Whether labels lie on the stones that the cloud shows.
 //!
-//! Labels come from photos, relief from the cloud. Where cameras and cloud do not fit each other, labels lie beside the
-//! stones: their joints are not where the relief dips, and the relief under matched labels of two epochs is not the same.
-//! Both show as a correlation that is best at another place than zero.
+//! Labels come from photos, relief from the cloud. Where cameras and cloud do not fit each other, labels lie
+//! beside the stones: their joints are not where the relief dips, and the relief under matched labels of two
+//! epochs is not the same. Both show as a correlation that is best at another place than zero.
 
 use super::face_patch::{CELL_M, FacePatch};
 use nalgebra::Vector2;
@@ -41,7 +41,8 @@ impl OffsetVote {
         }
     }
 
-    /// Adds a place. `larger` has the same middle as `smaller`; places that `larger` does not reach count at fewer shifts.
+    /// Adds a place. `larger` has the same middle as `smaller`; places that `larger` does not reach count at
+    /// fewer shifts.
     pub fn add(&mut self, smaller: &FacePatch, larger: &FacePatch) {
         let span = 2 * self.reach + 1;
         // Cell of the larger patch over the first cell of the smaller one at the least shift.

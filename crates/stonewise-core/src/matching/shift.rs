@@ -15,9 +15,9 @@ const MAX_VOTERS: usize = 3000;
 
 /// The common shift and the field that grows from it.
 ///
-/// Every pair of stones of similar area within the largest shift votes for its centroid difference; the peaks at
-/// several scales, and no motion at all, are tried, and the field with most agreeing pairs wins, the smaller shift
-/// among equals.
+/// Every pair of stones of similar area within the largest shift votes for its centroid difference; the peaks
+/// at several scales, and no motion at all, are tried, and the field with most agreeing pairs wins, the
+/// smaller shift among equals.
 pub(super) fn common_shift(
     first: &Centroids,
     second: &Centroids,

@@ -13,8 +13,8 @@ pub struct Component {
 
 /// Splits every label but 0 into parts that hang together by their sides (4-neighbours).
 ///
-/// Returns an image of part numbers, 0 for background and n for `parts[n - 1]`; parts are numbered by their first pixel in
-/// row order. Cost: O(pixels), two passes with union-find.
+/// Returns an image of part numbers, 0 for background and n for `parts[n - 1]`; parts are numbered by their
+/// first pixel in row order. Cost: O(pixels), two passes with union-find.
 pub fn connected_components(labels: &LabelImage) -> (LabelImage, Vec<Component>) {
     let (width, height) = (labels.width() as usize, labels.height() as usize);
     let data = labels.data();

@@ -8,8 +8,8 @@ pub type Ring = Vec<[f64; 2]>;
 
 /// Outlines of every label but 0: rings along pixel edges, with corners only.
 ///
-/// Filling a label's rings by the even-odd rule gives its pixels back exactly. Outer rings have positive [`ring_area`], holes
-/// negative. Pixels that touch only at a corner are apart. Cost: O(pixels + boundary).
+/// Filling a label's rings by the even-odd rule gives its pixels back exactly. Outer rings have positive
+/// [`ring_area`], holes negative. Pixels that touch only at a corner are apart. Cost: O(pixels + boundary).
 pub fn label_outlines(labels: &LabelImage) -> BTreeMap<u32, Vec<Ring>> {
     let mut edges: BTreeMap<u32, Edges> = BTreeMap::new();
     let (width, height) = (labels.width(), labels.height());
@@ -53,7 +53,8 @@ pub fn ring_area(ring: &[[f64; 2]]) -> f64 {
         / 2.0
 }
 
-/// Border edges by the corner (y, x) they start from, a bit for each heading; the label lies to the right of each.
+/// Border edges by the corner (y, x) they start from, a bit for each heading; the label lies to the right of
+/// each.
 type Edges = BTreeMap<(u32, u32), u8>;
 
 #[derive(Clone, Copy, PartialEq)]

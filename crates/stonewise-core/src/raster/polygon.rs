@@ -2,10 +2,11 @@
 
 /// Calls `span(y, x_begin, x_end)` for every horizontal run of pixels whose centres lie inside the rings.
 ///
-/// Inside is where a ray crosses the rings an odd number of times, so a ring inside another is a hole. Rings are closed
-/// implicitly; vertices are pixel coordinates (pixel (0, 0) covers [0, 1) x [0, 1)) and may lie outside the image, to which
-/// the spans are clipped. A centre exactly on an edge belongs to the polygon on its right. Rings with non-finite
-/// coordinates are ignored. Cost: O(c log c) for c crossings of rows with edges.
+/// Inside is where a ray crosses the rings an odd number of times, so a ring inside another is a hole. Rings
+/// are closed implicitly; vertices are pixel coordinates (pixel (0, 0) covers [0, 1) x [0, 1)) and may lie
+/// outside the image, to which the spans are clipped. A centre exactly on an edge belongs to the polygon on
+/// its right. Rings with non-finite coordinates are ignored. Cost: O(c log c) for c crossings of rows with
+/// edges.
 pub fn fill_polygon(rings: &[Vec<[f64; 2]>], width: u32, height: u32, mut span: impl FnMut(u32, u32, u32)) {
     let mut crossings: Vec<(u32, f64)> = Vec::new();
     for ring in rings {

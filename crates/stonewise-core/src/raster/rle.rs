@@ -34,6 +34,9 @@ pub enum RleError {
 
 impl Rle {
     /// A mask from its runs, which must cover the image exactly.
+    ///
+    /// # Errors
+    /// The runs do not cover the image exactly.
     pub fn from_counts(width: u32, height: u32, counts: Vec<u32>) -> Result<Self, RleError> {
         let covered: u64 = counts.iter().map(|&c| u64::from(c)).sum();
         if covered == u64::from(width) * u64::from(height) {
@@ -53,8 +56,12 @@ impl Rle {
 
     /// A mask from COCO's compressed text.
     ///
-    /// Each run is a signed number in groups of five bits, least significant first, each group a character from '0' on with
-    /// bit 5 set where another follows; from the fourth run on it is the difference to the run two before.
+    /// Each run is a signed number in groups of five bits, least significant first, each group a character
+    /// from '0' on with bit 5 set where another follows; from the fourth run on it is the difference to the
+    /// run two before.
+    ///
+    /// # Errors
+    /// The text is damaged, or the runs do not cover the image exactly.
     pub fn from_compressed(width: u32, height: u32, text: &str) -> Result<Self, RleError> {
         let bytes = text.as_bytes();
         let mut counts: Vec<u32> = Vec::new();

@@ -73,26 +73,24 @@ impl Outline {
 pub fn lay_stones(params: &WallParams, rng: &mut ChaCha8Rng) -> Vec<Outline> {
     let half = params.width_m / 2.0;
     let courses = course_lines(params, rng);
-    let mut outlines = Vec::new();
-    let mut taken: Vec<[f64; 2]> = Vec::new();
+    let mut laid = Laid::default();
     for (r, rise) in courses.windows(2).enumerate() {
         let (low, high) = (rise[0], rise[1]);
         let above = courses.get(r + 2).copied();
-        let mut next_taken = Vec::new();
+        let taken = std::mem::take(&mut laid.taken_above);
         for gap in free_intervals(&taken, -half, half) {
-            fill(
-                &gap,
-                [low, high],
-                above,
-                params,
-                rng,
-                &mut outlines,
-                &mut next_taken,
-            );
+            fill(&gap, [low, high], above, params, rng, &mut laid);
         }
-        taken = next_taken;
     }
-    outlines
+    laid.outlines
+}
+
+/// The stones laid so far.
+#[derive(Default)]
+struct Laid {
+    outlines: Vec<Outline>,
+    /// Stretches of the next course that stones of this one take.
+    taken_above: Vec<[f64; 2]>,
 }
 
 /// Heights of the bed joints, from the foot to the crown.
@@ -129,8 +127,7 @@ fn fill(
     above: Option<f64>,
     params: &WallParams,
     rng: &mut ChaCha8Rng,
-    outlines: &mut Vec<Outline>,
-    taken_above: &mut Vec<[f64; 2]>,
+    laid: &mut Laid,
 ) {
     let height = rise[1] - rise[0];
     let cuts = head_joints(stretch, height, params, rng);
@@ -147,7 +144,7 @@ fn fill(
         };
         let top = tall.unwrap_or(rise[1]);
         if tall.is_some() {
-            taken_above.push([x0, x1]);
+            laid.taken_above.push([x0, x1]);
         }
         let quad = [
             [x0 - left_slant, rise[0]],
@@ -156,9 +153,9 @@ fn fill(
             [x0 + left_slant, top],
         ];
         if tall.is_none() && height > 0.9 * params.course_m && rng.random_bool(params.split_share) {
-            split(&quad, params, rng, outlines);
+            split(&quad, params, rng, &mut laid.outlines);
         } else {
-            outlines.push(cut_stone(&quad, params, rng));
+            laid.outlines.push(cut_stone(&quad, params, rng));
         }
         left_slant = right_slant;
     }

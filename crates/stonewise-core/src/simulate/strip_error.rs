@@ -213,7 +213,8 @@ mod tests {
     fn every_kind_has_the_stated_size_and_a_walk_grows_with_the_root_of_the_way() {
         for drift in [StripDrift::Smooth, StripDrift::Sine, StripDrift::Jump] {
             let size = rms(draws(drift, [0.7, 0.7]).into_iter().map(|d| d[0]));
-            // Gradient noise varies a little less than its nominal 0.3 halfway between two rows of its lattice.
+            // Gradient noise varies a little less than its nominal 0.3 halfway between two rows of its
+            // lattice.
             let allowed = if drift == StripDrift::Smooth { 0.15 } else { 0.06 };
             assert!((size / 0.002 - 1.0).abs() < allowed, "{drift:?} {size}");
         }

@@ -2,8 +2,8 @@
 
 /// Cells of the finest grid, metres.
 const CELL_M: f64 = 0.005;
-/// The grid is coarsened until an occupied cell holds this many points on average: 86 % of the cells inside the
-/// patch are then occupied, and the closing fills the rest.
+/// The grid is coarsened until an occupied cell holds this many points on average: 86 % of the cells inside
+/// the patch are then occupied, and the closing fills the rest.
 const POINTS_PER_CELL: f64 = 2.0;
 /// A patch larger than this many cells to a side is measured on a coarser grid.
 const MAX_SIDE: usize = 2000;
@@ -52,8 +52,9 @@ impl Footprint {
 
     /// Area of the patch, m^2, whatever the density of its points.
     ///
-    /// Occupied cells after closing gaps of one cell, less what the cells on the border cover too much: a border cell
-    /// lies half inside on average, and is found with a probability that follows from the points per cell.
+    /// Occupied cells after closing gaps of one cell, less what the cells on the border cover too much: a
+    /// border cell lies half inside on average, and is found with a probability that follows from the points
+    /// per cell.
     pub(super) fn area_m2(&self) -> f64 {
         let finest = Grid {
             width: self.width,
@@ -121,8 +122,8 @@ impl Grid {
         })
     }
 
-    /// Number of cells that the patch's outline crosses: the mean of the set cells at the border, of which a slanted
-    /// outline has too few, and of their open sides, of which a ragged one has too many.
+    /// Number of cells that the patch's outline crosses: the mean of the set cells at the border, of which a
+    /// slanted outline has too few, and of their open sides, of which a ragged one has too many.
     fn border(&self) -> f64 {
         let sides = [(1, 0), (-1, 0), (0, 1), (0, -1)];
         let open = |x: i64, y: i64| sides.iter().filter(|(dx, dy)| !self.get(x + dx, y + dy)).count();

@@ -4,11 +4,11 @@ use super::overlap::Overlaps;
 use pathfinding::prelude::{Matrix, kuhn_munkres};
 use std::collections::BTreeMap;
 
-/// Pairs of instances of different photos that may be one stone, each instance at most once per pair of photos:
-/// the assignment with the greatest sum of intersection over union (Kuhn 1955).
+/// Pairs of instances of different photos that may be one stone, each instance at most once per pair of
+/// photos: the assignment with the greatest sum of intersection over union (Kuhn 1955).
 ///
-/// Solved block by block: pairs under `min_iou` could never be accepted and are no edges, so the blocks are a few
-/// instances large on a wall of any size. Cost: cubic in the instances of a block.
+/// Solved block by block: pairs under `min_iou` could never be accepted and are no edges, so the blocks are a
+/// few instances large on a wall of any size. Cost: cubic in the instances of a block.
 pub(super) fn assign(overlaps: &Overlaps, min_iou: f64) -> Vec<(u32, u32)> {
     let mut edges: BTreeMap<(u32, u32), Vec<Edge>> = BTreeMap::new();
     for &(i, j) in overlaps.common.keys() {

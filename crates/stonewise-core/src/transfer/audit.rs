@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum AuditEvent {
-    /// A photo shows several stones as one instance; at each point it votes for the stone that others see there.
+    /// A photo shows several stones as one instance; at each point it votes for the stone that others see
+    /// there.
     SplitInstance {
         /// The photo.
         photo: ImageId,

@@ -10,7 +10,8 @@ use crate::progress::Progress;
 use crate::raster::DepthMap;
 use rayon::prelude::*;
 
-/// Splats are never wider than this many map pixels to each side: keeps a lone near point from covering a photo.
+/// Splats are never wider than this many map pixels to each side: keeps a lone near point from covering a
+/// photo.
 const MAX_SPLAT_PX: i64 = 24;
 
 /// The nearest surface of each pixel of a photo, possibly at reduced resolution.
@@ -90,7 +91,8 @@ impl SplatDepth {
         self.map.at(pixel.map(|p| p * self.scale)).copied()
     }
 
-    /// The least and greatest depth at a pixel and within `radius_px` (photo pixels); `here`: that at the pixel.
+    /// The least and greatest depth at a pixel and within `radius_px` (photo pixels); `here`: that at the
+    /// pixel.
     #[inline]
     pub(super) fn around(&self, pixel: [f64; 2], here: f32, radius_px: f64) -> [f32; 2] {
         let radius = (radius_px * self.scale).max(1.0);

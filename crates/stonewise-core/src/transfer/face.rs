@@ -5,8 +5,8 @@ use crate::geometry::{Plane, cell_of};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::HashMap;
 
-/// Side of the cells whose mean points stand for the face, metres: many a stone, so that a plane through them does
-/// not depend on the density of the cloud.
+/// Side of the cells whose mean points stand for the face, metres: many a stone, so that a plane through them
+/// does not depend on the density of the cloud.
 const CELL_M: f64 = 0.1;
 /// Fewer cells do not make a face.
 const MIN_CELLS: usize = 6;
@@ -35,7 +35,8 @@ impl FaceCells {
         *sum += world - corner(voxel);
     }
 
-    /// Unit normal of the face within `radius_m` of a place, sign arbitrary; `None` where too little of it is known.
+    /// Unit normal of the face within `radius_m` of a place, sign arbitrary; `None` where too little of it is
+    /// known.
     ///
     /// A plane by iteratively reweighted least squares with Tukey's biweight (Beaton & Tukey 1974).
     pub(super) fn normal(&self, centre: &Point3<f64>, radius_m: f64) -> Option<Vector3<f64>> {

@@ -17,8 +17,14 @@ pub trait LabelStore {
     type Error: std::error::Error + Send + Sync + 'static;
 
     /// Keeps the labels of a tile in place of earlier ones.
+    ///
+    /// # Errors
+    /// They cannot be kept.
     fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<(), Self::Error>;
     /// The labels that were written for a tile.
+    ///
+    /// # Errors
+    /// They cannot be read.
     fn read(&self, tile: usize) -> Result<TileLabels, Self::Error>;
 }
 

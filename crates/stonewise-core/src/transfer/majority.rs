@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 
 /// Rounds of decisions; each may change what the majority is for the next.
 const MAX_ROUNDS: usize = 8;
-/// An instance must cover at least this share of a stone to have merged it, not just to reach over its border.
+/// An instance must cover at least this share of a stone to have merged it, not just to reach over its
+/// border.
 const COVERED_SHARE: f64 = 0.5;
 
 /// Why an instance's ballot is not the group it was assigned to.
@@ -66,8 +67,8 @@ struct Tables {
     area: Vec<u32>,
     /// Area won by a stone where a photo sees it, keyed (stone, photo).
     seen: BTreeMap<(u32, u32), u32>,
-    /// Votes for each stone, and of photos that show background where others show it and do not show it elsewhere:
-    /// weight times area.
+    /// Votes for each stone, and of photos that show background where others show it and do not show it
+    /// elsewhere: weight times area.
     support: BTreeMap<u32, [f64; 2]>,
     photo: Vec<u32>,
 }

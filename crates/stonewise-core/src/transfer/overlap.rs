@@ -29,7 +29,8 @@ pub(super) struct Overlaps {
     seen_by: CellMap<(u32, u32), u32>,
 }
 
-/// Labels below this, those of 16-bit label images, are looked up in a table of their photo, which takes 256 KB at most.
+/// Labels below this, those of 16-bit label images, are looked up in a table of their photo, which takes 256
+/// KB at most.
 const SMALL_LABELS: u32 = 1 << 16;
 /// In a table: no instance.
 const NONE: u32 = u32::MAX;

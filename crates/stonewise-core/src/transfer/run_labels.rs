@@ -4,8 +4,9 @@ use crate::raster::LabelImage;
 
 /// A label image as runs of equal labels per row.
 ///
-/// A 12 MP photo of masonry takes 2 to 3 MB instead of 48: memory follows the length of the borders. A look-up
-/// starts at the run in which its part of the row begins, and goes on to the run that holds it: one or two steps.
+/// A 12 MP photo of masonry takes 2 to 3 MB instead of 48: memory follows the length of the borders. A
+/// look-up starts at the run in which its part of the row begins, and goes on to the run that holds it: one
+/// or two steps.
 pub(super) struct RunLabels {
     width: u32,
     /// Start of each row in `runs`; one more entry than rows.

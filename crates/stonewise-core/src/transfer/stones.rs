@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct StoneParams {
-    /// Radius of the wall around a stone whose plane is the stone's face, metres. 0.75: several stones, so that bumps
-    /// of single stones average out, yet little of a dam's curvature.
+    /// Radius of the wall around a stone whose plane is the stone's face, metres. 0.75: several stones, so
+    /// that bumps of single stones average out, yet little of a dam's curvature.
     pub face_radius_m: f64,
 }
 
@@ -30,12 +30,15 @@ impl Default for StoneParams {
 
 /// One row for each stone that has points, ascending by id.
 ///
-/// `tiles` may have been moved after they were labelled, as long as every tile holds the same points in the same order.
-/// `views` and `instances` tell which photos show a stone: they give the number of photos and the side from which the
-/// wall is seen, towards which the normals point. The area is that of the stone's points on its face, corrected for
-/// density.
+/// `tiles` may have been moved after they were labelled, as long as every tile holds the same points in the
+/// same order. `views` and `instances` tell which photos show a stone: they give the number of photos and the
+/// side from which the wall is seen, towards which the normals point. The area is that of the stone's points
+/// on its face, corrected for density.
 ///
-/// Errors: a tile or its labels cannot be read or do not fit together, interruption. Cost: two passes over the tiles.
+/// Cost: two passes over the tiles.
+///
+/// # Errors
+/// A tile or its labels cannot be read or do not fit together, interruption.
 pub fn build_stones<T: TileSource, S: LabelStore>(
     tiles: &T,
     labels: &S,

@@ -4,13 +4,13 @@ use super::overlap::Overlaps;
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-/// Groups of instances that are one stone, at most one a photo; each instance is in exactly one group. Groups and their
-/// members ascend.
+/// Groups of instances that are one stone, at most one a photo; each instance is in exactly one group. Groups
+/// and their members ascend.
 ///
-/// Starts from every instance alone and joins the two groups that agree best, again and again. Agreement of two
-/// groups is the sum of intersections over the sum of unions of all their pairs, so a chain of photos, each shifted
-/// a little from the last, breaks where its ends stop overlapping, and the order of the photos does not matter.
-/// Only groups with an assigned pair between them are joined.
+/// Starts from every instance alone and joins the two groups that agree best, again and again. Agreement of
+/// two groups is the sum of intersections over the sum of unions of all their pairs, so a chain of photos,
+/// each shifted a little from the last, breaks where its ends stop overlapping, and the order of the photos
+/// does not matter. Only groups with an assigned pair between them are joined.
 pub(super) fn group(overlaps: &Overlaps, pairs: &[(u32, u32)], min_iou: f64) -> Vec<Vec<u32>> {
     let count = overlaps.instances.len();
     let mut groups: Vec<Vec<u32>> = (0..count as u32).map(|i| vec![i]).collect();

@@ -57,17 +57,19 @@ pub struct Transfer {
 
 /// Labels every point of a cloud by the masks of the photos that see it, and writes the labels tile by tile.
 ///
-/// `mask` gives the instances of a photo at the size its camera states; a photo without a mask does not vote. It is
-/// called once for each view, in order, and only one mask is held uncompressed. `store` has labels for every tile
-/// afterwards.
+/// `mask` gives the instances of a photo at the size its camera states; a photo without a mask does not vote.
+/// It is called once for each view, in order, and only one mask is held uncompressed. `store` has labels for
+/// every tile afterwards.
 ///
-/// Method: visibility by splatted depth maps; one-to-one assignment on intersection over union between each two
-/// photos (Kuhn 1955), counted on evenly thinned points that both see; groups by agreement of all their photos; merged
-/// and fragmented instances by the majority; each point by a vote weighted with ground sampling distance and
-/// incidence.
+/// Method: visibility by splatted depth maps; one-to-one assignment on intersection over union between each
+/// two photos (Kuhn 1955), counted on evenly thinned points that both see; groups by agreement of all their
+/// photos; merged and fragmented instances by the majority; each point by a vote weighted with ground
+/// sampling distance and incidence.
 ///
-/// Errors: a tile, mask or label store that fails, a mask of the wrong size, no mask at all, interruption.
 /// Cost: three passes over the tiles; each point is projected into the photos whose cone touches its tile.
+///
+/// # Errors
+/// A tile, mask or label store that fails, a mask of the wrong size, no mask at all, interruption.
 pub fn transfer_labels<T, E, S>(
     tiles: &T,
     views: &[View],
@@ -96,8 +98,9 @@ where
 
 /// The photos after the first two passes, ready to label any tile.
 ///
-/// [`transfer_labels`] in pieces: [`Self::new`] once, [`Self::label`] for ranges of tiles, and [`finish_transfer`] once all tiles are
-/// labelled. Between these, [`Self::election`] and the depth maps and surfaces can be kept as bytes; results are the same to the last bit.
+/// [`transfer_labels`] in pieces: [`Self::new`] once, [`Self::label`] for ranges of tiles, and
+/// [`finish_transfer`] once all tiles are labelled. Between these, [`Self::election`] and the depth maps and
+/// surfaces can be kept as bytes; results are the same to the last bit.
 pub struct PreparedTransfer<'a> {
     observer: Observer<'a>,
     election: Election,
@@ -110,14 +113,23 @@ pub trait KeptParts {
     type Error: std::error::Error + Send + Sync + 'static;
 
     /// Bytes of the depth map of a photo, by its position among those with a mask.
+    ///
+    /// # Errors
+    /// They cannot be read.
     fn depth(&self, photo: usize) -> Result<Vec<u8>, Self::Error>;
     /// Bytes of the surface of a tile.
+    ///
+    /// # Errors
+    /// They cannot be read.
     fn surface(&self, tile: usize) -> Result<Vec<u8>, Self::Error>;
 }
 
 impl<'a> PreparedTransfer<'a> {
-    /// Goes through the cloud for depth maps and for the overlaps of instances, and decides about these. Arguments as of
-    /// [`transfer_labels`].
+    /// Goes through the cloud for depth maps and for the overlaps of instances, and decides about these.
+    /// Arguments as of [`transfer_labels`].
+    ///
+    /// # Errors
+    /// As [`transfer_labels`].
     pub fn new<T, E>(
         tiles: &T,
         views: &'a [View],
@@ -155,6 +167,9 @@ impl<'a> PreparedTransfer<'a> {
     }
 
     /// The same for some tiles from what was kept; only photos that may show them are read.
+    ///
+    /// # Errors
+    /// A mask that fails; what was kept cannot be read, or is damaged.
     pub fn restore<T, K, E>(
         tiles: &T,
         range: &Range<usize>,
@@ -220,6 +235,9 @@ impl<'a> PreparedTransfer<'a> {
     }
 
     /// Labels some tiles; where the stones are in them.
+    ///
+    /// # Errors
+    /// A tile or label store that fails, interruption.
     pub fn label<T: TileSource, S: LabelStore>(
         &self,
         tiles: &T,
@@ -249,7 +267,11 @@ impl<'a> PreparedTransfer<'a> {
     }
 }
 
-/// Takes islands and small stones away once all tiles are labelled; `occupancy`: where the stones are in all of them.
+/// Takes islands and small stones away once all tiles are labelled; `occupancy`: where the stones are in all
+/// of them.
+///
+/// # Errors
+/// A tile or label store that fails, interruption.
 pub fn finish_transfer<T: TileSource, S: LabelStore>(
     tiles: &T,
     views: &[View],

@@ -1,6 +1,6 @@
 //! What can go wrong with camera files and photo folders.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why cameras or photos could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -94,4 +94,21 @@ pub enum CameraError {
         /// The other.
         second: PathBuf,
     },
+}
+
+/// Reads a text file.
+pub(super) fn read_text(path: &Path) -> Result<String, CameraError> {
+    std::fs::read_to_string(path).map_err(|source| CameraError::Read {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Builds "this file, at this place, has this problem".
+pub(super) fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> CameraError {
+    CameraError::Malformed {
+        path: PathBuf::from(path),
+        place: place.into(),
+        problem: problem.into(),
+    }
 }

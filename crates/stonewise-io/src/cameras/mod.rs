@@ -4,132 +4,22 @@
 //! 0.5), poses that take world to camera. Views keep the order of the file, and a view's image id is its
 //! index.
 
+mod camera_file;
 mod colmap;
 mod error;
 mod map_frame;
 mod metashape;
 mod opensfm;
 mod photos;
+mod read;
 mod xml;
 
+pub use camera_file::CameraFile;
 pub use colmap::{is_camera_folder, write_colmap};
 pub use error::CameraError;
 pub use map_frame::MapFrame;
 pub use metashape::write_metashape;
 pub use photos::{Photos, find_photos};
+pub use read::{read_cameras, read_cameras_on_map};
 
-use std::path::{Path, PathBuf};
-use stonewise_core::geometry::View;
-
-/// Pixels of the largest photo that is believed in.
-const MAX_PIXELS: u64 = 1 << 30;
-
-/// What a camera file holds.
-#[derive(Clone, Debug, Default)]
-pub struct CameraFile {
-    /// Posed photos, in the file's order.
-    pub views: Vec<View>,
-    /// Photos that cannot be used, with the reason: not aligned, disabled.
-    pub skipped: Vec<(String, String)>,
-    /// Coordinate reference system of the world frame as the file writes it, where it says.
-    pub crs: Option<String>,
-    /// What a person should know about how the file was read.
-    pub warnings: Vec<String>,
-}
-
-/// Reads a camera file of any of the known formats.
-///
-/// - Metashape: the XML of File > Export > Export Cameras.
-/// - COLMAP: a folder with cameras and images as .bin or .txt (.bin wins, as in COLMAP), or one of these
-///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
-/// - OpenSfM: reconstruction.json.
-///
-/// # Errors
-/// The file cannot be read or is none of these, a value is missing or impossible, a lens model or reference
-/// system is not supported, or no photo has a pose.
-pub fn read_cameras(path: &Path) -> Result<CameraFile, CameraError> {
-    read_cameras_on_map(path, &MapFrame::default())
-}
-
-/// As [`read_cameras`], for clouds whose place on the map is known.
-///
-/// Metashape stores the poses of georeferenced chunks earth-centred. They are brought to the system of the
-/// clouds; without one, to the chunk's own if it is a projected one. Transverse Mercator grids and Lambert's
-/// cone are covered, and no shift between geodetic datums. The other formats are read as they are.
-///
-/// # Errors
-/// As [`read_cameras`].
-pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
-    let file = if path.is_dir() {
-        colmap::read_folder(path)?
-    } else {
-        match extension(path).as_str() {
-            "xml" => metashape::read(path, map)?,
-            "json" => opensfm::read(path)?,
-            "txt" | "bin" => colmap::read_folder(path.parent().unwrap_or(Path::new(".")))?,
-            _ => {
-                return Err(CameraError::UnknownFormat {
-                    path: path.to_owned(),
-                });
-            }
-        }
-    };
-    if file.views.is_empty() {
-        return Err(CameraError::NoPoses {
-            path: path.to_owned(),
-            skipped: file.skipped.len(),
-        });
-    }
-    check_sizes(&file, path)?;
-    check_places(&file, path)?;
-    Ok(file)
-}
-
-/// Refuses photos that no memory holds.
-fn check_sizes(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
-    let pixels = |view: &&View| u64::from(view.camera.width) * u64::from(view.camera.height);
-    let Some(view) = file.views.iter().find(|view| pixels(view) > MAX_PIXELS) else {
-        return Ok(());
-    };
-    let problem = format!(
-        "its camera has {}x{} pixels, more than any photo",
-        view.camera.width, view.camera.height
-    );
-    Err(malformed(path, format!("photo {}", view.name), problem))
-}
-
-/// Refuses cameras whose place is beyond all numbers.
-fn check_places(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
-    let is_lost = |view: &&View| !view.centre().iter().all(|c| c.is_finite());
-    let Some(view) = file.views.iter().find(is_lost) else {
-        return Ok(());
-    };
-    let place = format!("photo {}", view.name);
-    Err(malformed(
-        path,
-        place,
-        "its rotation and translation give no place",
-    ))
-}
-
-fn extension(path: &Path) -> String {
-    path.extension()
-        .map(|e| e.to_string_lossy().to_lowercase())
-        .unwrap_or_default()
-}
-
-fn read_text(path: &Path) -> Result<String, CameraError> {
-    std::fs::read_to_string(path).map_err(|source| CameraError::Read {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// Builds "this file, at this place, has this problem".
-fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> CameraError {
-    CameraError::Malformed {
-        path: PathBuf::from(path),
-        place: place.into(),
-        problem: problem.into(),
-    }
-}
+use error::{malformed, read_text};

@@ -10,6 +10,20 @@ use super::{CloudError, CloudFormat, PointChunk, ReadSummary, e57_file, las, ply
 /// Reads LAS 1.0 to 1.4, LAZ, COPC, E57, PLY and text (see [`CloudFormat`]); memory is bounded by the chunk
 /// (LAZ unpacks faster with several times 50,000 points). An error of `visit` stops the pass and is returned.
 ///
+/// ```
+/// use stonewise_io::cloud::{CloudError, read_cloud};
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("wall.xyz");
+/// std::fs::write(&path, "1.0 2.0 3.0\n1.0 2.5 3.0\n")?;
+/// let mut highest = f64::NEG_INFINITY;
+/// let summary = read_cloud(&path, 100_000, |chunk| {
+///     highest = chunk.positions.iter().map(|p| p.y).fold(highest, f64::max);
+///     Ok::<(), CloudError>(())
+/// })?;
+/// assert_eq!((summary.records, highest), (2, 2.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// The file cannot be read, is of an unknown format, damaged or cut off; then some chunks may have been
 /// visited already.

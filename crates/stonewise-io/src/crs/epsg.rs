@@ -2,57 +2,29 @@
 
 use std::fmt::Write as _;
 
-/// A geodetic system: names, ellipsoid, and its number in the EPSG register.
-struct Base {
-    name: &'static str,
-    datum: &'static str,
-    /// Name, semi-major axis in metres, inverse flattening.
-    spheroid: (&'static str, &'static str, &'static str),
-    epsg: u32,
-}
+/// An ellipsoid: name, semi-major axis in metres, inverse flattening.
+type Spheroid = (&'static str, &'static str, &'static str);
 
-const WGS84: Base = Base {
-    name: "WGS 84",
-    datum: "WGS_1984",
-    spheroid: ("WGS 84", "6378137", "298.257223563"),
-    epsg: 4326,
-};
-const ETRS89: Base = Base {
-    name: "ETRS89",
-    datum: "European_Terrestrial_Reference_System_1989",
-    spheroid: ("GRS 1980", "6378137", "298.257222101"),
-    epsg: 4258,
-};
-const DHDN: Base = Base {
-    name: "DHDN",
-    datum: "Deutsches_Hauptdreiecksnetz",
-    spheroid: ("Bessel 1841", "6377397.155", "299.1528128"),
-    epsg: 4314,
-};
-const MGI: Base = Base {
-    name: "MGI",
-    datum: "Militar-Geographische_Institut",
-    spheroid: ("Bessel 1841", "6377397.155", "299.1528128"),
-    epsg: 4312,
-};
-const RGF93: Base = Base {
-    name: "RGF93",
-    datum: "Reseau_Geodesique_Francais_1993",
-    spheroid: ("GRS 1980", "6378137", "298.257222101"),
-    epsg: 4171,
-};
-const OSGB36: Base = Base {
-    name: "OSGB 1936",
-    datum: "OSGB_1936",
-    spheroid: ("Airy 1830", "6377563.396", "299.3249646"),
-    epsg: 4277,
-};
-const SWEREF99: Base = Base {
-    name: "SWEREF99",
-    datum: "SWEREF99",
-    spheroid: ("GRS 1980", "6378137", "298.257222101"),
-    epsg: 4619,
-};
+const WGS_84_SPHEROID: Spheroid = ("WGS 84", "6378137", "298.257223563");
+const GRS_1980: Spheroid = ("GRS 1980", "6378137", "298.257222101");
+const BESSEL_1841: Spheroid = ("Bessel 1841", "6377397.155", "299.1528128");
+const AIRY_1830: Spheroid = ("Airy 1830", "6377563.396", "299.3249646");
+
+/// A geodetic system: its number in the EPSG register, names of the system and of its datum, ellipsoid.
+struct Base(u32, &'static str, &'static str, Spheroid);
+
+const WGS84: Base = Base(4326, "WGS 84", "WGS_1984", WGS_84_SPHEROID);
+const ETRS89: Base = Base(
+    4258,
+    "ETRS89",
+    "European_Terrestrial_Reference_System_1989",
+    GRS_1980,
+);
+const DHDN: Base = Base(4314, "DHDN", "Deutsches_Hauptdreiecksnetz", BESSEL_1841);
+const MGI: Base = Base(4312, "MGI", "Militar-Geographische_Institut", BESSEL_1841);
+const RGF93: Base = Base(4171, "RGF93", "Reseau_Geodesique_Francais_1993", GRS_1980);
+const OSGB36: Base = Base(4277, "OSGB 1936", "OSGB_1936", AIRY_1830);
+const SWEREF99: Base = Base(4619, "SWEREF99", "SWEREF99", GRS_1980);
 
 /// Parameters of a transverse Mercator grid: origin in degrees, scale, false easting and northing in metres.
 struct Grid {
@@ -128,11 +100,10 @@ pub fn definition(code: u32) -> Option<String> {
 }
 
 fn geographic(base: &Base) -> String {
-    let (spheroid, semi_major, inverse) = base.spheroid;
+    let Base(epsg, name, datum, (spheroid, semi_major, inverse)) = base;
     format!(
-        "GEOGCS[\"{}\",DATUM[\"{}\",SPHEROID[\"{spheroid}\",{semi_major},{inverse}]],PRIMEM[\"Greenwich\",0],\
-         UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"{}\"]]",
-        base.name, base.datum, base.epsg
+        "GEOGCS[\"{name}\",DATUM[\"{datum}\",SPHEROID[\"{spheroid}\",{semi_major},{inverse}]],PRIMEM[\"Greenwich\",0],\
+         UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"{epsg}\"]]"
     )
 }
 

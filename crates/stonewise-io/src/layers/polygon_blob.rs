@@ -9,8 +9,8 @@ const MULTIPOLYGON: u32 = 6;
 /// Bits of the older extended code for z and m.
 const EXTENDED: [(u32, usize); 2] = [(0x8000_0000, 1), (0x4000_0000, 1)];
 
-/// The polygons of a blob: an outer ring and its holes each; z and m are dropped. `None` where it is damaged, or holds other
-/// shapes.
+/// The polygons of a blob: an outer ring and its holes each; z and m are dropped. `None` where it is damaged,
+/// or holds other shapes.
 ///
 /// Source: OGC 12-128r17, clause 2.1.3; ISO 13249-3 well-known binary.
 pub(super) fn polygons(blob: &[u8]) -> Option<Vec<Vec<Ring>>> {
@@ -107,7 +107,8 @@ impl Reader<'_> {
 mod tests {
     use super::*;
 
-    /// A multipolygon of a square with a hole and a triangle with z, big-endian and little-endian, put together by hand.
+    /// A multipolygon of a square with a hole and a triangle with z, big-endian and little-endian, put
+    /// together by hand.
     #[test]
     fn shapes_of_both_byte_orders_and_with_z_are_read() {
         let square: [[f64; 2]; 4] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];

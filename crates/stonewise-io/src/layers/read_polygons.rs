@@ -18,7 +18,8 @@ pub struct PolygonFeature {
     pub attributes: BTreeMap<String, String>,
 }
 
-/// Reads the features of a layer of polygons in a GeoPackage, by number; features without geometry are left out.
+/// Reads the features of a layer of polygons in a GeoPackage, by number; features without geometry are left
+/// out.
 ///
 /// # Errors
 /// The file is no GeoPackage or lacks the layer, or a geometry is damaged or no polygon.

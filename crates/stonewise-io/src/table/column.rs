@@ -12,7 +12,7 @@ pub struct Column {
 pub trait Cell: Clone + Default + sealed::Typed {}
 
 pub(super) mod sealed {
-    use super::Values;
+    use crate::table::column::Values;
 
     pub trait Typed: Sized {
         const NAME: &'static str;

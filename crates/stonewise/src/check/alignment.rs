@@ -80,8 +80,8 @@ impl Overlay {
         })
     }
 
-    /// The shift of the cloud's edges that fits the photo best: of every second within the reach, then of the best one's
-    /// neighbours. Edges are smoothed over more than that.
+    /// The shift of the cloud's edges that fits the photo best: of every second within the reach, then of the
+    /// best one's neighbours. Edges are smoothed over more than that.
     pub fn shift(&self) -> Shift {
         let photo = Edges::of(&self.grey);
         let side = REACH + 1;

@@ -132,7 +132,8 @@ fn judge(compared: &[Compared], best: &Compared) -> (Verdict, String) {
     let px = best.shift.length() * best.overlay.reduction;
     let mm = 1e3 * best.shift.length() * best.pixel_m;
     let place = format!("{px:.0} px ({mm:.0} mm) off those of photo {}", best.name);
-    // Sound surveys of small walls were seen with shifts of metres: the comparison informs and decides nothing.
+    // Sound surveys of small walls were seen with shifts of metres: the comparison informs and decides
+    // nothing.
     if 2 * of(DOUBTFUL_PX) <= clear.len() {
         let text = format!("the cloud's edges fit best {place}, which light and shade can do");
         return (Verdict::Fine, text);

@@ -1,11 +1,8 @@
 //! What a look at a survey found.
 
-use super::page;
-use crate::error::Result;
 use crate::project::Project;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
-use std::path::Path;
 
 /// What a finding means for a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -104,13 +101,6 @@ impl Report {
             );
         }
         text
-    }
-
-    /// Writes the table with its pictures as one HTML page.
-    ///
-    /// Errors: the page cannot be written.
-    pub fn write_page(&self, path: &Path, project: &Project) -> Result<()> {
-        page::write(self, path, project)
     }
 
     pub(super) fn sort(&mut self, project: &Project) {

@@ -3,6 +3,7 @@
 mod alignment;
 mod cameras;
 mod clouds;
+mod depth;
 mod edges;
 mod finding;
 mod page;
@@ -10,6 +11,7 @@ mod photos;
 mod resources;
 mod sample;
 
+pub use depth::Depth;
 pub use finding::{Finding, Report, Verdict};
 pub(crate) use resources::is_about_this_machine;
 
@@ -18,21 +20,13 @@ use crate::project::Project;
 use std::path::Path;
 use stonewise_core::progress::Progress;
 
-/// How closely to look.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Depth {
-    /// At the first 500,000 points of each epoch, without pictures: what a run affords before it works.
-    Quick,
-    /// At the first six million points of each epoch and the edges in three photos, with pictures.
-    Full,
-}
-
 /// Looks at everything that a project names.
 ///
-/// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk, memory and time.
-/// `out`: where the results are to go, for the disk's free space.
+/// Extents and units, coordinate systems, overlap, point spacing; photos; cameras against clouds; disk,
+/// memory and time. `out`: where the results are to go, for the disk's free space.
 ///
-/// Errors: a cloud or a camera file cannot be read, or the caller stopped it.
+/// # Errors
+/// A cloud or a camera file cannot be read, or the caller stopped it.
 pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progress) -> Result<Report> {
     progress.begin("check", project.epochs.len() as u64);
     let mut report = Report::default();

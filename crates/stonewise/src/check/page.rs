@@ -7,35 +7,41 @@ use crate::files::write_text;
 use crate::project::Project;
 use std::path::Path;
 
-pub(super) fn write(report: &Report, path: &Path, project: &Project) -> Result<()> {
-    let mut page = Page::new(&format!("{}: a look at the survey", project.name));
-    page.note(match report.verdict() {
-        Verdict::Fine | Verdict::Note => "Nothing speaks against running this project.",
-        Verdict::Doubt => "Some things are doubtful: a run goes on, and ends with exit code 3.",
-        Verdict::Wrong => "Something cannot be right: a run stops, unless --force is given.",
-    });
-    let rows: Vec<Vec<String>> = report
-        .findings
-        .iter()
-        .map(|f| {
-            let epoch = if f.epoch.is_empty() { "all" } else { &f.epoch };
-            vec![
-                epoch.to_owned(),
-                f.topic.clone(),
-                f.verdict.word().to_owned(),
-                f.text.clone(),
-            ]
-        })
-        .collect();
-    page.html(&table(&["epoch", "", "", ""], &rows, None));
-    if !report.pictures.is_empty() {
-        page.heading("Cameras against clouds").note(
-            "Each photo with the edges of the projected cloud in orange. Where camera and cloud belong together they lie on the \
-             joints and rims that the photo shows.",
-        );
+impl Report {
+    /// Writes the table with its pictures as one HTML page.
+    ///
+    /// # Errors
+    /// The page cannot be written.
+    pub fn write_page(&self, path: &Path, project: &Project) -> Result<()> {
+        let mut page = Page::new(&format!("{}: a look at the survey", project.name));
+        page.note(match self.verdict() {
+            Verdict::Fine | Verdict::Note => "Nothing speaks against running this project.",
+            Verdict::Doubt => "Some things are doubtful: a run goes on, and ends with exit code 3.",
+            Verdict::Wrong => "Something cannot be right: a run stops, unless --force is given.",
+        });
+        let rows: Vec<Vec<String>> = self
+            .findings
+            .iter()
+            .map(|f| {
+                let epoch = if f.epoch.is_empty() { "all" } else { &f.epoch };
+                vec![
+                    epoch.to_owned(),
+                    f.topic.clone(),
+                    f.verdict.word().to_owned(),
+                    f.text.clone(),
+                ]
+            })
+            .collect();
+        page.html(&table(&["epoch", "", "", ""], &rows, None));
+        if !self.pictures.is_empty() {
+            page.heading("Cameras against clouds").note(
+                "Each photo with the edges of the projected cloud in orange. Where camera and cloud belong together they lie on the \
+                 joints and rims that the photo shows.",
+            );
+        }
+        for picture in &self.pictures {
+            page.figure(&picture.caption, &jpeg_element(&picture.jpeg, &picture.caption));
+        }
+        write_text(path, &page.finish())
     }
-    for picture in &report.pictures {
-        page.figure(&picture.caption, &jpeg_element(&picture.jpeg, &picture.caption));
-    }
-    write_text(path, &page.finish())
 }

@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on surveys of 1 to
-/// 200 million points (docs/src/performance.md), rounded up.
+/// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on
+/// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
 const DISK_PER_POINT: u64 = 90;
 /// Memory at rest, and per point: 185 MB at 1.3 million points, 404 MB at 5.2 million, 4.9 GB at 133 million.
 const MEMORY_BASE: u64 = 200 << 20;

@@ -82,7 +82,8 @@ impl From<CloudError> for Stop {
     }
 }
 
-/// Median distance between neighbours on a surface: the root of the area that each point of a cell has for itself.
+/// Median distance between neighbours on a surface: the root of the area that each point of a cell has for
+/// itself.
 fn spacing(points: &[Point3<f64>]) -> Option<f64> {
     let mut cell_m = CELL_M;
     // Sparser clouds are counted in larger cells.

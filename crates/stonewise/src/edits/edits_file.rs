@@ -23,7 +23,8 @@ const MAX_AREA_M2: f64 = 1e5;
 pub struct EditsFile {
     /// Where they are written.
     pub path: PathBuf,
-    /// The unrolled wall on which those in facade coordinates were drawn; absent: that of the run without edits.
+    /// The unrolled wall on which those in facade coordinates were drawn; absent: that of the run without
+    /// edits.
     pub facade: Option<Facade>,
     /// The edits.
     pub edits: Vec<Edit>,
@@ -218,7 +219,8 @@ impl EditsFile {
 
     /// Reads and checks a file of edits.
     ///
-    /// Errors name the line: no JSON, an unknown key, a shape that does not fit, no signature.
+    /// # Errors
+    /// With the line: no JSON, an unknown key, a shape that does not fit, no signature.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::io("reading the edits", path))?;
         let at = |line: usize, message: String| Error::Project {

@@ -22,12 +22,14 @@ pub struct Imported {
     pub notes: Vec<String>,
 }
 
-/// Reads edits from `stones.gpkg`, whose layer `stones_facade` was edited, or from a COCO file whose categories are named after edits.
+/// Reads edits from `stones.gpkg`, whose layer `stones_facade` was edited, or from a COCO file whose
+/// categories are named after edits.
 ///
-/// `results`: the results from which the GeoPackage was taken: what differs from them are the edits. `epoch`: of the photos of a
-/// COCO file. `earlier`: edits that these results had already; the new ones follow them.
+/// `results`: the results from which the GeoPackage was taken: what differs from them are the edits. `epoch`:
+/// of the photos of a COCO file. `earlier`: edits that these results had already; the new ones follow them.
 ///
-/// Errors: a file cannot be read, or is neither; the results were unrolled otherwise than the earlier edits.
+/// # Errors
+/// A file cannot be read, or is neither; the results were unrolled otherwise than the earlier edits.
 pub fn import(
     source: &Path,
     results: Option<&Path>,

@@ -1,13 +1,15 @@
 //! Halves of one epoch, made once an experiment.
 
 use crate::error::Result;
-use crate::pipeline::{Key, StepStore};
 use crate::project::{Epoch, Project};
 use crate::split;
+use crate::storage::step::Key;
+use crate::storage::store::StepStore;
 use stonewise_core::progress::Progress;
 use stonewise_io::cameras::find_photos;
 
-/// The project of the two halves of an epoch, with the settings and the part of the whole; nothing moved between them.
+/// The project of the two halves of an epoch, with the settings and the part of the whole; nothing moved
+/// between them.
 ///
 /// Made by [`crate::split()`], or taken from the store where an earlier run of the experiment made them.
 pub(super) fn halves_of(

@@ -10,8 +10,8 @@ use stonewise_core::stone::Stone;
 const SHIFT_M: [f64; 2] = [0.02, 0.05];
 /// Depth of the bulge, metres, as in the paper.
 const DEPTH_M: f64 = 0.05;
-/// Diameter of the bulge, metres, as in the paper; on a wall under twice this height it is half the height, and the depth
-/// less in proportion.
+/// Diameter of the bulge, metres, as in the paper; on a wall under twice this height it is half the height,
+/// and the depth less in proportion.
 const DIAMETER_M: f64 = 4.0;
 
 /// A motion that is put into the points of the second half, with its name.
@@ -25,8 +25,8 @@ pub(super) struct KnownMotion {
 
 /// The paper's translation in the plane and its bulge out of the plane, for a wall of these stones.
 ///
-/// The translation goes along the wall's horizontal direction and upwards in its mean face; the bulge along the normal of
-/// the face at the stone nearest to the middle. Errors: no stones.
+/// The translation goes along the wall's horizontal direction and upwards in its mean face; the bulge along
+/// the normal of the face at the stone nearest to the middle. Errors: no stones.
 pub(super) fn paper_motions(stones: &[Stone]) -> Result<[KnownMotion; 2]> {
     let none = || Error::Survey("there are no stones to put a motion into".to_owned());
     let normal: Vector3<f64> = stones.iter().map(|s| s.normal * s.area_m2.max(1e-6)).sum();

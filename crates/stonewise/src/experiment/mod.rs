@@ -1,7 +1,7 @@
 //! Experiments: what becomes of the results when parameters, masks, noise or motions change.
 //!
-//! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that what
-//! variants have in common is done once, and an interrupted experiment goes on where it stopped.
+//! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that
+//! what variants have in common is done once, and an interrupted experiment goes on where it stopped.
 
 mod halves;
 mod known_motion;

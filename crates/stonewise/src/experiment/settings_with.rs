@@ -2,11 +2,12 @@
 
 use crate::error::{Error, Result};
 use crate::limits::impossible;
-use crate::project::Settings;
+use crate::settings::Settings;
 
 /// The settings with each parameter (`section.key`, as in the project file) set to its value.
 ///
-/// Errors: no parameter of this name, a value of the wrong kind, an impossible value.
+/// # Errors
+/// No parameter of this name, a value of the wrong kind, an impossible value.
 pub(super) fn settings_with(settings: &Settings, changes: &[(&str, &toml::Value)]) -> Result<Settings> {
     let bad = |message: String| Error::Survey(message);
     let mut all = toml::Value::try_from(settings).map_err(|e| bad(e.to_string()))?;
@@ -89,7 +90,7 @@ fn unknown(settings: &Settings, key: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::project::Estimator;
+    use crate::settings::Estimator;
 
     fn value(text: &str) -> toml::Value {
         format!("x = {text}").parse::<toml::Table>().unwrap()["x"].clone()

@@ -9,7 +9,8 @@ use stonewise_io::mesh_ply::ColouredMesh;
 /// Columns of the stone table that the mesh carries.
 const COLUMNS: [&str; 6] = ["stone_id", "d_along", "d_up", "d_out", "length_m", "lod95"];
 
-/// Faces of all stones as triangles, coloured by the out-of-plane displacement; grey where it was not measured.
+/// Faces of all stones as triangles, coloured by the out-of-plane displacement; grey where it was not
+/// measured.
 pub(super) fn face_mesh(results: &ResultSet) -> ColouredMesh {
     let colours = FaceColours::new(&results.stones);
     let columns: Vec<&StoneColumn> = COLUMNS.iter().filter_map(|name| column(name)).collect();

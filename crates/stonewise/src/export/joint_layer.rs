@@ -10,8 +10,7 @@ use stonewise_io::table::{Table, TableError};
 
 /// The joints as lines; their motions are empty where a stone was not measured.
 pub(super) fn joint_layer(
-    name: &str,
-    title: &str,
+    [name, title]: [&str; 2],
     geometry: Geometry,
     crs: Option<Crs>,
     joints: &[Joint],

@@ -105,8 +105,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             moved.iter().map(unrolled_arrow).collect(),
         )?,
         joint_layer(
-            &numbered("joints"),
-            &titled("Joints"),
+            [&numbered("joints"), &titled("Joints")],
             Geometry::LineStringZ,
             crs,
             &all_joints,
@@ -114,8 +113,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             |j| j.world.to_vec(),
         )?,
         joint_layer(
-            &numbered("joints_facade"),
-            &titled("Joints, unrolled"),
+            [&numbered("joints_facade"), &titled("Joints, unrolled")],
             Geometry::LineString,
             None,
             &all_joints,

@@ -7,8 +7,8 @@ use stonewise_io::layers::PolyData;
 /// One of the vectors of a motion.
 type VectorOf = fn(&RowMotion) -> Vector3<f64>;
 
-/// Numbers and vectors of all stones: every column of the stone table, the status as its place in the order of reports, and the
-/// vectors once more as such.
+/// Numbers and vectors of all stones: every column of the stone table, the status as its place in the order
+/// of reports, and the vectors once more as such.
 fn attributes(data: &mut PolyData, stones: &[&StoneRow]) {
     for column in STONE_COLUMNS {
         let number = |s: &&StoneRow| column.number(s).unwrap_or_else(|| f64::from(s.status as u8));

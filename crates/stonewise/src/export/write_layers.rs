@@ -11,16 +11,17 @@ use std::path::Path;
 use stonewise_io::layers::{write_geojson, write_geopackage, write_vtp};
 use stonewise_io::mesh_ply::write_coloured_mesh;
 
-/// Makes `stones.gpkg`, `stones.geojson`, `stones.vtp`, `displacements.vtp` and `stones.ply` from the result files in `dir`.
+/// Makes `stones.gpkg`, `stones.geojson`, `stones.vtp`, `displacements.vtp` and `stones.ply` from the result
+/// files in `dir`.
 ///
-/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their displacements as
-/// exaggerated lines in both (`displacements`, `displacements_facade`), and the joints between them (`joints`,
-/// `joints_facade`), each with styles for QGIS. The VTK files hold the stones as polygons and their centroids with the
-/// displacements as vectors, for ParaView. The PLY is a mesh
-/// of the stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than two epochs,
-/// the GeoPackage has the layers of the third against the first as `stones_2` and so on; the other files are of the second epoch.
-/// Its time stamps are the date of the latest survey, so that the same inputs give the same bytes; 1 January 1970 where the project
-/// states no date.
+/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
+/// displacements as exaggerated lines in both (`displacements`, `displacements_facade`), and the joints
+/// between them (`joints`, `joints_facade`), each with styles for QGIS. The VTK files hold the stones as
+/// polygons and their centroids with the displacements as vectors, for ParaView. The PLY is a mesh of the
+/// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than
+/// two epochs, the GeoPackage has the layers of the third against the first as `stones_2` and so on; the
+/// other files are of the second epoch. Its time stamps are the date of the latest survey, so that the same
+/// inputs give the same bytes; 1 January 1970 where the project states no date.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or a file cannot be written.

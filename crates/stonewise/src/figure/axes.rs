@@ -24,7 +24,8 @@ impl Axes {
         self.area[1] + (1.0 - self.y.share(y)) * self.area[3]
     }
 
-    /// Ranges and area as the attribute `data-axes`, by which the page's program finds what lies under the pointer.
+    /// Ranges and area as the attribute `data-axes`, by which the page's program finds what lies under the
+    /// pointer.
     pub(crate) fn attribute(&self) -> String {
         let [left, top, width, height] = self.area;
         format!(

@@ -124,7 +124,8 @@ impl Axis {
     }
 }
 
-/// The smallest of 1, 2, 2.5, 5 times a power of ten that is at least `value`; 1 for values that are not positive.
+/// The smallest of 1, 2, 2.5, 5 times a power of ten that is at least `value`; 1 for values that are not
+/// positive.
 pub(crate) fn nice_above(value: f64) -> f64 {
     if !value.is_finite() || value <= 0.0 {
         return 1.0;

@@ -34,7 +34,8 @@ const RAMP: [[f64; 3]; 5] = [
     [0.25, 0.09, 300.0],
 ];
 
-/// Blue (-1) over near white (0) to red (1); equal steps look equally large. Values beyond are the end colours.
+/// Blue (-1) over near white (0) to red (1); equal steps look equally large. Values beyond are the end
+/// colours.
 ///
 /// Straight lines in Oklab (Ottosson 2020), walked at constant speed; both halves have the same lightness.
 pub(crate) fn diverging(value: f64) -> Rgb {

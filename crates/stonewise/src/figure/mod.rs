@@ -1,5 +1,5 @@
-//! What every picture is made of: axes and their ticks, colours and their bar, escaped text; and pictures that stand alone,
-//! SVG files and pages of them.
+//! What every picture is made of: axes and their ticks, colours and their bar, escaped text; and pictures
+//! that stand alone, SVG files and pages of them.
 //!
 //! The report's own pictures ([`crate::report`]) use the same parts and take their looks from its page.
 

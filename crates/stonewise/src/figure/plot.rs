@@ -63,7 +63,8 @@ impl Plot {
         }
     }
 
-    /// An empty map of a wall, with equal scales, `width` pixels wide where the wall is not too tall for that.
+    /// An empty map of a wall, with equal scales, `width` pixels wide where the wall is not too tall for
+    /// that.
     pub(crate) fn map(title: &str, x: Axis, y: Axis, width: f64, bar: Option<(Ramp, String)>) -> Self {
         let right = MARGIN[2] + if bar.is_some() { BAR_PX } else { 0.0 };
         let (across, high) = (x.range[1] - x.range[0], y.range[1] - y.range[0]);

@@ -189,7 +189,8 @@ fn photos_of(cameras: &CameraFile, folder: &Path) -> usize {
     find_photos(folder, cameras).map_or(0, |photos| photos.paths.iter().flatten().count())
 }
 
-/// Keeps the clouds of one sensor in every epoch: the one that all epochs have, the terrestrial one where they have both.
+/// Keeps the clouds of one sensor in every epoch: the one that all epochs have, the terrestrial one where
+/// they have both.
 pub(super) fn agree_on_sensor(epochs: &mut [Found]) {
     let has = |epoch: &Found, words: &[&str]| epoch.clouds.iter().any(|c| is_of(c, words));
     let mixed = epochs

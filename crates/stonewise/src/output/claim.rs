@@ -22,7 +22,8 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Claims a folder for the results of a project, made if need be.
     ///
-    /// Errors: results would replace an input (also with `force`); the folder holds something else and `force` is not
+    /// # Errors
+    /// Results would replace an input (also with `force`); the folder holds something else and `force` is not
     /// given; another run works in it; it cannot be made.
     pub fn of_project(path: &Path, project: &Project, force: bool) -> Result<Self> {
         let folders = result_folders(project);
@@ -32,16 +33,18 @@ impl OutputFolder {
         Ok(claimed)
     }
 
-    /// Removes temporary files that killed commands left among the results of a project. Only where no other command works in the folder.
+    /// Removes temporary files that killed commands left among the results of a project. Only where no other
+    /// command works in the folder.
     pub(crate) fn sweep(&self, project: &Project) {
         let folders = result_folders(project);
         sweep(&self.path, &|below| folders.iter().any(|f| below.starts_with(f)));
     }
 
-    /// Claims a folder for anything else. `inputs`: what must not be replaced; `written`: names of files and folders that
-    /// the command writes in it.
+    /// Claims a folder for anything else. `inputs`: what must not be replaced; `written`: names of files and
+    /// folders that the command writes in it.
     ///
-    /// Errors: as [`Self::of_project`].
+    /// # Errors
+    /// As [`Self::of_project`].
     pub fn of_inputs(
         path: &Path,
         owner: &Owner,
@@ -58,7 +61,8 @@ impl OutputFolder {
 
     /// Takes the folder of a finished run, to write some of its results again.
     ///
-    /// Errors: another run works in it; the last run in it has not finished.
+    /// # Errors
+    /// Another run works in it; the last run in it has not finished.
     pub fn of_results(path: &Path) -> Result<Self> {
         if !path.join("stones.parquet").is_file() {
             return Err(Error::NoResults(path.to_path_buf()));
@@ -72,7 +76,8 @@ impl OutputFolder {
 
     /// Takes the folder of a plan to do one of its units, beside others who do.
     ///
-    /// Errors: a run, or the making of a plan, is under way; files cannot be locked there.
+    /// # Errors
+    /// A run, or the making of a plan, is under way; files cannot be locked there.
     pub(crate) fn of_unit(path: &Path) -> Result<Self> {
         Ok(Self {
             path: path.to_path_buf(),
@@ -99,7 +104,8 @@ impl OutputFolder {
         self.forced
     }
 
-    /// Moves results of an earlier run aside, see [`super::PREVIOUS_DIR`], and marks the folder as unfinished.
+    /// Moves results of an earlier run aside, see [`super::PREVIOUS_DIR`], and marks the folder as
+    /// unfinished.
     pub(crate) fn begin_results(&self, project: &Project) -> Result<()> {
         previous::set_aside(&self.path, project)
     }

@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// The canonical path of a file or folder that need not exist: the part that exists without links, the rest appended.
+/// The canonical path of a file or folder that need not exist: the part that exists without links, the rest
+/// appended.
 pub(super) fn resolved(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let mut rest = Vec::new();
@@ -22,8 +23,8 @@ pub(super) fn resolved(path: &Path) -> PathBuf {
 
 /// Refuses an output folder in which results would replace an input, or that lies inside a folder of inputs.
 ///
-/// `folders`, `is_written`: what is written, relative to `out`: everything in these folders, and files of these names.
-/// Inputs are compared where they lie and, if they are links, where they point.
+/// `folders`, `is_written`: what is written, relative to `out`: everything in these folders, and files of
+/// these names. Inputs are compared where they lie and, if they are links, where they point.
 pub(super) fn refuse_overwriting(
     out: &Path,
     inputs: &[PathBuf],

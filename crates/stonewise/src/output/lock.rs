@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 /// The file that is locked; it stays behind empty and means nothing then.
 pub(super) const LOCK_FILE: &str = "lock";
-/// The file that every unit of a plan locks together with all others, and a run for itself; the same holds for it.
+/// The file that every unit of a plan locks together with all others, and a run for itself; the same holds
+/// for it.
 pub(super) const UNITS_LOCK_FILE: &str = "units.lock";
 
 /// Holds an output folder for this process. The system releases it with the process, however that ends.
@@ -22,7 +23,9 @@ pub(super) struct FolderLock {
 impl FolderLock {
     /// Locks a folder, which exists, for a run: nobody else works in it.
     ///
-    /// Errors: another process, or another run of this one, holds it; units are being done; the file system has no locks.
+    /// # Errors
+    /// Another process, or another run of this one, holds it; units are being done; the file system has no
+    /// locks.
     pub fn take(folder: &Path) -> Result<Self> {
         let (lock, path) = open(folder, LOCK_FILE)?;
         held(lock.try_lock(), folder, &path)?;

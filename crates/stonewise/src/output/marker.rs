@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// Name of the marker, in the folder that stonewise keeps for itself.
 const MARKER_FILE: &str = "marker.json";
 
-/// What a folder's contents are made from. Two commands may write into one folder if their owners are the same.
+/// What a folder's contents are made from. Two commands may write into one folder if their owners are the
+/// same.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Owner {
     /// `project`, `survey`, `clouds`, ...
@@ -167,8 +168,8 @@ fn is_empty(folder: &Path) -> Result<bool> {
     })
 }
 
-/// Whether version 1, which wrote no markers, made the folder for this owner: `run.json` of the same project, or
-/// `simulation.toml` with the same parameters.
+/// Whether version 1, which wrote no markers, made the folder for this owner: `run.json` of the same project,
+/// or `simulation.toml` with the same parameters.
 fn of_first_version(folder: &Path, owner: &Owner) -> bool {
     match owner.kind.as_str() {
         "project" => {

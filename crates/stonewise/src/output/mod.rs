@@ -1,8 +1,8 @@
 //! The folder that a command writes into: whose it is, who works in it, what in it is current.
 //!
-//! No command writes over a file that it did not make. [`OutputFolder::claim`] looks before the first byte: inputs
-//! must not lie where results go, and a folder that holds anything must carry stonewise's marker of the same
-//! project. A lock that the system releases with the process keeps a second run out.
+//! No command writes over a file that it did not make. [`OutputFolder::claim`] looks before the first byte:
+//! inputs must not lie where results go, and a folder that holds anything must carry stonewise's marker of
+//! the same project. A lock that the system releases with the process keeps a second run out.
 
 mod claim;
 mod inputs;
@@ -14,5 +14,6 @@ mod result_names;
 
 pub use claim::OutputFolder;
 pub use marker::Owner;
-pub use previous::{PREVIOUS_DIR, UNFINISHED_FILE};
+pub use previous::UNFINISHED_FILE;
+pub use result_names::PREVIOUS_DIR;
 pub(crate) use result_names::cloud_names;

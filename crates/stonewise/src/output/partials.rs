@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-/// Removes temporary files and folders below a folder, `.NAME.DIGITS.partial`. Only for the holder of the folder's lock: nobody else
-/// writes there. What cannot be removed or listed stays; it does no harm.
+/// Removes temporary files and folders below a folder, `.NAME.DIGITS.partial`. Only for the holder of the
+/// folder's lock: nobody else writes there. What cannot be removed or listed stays; it does no harm.
 ///
 /// `is_ours`: whether to look into a folder, by its path below `folder`.
 pub(super) fn sweep(folder: &Path, is_ours: &dyn Fn(&Path) -> bool) {

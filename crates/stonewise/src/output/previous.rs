@@ -1,9 +1,10 @@
 //! Results of an earlier run while another one works, and after it failed.
 //!
-//! A run that begins moves the results of the last one into `previous/`; a run that finishes removes them. What lies
-//! under its final name is so always the current run's, and `UNFINISHED.txt` says where that is not finished.
+//! A run that begins moves the results of the last one into `previous/`; a run that finishes removes them.
+//! What lies under its final name is so always the current run's, and `UNFINISHED.txt` says where that is not
+//! finished.
 
-use super::result_names::{cloud_names, is_result};
+use super::result_names::{PREVIOUS_DIR, cloud_names, is_result};
 use crate::error::{Error, Result};
 use crate::files::write_text;
 use crate::project::Project;
@@ -11,12 +12,11 @@ use crate::results::names::{EVIDENCE_DIR, REPORT_DIR};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Where the results of the last finished run lie until the next one has finished.
-pub const PREVIOUS_DIR: &str = "previous";
 /// Says that the results beside it are not finished.
 pub const UNFINISHED_FILE: &str = "UNFINISHED.txt";
 
-/// Marks the results in a folder as unfinished and moves those of an earlier run aside. The folder's lock is held.
+/// Marks the results in a folder as unfinished and moves those of an earlier run aside. The folder's lock is
+/// held.
 ///
 /// After a run that did not finish, `previous` keeps what it holds: the last finished run's.
 pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
@@ -46,7 +46,8 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
     Ok(())
 }
 
-/// Brings labelled clouds of the last run back, where it wrote them: the step that made them compares their digests.
+/// Brings labelled clouds of the last run back, where it wrote them: the step that made them compares their
+/// digests.
 pub(super) fn bring_back(folder: &Path, file: &Path) -> Result<()> {
     let (from, to) = (folder.join(PREVIOUS_DIR).join(file), folder.join(file));
     if from.exists() && !to.exists() {
@@ -140,7 +141,8 @@ mod tests {
         );
         assert!(read(out, UNFINISHED_FILE).unwrap().contains("has not finished"));
 
-        // The second run writes a table and is killed; the third writes the same and is killed; the fourth finishes.
+        // The second run writes a table and is killed; the third writes the same and is killed; the fourth
+        // finishes.
         for _ in 0..2 {
             write(out, "stones.csv", "half");
             set_aside(out, &project).unwrap();

@@ -4,6 +4,8 @@ use crate::project::Project;
 use crate::results::names::{EVIDENCE_DIR, REPORT_DIR, WORK_DIR};
 use std::path::{Path, PathBuf};
 
+/// Where the results of the last finished run lie until the next one has finished.
+pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
 const STEMS: [&str; 16] = [
     "stones",
@@ -33,11 +35,12 @@ const EVIDENCE: [&str; 6] = ["crops", "crop_outlines", "sections", "cloud", "cam
 /// Folders in an output folder that a run of the project writes into.
 pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {
     let epochs = (1..=project.epochs.len()).map(|n| PathBuf::from(format!("epoch{n}")));
-    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, super::PREVIOUS_DIR];
+    let others = [REPORT_DIR, EVIDENCE_DIR, WORK_DIR, PREVIOUS_DIR];
     epochs.chain(others.map(PathBuf::from)).collect()
 }
 
-/// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see [`cloud_names`].
+/// Whether a run publishes a file of this name, relative to the folder; the labelled clouds apart, see
+/// [`cloud_names`].
 pub(super) fn is_result(file: &Path) -> bool {
     let name = file
         .file_name()
@@ -62,8 +65,8 @@ pub(super) fn is_result(file: &Path) -> bool {
     }
 }
 
-/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs that share a
-/// stem are told apart by a number.
+/// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs
+/// that share a stem are told apart by a number.
 pub(crate) fn cloud_names(number: usize, clouds: &[PathBuf]) -> Vec<PathBuf> {
     let stem = |p: &PathBuf| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = |(i, cloud): (usize, &PathBuf)| {

@@ -1,7 +1,8 @@
 //! The list of steps that a run announces before it begins.
 
 use crate::pipeline::until::Until;
-use crate::project::{Estimator, Project};
+use crate::project::Project;
+use crate::settings::Estimator;
 use stonewise_core::progress::Progress;
 
 /// Name of the steps that edit labels, before their numbers.

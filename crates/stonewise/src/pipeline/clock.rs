@@ -27,7 +27,8 @@ impl Clock {
         self.wall.elapsed().as_secs_f64()
     }
 
-    /// Processor time of all threads since the start, seconds, to a hundredth; `None` where the system does not report it.
+    /// Processor time of all threads since the start, seconds, to a hundredth; `None` where the system does
+    /// not report it.
     pub fn processor_seconds(&self) -> Option<f64> {
         Some(processor_seconds()? - self.processor_seconds?)
     }

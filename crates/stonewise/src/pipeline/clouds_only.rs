@@ -25,7 +25,8 @@ pub enum Comparison<'a> {
         /// Farther points have no distance, metres.
         max_m: f64,
     },
-    /// Each point of the second epoch with a mesh: `c2m.laz` with `c2m_distance`, positive on the side of the faces' normals.
+    /// Each point of the second epoch with a mesh: `c2m.laz` with `c2m_distance`, positive on the side of the
+    /// faces' normals.
     C2m {
         /// The mesh, PLY.
         mesh: &'a Path,
@@ -37,6 +38,9 @@ pub enum Comparison<'a> {
 /// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed.
 ///
 /// M3C2's normals point at the cameras of the first epoch where it has any, else upwards.
+///
+/// # Errors
+/// A cloud, the mesh or a camera file cannot be read; a result cannot be written; interruption.
 pub fn compare_clouds(
     project: &Project,
     what: Comparison,
@@ -72,7 +76,11 @@ pub fn compare_clouds(
     }
 }
 
-/// Cuts the clouds of all epochs of a project into tiles, as the first step of a run; the number of their points.
+/// Cuts the clouds of all epochs of a project into tiles, as the first step of a run; the number of their
+/// points.
+///
+/// # Errors
+/// A cloud cannot be read, tiles cannot be written, interruption.
 pub fn tile_clouds(project: &Project, folder: &OutputFolder, progress: &dyn Progress) -> Result<u64> {
     let context = Context::new(project, folder, progress)?;
     let mut points = 0;

@@ -5,11 +5,11 @@ use crate::files::{create_results_folder, read_json, write_json};
 use crate::output::OutputFolder;
 use crate::pipeline::agenda::Agenda;
 use crate::pipeline::clock::{Clock, peak_memory_bytes};
-use crate::pipeline::storage::step::{Key, StepDir};
-use crate::pipeline::storage::store::{Keeps, Origin, Scope, StepStore};
 use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
+use crate::storage::step::{Key, StepDir};
+use crate::storage::store::{Keeps, Origin, Scope, StepStore};
 use crate::warnings::{Warning, Warnings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,8 @@ pub struct Context<'a> {
     pub out: PathBuf,
     /// Where steps keep their files.
     pub store: Arc<StepStore>,
-    /// The folder that results go to, claimed for this run; `None` within an experiment, which claims its own.
+    /// The folder that results go to, claimed for this run; `None` within an experiment, which claims its
+    /// own.
     pub output: Option<&'a OutputFolder>,
     /// Whom to tell, and who may stop the run.
     pub progress: &'a dyn Progress,
@@ -130,7 +131,8 @@ impl<'a> Context<'a> {
         Ok(dir)
     }
 
-    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another process may have done.
+    /// Does a part of the step `whole`, or takes the files that it left earlier: a unit of work that another
+    /// process may have done.
     pub fn part(
         &self,
         whole: (&str, &Key),

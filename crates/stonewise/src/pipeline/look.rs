@@ -5,15 +5,16 @@ use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::segment::listing;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 
 /// Name of the step.
 const STEP: &str = "check";
 
-/// Looks at the survey before the work. What is doubtful becomes a warning; what cannot be right stops the run, unless it
-/// is forced.
+/// Looks at the survey before the work. What is doubtful becomes a warning; what cannot be right stops the
+/// run, unless it is forced.
 ///
-/// Errors: something cannot be right; a cloud or camera file cannot be read.
+/// # Errors
+/// Something cannot be right; a cloud or camera file cannot be read.
 pub fn look(context: &Context, forced: bool) -> Result<()> {
     let project = context.project;
     let mut inputs = Vec::new();

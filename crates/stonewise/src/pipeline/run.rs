@@ -82,8 +82,27 @@ impl Summary {
 
 /// Runs a project as far as asked, in the folder `out`; takes over whatever an earlier run finished there.
 ///
-/// Results of an earlier run lie aside until this one has finished. Errors: an input that cannot be used, epochs that do
-/// not overlap, a full disk, interruption. What is finished stays, and the same call goes on from there.
+/// Results of an earlier run lie aside until this one has finished.
+///
+/// ```no_run
+/// use std::path::Path;
+/// use stonewise::results::ResultSet;
+/// use stonewise::{OutputFolder, Project, Until, run};
+/// use stonewise_core::progress::Silent;
+///
+/// let (project, out) = (Project::read(Path::new("survey/stonewise.toml"))?, Path::new("results"));
+/// let folder = OutputFolder::of_project(out, &project, false)?;
+/// let summary = run(&project, &folder, Until::Reported, &Silent)?;
+/// println!("{} warnings", summary.warnings.len());
+/// for stone in &ResultSet::read(out)?.stones {
+///     println!("{} {:?}", stone.stone_id, stone.motion.as_ref().map(|m| m.displacement));
+/// }
+/// # Ok::<(), stonewise::Error>(())
+/// ```
+///
+/// # Errors
+/// An input that cannot be used, epochs that do not overlap, a full disk, interruption. Finished steps stay,
+/// and the same call continues from there.
 pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn Progress) -> Result<Summary> {
     forget(out.path())?;
     out.begin_results(project)?;

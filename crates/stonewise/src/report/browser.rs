@@ -23,7 +23,8 @@ const PROGRAMS: [&str; 9] = [
     "msedge",
     "brave-browser",
 ];
-/// Where installers of macOS and Windows put them, beside the path; the first part is an environment variable, or empty.
+/// Where installers of macOS and Windows put them, beside the path; the first part is an environment
+/// variable, or empty.
 const PLACES: [(&str, &str); 7] = [
     ("", "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome"),
     ("", "/Applications/Chromium.app/Contents/MacOS/Chromium"),
@@ -78,7 +79,8 @@ impl Browser {
         })
     }
 
-    /// Prints the page `html` (a file) to the file `pdf`; `folder` is empty and takes what the browser writes for itself.
+    /// Prints the page `html` (a file) to the file `pdf`; `folder` is empty and takes what the browser writes
+    /// for itself.
     ///
     /// # Errors
     /// The browser cannot be started, fails or takes too long; the caller stopped the work.
@@ -126,7 +128,8 @@ impl Browser {
             "--no-pdf-header-footer",
         ]);
         if is_root() {
-            // Chromium refuses to start for root otherwise; the page comes from this program and runs no scripts.
+            // Chromium refuses to start for root otherwise; the page comes from this program and runs no
+            // scripts.
             command.arg("--no-sandbox");
         }
         command.args([

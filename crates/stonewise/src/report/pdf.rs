@@ -56,10 +56,11 @@ impl Pdf {
         &self.path
     }
 
-    /// Prints the report on the results in `dir`, A4; `appendix`: with parameters, digests and decisions about masks at the end.
+    /// Prints the report on the results in `dir`, A4; `appendix`: with parameters, digests and decisions
+    /// about masks at the end.
     ///
-    /// Every later epoch has its own part, with project, epochs and date at the foot of each page. The file appears whole or not
-    /// at all.
+    /// Every later epoch has its own part, with project, epochs and date at the foot of each page. The file
+    /// appears whole or not at all.
     ///
     /// # Errors
     /// `dir` holds no results, the browser fails, the file cannot be written, or the caller stopped the work.

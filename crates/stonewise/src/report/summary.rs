@@ -34,8 +34,8 @@ pub(crate) struct Summary<'a> {
     pub components: [Sorted; 3],
     /// Where nine tenths of the stones that moved lie: (along, up) from and to, metres.
     pub region: Option<[Point2<f64>; 2]>,
-    /// The least of the largest tenth of their motions, metres, and where nine tenths of those lie; `None` for
-    /// few stones.
+    /// The least of the largest tenth of their motions, metres, and where nine tenths of those lie; `None`
+    /// for few stones.
     pub strongest: Option<(f64, [Point2<f64>; 2])>,
 }
 

@@ -9,7 +9,8 @@ const SQUARE_M: f64 = 0.5;
 
 /// The same place in both methods.
 pub(crate) struct Comparison {
-    /// Median M3C2 distance on each stone, metres, in the order of [`ResultSet::stones`]; `None` without core points.
+    /// Median M3C2 distance on each stone, metres, in the order of [`ResultSet::stones`]; `None` without core
+    /// points.
     pub on_stone: Vec<Option<f64>>,
     /// In-plane components (along, up) of the M3C2 displacement vectors, distance times normal, metres.
     pub in_plane: Vec<[f64; 2]>,

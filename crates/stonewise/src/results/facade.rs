@@ -13,9 +13,9 @@ const MAX_TURN_RAD: f64 = 1.396;
 
 /// Unrolls a straight or curved wall that is seen from one side.
 ///
-/// `along` is the arc length of the wall's horizontal line, from its left end for a viewer in front; `up` is the
-/// length along the batter, from the lowest stone. The direction of the wall is the mean of its stones' normals in
-/// stretches of the chord; the arc length integrates 1 / cos(turn against the mean normal).
+/// `along` is the arc length of the wall's horizontal line, from its left end for a viewer in front; `up` is
+/// the length along the batter, from the lowest stone. The direction of the wall is the mean of its stones'
+/// normals in stretches of the chord; the arc length integrates 1 / cos(turn against the mean normal).
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(try_from = "FacadeFile", into = "FacadeFile")]
 pub struct Facade {

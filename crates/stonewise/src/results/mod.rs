@@ -1,4 +1,5 @@
-//! The result files of a run as types: stones and their columns, outlines, the unrolled wall, joints, evidence, records.
+//! The result files of a run as types: stones and their columns, outlines, the unrolled wall, joints,
+//! evidence, records.
 
 mod change_points;
 mod column_metadata;

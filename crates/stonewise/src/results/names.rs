@@ -35,7 +35,8 @@ pub const EVIDENCE_DIR: &str = "evidence";
 /// Folder of the steps' files.
 pub const WORK_DIR: &str = "work";
 
-/// A file that every later epoch has: the second epoch's is `stones.csv`, the third's `stones_2.csv`, and so on.
+/// A file that every later epoch has: the second epoch's is `stones.csv`, the third's `stones_2.csv`, and so
+/// on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PairFile {
     /// The stone table as text.

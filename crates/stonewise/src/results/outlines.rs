@@ -19,19 +19,21 @@ pub struct StoneOutline {
     pub stone_id: u32,
     /// Unit normal of its face, out of the wall, world.
     pub normal: Vector3<f64>,
-    /// Polygon in the plane of the face, world, counter-clockwise for a viewer in front; first vertex not repeated.
+    /// Polygon in the plane of the face, world, counter-clockwise for a viewer in front; first vertex not
+    /// repeated.
     pub ring: Vec<Point3<f64>>,
 }
 
-/// Least vertical part of a normal of [`StoneOutline::seen_from_above`]: 0.5 %, half a millimetre on a face 20 cm high.
+/// Least vertical part of a normal of [`StoneOutline::seen_from_above`]: 0.5 %, half a millimetre on a face
+/// 20 cm high.
 const LEAST_LEAN: f64 = 0.005;
 
 impl StoneOutline {
     /// The ring as a polygon whose plan, x and y alone, is valid too.
     ///
-    /// Simple-features geometry is judged in plan, where a stone of a vertical wall is a line. The ring is laid flat into its
-    /// plane, which rounding took it out of by up to 0.1 mm, and a plane steeper than 0.5 % leans back that far about its
-    /// middle.
+    /// Simple-features geometry is judged in plan, where a stone of a vertical wall is a line. The ring is
+    /// laid flat into its plane, which rounding took it out of by up to 0.1 mm, and a plane steeper than 0.5
+    /// % leans back that far about its middle.
     pub fn seen_from_above(&self) -> Vec<Point3<f64>> {
         let face = FaceFrame::from_normal(&self.normal);
         let lean = LEAST_LEAN.copysign(self.normal.z);

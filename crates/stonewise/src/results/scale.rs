@@ -8,7 +8,8 @@ pub(crate) fn nice_scale_m(values: impl IntoIterator<Item = f64>) -> f64 {
     nice_above(Sorted::new(values).quantile(0.98).unwrap_or(0.0) * 1e3) / 1e3
 }
 
-/// End of the scale that the components of these motions share, metres: covers 98 % of them, and their typical detection limit.
+/// End of the scale that the components of these motions share, metres: covers 98 % of them, and their
+/// typical detection limit.
 pub(crate) fn component_limit_m<'a>(motions: impl Iterator<Item = &'a RowMotion> + Clone) -> f64 {
     let components = motions
         .clone()

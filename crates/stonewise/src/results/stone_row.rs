@@ -49,8 +49,8 @@ pub struct RowMotion {
     pub face: Vector3<f64>,
     /// Rotation vector, world.
     pub rotation: Vector3<f64>,
-    /// Covariance of what is tested: of `displacement`, registration error of the epochs included; where that error is not known,
-    /// of the motion against the common rigid motion of the measured stones.
+    /// Covariance of what is tested: of `displacement`, registration error of the epochs included; where that
+    /// error is not known, of the motion against the common rigid motion of the measured stones.
     pub covariance: Matrix3<f64>,
     /// Standard deviations of `face`.
     pub face_sd: Vector3<f64>,
@@ -75,10 +75,11 @@ pub struct RowMotion {
 /// What the motion of a stone is tested against.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
-    /// Motion of the reference at the stone, metres, world: zero where the registration of the epochs is known, else the common
-    /// rigid motion of the measured stones.
+    /// Motion of the reference at the stone, metres, world: zero where the registration of the epochs is
+    /// known, else the common rigid motion of the measured stones.
     pub motion: Vector3<f64>,
-    /// Covariance that the reference adds to the stone's own, m^2: error of the registration, or of the common motion.
+    /// Covariance that the reference adds to the stone's own, m^2: error of the registration, or of the
+    /// common motion.
     pub covariance: Matrix3<f64>,
 }
 
@@ -251,8 +252,8 @@ fn symmetric(matrix: &Matrix3<f64>) -> Matrix3<f64> {
 
 /// Length that a displacement of this direction must exceed to differ from zero at 95 %, metres.
 ///
-/// The test is d' C^-1 d > 7.81, the 95 % quantile of chi-square with 3 degrees of freedom: a stone that stands
-/// still is called significant in 5 % of the cases. Along the unit vector e of d it reads
+/// The test is d' C^-1 d > 7.81, the 95 % quantile of chi-square with 3 degrees of freedom: a stone that
+/// stands still is called significant in 5 % of the cases. Along the unit vector e of d it reads
 /// |d| > sqrt(7.81 / (e' C^-1 e)), which is what this returns. A zero displacement has no direction; the largest limit
 /// over all directions is given then. Infinite where C is not positive definite.
 pub fn detection_limit_m(displacement: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {

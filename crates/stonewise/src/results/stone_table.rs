@@ -8,8 +8,8 @@ use std::path::Path;
 use stonewise_io::atomic::write_atomically;
 use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parquet};
 
-/// Writes the stones of a pair of epochs into `dir`: `stones.csv` with `stones.csv-metadata.json`, and `stones.parquet`;
-/// of the third epoch `stones_2.csv` and so on.
+/// Writes the stones of a pair of epochs into `dir`: `stones.csv` with `stones.csv-metadata.json`, and
+/// `stones.parquet`; of the third epoch `stones_2.csv` and so on.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -50,7 +50,8 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
     Ok(rows)
 }
 
-/// Rows as a table with [`STONE_COLUMNS`], and `edited` where a stone was edited by hand; the metadata hold `NAME.unit` and `NAME.meaning` of every column.
+/// Rows as a table with [`STONE_COLUMNS`], and `edited` where a stone was edited by hand; the metadata hold
+/// `NAME.unit` and `NAME.meaning` of every column.
 ///
 /// # Errors
 /// None in practice; a table refuses columns of unequal length.

@@ -6,7 +6,7 @@ use super::records::{
     ProjectRecord, RegistrationRecord, RunRecord,
 };
 use super::{RowMotion, Status, StoneRow, write_outlines, write_stones};
-use crate::project::Settings;
+use crate::settings::Settings;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use stonewise_core::registration::VarianceComponents;
 use stonewise_core::registration::observers::SensorClass;

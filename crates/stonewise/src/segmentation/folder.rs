@@ -4,7 +4,7 @@ use super::overlay::outlined;
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json, write_readable_json};
 use crate::kept::Kept;
-use crate::pipeline::storage::step::{Key, StepDir, path_digest};
+use crate::storage::step::{Key, StepDir, path_digest};
 use crate::warnings::{Warning, Warnings};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

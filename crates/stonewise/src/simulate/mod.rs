@@ -1,7 +1,6 @@
 //! Simulated surveys as files, which enter through the same door as real ones.
 
 mod clouds;
-mod error;
 mod params;
 mod photo_masks;
 mod photos;
@@ -11,6 +10,6 @@ mod truth;
 mod unfinished;
 mod write;
 
-pub use error::SimulateError;
+pub use crate::simulate_error::SimulateError;
 pub use params::{MaskFiles, SurveyParams};
 pub use write::{SurveySummary, write_survey};

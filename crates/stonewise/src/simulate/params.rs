@@ -51,10 +51,10 @@ impl Default for SurveyParams {
 }
 
 impl SurveyParams {
-    /// The survey of `stonewise demo`: 3 x 2 m that settle, swell, and have two loose stones; small photos, so
-    /// that it is made in seconds. The project gets no masks: the detector finds the stones. No building and no
-    /// railing stand before the wall: the detector takes parts of a building for stones, and points on thin bars
-    /// take the label of the stone behind them.
+    /// The survey of `stonewise demo`: 3 x 2 m that settle, swell, and have two loose stones; small photos,
+    /// so that it is made in seconds. The project gets no masks: the detector finds the stones. No building
+    /// and no railing stand before the wall: the detector takes parts of a building for stones, and points on
+    /// thin bars take the label of the stone behind them.
     pub fn demo() -> Self {
         let wall = WallParams {
             width_m: 3.0,

@@ -1,9 +1,9 @@
 //! What an interrupted simulation has finished.
 
 use crate::files::{read_json, write_json};
-use crate::pipeline::Key;
-use crate::pipeline::storage::step::StepDir;
 use crate::simulate::{SimulateError, SurveyParams};
+use crate::storage::step::Key;
+use crate::storage::step::StepDir;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;

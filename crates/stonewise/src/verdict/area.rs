@@ -1,6 +1,7 @@
 //! The state and the numbers of the wall or of a zone.
 
-use super::assess::{Case, JudgedJoint, JudgedStone, Level, millimetres};
+use super::case::Case;
+use super::judged::{Judged, JudgedStone, Level, millimetres};
 use crate::results::Sorted;
 use crate::results::records::{Area, DetectionLimit, Largest, ReasonCode, State};
 use crate::thresholds::Thresholds;
@@ -8,35 +9,6 @@ use std::collections::BTreeMap;
 
 /// A wall of which less than this share was measured is never called fine.
 const LEAST_MEASURED: f64 = 0.5;
-
-/// All stones and joints with their states.
-#[derive(Clone, Debug)]
-pub(super) struct Judged {
-    pub stones: Vec<JudgedStone>,
-    pub joints: Vec<JudgedJoint>,
-}
-
-impl Judged {
-    /// Stones beyond an alarm threshold, whether the run is sound or not.
-    pub(super) fn apparent_alarms(&self) -> usize {
-        let beyond = |s: &&JudgedStone| s.length.max(s.neighbours) == Level::Alarm;
-        self.stones.iter().filter(beyond).count()
-    }
-
-    /// Stones of a zone, or all.
-    pub(super) fn stones_in(&self, zone: Option<usize>) -> impl Iterator<Item = &JudgedStone> + Clone {
-        self.stones
-            .iter()
-            .filter(move |s| zone.is_none() || s.zone == zone)
-    }
-
-    /// Joints of a zone, or all.
-    pub(super) fn joints_in(&self, zone: Option<usize>) -> impl Iterator<Item = &JudgedJoint> + Clone {
-        self.joints
-            .iter()
-            .filter(move |j| zone.is_none() || j.zone == zone)
-    }
-}
 
 /// The numbers of a zone, or of the wall, and the state that follows from them.
 pub(super) fn area(case: &Case, thresholds: &Thresholds, judged: &Judged, zone: Option<usize>) -> Area {

@@ -1,79 +1,17 @@
 //! From what was measured to the verdict.
 
-use super::area::{Judged, area};
+use super::area::area;
+use super::case::{Case, JointCase, StoneCase};
 use super::interval::{Estimate, QUANTILE};
+use super::judged::{Judged, JudgedJoint, JudgedStone, Level, millimetres};
 use super::sentence::{reasons, sentence};
 use crate::report_params::Language;
-use crate::results::records::{DatumState, EpochVerdict, JointVerdict, State, StoneVerdict, ZoneVerdict};
-use crate::thresholds::{Levels, Measures, Thresholds};
-use nalgebra::Point2;
+use crate::results::records::{EpochVerdict, JointVerdict, State, StoneVerdict, ZoneVerdict};
+use crate::thresholds::{Measures, Thresholds};
 use stonewise_core::statistics::q_values;
 
 /// Share of false ones that is accepted among the stones said to have moved.
 const FALSE_DISCOVERY_RATE: f64 = 0.05;
-
-/// What is known of one pair of epochs.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Case {
-    /// Names of the first and of the later epoch.
-    pub epochs: [String; 2],
-    /// What the registration is known from.
-    pub datum: Option<DatumState>,
-    /// The estimate stopped before it settled.
-    pub not_converged: bool,
-    /// There is a doubt about the run as a whole.
-    pub in_doubt: bool,
-    /// The stones of the first epoch.
-    pub stones: Vec<StoneCase>,
-    /// The joints whose stones were both measured.
-    pub joints: Vec<JointCase>,
-}
-
-/// What is known of a stone.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct StoneCase {
-    pub stone_id: u32,
-    /// Place (along, up) in the facade frame, metres.
-    pub place: Point2<f64>,
-    /// The first epoch shows it well, and the later one shows its place without it.
-    pub lost: bool,
-    /// What was measured.
-    pub measured: Option<StoneMeasured>,
-}
-
-/// The measured motion of a stone.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct StoneMeasured {
-    /// The motion that is tested, see the stone table.
-    pub motion: Estimate,
-    /// The motion against the neighbours.
-    pub neighbours: Estimate,
-    pub above_limit: bool,
-    pub loose: bool,
-    pub detection_limit_m: f64,
-}
-
-/// What is known of a joint.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct JointCase {
-    pub stones: [u32; 2],
-    /// Its middle (along, up) in the facade frame, metres.
-    pub place: Point2<f64>,
-    pub opening_m: f64,
-    pub sigma_m: f64,
-}
-
-impl Case {
-    /// Whether the results can be relied on as a whole.
-    fn is_sound(&self) -> bool {
-        !self.not_converged && !self.in_doubt
-    }
-
-    /// Whether intervals hold the registration error, so that they say something about the wall as a whole.
-    pub(super) fn has_datum(&self) -> bool {
-        self.datum.is_some_and(|d| d != DatumState::Unknown)
-    }
-}
 
 /// The verdict on a pair of epochs.
 pub(crate) fn assess(case: &Case, thresholds: &Thresholds, language: Language) -> EpochVerdict {
@@ -116,60 +54,6 @@ fn judge(case: &Case, thresholds: &Thresholds) -> Judged {
     let joint = |(j, q)| judge_joint(case, j, q, thresholds);
     let joints = case.joints.iter().zip(q).map(joint).collect();
     Judged { stones, joints }
-}
-
-/// A stone with its state, and why.
-#[derive(Clone, Debug)]
-pub(super) struct JudgedStone {
-    pub verdict: StoneVerdict,
-    pub zone: Option<usize>,
-    pub length: Level,
-    pub neighbours: Level,
-    pub detection_limit_m: Option<f64>,
-}
-
-/// A joint with its state, and why.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct JudgedJoint {
-    pub verdict: JointVerdict,
-    pub zone: Option<usize>,
-    pub opening: Level,
-    pub opened: bool,
-}
-
-/// Where an interval lies among the thresholds of its quantity.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Level {
-    /// No threshold is given.
-    #[default]
-    NotAsked,
-    /// Below the threshold of attention as a whole.
-    Below,
-    /// It reaches the threshold of attention, and does not lie beyond it.
-    Reaches,
-    /// Beyond the threshold of attention, of something that moved.
-    Attention,
-    /// Beyond the alarm threshold, of something that moved.
-    Alarm,
-}
-
-impl Level {
-    fn of(interval_m: [f64; 2], moved: bool, levels: &Levels) -> Self {
-        let [low, high] = interval_m;
-        let Some(attention) = levels.attention_m() else {
-            return Self::NotAsked;
-        };
-        let beyond = |threshold: Option<f64>| moved && threshold.is_some_and(|t| low > t);
-        if beyond(levels.alarm_m()) {
-            Self::Alarm
-        } else if beyond(Some(attention)) {
-            Self::Attention
-        } else if high < attention {
-            Self::Below
-        } else {
-            Self::Reaches
-        }
-    }
 }
 
 fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thresholds) -> JudgedStone {
@@ -279,11 +163,6 @@ fn finite(interval_m: [f64; 2]) -> Option<[f64; 2]> {
         .iter()
         .all(|v| v.is_finite())
         .then(|| interval_m.map(millimetres))
-}
-
-/// Metres as millimetres, to a micrometre.
-pub(super) fn millimetres(metres: f64) -> f64 {
-    (metres * 1e6).round() / 1e3
 }
 
 /// A number with so many digits.

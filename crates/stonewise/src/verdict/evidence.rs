@@ -1,6 +1,7 @@
 //! What the verdict needs, from result files.
 
-use super::assess::{Case, JointCase, StoneCase, StoneMeasured, assess};
+use super::assess::assess;
+use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
 use crate::report_params::Language;
 use crate::results::records::{DatumState, EpochVerdict};
@@ -16,7 +17,8 @@ const WELL_SEEN_CONFIDENCE: f64 = 0.6;
 /// A stone whose surface is still within this distance, metres, is there: its mask is missing, not the stone.
 const STILL_THERE_M: f64 = 0.02;
 
-/// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole; `epochs`: their names.
+/// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
+/// `epochs`: their names.
 pub(crate) fn verdict_on(
     results: &ResultSet,
     epochs: [String; 2],
@@ -63,7 +65,8 @@ fn stones(results: &ResultSet) -> Vec<StoneCase> {
     results.stones.iter().zip(&on_stone).map(stone).collect()
 }
 
-/// Whether the first epoch shows the stone well and the later one its place without it; `distance_m`: M3C2 on the stone.
+/// Whether the first epoch shows the stone well and the later one its place without it; `distance_m`: M3C2 on
+/// the stone.
 fn is_lost(stone: &StoneRow, distance_m: Option<f64>) -> bool {
     stone.status == Status::UnmatchedLost
         && stone.photos >= WELL_SEEN_PHOTOS

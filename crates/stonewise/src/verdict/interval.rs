@@ -1,17 +1,20 @@
 //! The 95 % interval of the length of a motion that was measured with an error.
 //!
-//! t is measured, t = m + error, error ~ N(0, C); wanted is the length |m|. The length of t is too long on average, the more so the smaller
-//! the motion, so that |t| +- 1.96 sd would be wrong for small motions.
+//! t is measured, t = m + error, error ~ N(0, C); wanted is the length |m|. The length of t is too long on
+//! average, the more so the smaller the motion, so that |t| +- 1.96 sd would be wrong for small motions.
 //!
-//! Upper limit: the largest |m| with (t - m)' C^-1 (t - m) <= 1.96^2. Where it falls short of |m|, that ellipsoid lies inside the ball of
-//! radius |m| and so on the inner side of the plane that touches the ball at m: u't + 1.96 sqrt(u'Cu) < |m| with u = m / |m|, which
-//! happens in at most 2.5 % of the cases, for every m and C.
+//! Upper limit: the largest |m| with (t - m)' C^-1 (t - m) <= 1.96^2. Where it falls short of |m|, that
+//! ellipsoid lies inside the ball of radius |m| and so on the inner side of the plane that touches the ball
+//! at m: u't + 1.96 sqrt(u'Cu) < |m| with u = m / |m|, which happens in at most 2.5 % of the cases, for every
+//! m and C.
 //!
-//! Lower limit: the smallest length r that is not rejected. With d^2(r) = min of (t - m)' C^-1 (t - m) over |m| = r, r is rejected where
-//! P(|z + R e| > R + d) < 2.5 %, z standard normal in three dimensions, R = r s_min / s_max^2 with the smallest and the largest
-//! standard deviation of C. In coordinates in which C is the unit matrix the ball of radius r is an ellipsoid with curvature radii of R and
-//! more, so that a ball of radius R rolls inside it: the probability is an upper bound, and exact for equal standard deviations. At
-//! r = 0 it is the chi-square test with three degrees of freedom; for long motions d tends to 1.96, the first-order interval along the motion.
+//! Lower limit: the smallest length r that is not rejected. With d^2(r) = min of (t - m)' C^-1 (t - m) over
+//! |m| = r, r is rejected where P(|z + R e| > R + d) < 2.5 %, z standard normal in three dimensions, R = r
+//! s_min / s_max^2 with the smallest and the largest standard deviation of C. In coordinates in which C is
+//! the unit matrix the ball of radius r is an ellipsoid with curvature radii of R and more, so that a ball of
+//! radius R rolls inside it: the probability is an upper bound, and exact for equal standard deviations. At r
+//! = 0 it is the chi-square test with three degrees of freedom; for long motions d tends to 1.96, the
+//! first-order interval along the motion.
 //!
 //! Coverage is therefore 95 % at least; `tests` measure it.
 
@@ -34,7 +37,8 @@ pub(crate) struct Estimate {
 }
 
 impl Estimate {
-    /// Ends of the 95 % interval of the true length, metres; from 0 to infinity where the covariance is not positive definite.
+    /// Ends of the 95 % interval of the true length, metres; from 0 to infinity where the covariance is not
+    /// positive definite.
     pub(crate) fn length_interval(&self) -> [f64; 2] {
         match Axes::of(self) {
             Some(axes) => [axes.lower(), axes.upper()],
@@ -42,7 +46,8 @@ impl Estimate {
         }
     }
 
-    /// Probability of a vector as unlikely as this one if nothing had moved: chi-square with three degrees of freedom.
+    /// Probability of a vector as unlikely as this one if nothing had moved: chi-square with three degrees of
+    /// freedom.
     pub(crate) fn p_value(&self) -> f64 {
         let solved = self.covariance.cholesky().map(|c| c.solve(&self.vector));
         let square = solved.map_or(0.0, |s| self.vector.dot(&s));
@@ -62,7 +67,8 @@ impl Estimate {
 
 /// P(|z + r e| > distance) of a standard normal z in three dimensions and a unit vector e.
 ///
-/// Source: integral of the noncentral chi density with three degrees of freedom, x / r (phi(x - r) - phi(x + r)).
+/// Source: integral of the noncentral chi density with three degrees of freedom, x / r (phi(x - r) - phi(x +
+/// r)).
 fn beyond(distance: f64, r: f64) -> f64 {
     let density = |x: f64| (-0.5 * x * x).exp() / (2.0 * PI).sqrt();
     let tail = |x: f64| 0.5 * erfc(x / SQRT_2);
@@ -104,7 +110,8 @@ impl Axes {
         self.variance.iter().fold(f64::INFINITY, |a, v| a.min(*v))
     }
 
-    /// Distance d^2 and length |m| of the point m = a t / (a + C), the nearest of its length: a > 0 inside, a < -s_max^2 outside.
+    /// Distance d^2 and length |m| of the point m = a t / (a + C), the nearest of its length: a > 0 inside, a
+    /// < -s_max^2 outside.
     fn at(&self, a: f64) -> (f64, f64) {
         let (mut distance, mut length) = (0.0, 0.0);
         for (t, v) in self.along.iter().zip(&self.variance) {
@@ -117,14 +124,16 @@ impl Axes {
     fn upper(&self) -> f64 {
         let largest = self.largest();
         let mut axes = Self { ..*self };
-        // A motion right across the longest axis has two farthest points; a trace of motion along it chooses one.
+        // A motion right across the longest axis has two farthest points; a trace of motion along it chooses
+        // one.
         for (t, v) in axes.along.iter_mut().zip(&self.variance) {
             if *v == largest {
                 *t = t.abs().max(1e-9 * largest.sqrt());
             }
         }
         let size = axes.along.iter().map(|t| t * t).sum::<f64>().sqrt();
-        // The distance falls from infinity at a = -s_max^2 to 0 far away; it is below the quantile at the upper end of the bracket.
+        // The distance falls from infinity at a = -s_max^2 to 0 far away; it is below the quantile at the
+        // upper end of the bracket.
         let reach = size * largest.sqrt() / QUANTILE + largest;
         let (mut low, mut high) = (0.0, reach);
         for _ in 0..HALVINGS {
@@ -255,7 +264,8 @@ mod tests {
                         share > 0.9416,
                         "{share} at {length} along {direction:?} with {sd:?}"
                     );
-                    // Not needlessly wide where the first order holds; with very unequal errors the bound on the curvature costs more.
+                    // Not needlessly wide where the first order holds; with very unequal errors the bound on
+                    // the curvature costs more.
                     let most = if sd.max() / sd.min() > 10.0 { 0.99 } else { 0.965 };
                     assert!(
                         length < 400.0 || share < most,

@@ -1,12 +1,15 @@
-//! The verdict on a run: the state of the wall, its zones and its stones, and one sentence that says it everywhere.
+//! The verdict on a run: the state of the wall, its zones and its stones, and one sentence that says it
+//! everywhere.
 //!
-//! [`assess`] is a pure function of what was measured, of how sound the run is and of the thresholds; `evidence` takes what it needs from
-//! result files.
+//! [`assess`] is a pure function of what was measured, of how sound the run is and of the thresholds;
+//! `evidence` takes what it needs from result files.
 
 mod area;
 mod assess;
+mod case;
 mod evidence;
 mod interval;
+mod judged;
 mod sentence;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -17,7 +20,8 @@ pub(crate) use evidence::verdict_on;
 
 use crate::warnings::Warning;
 
-/// Whether there is a doubt about a later epoch or about the run as a whole; `later`: names of all later epochs.
+/// Whether there is a doubt about a later epoch or about the run as a whole; `later`: names of all later
+/// epochs.
 pub(crate) fn is_doubted<'a>(
     warnings: &[Warning],
     epoch: &str,

@@ -1,7 +1,7 @@
 //! The verdict in words.
 
-use super::area::Judged;
-use super::assess::{Case, Level};
+use super::case::Case;
+use super::judged::{Judged, Level};
 use crate::figure::count;
 use crate::report_params::Language;
 use crate::results::records::{Area, Largest, Reason, ReasonCode, State};
@@ -17,8 +17,8 @@ struct Speaker<'a> {
     texts: &'static Texts,
 }
 
-/// The sentence on the wall: its state, why, and the most important numbers. `apparent`: stones beyond the alarm threshold if the run
-/// were sound.
+/// The sentence on the wall: its state, why, and the most important numbers. `apparent`: stones beyond the
+/// alarm threshold if the run were sound.
 pub(super) fn sentence(
     case: &Case,
     thresholds: &Thresholds,
@@ -123,35 +123,20 @@ impl Speaker<'_> {
     }
 
     fn length(&self, text: [&'static str; 2], level: Level) -> String {
-        let zones: Vec<Option<usize>> = self
-            .judged
-            .stones
-            .iter()
-            .filter(|s| s.length == level)
-            .map(|s| s.zone)
-            .collect();
+        let beyond = self.judged.stones.iter().filter(|s| s.length == level);
+        let zones: Vec<Option<usize>> = beyond.map(|s| s.zone).collect();
         self.beyond(text, level, &zones, |m| m.length)
     }
 
     fn neighbours(&self, text: [&'static str; 2], level: Level) -> String {
-        let zones: Vec<Option<usize>> = self
-            .judged
-            .stones
-            .iter()
-            .filter(|s| s.neighbours == level)
-            .map(|s| s.zone)
-            .collect();
+        let beyond = self.judged.stones.iter().filter(|s| s.neighbours == level);
+        let zones: Vec<Option<usize>> = beyond.map(|s| s.zone).collect();
         self.beyond(text, level, &zones, |m| m.neighbours)
     }
 
     fn joints(&self, text: [&'static str; 2], level: Level) -> String {
-        let zones: Vec<Option<usize>> = self
-            .judged
-            .joints
-            .iter()
-            .filter(|j| j.opening == level)
-            .map(|j| j.zone)
-            .collect();
+        let beyond = self.judged.joints.iter().filter(|j| j.opening == level);
+        let zones: Vec<Option<usize>> = beyond.map(|j| j.zone).collect();
         self.beyond(text, level, &zones, |m| m.joints)
     }
 

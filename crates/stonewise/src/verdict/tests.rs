@@ -1,6 +1,7 @@
 //! Made-up walls whose true motion is known.
 
-use super::assess::{Case, JointCase, StoneCase, StoneMeasured, assess};
+use super::assess::assess;
+use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
 use super::testing::Normal;
 use crate::report_params::Language;

@@ -33,6 +33,41 @@ const MAX_CRACKS: usize = 8;
 ///
 /// Cost: about ten evaluations of all points and ten sparse factorisations.
 ///
+/// ```
+/// use nalgebra::{Point3, Vector3};
+/// use stonewise_core::registration::{AdjustmentParams, MemoryPairs, PairPoints, adjust};
+/// use stonewise_core::{cloud::Cloud, id::StoneId, progress::Silent};
+///
+/// // Twelve stones with wavy faces in the plane x = 0, which move by (1, 3, -2) mm.
+/// let moved = Vector3::new(0.001, 0.003, -0.002);
+/// let pair = |k: u32| {
+///     let centroid = Point3::new(0.0, 0.3 * f64::from(k % 4), 0.2 * f64::from(k / 4));
+///     let scan = |start: f64, by: Vector3<f64>| {
+///         let point = |i: u32| {
+///             let (y, z) = ((start + 0.618034 * f64::from(i)).fract(), (start + 0.754878 * f64::from(i)).fract());
+///             let (y, z) = (0.2 * y - 0.1, 0.16 * z - 0.08);
+///             centroid + Vector3::new(0.004 * ((50.0 * y).sin() + (43.0 * z).cos()), y, z) + by
+///         };
+///         Cloud::from_world(centroid, (0..600).map(point))
+///     };
+///     PairPoints {
+///         first: StoneId(k),
+///         second: StoneId(k),
+///         centroid,
+///         centroid_second: centroid + moved,
+///         normal: Vector3::x(),
+///         points_first: scan(0.0, Vector3::zeros()),
+///         points_second: scan(0.3, moved),
+///         nearby_second: Cloud::new(centroid, Vec::new()),
+///         window: None,
+///     }
+/// };
+/// let pairs = MemoryPairs::new((1..=12).map(pair).collect());
+/// let report = adjust(&pairs, &AdjustmentParams::default(), &Silent)?;
+/// assert!((report.common_motion - moved).norm() < 3e-4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// A batch cannot be read, the caller stopped the work, or the equations cannot be factored.
 pub fn adjust<S: PairSource>(

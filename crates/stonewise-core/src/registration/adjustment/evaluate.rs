@@ -182,3 +182,162 @@ fn placed(candidate: &CandidateMotion) -> Placed {
         window: candidate.surface.window(&candidate.motion),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::params::AdjustmentParams;
+    use super::super::survey::survey;
+    use super::super::testing::wall;
+    use super::*;
+    use crate::progress::Silent;
+    use crate::registration::points::MemoryPairs;
+    use nalgebra::Vector3;
+    use std::convert::Infallible;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// Counts how often each batch is read.
+    struct Counting {
+        pairs: MemoryPairs,
+        loads: [AtomicUsize; 2],
+    }
+
+    impl Counting {
+        fn loads(&self) -> [usize; 2] {
+            [0, 1].map(|batch| self.loads[batch].load(Ordering::Relaxed))
+        }
+    }
+
+    impl PairSource for Counting {
+        type Error = Infallible;
+
+        fn batch_count(&self) -> usize {
+            self.pairs.batch_count()
+        }
+
+        fn load(&self, batch: usize) -> Result<Vec<PairPoints>, Infallible> {
+            self.loads[batch].fetch_add(1, Ordering::Relaxed);
+            self.pairs.load(batch)
+        }
+    }
+
+    fn adjustment(pairs: &MemoryPairs) -> Adjustment {
+        let params = AdjustmentParams::default();
+        Adjustment::new(survey(pairs, &params).unwrap(), &params).unwrap()
+    }
+
+    /// The true motion of a stone in its frame.
+    fn true_motion(adjustment: &Adjustment, i: usize, world: Vector3<f64>) -> StoneVector {
+        StoneVector::from_translation(adjustment.graph.nodes[i].face_from_world * world)
+    }
+
+    #[test]
+    fn a_newton_step_errs_as_the_information_says() {
+        let truth = Vector3::new(0.001, 0.004, -0.003);
+        let noise = [0.001, 0.0015];
+        let pairs = MemoryPairs::new(wall(8, noise, |_| truth));
+        let mut adjustment = adjustment(&pairs);
+        adjustment.surface.noise.sigma_m = noise;
+        // Half a millimetre beside the truth, far less than the waves of the faces.
+        for i in 0..adjustment.stones.len() {
+            let beside = truth + Vector3::new(0.0002, -0.0004, 0.0003);
+            adjustment.stones[i].with_field.motion = true_motion(&adjustment, i, beside);
+        }
+        adjustment.evaluate(&pairs, &Silent).unwrap();
+        let squares: Vec<f64> = (0..adjustment.stones.len())
+            .map(|i| {
+                let stone = &adjustment.stones[i].with_field;
+                let e = stone.surface.equations().unwrap();
+                let step = e.information.cholesky().unwrap().solve(&e.gradient);
+                let error = (stone.motion - true_motion(&adjustment, i, truth)).unknowns() - step;
+                error.dot(&(e.information * error))
+            })
+            .collect();
+        // Nine unknowns: chi-square of 9 a stone, whose mean over 64 stones scatters by 0.5.
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        assert!((6.5..11.5).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn only_batches_with_stones_that_moved_are_read_again() {
+        let source = Counting {
+            pairs: MemoryPairs::new(wall(10, [0.001; 2], |_| Vector3::zeros())),
+            loads: Default::default(),
+        };
+        let mut adjustment = adjustment(&source.pairs);
+        adjustment.evaluate(&source, &Silent).unwrap();
+        assert_eq!(source.loads(), [1, 1]);
+        adjustment.evaluate(&source, &Silent).unwrap();
+        assert_eq!(source.loads(), [1, 1]);
+
+        let gradient =
+            |a: &Adjustment, i: usize| a.stones[i].with_field.surface.equations().unwrap().gradient;
+        let before = [0, 70, 71].map(|i| gradient(&adjustment, i));
+        let moved = true_motion(&adjustment, 70, Vector3::new(0.0, 0.001, 0.0));
+        adjustment.stones[70].with_field.motion = moved;
+        adjustment.evaluate(&source, &Silent).unwrap();
+        assert_eq!(source.loads(), [1, 2]);
+        assert_eq!([0, 71].map(|i| gradient(&adjustment, i)), [before[0], before[2]]);
+        // Brute force: the stone's points alone at its new motion.
+        let frame = &adjustment.graph.nodes[70].face_from_world;
+        let local = LocalPair::new(&source.pairs.pairs()[70], frame);
+        let alone = adjustment.surface.equations(&local, &moved, &moved);
+        assert_eq!(gradient(&adjustment, 70), alone.gradient);
+        assert_ne!(alone.gradient, before[1]);
+    }
+
+    #[test]
+    fn the_noise_of_both_epochs_is_found_and_equations_are_due_again() {
+        let noise = [0.001, 0.002];
+        let pairs = MemoryPairs::new(wall(8, noise, |_| Vector3::zeros()));
+        let mut adjustment = adjustment(&pairs);
+        for _ in 0..4 {
+            adjustment.evaluate(&pairs, &Silent).unwrap();
+            assert!(!adjustment.stones.iter().any(|s| adjustment.is_due(s)));
+            adjustment.estimate_noise();
+            assert!(adjustment.stones.iter().all(|s| adjustment.is_due(s)));
+        }
+        for (found, truth) in adjustment.surface.noise.sigma_m.iter().zip(noise) {
+            assert!((found / truth - 1.0).abs() < 0.1, "{found} instead of {truth}");
+        }
+    }
+
+    #[test]
+    fn the_stone_that_went_away_is_followed_on_its_own() {
+        let far = Vector3::new(0.0, 0.015, 0.0);
+        let moved = |k| if k == 20 { far } else { Vector3::zeros() };
+        let noise = [0.005; 2];
+        let pairs = MemoryPairs::new(wall(5, noise, moved));
+        let mut adjustment = adjustment(&pairs);
+        for _ in 0..3 {
+            adjustment.evaluate(&pairs, &Silent).unwrap();
+            adjustment.estimate_noise();
+        }
+        adjustment.evaluate(&pairs, &Silent).unwrap();
+        adjustment.probe(&pairs, &Silent).unwrap();
+        let followed: Vec<usize> = (0..adjustment.stones.len())
+            .filter(|&i| adjustment.stones[i].on_own.is_some())
+            .collect();
+        // A noisy stone that stayed may be followed too: that alone does not make it loose.
+        assert!(followed.contains(&20) && followed.len() <= 3, "{followed:?}");
+        // Newton's steps from there lead to the truth.
+        for _ in 0..4 {
+            adjustment.evaluate(&pairs, &Silent).unwrap();
+            let own = adjustment.stones[20].on_own.as_mut().unwrap();
+            let e = own.surface.equations().unwrap();
+            let step = e.information.cholesky().unwrap().solve(&e.gradient);
+            own.motion = own.motion - StoneVector::from(step);
+        }
+        adjustment.evaluate(&pairs, &Silent).unwrap();
+        let own = adjustment.stones[20].on_own.as_ref().unwrap().motion;
+        let error = own - true_motion(&adjustment, 20, far);
+        assert!(error.translation().norm() < 0.004, "{error:?}");
+        // Both motions are compared on the same points, and its own is far more likely.
+        assert!(
+            adjustment.stones[20].ratio.log_ratio > 5.0,
+            "{:?}",
+            adjustment.stones[20].ratio
+        );
+        let other = (0..40).find(|i| !followed.contains(i)).unwrap();
+        assert_eq!(adjustment.stones[other].ratio.log_ratio, 0.0);
+    }
+}

@@ -22,6 +22,8 @@ mod state;
 mod step;
 pub(crate) mod stone_vector;
 mod survey;
+#[cfg(test)]
+mod testing;
 mod tracking;
 
 pub use adjust::{adjust, adjust_with_photos};

@@ -38,7 +38,7 @@ pub(crate) fn report(
     let tested = last.map_or_else(Vec::new, |solution| test_stones(adjustment, solution));
     let results = last.map_or_else(Vec::new, |solution| results(adjustment, solution, &tested));
     let breaks = last.map_or_else(Vec::new, |solution| {
-        find_breaks(adjustment, solution, |i| tested[i].is_loose)
+        find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose)
     });
     let moved: Vec<Vector3<f64>> = results
         .iter()

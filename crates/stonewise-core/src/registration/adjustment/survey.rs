@@ -3,9 +3,8 @@
 use super::error::AdjustError;
 use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
-use crate::geometry::FaceFrame;
 use crate::id::StoneId;
-use crate::registration::points::{PairPoints, PairSource};
+use crate::registration::points::{PairPoints, PairSource, face_spacing};
 use crate::statistics::{component_median, upper_median};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -40,9 +39,6 @@ const SAMPLE: usize = 48;
 /// Stones whose centroid shifts are smoothed into a first guess: a ring of neighbours, so that one wrong mask
 /// does not matter.
 const SMOOTHED: usize = 12;
-/// Cells in which a face's area is counted, metres: some dozens on a stone, each with some points of a sparse
-/// drone cloud.
-const AREA_CELL_M: f64 = 0.02;
 /// Points below which a stone shows no spacing.
 const SPACING_POINTS: usize = 10;
 /// Point spacing of a survey none of whose stones shows one, metres.
@@ -131,17 +127,7 @@ fn spacing(pair: &PairPoints) -> Option<f64> {
     } else {
         &pair.points_second
     };
-    let frame = FaceFrame::from_normal(&pair.normal);
-    let cells: BTreeSet<(i64, i64)> = (0..sparse.len())
-        .map(|i| {
-            let p = sparse.local(i).coords;
-            (
-                (p.dot(&frame.along) / AREA_CELL_M).floor() as i64,
-                (p.dot(&frame.up) / AREA_CELL_M).floor() as i64,
-            )
-        })
-        .collect();
-    (sparse.len() >= SPACING_POINTS).then(|| AREA_CELL_M * (cells.len() as f64 / sparse.len() as f64).sqrt())
+    (sparse.len() >= SPACING_POINTS).then(|| face_spacing(sparse, &pair.normal))
 }
 
 #[cfg(test)]

@@ -9,12 +9,12 @@ use crate::registration::adjustment::observation::surface::{
     Equations, Layout, LocalPair, SurfaceNoise, equations::equations, estimate_noise,
 };
 use crate::registration::adjustment::stone_vector::StoneVector;
-use crate::registration::points::PairPoints;
+use crate::registration::points::{PairPoints, face_spacing};
 use crate::statistics::upper_median;
-use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Parameters of the comparison of an epoch's sources.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,8 +56,6 @@ const NOISE_SAMPLE: usize = 32;
 const ALIGNMENTS: usize = 3;
 /// Standard deviation that stands for "not seen", metres: keeps a flat stone's covariance finite.
 const UNSEEN_M: f64 = 0.1;
-/// Cells in which a face's area is counted, metres.
-const AREA_CELL_M: f64 = 0.02;
 
 /// What the sources of epoch `epoch` show of the stones, relative to the source that shows most of each.
 pub(super) fn contrasts(
@@ -138,7 +136,7 @@ impl Comparison {
         };
         Some(Self {
             pairs: others.iter().map(pair).collect(),
-            spacing_m: spacing(&thinned(&reference.points, params.max_points), &stone.normal),
+            spacing_m: face_spacing(&thinned(&reference.points, params.max_points), &stone.normal),
             sights: seen.iter().map(sight).collect(),
             face_from_world: frame,
         })
@@ -290,15 +288,4 @@ fn thinned(cloud: &Cloud, most: usize) -> Cloud {
         cloud.origin(),
         cloud.offsets().iter().copied().step_by(step).collect(),
     )
-}
-
-/// Mean distance of neighbouring points, seen along the normal.
-fn spacing(cloud: &Cloud, normal: &Vector3<f64>) -> f64 {
-    let frame = FaceFrame::from_normal(normal);
-    let cell = |p: Point3<f64>| {
-        let at = |axis: &Vector3<f64>| (p.coords.dot(axis) / AREA_CELL_M).floor() as i64;
-        (at(&frame.along), at(&frame.up))
-    };
-    let cells: BTreeSet<(i64, i64)> = (0..cloud.len()).map(|i| cell(cloud.local(i))).collect();
-    AREA_CELL_M * (cells.len() as f64 / cloud.len().max(1) as f64).sqrt()
 }

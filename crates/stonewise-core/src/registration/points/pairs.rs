@@ -40,6 +40,9 @@ pub trait PairSource: Sync {
     /// Number of batches.
     fn batch_count(&self) -> usize;
     /// The pairs of a batch.
+    ///
+    /// # Errors
+    /// The batch cannot be read.
     fn load(&self, batch: usize) -> Result<Vec<PairPoints>, Self::Error>;
 }
 

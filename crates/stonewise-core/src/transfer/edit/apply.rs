@@ -8,8 +8,8 @@ use crate::geometry::{Plane, ring_contains};
 use nalgebra::{Point2, Point3};
 use std::collections::BTreeSet;
 
-/// Points further than this from the face of the stones around do not belong to an added stone, metres. 0.15: where the
-/// transfer takes a step in depth for the silhouette of another object.
+/// Points further than this from the face of the stones around do not belong to an added stone, metres. 0.15:
+/// where the transfer takes a step in depth for the silhouette of another object.
 const FACE_DEPTH_M: f64 = 0.15;
 /// Rounds in which points far from the face are left out of its plane: two, as one far point bends the first.
 const FACE_ROUNDS: usize = 3;
@@ -219,7 +219,8 @@ fn distance_m(plane: &Plane, p: &Point3<f64>) -> f64 {
     plane.normal.dot(&(p - plane.centroid)).abs()
 }
 
-/// The plane of the stones around an outline; of the points inside where there are none. `None` where neither gives a plane.
+/// The plane of the stones around an outline; of the points inside where there are none. `None` where neither
+/// gives a plane.
 fn face_around(touched: &Touched, outline: &[Point2<f64>], inside: &[usize]) -> Option<Plane> {
     let low = outline.iter().copied().reduce(|a, b| a.inf(&b))?;
     let high = outline.iter().copied().reduce(|a, b| a.sup(&b))?;

@@ -16,8 +16,8 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct EditReport {
     /// What each edit did, in their order.
     pub effects: Vec<Result<EditEffect, NoEffect>>,
-    /// Of every stone that edits made or changed: the stones as labelled whose points it has. Stones that are gone are not
-    /// among them.
+    /// Of every stone that edits made or changed: the stones as labelled whose points it has. Stones that are
+    /// gone are not among them.
     pub origins: BTreeMap<u32, BTreeSet<u32>>,
     /// Stones as labelled that are gone.
     pub gone: BTreeSet<u32>,
@@ -29,12 +29,15 @@ pub struct EditReport {
 
 /// Applies edits to the labels of a cloud; labels of tiles that change go to `target`.
 ///
-/// A merged stone keeps the lowest number of its parts. Of a stone that is split the part with more points keeps the
-/// number; others get new numbers from [`EditedWall::first_new`] on, in the order of the edits. Points of an added stone
-/// have confidence 0: no photo voted for it.
+/// A merged stone keeps the lowest number of its parts. Of a stone that is split the part with more points
+/// keeps the number; others get new numbers from [`EditedWall::first_new`] on, in the order of the edits.
+/// Points of an added stone have confidence 0: no photo voted for it.
 ///
-/// Errors: a tile or its labels cannot be read or written, interruption. Cost: two passes over the tiles and one over those
-/// that change; memory holds the points of the stones that edits touch.
+/// Cost: two passes over the tiles and one over those that change; memory holds the points of the stones that
+/// edits touch.
+///
+/// # Errors
+/// A tile or its labels cannot be read or written, interruption.
 pub fn edit_labels<T: TileSource, S: LabelStore>(
     tiles: &T,
     labels: &S,

@@ -6,8 +6,8 @@ use std::collections::BTreeSet;
 
 /// How a cloud lies on the wall on which edits are drawn.
 pub struct EditedWall<'a> {
-    /// (along, up, out) of a point, metres: its place on the unrolled wall, and how far it lies in front of any fixed plane
-    /// that is roughly the wall's.
+    /// (along, up, out) of a point, metres: its place on the unrolled wall, and how far it lies in front of
+    /// any fixed plane that is roughly the wall's.
     pub place: &'a (dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
     /// Stones that belong to the side of the wall on which edits are drawn.
     pub stones: &'a BTreeSet<StoneId>,

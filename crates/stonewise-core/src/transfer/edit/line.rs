@@ -3,7 +3,8 @@
 use crate::geometry::ring_contains;
 use nalgebra::Point2;
 
-/// How far the ends of a line may miss the border of a stone, metres. 0.03: a joint's width, and as well as people draw.
+/// How far the ends of a line may miss the border of a stone, metres. 0.03: a joint's width, and as well as
+/// people draw.
 pub(super) const END_TOLERANCE_M: f64 = 0.03;
 /// How far a line is lengthened to divide the wall into two sides, metres: longer than any stone.
 const FAR_M: f64 = 100.0;
@@ -43,8 +44,8 @@ impl DividingLine {
         ring_contains(&self.left, p)
     }
 
-    /// Whether the line, as drawn, reaches from border to border of a stone with these points: those close to the line, which
-    /// is continued straight on for this, lie beside its drawn part.
+    /// Whether the line, as drawn, reaches from border to border of a stone with these points: those close to
+    /// the line, which is continued straight on for this, lie beside its drawn part.
     pub(super) fn crosses<'p>(&self, points: impl Iterator<Item = &'p Point2<f64>>) -> bool {
         let mut is_close = false;
         for p in points {
@@ -102,7 +103,8 @@ mod tests {
         let middle = stone([0.0, 0.0], [0.4, 0.2]);
         assert!(line.crosses(middle.iter()));
         let left = middle.iter().filter(|p| line.is_left(p)).count();
-        // By hand: the line bulges to the right, so that 0.2 x 0.2 m and a triangle of 0.2 x 0.0167 / 2 m lie to its left.
+        // By hand: the line bulges to the right, so that 0.2 x 0.2 m and a triangle of 0.2 x 0.0167 / 2 m lie
+        // to its left.
         let expected = middle.len() as f64 * (0.04 + 0.2 * 0.0167 / 2.0) / 0.08;
         assert!((left as f64 - expected).abs() < 30.0, "{left} {expected}");
         // The stones above and below have its ends, but not the whole line.

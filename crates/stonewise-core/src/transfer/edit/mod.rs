@@ -1,8 +1,9 @@
-//! Corrections of labels by hand: stones that a person merges, splits, deletes or adds, and areas that are ignored.
+//! Corrections of labels by hand: stones that a person merges, splits, deletes or adds, and areas that are
+//! ignored.
 //!
-//! Edits work on the labelled cloud, after the vote of the photos, in the frame of the unrolled wall (along, up): the
-//! same shapes apply to every epoch, whatever its photos and instances are, and points that no edit touches keep
-//! their stone. Edits are applied one after the other, each to what the earlier ones left.
+//! Edits work on the labelled cloud, after the vote of the photos, in the frame of the unrolled wall (along,
+//! up): the same shapes apply to every epoch, whatever its photos and instances are, and points that no edit
+//! touches keep their stone. Edits are applied one after the other, each to what the earlier ones left.
 
 mod apply;
 mod edit_labels;

@@ -11,7 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Stones of 0.4 x 0.2 m in three courses, joints of 2 cm, a point every centimetre; the face leans back.
 const PITCH: [f64; 2] = [0.42, 0.22];
 
-/// (along, up) of the points, in two tiles, and the stone of each: 1 to 9, column by column of a course; 0 in joints.
+/// (along, up) of the points, in two tiles, and the stone of each: 1 to 9, column by column of a course; 0 in
+/// joints.
 fn wall() -> (Vec<Vec<Point2<f64>>>, Vec<TileLabels>) {
     let (mut places, mut labels) = (vec![Vec::new(); 2], vec![TileLabels::default(); 2]);
     for i in 0..126 {
@@ -156,8 +157,8 @@ fn a_deleted_stone_comes_back_as_an_added_one_within_its_outline() {
     let outline = boxed([PITCH[0] - 0.008, PITCH[0] + 0.2], [0.2, 0.5]);
     let (report, points, labels) = edited(&[LabelEdit::Delete(vec![at(5)]), LabelEdit::Add(outline)]);
     assert_eq!(effect(&report, 0), (vec![5], vec![], 800));
-    // By hand: 20 columns of the stone with two rows of either joint, and one column of the joint to the left over all 30 rows; the
-    // stone above keeps its own.
+    // By hand: 20 columns of the stone with two rows of either joint, and one column of the joint to the left
+    // over all 30 rows; the stone above keeps its own.
     let (_, after, count) = effect(&report, 1);
     assert_eq!(after, [10]);
     assert_eq!(points[&10] as u64, count);

@@ -9,12 +9,13 @@ use crate::progress::Progress;
 use nalgebra::{Point2, Point3};
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-/// A place belongs to the stone of the nearest point within this distance, metres. 0.05: half of a small stone, more than
-/// the gaps between points.
+/// A place belongs to the stone of the nearest point within this distance, metres. 0.05: half of a small
+/// stone, more than the gaps between points.
 const PLACE_REACH_M: f64 = 0.05;
 /// Around an added stone, stones within this distance say where the face is, metres: the next course.
 pub(super) const FACE_REACH_M: f64 = 0.5;
-/// Edge of the cells in which the neighbourhood of edits is noted, metres. 0.5: about a stone, and few cells for large areas.
+/// Edge of the cells in which the neighbourhood of edits is noted, metres. 0.5: about a stone, and few cells
+/// for large areas.
 const CELL_M: f64 = 0.5;
 
 /// A point of the wall that edits can touch.
@@ -126,8 +127,8 @@ impl Touched {
         by_stone
     }
 
-    /// Stones as labelled whose points each stone has that differs from how it was labelled. Points of added stones come from none: what
-    /// was voted for there was not this stone.
+    /// Stones as labelled whose points each stone has that differs from how it was labelled. Points of added
+    /// stones come from none: what was voted for there was not this stone.
     pub(super) fn origins(&self) -> BTreeMap<u32, BTreeSet<u32>> {
         let mut changed: BTreeSet<u32> = BTreeSet::new();
         let mut all: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();

@@ -2,7 +2,7 @@
 
 use super::super::{CameraError, malformed};
 use super::model::MODELS;
-use super::{RawCamera, RawImage};
+use super::raw::{RawCamera, RawImage};
 use std::collections::BTreeMap;
 use std::path::Path;
 

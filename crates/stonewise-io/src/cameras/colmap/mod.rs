@@ -4,6 +4,7 @@
 
 mod binary;
 mod model;
+mod raw;
 mod text;
 mod write;
 
@@ -16,25 +17,6 @@ use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Rigid3, View};
 use stonewise_core::id::ImageId;
-
-/// A line of the camera list.
-struct RawCamera {
-    model: String,
-    width: u64,
-    height: u64,
-    params: Vec<f64>,
-    /// Where in the file, for messages.
-    place: String,
-}
-
-/// A line of the image list.
-struct RawImage {
-    rotation_wxyz: [f64; 4],
-    translation: [f64; 3],
-    camera_id: u32,
-    name: String,
-    place: String,
-}
 
 /// Whether a folder holds a COLMAP model, in itself or in its `sparse/0`, `sparse` or `0`.
 pub fn is_camera_folder(folder: &Path) -> bool {

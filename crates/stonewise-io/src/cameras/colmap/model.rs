@@ -1,7 +1,7 @@
 //! COLMAP's camera models and their parameter orders (COLMAP documentation, "Camera Models").
 
 use super::super::{CameraError, malformed};
-use super::RawCamera;
+use super::raw::RawCamera;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion};
 

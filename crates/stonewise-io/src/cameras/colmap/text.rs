@@ -1,7 +1,7 @@
 //! COLMAP's text files.
 
 use super::super::{CameraError, malformed, read_text};
-use super::{RawCamera, RawImage};
+use super::raw::{RawCamera, RawImage};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::FromStr;

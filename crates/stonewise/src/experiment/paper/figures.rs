@@ -1,6 +1,6 @@
 //! Figures 6 to 9 of the paper from our data.
 
-use super::Case;
+use super::case::Case;
 use crate::figure::{Axis, GREY, Item, PALETTE, Plot, Ramp};
 use crate::results::{ResultSet, StoneRow};
 use nalgebra::{Point3, Vector3};

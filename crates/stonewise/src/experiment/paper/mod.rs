@@ -1,5 +1,7 @@
-//! The paper's experiment, section 4 and 5: one epoch split into halves, the second moved, every figure and table again.
+//! The paper's experiment, section 4 and 5: one epoch split into halves, the second moved, every figure and
+//! table again.
 
+mod case;
 mod figures;
 mod page;
 mod segmentation;
@@ -12,16 +14,18 @@ use crate::experiment::halves::halves_of;
 use crate::experiment::known_motion::{KnownMotion, paper_motions};
 use crate::experiment::quiet::Quiet;
 use crate::part::Part;
-use crate::pipeline::{Context, Keeps, StepStore, Until, first_stones, run_in};
-use crate::project::{Epoch, Estimator, Project, Settings};
+use crate::pipeline::{Context, Until, first_stones, run_in};
+use crate::project::{Epoch, Project};
 use crate::results::ResultSet;
+use crate::settings::Settings;
+use crate::storage::store::{Keeps, StepStore};
 use crate::truth::outcome;
+use case::{Case, Method, file_name};
 use nalgebra::{Point3, Vector3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint};
 use stonewise_core::evaluate::{MotionScore, StoneOutcome, score_change, score_stones};
-use stonewise_core::matching::MatchParams;
 use stonewise_core::progress::Progress;
 
 /// A survey whose first epoch is split, under the name of its scanner.
@@ -35,71 +39,16 @@ pub struct PaperSurvey {
     pub paper_part: Option<Part>,
 }
 
-/// How the stones are measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Method {
-    /// With the settings of the project.
-    Ours,
-    /// With the paper's matching and its estimator.
-    Paper,
-}
-
-impl Method {
-    const ALL: [Self; 2] = [Self::Ours, Self::Paper];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Ours => "stonewise",
-            Self::Paper => "the paper's estimator",
-        }
-    }
-
-    fn folder(self) -> &'static str {
-        match self {
-            Self::Ours => "stonewise",
-            Self::Paper => "paper",
-        }
-    }
-
-    fn settings(self, settings: &Settings) -> Settings {
-        let mut settings = settings.clone();
-        if self == Self::Paper {
-            settings.r#match = MatchParams::paper();
-            settings.registration.estimator = Estimator::Gicp;
-        }
-        settings
-    }
-}
-
-/// One run: a survey, a motion, a method.
-pub(super) struct Case {
-    pub survey: String,
-    pub motion: KnownMotion,
-    pub method: Method,
-    pub results: ResultSet,
-    /// All stones.
-    pub stones: MotionScore,
-    /// M3C2 at its core points.
-    pub m3c2: MotionScore,
-    /// The same for the place that moves alone, where only a part does.
-    pub inside: Option<[MotionScore; 2]>,
-}
-
-/// A photo with the outlines of its stones, for the paper's figure 5.
-pub(super) struct Example {
-    pub photo: String,
-    pub instances: usize,
-    pub jpeg: Vec<u8>,
-}
-
 /// Does the whole experiment and writes `index.html`, `tables.md`, `table2.csv` and `figures/` into `out`.
 ///
-/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points and photos; each
-/// half is labelled on its own; the points of the second are moved by the paper's translation, or by its bulge, after
-/// labelling; stones are matched and measured with the project's settings and again in the paper's way; M3C2 runs on the same
-/// clouds. The folder of each run holds its tables. An interrupted experiment goes on where it stopped.
+/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points
+/// and photos; each half is labelled on its own; the points of the second are moved by the paper's
+/// translation, or by its bulge, after labelling; stones are matched and measured with the project's settings
+/// and again in the paper's way; M3C2 runs on the same clouds. The folder of each run holds its tables. An
+/// interrupted experiment goes on where it stopped.
 ///
-/// Errors: no survey, no such epoch, or what stops a run.
+/// # Errors
+/// No survey, no such epoch, or what stops a run.
 pub fn paper(
     surveys: &[PaperSurvey],
     epoch: Option<&str>,
@@ -115,6 +64,10 @@ pub fn paper(
         let halves = halves_of(&survey.project, epoch, seed, &store, progress)?;
         let folder = out.join(file_name(&survey.name));
         let context = Context::with_store(&halves, &folder, Arc::clone(&store), progress)?;
+        let split = SplitSurvey {
+            survey,
+            halves: &halves,
+        };
         let motions = paper_motions(&first_stones(&context)?)?;
         if example.is_none() {
             example = segmentation::example(&context)?;
@@ -123,9 +76,7 @@ pub fn paper(
             for method in Method::ALL {
                 progress.begin(&format!("{}: {}, {}", survey.name, motion.name, method.name()), 1);
                 let folder = folder.join(format!("{}-{}", motion.name, method.folder()));
-                cases.extend(measure(
-                    survey, &halves, motion, method, &folder, &store, progress,
-                )?);
+                cases.extend(measure(&split, motion, method, &folder, &store, progress)?);
                 progress.advance(1);
             }
         }
@@ -153,16 +104,22 @@ fn epoch_of<'a>(project: &'a Project, name: Option<&str>) -> Result<&'a Epoch> {
     })
 }
 
+/// A survey and the project of its halves.
+struct SplitSurvey<'a> {
+    survey: &'a PaperSurvey,
+    halves: &'a Project,
+}
+
 /// Measures one case; `None` where the method finds no stone of the first half in the second.
 fn measure(
-    survey: &PaperSurvey,
-    halves: &Project,
+    split: &SplitSurvey,
     motion: &KnownMotion,
     method: Method,
     folder: &Path,
     store: &Arc<StepStore>,
     progress: &dyn Progress,
 ) -> Result<Option<Case>> {
+    let SplitSurvey { survey, halves } = *split;
     let mut project = halves.clone();
     project.settings = method.settings(&project.settings);
     if method == Method::Paper && survey.paper_part.is_some() {
@@ -230,19 +187,4 @@ fn score_region(
     };
     let face = |p: &ChangePoint| results.facade.frame_at(&p.position).out;
     [stones, score_change(&field, truth, face, &settings.evaluate)]
-}
-
-/// A name as a folder: letters, digits, dashes.
-fn file_name(name: &str) -> PathBuf {
-    let plain: String = name
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() {
-                c.to_ascii_lowercase()
-            } else {
-                '-'
-            }
-        })
-        .collect();
-    plain.into()
 }

@@ -1,7 +1,8 @@
 //! The page of the experiment and its files.
 
+use super::case::{Case, Example, Method, file_name};
+use super::figures;
 use super::tables::{PARAMETER_HEAD, PaperTables, RMSE_HEAD};
-use super::{Case, Example, Method, figures};
 use crate::error::{Error, Result};
 use crate::figure::{Page, Plot, jpeg_element, table};
 use crate::files::write_text;
@@ -50,7 +51,7 @@ pub(super) fn write(
         Ok(())
     };
     for case in cases {
-        let key = super::file_name(&format!("{}-{}", case.survey, case.method.folder()));
+        let key = file_name(&format!("{}-{}", case.survey, case.method.folder()));
         let key = key.to_string_lossy();
         let who = format!("{}, {}", case.survey, case.method.name());
         if case.motion.region.is_none() {

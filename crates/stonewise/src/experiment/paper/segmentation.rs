@@ -1,6 +1,6 @@
 //! Figure 5: a photo with its stones.
 
-use super::Example;
+use super::case::Example;
 use crate::error::Result;
 use crate::files::read_bytes;
 use crate::pipeline::{Context, segment};
@@ -13,7 +13,8 @@ const WIDTH_PX: u32 = 1400;
 /// Share of a stone's colour over the photo.
 const COVER: f64 = 0.45;
 
-/// The photo of the first half with the most instances, each in a colour of its own; `None` where there is no photo.
+/// The photo of the first half with the most instances, each in a colour of its own; `None` where there is no
+/// photo.
 pub(super) fn example(context: &Context) -> Result<Option<Example>> {
     let segmented = segment(context, 1)?;
     let chosen = segmented

@@ -1,6 +1,6 @@
 //! The paper's tables beside ours.
 
-use super::{Case, Method};
+use super::case::{Case, Method};
 use crate::error::Result;
 use crate::figure::number;
 use std::fmt::Write;
@@ -20,8 +20,8 @@ const PAPER: [(&str, &str, [f64; 2]); 4] = [
 pub struct PaperTables {
     /// The paper's parameters and those of our runs: parameter, paper, the paper's estimator here, stonewise.
     pub parameters: Vec<Vec<String>>,
-    /// Method, survey, how many were estimated with either motion, RMSE in-plane per axis (translation) and out of plane
-    /// (bulge) in cm, the paper's two figures.
+    /// Method, survey, how many were estimated with either motion, RMSE in-plane per axis (translation) and
+    /// out of plane (bulge) in cm, the paper's two figures.
     pub rmse: Vec<Vec<String>>,
     /// All figures of every run, one row a method, survey, motion and region.
     pub details: Vec<Detail>,

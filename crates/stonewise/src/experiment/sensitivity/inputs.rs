@@ -3,9 +3,10 @@
 use super::cases::{Change, Variant, changed};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
-use crate::pipeline::{Key, StepStore};
 use crate::project::Project;
 use crate::simulate::{SurveyParams, write_survey};
+use crate::storage::step::Key;
+use crate::storage::store::StepStore;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;

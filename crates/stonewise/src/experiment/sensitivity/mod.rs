@@ -1,15 +1,20 @@
-//! How the results depend on masks, noise, spacing, motion, poses and overlap: what the paper left for future work.
+//! How the results depend on masks, noise, spacing, motion, poses and overlap: what the paper left for future
+//! work.
 
 mod cases;
 mod inputs;
 mod page;
+mod point;
 
 pub use cases::Influence;
+pub use point::{SensitivityOptions, SensitivityPoint};
 
 use crate::error::{Error, Result};
 use crate::experiment::quiet::Quiet;
-use crate::pipeline::{Context, Keeps, StepStore, Until, run_in};
-use crate::project::{Estimator, Project};
+use crate::pipeline::{Context, Until, run_in};
+use crate::project::Project;
+use crate::settings::Estimator;
+use crate::storage::store::{Keeps, StepStore};
 use crate::truth::evaluate_truth;
 use cases::{Variant, base, variants};
 use inputs::inputs;
@@ -20,55 +25,15 @@ use stonewise_core::matching::MatchParams;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
-/// What is varied, on what.
-#[derive(Clone, Debug)]
-pub struct SensitivityOptions {
-    /// Influences; all where empty.
-    pub influences: Vec<Influence>,
-    /// Width and height of the simulated wall, metres.
-    pub size_m: [f64; 2],
-    /// Number of walls; figures are pooled over them.
-    pub seeds: u64,
-    /// Whether the paper's matching and estimator are measured too.
-    pub with_paper: bool,
-}
-
-/// One point of a curve: a variant with a scanner and a method, all walls together.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SensitivityPoint {
-    /// What is varied.
-    pub influence: Influence,
-    /// Which curve of it; empty where there is one.
-    pub kind: String,
-    /// `TLS` or `UAV`.
-    pub scanner: String,
-    /// `stonewise` or `paper`.
-    pub method: String,
-    /// Place on the axis: mean IoU, mm, px or photos.
-    pub x: f64,
-    /// Stones that count, and those that were measured.
-    pub stones: [usize; 2],
-    /// RMSE of the 3D error, per axis in the plane, out of the plane, metres; NaN without measured stones.
-    pub rmse_m: [f64; 3],
-    /// Median of the 3D error, metres.
-    pub median_m: f64,
-    /// Share of measured stones that are wrong by more than 1 cm.
-    pub outlier_rate: f64,
-}
-
-impl SensitivityPoint {
-    /// Share of the stones that were measured.
-    pub fn found_share(&self) -> f64 {
-        self.stones[1] as f64 / self.stones[0].max(1) as f64
-    }
-}
-
-/// Measures all curves on simulated walls and writes `sensitivity.csv`, `index.html` and one SVG a plot into `out`.
+/// Measures all curves on simulated walls and writes `sensitivity.csv`, `index.html` and one SVG a plot into
+/// `out`.
 ///
-/// The base is a wall that moves by the paper's translation between two surveys, without any error of registration; one thing
-/// is changed at a time. Truth is the simulator's. An interrupted experiment goes on where it stopped.
+/// The base is a wall that moves by the paper's translation between two surveys, without any error of
+/// registration; one thing is changed at a time. Truth is the simulator's. An interrupted experiment goes on
+/// where it stopped.
 ///
-/// Errors: what stops a simulation or a run. A variant in which nothing can be measured is a point with no stones.
+/// # Errors
+/// What stops a simulation or a run. A variant in which nothing can be measured is a point with no stones.
 pub fn sensitivity(
     options: &SensitivityOptions,
     out: &Path,
@@ -168,7 +133,8 @@ fn point(
     }
 }
 
-/// The same variant on several walls: counts are added, squares and shares weighted by the stones that were measured.
+/// The same variant on several walls: counts are added, squares and shares weighted by the stones that were
+/// measured.
 fn pooled(walls: &[Vec<SensitivityPoint>]) -> Vec<SensitivityPoint> {
     let Some(first) = walls.first() else {
         return Vec::new();

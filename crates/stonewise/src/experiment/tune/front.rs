@@ -1,7 +1,8 @@
 //! Which grid points are worth a look: no other is better in both ways.
 
-/// A share of the most stones that the recommended point must measure at least: 0.95, as the paper asks for the lowest
-/// RMSE and for the most matches at once, and a twentieth of the stones is not worth much accuracy.
+/// A share of the most stones that the recommended point must measure at least: 0.95, as the paper asks for
+/// the lowest RMSE and for the most matches at once, and a twentieth of the stones is not worth much
+/// accuracy.
 const ENOUGH: f64 = 0.95;
 
 /// What a grid point is worth.
@@ -15,8 +16,8 @@ pub(super) struct Worth {
     pub changes: usize,
 }
 
-/// Indices of the points that no other beats: more stones at the same error, or less error with as many stones.
-/// Ascending by number of stones.
+/// Indices of the points that no other beats: more stones at the same error, or less error with as many
+/// stones. Ascending by number of stones.
 pub(super) fn front(points: &[Worth]) -> Vec<usize> {
     let mut order: Vec<(usize, f64)> = points
         .iter()
@@ -44,7 +45,8 @@ pub(super) fn front(points: &[Worth]) -> Vec<usize> {
 pub(super) fn recommended(points: &[Worth]) -> Option<usize> {
     let front = front(points);
     let most = points[*front.last()?].stones;
-    // Along the front the error rises with the number of stones: the first that measures enough has the least.
+    // Along the front the error rises with the number of stones: the first that measures enough has the
+    // least.
     front.into_iter().find(|&i| points[i].stones >= ENOUGH * most)
 }
 

@@ -1,6 +1,6 @@
 //! Which values of which parameters are tried.
 
-use crate::project::{Estimator, Settings};
+use crate::settings::{Estimator, Settings};
 use std::str::FromStr;
 
 /// One parameter and the values that are tried.
@@ -77,9 +77,11 @@ fn range(text: &str) -> Option<Vec<toml::Value>> {
     )
 }
 
-/// The grid that is tried where none is given: the paper's three parameters, with values on both sides of its choice.
+/// The grid that is tried where none is given: the paper's three parameters, with values on both sides of its
+/// choice.
 ///
-/// The buffer belongs to plane-to-plane ICP; the adjustment has the border instead that it leaves out of every stone.
+/// The buffer belongs to plane-to-plane ICP; the adjustment has the border instead that it leaves out of
+/// every stone.
 pub fn default_grid(settings: &Settings) -> Vec<Dimension> {
     let dimension = |key: &str, values: &[f64]| Dimension {
         key: key.to_owned(),

@@ -3,8 +3,10 @@
 mod front;
 mod grid;
 mod page;
+mod tuned;
 
 pub use grid::{Dimension, DimensionError, default_grid};
+pub use tuned::{PointErrors, TuneOptions, Tuned, TunedPoint};
 
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
@@ -12,9 +14,9 @@ use crate::experiment::known_motion::paper_motions;
 use crate::experiment::quiet::Quiet;
 use crate::experiment::settings_with::{count_changes, project_lines, settings_with};
 use crate::files::write_text;
-use crate::part::Part;
-use crate::pipeline::{Context, Keeps, StepStore, Until, first_stones, run_in};
+use crate::pipeline::{Context, Until, first_stones, run_in};
 use crate::project::Project;
+use crate::storage::store::{Keeps, StepStore};
 use front::{Worth, front, recommended};
 use std::path::Path;
 use std::sync::Arc;
@@ -22,72 +24,18 @@ use stonewise_core::evaluate::MotionScore;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
 
-/// What is tuned, on what.
-#[derive(Clone, Debug, Default)]
-pub struct TuneOptions {
-    /// Parameters and their values; [`default_grid`] where empty.
-    pub grid: Vec<Dimension>,
-    /// Points that take part; all where absent.
-    pub part: Option<Part>,
-    /// Which points and photos go to which half, where the project knows no motion.
-    pub seed: u64,
-}
-
-/// One point of the grid and what it came to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TunedPoint {
-    /// Values, in the order of the grid's dimensions.
-    pub values: Vec<toml::Value>,
-    /// Stones of the first epoch.
-    pub stones: f64,
-    /// Of them, matched; mean over the motions.
-    pub matched: f64,
-    /// Of them, measured; mean over the motions.
-    pub measured: f64,
-    /// Errors of the measured stones; `None` where there are none.
-    pub errors: Option<PointErrors>,
-    /// Why the stones could not be measured.
-    pub failure: Option<String>,
-}
-
-/// Errors of a grid point, all motions together, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointErrors {
-    /// RMSE of the norm of the 3D error: what is made small.
-    pub rmse_m: f64,
-    /// RMSE per axis in the plane of the face, as the paper's in-plane figures.
-    pub in_plane_m: f64,
-    /// RMSE out of the plane.
-    pub out_of_plane_m: f64,
-    /// 95th percentile of the norm, the worst motion's.
-    pub p95_m: f64,
-    /// Share of stones that are wrong by more than `outlier_m`.
-    pub outlier_rate: f64,
-}
-
-/// A finished grid.
-#[derive(Clone, Debug)]
-pub struct Tuned {
-    /// Its dimensions.
-    pub grid: Vec<Dimension>,
-    /// All points, the last dimension changing fastest.
-    pub points: Vec<TunedPoint>,
-    /// Indices of the points that no other beats in error and number of stones, ascending by number of stones.
-    pub front: Vec<usize>,
-    /// The point on the front with the lowest error among those with at least 95 % of the most stones.
-    pub recommended: Option<usize>,
-    /// Lines for the project file that set the recommended values.
-    pub lines: String,
-}
-
-/// Tries every combination of parameters and writes `tune.csv`, `index.html`, `tune.svg` and `recommended.toml` into `out`.
+/// Tries every combination of parameters and writes `tune.csv`, `index.html`, `tune.svg` and
+/// `recommended.toml` into `out`.
 ///
-/// Truth is the project's known motion. A project without one is split: epoch 1 into halves ([`crate::split()`]), the points
-/// of the second moved once by the paper's translation and once by its bulge; errors are pooled over both, because the
-/// translation alone would favour any amount of smoothing. Points of the grid run in parallel; steps are kept in `out/work`,
-/// one version for each set of parameters, so that points share what they have in common and an interrupted grid goes on.
+/// Truth is the project's known motion. A project without one is split: epoch 1 into halves
+/// ([`crate::split()`]), the points of the second moved once by the paper's translation and once by its
+/// bulge; errors are pooled over both, because the translation alone would favour any amount of smoothing.
+/// Points of the grid run in parallel; steps are kept in `out/work`, one version for each set of parameters,
+/// so that points share what they have in common and an interrupted grid goes on.
 ///
-/// Errors: a parameter or value that cannot be, no stones, files. A grid point that cannot be measured is a row that says why.
+/// # Errors
+/// A parameter or value that cannot be, no stones, files. A grid point that cannot be measured is a row that
+/// says why.
 pub fn tune(project: &Project, options: &TuneOptions, out: &Path, progress: &dyn Progress) -> Result<Tuned> {
     let grid = match options.grid.as_slice() {
         [] => default_grid(&project.settings),

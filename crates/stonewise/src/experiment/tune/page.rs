@@ -117,7 +117,8 @@ fn scatter(tuned: &Tuned) -> Plot {
     plot
 }
 
-/// The best of a figure for each value of one dimension; `figure` is larger where better, and may be a negated error.
+/// The best of a figure for each value of one dimension; `figure` is larger where better, and may be a
+/// negated error.
 fn marginal(
     tuned: &Tuned,
     dimension: usize,

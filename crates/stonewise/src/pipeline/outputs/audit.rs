@@ -9,7 +9,8 @@ use stonewise_core::id::ImageId;
 use stonewise_core::transfer::AuditEvent;
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `audit_epochN.csv`: what the majority of the photos decided about merged, split and dropped instances.
+/// Writes `audit_epochN.csv`: what the majority of the photos decided about merged, split and dropped
+/// instances.
 pub fn write_audit(context: &Context, number: usize, photos: &Segmented, labelled: &Labelled) -> Result<()> {
     let rows: Vec<AuditRow> = labelled
         .transfer

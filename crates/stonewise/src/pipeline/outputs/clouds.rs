@@ -4,9 +4,9 @@ use crate::error::{Error, Result};
 use crate::output::cloud_names;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::storage::step::Key;
 use crate::results::StoneRow;
 use crate::results::names::epoch_dir;
+use crate::storage::step::Key;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
@@ -32,7 +32,8 @@ pub fn write_clouds(
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
     context.step_publishing(&format!("clouds-{number}"), key, &outputs, |_, _| {
-        // Of two processes that do the same unit the slower one must not take away what the other has finished.
+        // Of two processes that do the same unit the slower one must not take away what the other has
+        // finished.
         let removes = !context.store.is_of_unit();
         for stale in outputs.iter().filter(|o| removes && o.exists()) {
             fs::remove_file(stale).map_err(Error::io("removing a cloud of an earlier run", stale))?;

@@ -5,7 +5,8 @@ use crate::project::Project;
 use stonewise_io::cloud::cloud_crs;
 use stonewise_io::crs::Crs;
 
-/// The system that the first epoch's clouds name; `None` for a local frame, or where they name different ones.
+/// The system that the first epoch's clouds name; `None` for a local frame, or where they name different
+/// ones.
 pub fn coordinate_system(project: &Project) -> Result<Option<Crs>> {
     let mut found: Option<Crs> = None;
     for cloud in project.epochs.iter().take(1).flat_map(|e| &e.clouds) {

@@ -8,8 +8,8 @@ use crate::results::names::{EDITS_AUDIT, FACADE};
 use stonewise_core::transfer::{EditEffect, NoEffect};
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `audit_edits.csv`, one row for each edit and epoch, and `facade.json`, the wall on which the stones are unrolled; names
-/// edits that did nothing in any epoch. Nothing where the project has no edits.
+/// Writes `audit_edits.csv`, one row for each edit and epoch, and `facade.json`, the wall on which the stones
+/// are unrolled; names edits that did nothing in any epoch. Nothing where the project has no edits.
 pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<()> {
     let (Some(edited), Some(file)) = (edited, &context.project.edits) else {
         return Ok(());

@@ -22,8 +22,8 @@ const DIMENSIONS: [&str; 6] = [
     "lod95_mm",
 ];
 
-/// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on the scale of
-/// the report, grey where that was not measured.
+/// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on
+/// the scale of the report, grey where that was not measured.
 pub fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
     let colours = FaceColours::new(rows);
     let by_id: BTreeMap<u32, &StoneRow> = rows.iter().map(|r| (r.stone_id, r)).collect();

@@ -3,9 +3,9 @@
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::storage::step::{Key, StepDir};
 use crate::results::names::OUTLINES;
 use crate::results::{StoneOutline, write_outlines};
+use crate::storage::step::{Key, StepDir};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::fs;

@@ -13,7 +13,8 @@ use crate::results::records::{
 };
 use std::path::Path;
 
-/// Writes `run.json`; `datums`: what is known about the registration of each later epoch, `verdict`: the verdict on the run.
+/// Writes `run.json`; `datums`: what is known about the registration of each later epoch, `verdict`: the
+/// verdict on the run.
 pub fn write_run_record(
     context: &Context,
     photos: &[Segmented],

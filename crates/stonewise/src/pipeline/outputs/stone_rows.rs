@@ -7,10 +7,9 @@ use crate::results::records::Datum;
 use crate::results::{Facade, Reference, StoneRow};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use stonewise_core::geometry::{DisplacementSample, SmallMotion};
-use stonewise_core::id::StoneId;
+use stonewise_core::geometry::SmallMotion;
 use stonewise_core::registration::observers::ErrorAt;
-use stonewise_core::stone::{MatchOutcome, PairResult, Stone};
+use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
 
 /// One row for each stone of the first epoch.
 pub fn stone_rows(
@@ -60,30 +59,13 @@ pub fn stone_rows(
     first.iter().filter_map(row).collect()
 }
 
-/// The common rigid motion of the measured stones that are not loose, which motions are tested against where the datum is unknown.
+/// The common rigid motion of the measured stones that are not loose, which motions are tested against where
+/// the datum is unknown.
 pub fn motion_in_common(first: &Labelled, registered: &Registered) -> Option<SmallMotion> {
     common_motion(
         &first.stones,
         &registered.results.iter().map(|r| (r.first, r)).collect(),
     )
-}
-
-/// The same, motions by stone.
-fn common_motion(stones: &[Stone], motions: &BTreeMap<StoneId, &PairResult>) -> Option<SmallMotion> {
-    let sample = |stone: &Stone| {
-        let motion = motions
-            .get(&stone.id)?
-            .motion
-            .as_ref()
-            .ok()
-            .filter(|m| !m.loose)?;
-        Some(DisplacementSample {
-            place: stone.centroid,
-            displacement: motion.displacement,
-            covariance: motion.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
-        })
-    };
-    SmallMotion::fit(&stones.iter().filter_map(sample).collect::<Vec<_>>())
 }
 
 /// The motion less the error of the later epoch there.

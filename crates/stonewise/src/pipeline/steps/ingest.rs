@@ -2,9 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
-use crate::pipeline::storage::epoch_tiles::EpochTiles;
-use crate::pipeline::storage::step::{Key, StepDir};
-use crate::pipeline::storage::tiles::{DiskTiles, cut_into_tiles};
+use crate::storage::epoch_tiles::EpochTiles;
+use crate::storage::step::{Key, StepDir};
+use crate::storage::tiles::{DiskTiles, cut_into_tiles};
 use nalgebra::Point3;
 use stonewise_core::cloud::TileSource;
 

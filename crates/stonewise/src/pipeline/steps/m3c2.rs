@@ -3,9 +3,9 @@
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::label_batch::batch_name;
-use crate::pipeline::storage::step::{Key, StepDir};
+use crate::pipeline::steps::label::batches::batch_name;
 use crate::results::records::Datum;
+use crate::storage::step::{Key, StepDir};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::ops::Range;
 use std::path::Path;

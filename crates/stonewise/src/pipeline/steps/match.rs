@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 use nalgebra::Point3;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{CellSet, cell_of};

@@ -4,7 +4,6 @@ pub mod edit;
 pub mod evaluate;
 pub mod ingest;
 pub mod label;
-pub mod label_batch;
 pub mod m3c2;
 pub mod r#match;
 pub mod offsets;

@@ -5,7 +5,7 @@ use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -99,8 +99,8 @@ struct Place {
     normal: Vector3<f64>,
 }
 
-/// Matched stones, spread over the list; the later epoch's place follows the labels around the stone, whose outlines differ
-/// one by one.
+/// Matched stones, spread over the list; the later epoch's place follows the labels around the stone, whose
+/// outlines differ one by one.
 fn places(first: &[Stone], second: &[Stone], matches: &[(StoneId, StoneId)]) -> Vec<Place> {
     let find = |stones: &[Stone], id: StoneId| {
         let found = stones.binary_search_by_key(&id, |s| s.id).ok()?;

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::kept::files_of;
 use crate::pipeline::context::Context;
-use crate::pipeline::storage::step::Key;
+use crate::storage::step::Key;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;

@@ -8,9 +8,9 @@ use crate::files::write_readable_json;
 use crate::output::{OutputFolder, UNFINISHED_FILE};
 use crate::pipeline::context::Context;
 use crate::pipeline::look::look;
-use crate::pipeline::storage::step::{Key, code_version};
 use crate::project::Project;
 use crate::results::names::{RUN, WORK_DIR};
+use crate::storage::step::{Key, code_version};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fs;
@@ -54,8 +54,8 @@ pub struct PlanOptions {
 }
 
 impl Default for PlanOptions {
-    /// Batches of 4 million points: at 3 million points and photos a second and core, and ten photos a point, 14 seconds; much longer
-    /// than it takes to start a process, and 50 batches for a cloud of 200 million.
+    /// Batches of 4 million points: at 3 million points and photos a second and core, and ten photos a point,
+    /// 14 seconds; much longer than it takes to start a process, and 50 batches for a cloud of 200 million.
     fn default() -> Self {
         Self {
             batch_points: 4_000_000,
@@ -74,12 +74,12 @@ pub struct Coordinator {
 
 /// Plans the units of a run in a folder and notes the plan there.
 ///
-/// Units that were done for the same plan stay done; results of an earlier run lie aside until the last unit is done. `parameters`
-/// replace those of the project file. Every input is read once for its digest.
+/// Units that were done for the same plan stay done; results of an earlier run lie aside until the last unit
+/// is done. `parameters` replace those of the project file. Every input is read once for its digest.
 ///
 /// # Errors
-/// A project file that is wrong, an input that cannot be read, a survey that cannot be right, a folder that must not be written into, a
-/// full disk, interruption.
+/// A project file that is wrong, an input that cannot be read, a survey that cannot be right, a folder that
+/// must not be written into, a full disk, interruption.
 pub fn plan(
     project: &Path,
     parameters: &Map<String, Value>,

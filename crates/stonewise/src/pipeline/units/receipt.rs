@@ -92,7 +92,8 @@ fn remove(path: &Path, how: impl FnOnce(&Path) -> std::io::Result<()>) -> Result
     }
 }
 
-/// Times of the steps whose units are done, by the name of the step; those of a step that was done in parts are added up.
+/// Times of the steps whose units are done, by the name of the step; those of a step that was done in parts
+/// are added up.
 pub(super) fn times<'a>(
     out: &Path,
     plan: &str,

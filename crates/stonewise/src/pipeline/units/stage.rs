@@ -1,11 +1,11 @@
 //! The units of a project: what each is, what it needs, and what it will take.
 
 use crate::error::Result;
-use crate::pipeline::steps::label_batch::{PREPARE, batch_name};
+use crate::pipeline::steps::label::batches::{PREPARE, batch_name};
 use crate::pipeline::steps::segment::{part_name, photos_to_segment};
-use crate::pipeline::storage::tiles::most_records;
 use crate::pipeline::units::receipt::receipt_file;
 use crate::project::{Epoch, Project};
+use crate::storage::tiles::most_records;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -66,7 +66,8 @@ pub struct Unit {
     pub rank: usize,
     /// The units that it needs; what these need is left out.
     pub needs: Vec<String>,
-    /// Files that must be there: of the survey, and, relative to the results folder, the outputs of the units that it needs.
+    /// Files that must be there: of the survey, and, relative to the results folder, the outputs of the units
+    /// that it needs.
     pub inputs: Vec<PathBuf>,
     /// The file, relative to the results folder, that says it is done.
     pub output: PathBuf,
@@ -82,15 +83,18 @@ pub struct Unit {
 
 /// Memory of any unit before it has read anything, bytes: the program, its threads, buffers of files.
 const BASE_BYTES: u64 = 512 << 20;
-/// Memory of the step `register` for each point of both epochs, bytes: 4.1 to 5.1 GB were measured for 67 million.
+/// Memory of the step `register` for each point of both epochs, bytes: 4.1 to 5.1 GB were measured for 67
+/// million.
 const REGISTER_BYTES: u64 = 80;
-/// Memory of other steps that go through a cloud, for each of its points, bytes: the labels of the points of a file while it is
-/// written, the cells that are covered while stones are matched.
+/// Memory of other steps that go through a cloud, for each of its points, bytes: the labels of the points of
+/// a file while it is written, the cells that are covered while stones are matched.
 const POINT_BYTES: u64 = 16;
-/// Memory of the detector for each pixel of a photo, bytes: the photo as numbers at two sizes, and a tile a thread.
+/// Memory of the detector for each pixel of a photo, bytes: the photo as numbers at two sizes, and a tile a
+/// thread.
 const PIXEL_BYTES: u64 = 100;
 
-/// All units of a project, each after those that it needs; `batch_points`: points of a cloud in a batch of tiles, about.
+/// All units of a project, each after those that it needs; `batch_points`: points of a cloud in a batch of
+/// tiles, about.
 pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>> {
     let mut list = List::default();
     let points = project
@@ -102,106 +106,65 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
     for (n, epoch) in (1..).zip(&project.epochs) {
         let of_cloud = POINT_BYTES * points[n - 1];
         // Tiles are sorted in a buffer of a quarter of a gibibyte.
-        list.add(Stage::Ingest, n, &[], 2, 256 << 20, &epoch.clouds);
-        let photo_bytes = PIXEL_BYTES * most_pixels(epoch)?;
-        let mut photos = Vec::new();
-        let count = photos_to_segment(epoch)?;
-        for photo in 0..count {
-            let id = format!("segment-{n}.{}", part_name(photo));
-            let inputs = [epoch.cameras.clone(), epoch.images.clone()];
-            list.push(
-                id.clone(),
-                Stage::SegmentPhoto,
-                Some(n),
-                &[],
-                4,
-                photo_bytes,
-                &inputs,
-            );
-            list.last(|unit| {
-                (unit.part, unit.parts) = (Some(photo), Some(count));
-                unit.gpu = stonewise_segment::backend::can_use_gpu();
-            });
-            photos.push(id);
-        }
-        let inputs = [epoch.cameras.clone()].into_iter().chain(epoch.masks.clone());
-        list.add(
-            Stage::Segment,
-            n,
-            &photos,
-            2,
-            photo_bytes,
-            &inputs.collect::<Vec<_>>(),
-        );
+        let ingest = Work::of(&[], 2, 256 << 20);
+        list.add(Stage::Ingest, n, ingest.reading(&epoch.clouds));
+        list.add_photos(n, epoch)?;
         list.add_labels(n, batches_of(points[n - 1], batch_points), depth_maps, of_cloud);
-        list.add(Stage::Stones, n, &[format!("label-{n}")], 1, of_cloud, &[]);
+        list.add(Stage::Stones, n, Work::of(&[format!("label-{n}")], 1, of_cloud));
     }
     // Corrections by hand look at the stones of all epochs.
     let stones: Vec<String> = (1..=project.epochs.len())
         .map(|n| format!("stones-{n}"))
         .collect();
-    let bytes = 2 * POINT_BYTES * points[0];
-    list.push(
-        "outlines".to_owned(),
-        Stage::Outlines,
-        None,
-        &stones,
-        1,
-        bytes,
-        &[],
-    );
+    let outlines = Work::of(&stones, 1, 2 * POINT_BYTES * points[0]);
+    list.push("outlines".to_owned(), Stage::Outlines, None, outlines);
     for n in 2..=project.epochs.len() {
-        let both = points[0] + points[n - 1];
-        list.add(
-            Stage::Match,
-            n,
-            &["outlines".to_owned()],
-            1,
-            POINT_BYTES * both,
-            &[],
-        );
-        list.add(Stage::Offsets, n, &[format!("match-{n}")], 2, 0, &[]);
-        list.add(
-            Stage::Register,
-            n,
-            &[format!("match-{n}")],
-            8,
-            REGISTER_BYTES * both,
-            &[],
-        );
-        let clouds = [
-            "ingest-1".to_owned(),
-            format!("ingest-{n}"),
-            "segment-1".to_owned(),
-        ];
-        list.add_batches(
-            Stage::M3c2Tiles,
-            n,
-            batches_of(points[0], batch_points),
-            &clouds,
-            512 << 20,
-        );
-        list.finish_batches(Stage::M3c2, n, POINT_BYTES * points[0]);
+        list.add_pair(n, [points[0], points[n - 1]], batch_points);
     }
     for n in 1..=project.epochs.len() {
         let needs = match n {
             1 => "register-2".to_owned(),
             _ => "outlines".to_owned(),
         };
-        let needs = [needs];
-        list.add(Stage::Clouds, n, &needs, 1, POINT_BYTES * points[n - 1], &[]);
+        list.add(
+            Stage::Clouds,
+            n,
+            Work::of(&[needs], 1, POINT_BYTES * points[n - 1]),
+        );
     }
     let rest = list.not_needed();
-    list.push(
-        "report".to_owned(),
-        Stage::Report,
-        None,
-        &rest,
-        2,
-        POINT_BYTES * points.iter().sum::<u64>(),
-        &[],
-    );
+    let report = Work::of(&rest, 2, POINT_BYTES * points.iter().sum::<u64>());
+    list.push("report".to_owned(), Stage::Report, None, report);
     Ok(list.units)
+}
+
+/// What a unit needs.
+#[derive(Clone, Copy)]
+struct Work<'a> {
+    /// Units that come first.
+    needs: &'a [String],
+    cores: u32,
+    /// Memory beyond that at rest.
+    bytes: u64,
+    /// Files of the survey that it reads.
+    inputs: &'a [PathBuf],
+}
+
+impl<'a> Work<'a> {
+    /// A unit that reads no file of the survey.
+    fn of(needs: &'a [String], cores: u32, bytes: u64) -> Self {
+        Self {
+            needs,
+            cores,
+            bytes,
+            inputs: &[],
+        }
+    }
+
+    /// The same, reading these files.
+    fn reading(self, inputs: &'a [PathBuf]) -> Self {
+        Self { inputs, ..self }
+    }
 }
 
 /// Units as they are added.
@@ -212,32 +175,13 @@ struct List {
 }
 
 impl List {
-    fn add(
-        &mut self,
-        stage: Stage,
-        epoch: usize,
-        needs: &[String],
-        cores: u32,
-        bytes: u64,
-        inputs: &[PathBuf],
-    ) {
-        let id = format!("{}-{epoch}", stage.step());
-        self.push(id, stage, Some(epoch), needs, cores, bytes, inputs);
+    fn add(&mut self, stage: Stage, epoch: usize, work: Work) {
+        self.push(format!("{}-{epoch}", stage.step()), stage, Some(epoch), work);
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn push(
-        &mut self,
-        id: String,
-        stage: Stage,
-        epoch: Option<usize>,
-        needs: &[String],
-        cores: u32,
-        bytes: u64,
-        inputs: &[PathBuf],
-    ) {
-        let outputs = needs.iter().map(|id| receipt_file(id));
-        let ranks = needs.iter().filter_map(|id| self.ranks.get(id));
+    fn push(&mut self, id: String, stage: Stage, epoch: Option<usize>, work: Work) {
+        let outputs = work.needs.iter().map(|id| receipt_file(id));
+        let ranks = work.needs.iter().filter_map(|id| self.ranks.get(id));
         let rank = ranks.max().map_or(0, |rank| rank + 1);
         self.ranks.insert(id.clone(), rank);
         self.units.push(Unit {
@@ -246,15 +190,54 @@ impl List {
             part: None,
             parts: None,
             rank,
-            needs: needs.to_vec(),
-            inputs: inputs.iter().cloned().chain(outputs).collect(),
+            needs: work.needs.to_vec(),
+            inputs: work.inputs.iter().cloned().chain(outputs).collect(),
             output: receipt_file(&id),
-            cores,
-            memory_bytes: BASE_BYTES + bytes,
+            cores: work.cores,
+            memory_bytes: BASE_BYTES + work.bytes,
             gpu: false,
             done: false,
             id,
         });
+    }
+
+    /// The photos of an epoch, one by one where the detector looks at them, and the step that gathers them.
+    fn add_photos(&mut self, n: usize, epoch: &Epoch) -> Result<()> {
+        let bytes = PIXEL_BYTES * most_pixels(epoch)?;
+        let mut photos = Vec::new();
+        let count = photos_to_segment(epoch)?;
+        for photo in 0..count {
+            let id = format!("segment-{n}.{}", part_name(photo));
+            let inputs = [epoch.cameras.clone(), epoch.images.clone()];
+            let work = Work::of(&[], 4, bytes).reading(&inputs);
+            self.push(id.clone(), Stage::SegmentPhoto, Some(n), work);
+            self.last(|unit| {
+                (unit.part, unit.parts) = (Some(photo), Some(count));
+                unit.gpu = stonewise_segment::backend::can_use_gpu();
+            });
+            photos.push(id);
+        }
+        let inputs = [epoch.cameras.clone()].into_iter().chain(epoch.masks.clone());
+        let inputs: Vec<PathBuf> = inputs.collect();
+        self.add(Stage::Segment, n, Work::of(&photos, 2, bytes).reading(&inputs));
+        Ok(())
+    }
+
+    /// A later epoch against the first; `points`: of both.
+    fn add_pair(&mut self, n: usize, points: [u64; 2], batch_points: u64) {
+        let both = points[0] + points[1];
+        let (outlines, matched) = (["outlines".to_owned()], [format!("match-{n}")]);
+        self.add(Stage::Match, n, Work::of(&outlines, 1, POINT_BYTES * both));
+        self.add(Stage::Offsets, n, Work::of(&matched, 2, 0));
+        self.add(Stage::Register, n, Work::of(&matched, 8, REGISTER_BYTES * both));
+        let clouds = [
+            "ingest-1".to_owned(),
+            format!("ingest-{n}"),
+            "segment-1".to_owned(),
+        ];
+        let batches = batches_of(points[0], batch_points);
+        self.add_batches(Stage::M3c2Tiles, n, batches, &clouds, 512 << 20);
+        self.finish_batches(Stage::M3c2, n, POINT_BYTES * points[0]);
     }
 
     /// Labels of an epoch: what all batches need, the batches, and the whole.
@@ -266,10 +249,7 @@ impl List {
             prepare.clone(),
             Stage::LabelPrepare,
             Some(n),
-            &needs,
-            4,
-            bytes,
-            &[],
+            Work::of(&needs, 4, bytes),
         );
         self.add_batches(Stage::LabelTiles, n, batches, &[prepare], bytes);
         self.finish_batches(Stage::Label, n, of_cloud);
@@ -279,7 +259,7 @@ impl List {
     fn add_batches(&mut self, stage: Stage, n: usize, batches: usize, needs: &[String], bytes: u64) {
         for batch in 0..batches {
             let id = format!("{}-{n}.{}", stage.step(), batch_name(batch, batches));
-            self.push(id, stage, Some(n), needs, 4, bytes, &[]);
+            self.push(id, stage, Some(n), Work::of(needs, 4, bytes));
             self.last(|unit| (unit.part, unit.parts) = (Some(batch), Some(batches)));
         }
     }
@@ -289,7 +269,7 @@ impl List {
         let parts = self.units.last().and_then(|u| u.parts).unwrap_or(1);
         let batches = &self.units[self.units.len() - parts..];
         let needs: Vec<String> = batches.iter().map(|u| u.id.clone()).collect();
-        self.add(stage, n, &needs, 1, bytes, &[]);
+        self.add(stage, n, Work::of(&needs, 1, bytes));
         self.last(|unit| unit.parts = Some(parts));
     }
 
@@ -331,7 +311,8 @@ fn batches_of(points: u64, batch_points: u64) -> usize {
     points.div_ceil(batch_points.max(1)).clamp(1, 999) as usize
 }
 
-/// Points that the clouds of an epoch say they hold; of files that do not say so, as many as fit in their length.
+/// Points that the clouds of an epoch say they hold; of files that do not say so, as many as fit in their
+/// length.
 fn points_of(clouds: &[PathBuf]) -> Result<u64> {
     clouds.iter().map(|cloud| most_records(cloud)).sum()
 }

@@ -16,16 +16,16 @@ use crate::pipeline::run::{
     Corrected, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
 };
 use crate::pipeline::steps::ingest::ingest;
+use crate::pipeline::steps::label::batches::LabelBatches;
 use crate::pipeline::steps::label::gather_labels;
-use crate::pipeline::steps::label_batch::LabelBatches;
 use crate::pipeline::steps::m3c2::Comparison;
 use crate::pipeline::steps::offsets::label_offsets;
 use crate::pipeline::steps::register::register;
 use crate::pipeline::steps::segment::{segment, segment_photo};
-use crate::pipeline::storage::step::code_version;
-use crate::pipeline::storage::store::Scope;
 use crate::pipeline::until::Until;
 use crate::project::Project;
+use crate::storage::step::code_version;
+use crate::storage::store::Scope;
 use std::path::Path;
 use stonewise_core::change::OutwardReference;
 use stonewise_core::geometry::View;
@@ -43,12 +43,12 @@ pub struct UnitDone {
 
 /// Does one unit of the plan in a results folder.
 ///
-/// A unit that is done is left as it is. Any number of processes may do units at the same time, also the same one; their files appear
-/// whole or not at all.
+/// A unit that is done is left as it is. Any number of processes may do units at the same time, also the same
+/// one; their files appear whole or not at all.
 ///
 /// # Errors
-/// No such unit; a unit that it needs is not done; the plan is that of other inputs, or of another program; a run works in the folder;
-/// whatever the step may fail with.
+/// No such unit; a unit that it needs is not done; the plan is that of other inputs, or of another program; a
+/// run works in the folder; whatever the step may fail with.
 pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone> {
     let file = plan_file(out);
     let stale = |message: &str| Error::Plan {
@@ -88,7 +88,8 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         do_stage(&context, unit, plan.forced)?
     };
     if summary.is_some() {
-        // The last unit: all others are done, and what they left unfinished when they were killed is of no use.
+        // The last unit: all others are done, and what they left unfinished when they were killed is of no
+        // use.
         folder.sweep(&project);
         folder.finish_results(true)?;
     }

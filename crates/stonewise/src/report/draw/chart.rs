@@ -10,7 +10,18 @@ pub(crate) struct Series<'a> {
     pub points: Vec<[f64; 2]>,
 }
 
-/// A square scatter plot with equal scales, millimetres; `cross` marks a known truth, `diagonal` the line y = x.
+/// What a scatter plot shows beside its points.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Guide {
+    /// Nothing.
+    None,
+    /// A cross at a known truth, millimetres.
+    Cross([f64; 2]),
+    /// The line y = x.
+    Diagonal,
+}
+
+/// A square scatter plot with equal scales, millimetres.
 ///
 /// `key`: what the page's program calls the plot; empty where its points are no stones.
 pub(crate) fn scatter(
@@ -19,8 +30,7 @@ pub(crate) fn scatter(
     labels: [&str; 2],
     series: &[Series],
     limits_mm: [[f64; 2]; 2],
-    cross: Option<[f64; 2]>,
-    diagonal: bool,
+    guide: Guide,
 ) -> String {
     let axes = Axes {
         x: Axis::linear(labels[0], limits_mm[0]),
@@ -40,7 +50,7 @@ pub(crate) fn scatter(
     if let Some(zero) = zero_lines(&axes) {
         let _ = write!(out, r#"<path class="zero" d="{zero}"/>"#);
     }
-    if diagonal {
+    if matches!(guide, Guide::Diagonal) {
         let ([x0, x1], [y0, y1]) = (axes.x.range, axes.y.range);
         let (low, high) = (x0.max(y0), x1.min(y1));
         let [x0, y0, x1, y1] = [axes.px(low), axes.py(low), axes.px(high), axes.py(high)];
@@ -57,7 +67,7 @@ pub(crate) fn scatter(
             dots(&s.points, &axes)
         );
     }
-    if let Some([x, y]) = cross {
+    if let Guide::Cross([x, y]) = guide {
         let (x, y) = (axes.px(x), axes.py(y));
         // Open in the middle, so that points on the truth stay visible.
         let d = format!("M{:.1} {y:.1}h8m10 0h8M{x:.1} {:.1}v8m0 10v8", x - 13.0, y - 13.0);
@@ -70,7 +80,8 @@ pub(crate) fn scatter(
     out
 }
 
-/// A histogram of values in millimetres, with labels below and beside it, between two limits; values beyond are counted in the end bars.
+/// A histogram of values in millimetres, with labels below and beside it, between two limits; values beyond
+/// are counted in the end bars.
 pub(crate) fn histogram(title: &str, labels: [&str; 2], values_mm: &[f64], limits_mm: [f64; 2]) -> String {
     const BARS: usize = 40;
     let span = limits_mm[1] - limits_mm[0];

@@ -67,7 +67,8 @@ pub(crate) fn distance_map(layout: &MapLayout, results: &ResultSet, scale: Scale
     Some(out)
 }
 
-/// Typical distance between core points, pixels: the root of the area that a point has, where there are points.
+/// Typical distance between core points, pixels: the root of the area that a point has, where there are
+/// points.
 fn spacing(points: &[(f64, f64, usize)], area: f64) -> f64 {
     let coarse = 4.0 * (area / points.len().max(1) as f64).sqrt();
     let filled: BTreeSet<(i64, i64)> = points
@@ -77,8 +78,8 @@ fn spacing(points: &[(f64, f64, usize)], area: f64) -> f64 {
     (filled.len() as f64 * coarse * coarse / points.len().max(1) as f64).sqrt()
 }
 
-/// Gives empty squares between filled ones the median of their neighbours: core points on a grid of their own leave
-/// rows of squares empty. A square needs five filled neighbours of its eight.
+/// Gives empty squares between filled ones the median of their neighbours: core points on a grid of their own
+/// leave rows of squares empty. A square needs five filled neighbours of its eight.
 fn fill_gaps(squares: &mut BTreeMap<(i64, i64), [f64; 2]>) {
     let around = |(row, column): (i64, i64)| {
         (-1..=1)

@@ -139,8 +139,8 @@ impl<'a> MapLayout<'a> {
     }
 }
 
-/// The joints, coloured by how much they open (metres), as one SVG element; `joints`: line, opening, whether it is
-/// significant.
+/// The joints, coloured by how much they open (metres), as one SVG element; `joints`: line, opening, whether
+/// it is significant.
 pub(crate) fn joint_map(
     layout: &MapLayout,
     title: &str,

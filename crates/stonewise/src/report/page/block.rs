@@ -9,8 +9,9 @@ use std::io::Write;
 
 /// Named columns that travel together; the page unpacks a block when it needs it.
 ///
-/// A column is little-endian integers times a unit. The least value of a signed type stands for "no value", which the
-/// page reads as NaN; unsigned types hold whole numbers that always exist. Numbers beyond a type's range are cut to it.
+/// A column is little-endian integers times a unit. The least value of a signed type stands for "no value",
+/// which the page reads as NaN; unsigned types hold whole numbers that always exist. Numbers beyond a type's
+/// range are cut to it.
 #[derive(Default)]
 pub(super) struct Block {
     bytes: Vec<u8>,
@@ -93,8 +94,8 @@ impl Block {
             .push(json!({ "name": name, "type": kind, "unit": unit, "start": start, "length": length }));
     }
 
-    /// The list of columns, and all bytes compressed by gzip (RFC 1952) as base64 (RFC 4648). The same columns give
-    /// the same text.
+    /// The list of columns, and all bytes compressed by gzip (RFC 1952) as base64 (RFC 4648). The same
+    /// columns give the same text.
     pub(super) fn finish(self) -> std::io::Result<(Value, String)> {
         let mut encoder = GzEncoder::new(Vec::new(), Compression::new(7));
         encoder.write_all(&self.bytes)?;

@@ -3,7 +3,7 @@
 use super::first_page::datum_note;
 use super::html::{figure, section, table};
 use crate::figure::count;
-use crate::report::draw::{Series, histogram, scatter};
+use crate::report::draw::{Guide, Series, histogram, scatter};
 use crate::report::summary::Summary;
 use crate::results::Comparison;
 use crate::results::records::DatumState;
@@ -57,7 +57,8 @@ pub(super) fn distributions(
             class,
             points: points.clone(),
         }];
-        scatter(key, title, labels, &series, limits, truth_mm, false)
+        let guide = truth_mm.map_or(Guide::None, Guide::Cross);
+        scatter(key, title, labels, &series, limits, guide)
     };
     grid.push_str(&figure(
         names.stones_title,
@@ -92,8 +93,7 @@ pub(super) fn distributions(
             [names.axis_out, "M3C2 (mm)"],
             &series,
             limits,
-            None,
-            true,
+            Guide::Diagonal,
         );
         grid.push_str(&figure(names.out_title, &picture, &text));
     }
@@ -104,7 +104,8 @@ pub(super) fn distributions(
     )
 }
 
-/// Limits of a histogram: 98 % of the values and a margin, millimetres; values beyond are counted in the end bars.
+/// Limits of a histogram: 98 % of the values and a margin, millimetres; values beyond are counted in the end
+/// bars.
 fn own_limits_mm(values: &Sorted) -> [f64; 2] {
     let (low, high) = (
         values.quantile(0.01).unwrap_or(0.0) * 1e3,

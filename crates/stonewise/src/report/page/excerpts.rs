@@ -34,8 +34,8 @@ pub(super) fn blocks(results: &ResultSet, origin: &Point3<f64>) -> Vec<(&'static
     blocks
 }
 
-/// Sections stone by stone in the order of the rows, four runs each: first epoch level and upright, later epoch level
-/// and upright. `end`: where each run ends.
+/// Sections stone by stone in the order of the rows, four runs each: first epoch level and upright, later
+/// epoch level and upright. `end`: where each run ends.
 fn sections(results: &ResultSet) -> Block {
     let run = |p: &SectionPoint| 2 * usize::from(p.is_later) + usize::from(p.cut == Cut::Upright);
     let mut by_stone: BTreeMap<u32, [Vec<&SectionPoint>; 4]> = BTreeMap::new();

@@ -1,11 +1,12 @@
-//! The part of the page that answers to mouse, touch and keyboard; without scripts the page is whole without it.
+//! The part of the page that answers to mouse, touch and keyboard; without scripts the page is whole without
+//! it.
 //!
-//! The program lies in `web/` (TypeScript) and is embedded as one bundle. Its data are a small JSON document and blocks
-//! of packed columns ([`Block`]), so that a wall of 10,000 stones stays small and opens at once.
+//! The program lies in `web/` (TypeScript) and is embedded as one bundle. Its data are a small JSON document
+//! and blocks of packed columns ([`Block`]), so that a wall of 10,000 stones stays small and opens at once.
 
 use super::block::Block;
 use super::excerpts;
-use super::{epoch_names, known_translation_mm};
+use super::pair::{epoch_names, known_translation_mm};
 use crate::error::Error;
 use crate::figure::{colours, nice_above};
 use crate::report::summary::Summary;
@@ -109,7 +110,8 @@ fn origin(results: &ResultSet) -> Point3<f64> {
     first.map_or(Point3::origin(), |s| s.centroid.map(f64::round))
 }
 
-/// One row for each stone; rings as (along, up) from the stone's place, their vertices in a column of their own.
+/// One row for each stone; rings as (along, up) from the stone's place, their vertices in a column of their
+/// own.
 fn stones(results: &ResultSet, facts: &Summary, compared: &Comparison) -> Block {
     let rows = &results.stones;
     let mut block = Block::default();

@@ -12,6 +12,7 @@ mod html;
 mod maps;
 mod method;
 mod overview;
+mod pair;
 mod survey;
 
 use super::summary::Summary;
@@ -23,6 +24,7 @@ use crate::results::records::RunRecord;
 use crate::results::{Comparison, Joint, ResultSet, compare, joints};
 use crate::texts::{Texts, fill};
 use html::with_decimals;
+use pair::{epoch_names, known_translation_mm};
 use std::fmt::Write;
 
 #[cfg(test)]
@@ -47,8 +49,8 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 8] {
 
 /// The whole report as one HTML document. The same results give the same bytes.
 ///
-/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be fetched: markup
-/// that a name from an input might smuggle in would stay dead.
+/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be
+/// fetched: markup that a name from an input might smuggle in would stay dead.
 ///
 /// # Errors
 /// None in practice: compressing in memory does not fail.
@@ -180,7 +182,8 @@ fn head(title: &str, texts: &Texts, scripts: &str, style: &str) -> String {
     )
 }
 
-/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without one.
+/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without
+/// one.
 fn footer(results: &ResultSet, page: &str) -> String {
     let Some(run) = &results.run else {
         return String::new();
@@ -207,13 +210,7 @@ fn title(results: &ResultSet, texts: &Texts) -> String {
     escape(name.filter(|n| !n.is_empty()).unwrap_or(texts.sections.survey))
 }
 
-/// Names of the first and of the compared epoch, as far as run.json has them.
-fn epoch_names(run: &RunRecord, pair: usize) -> Option<[String; 2]> {
-    let name = |epoch: usize| Some(run.epochs.get(epoch)?.name.clone());
-    Some([name(0)?, name(pair)?])
-}
-
-/// The same as one line of HTML.
+/// Names of the first and of the compared epoch as one line of HTML.
 fn epochs(run: &RunRecord, pair: usize) -> Option<String> {
     epoch_names(run, pair).map(|[first, second]| format!("{} \u{2192} {}", escape(&first), escape(&second)))
 }
@@ -243,13 +240,4 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
         format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
     };
     format!("{line}{}", survey::survey(results, texts))
-}
-
-/// In-plane part of a known translation of the compared epoch, millimetres, where run.json names one.
-fn known_translation_mm(results: &ResultSet) -> Option<[f64; 2]> {
-    let epoch = results.run.as_ref()?.epochs.get(results.pair)?;
-    let d = epoch.motion.as_ref()?.common_displacement()?;
-    let stone = results.stones.get(results.stones.len() / 2)?;
-    let frame = results.facade.frame_at(&stone.centroid);
-    Some([d.dot(&frame.along) * 1e3, d.dot(&frame.up) * 1e3])
 }

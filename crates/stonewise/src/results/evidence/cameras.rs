@@ -1,6 +1,6 @@
 //! Where the photos were taken from.
 
-use super::{make_dir, path, read_table};
+use super::files::{make_dir, path, read_table};
 use crate::error::Error;
 use nalgebra::{Point3, Vector3};
 use std::path::Path;

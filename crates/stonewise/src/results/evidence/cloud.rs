@@ -1,6 +1,6 @@
 //! A thinned cloud for the 3D view.
 
-use super::{make_dir, path, read_table};
+use super::files::{make_dir, path, read_table};
 use crate::error::Error;
 use nalgebra::Point3;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Photo crops of stones, rectified to their faces, side by side in a few pictures.
 
-use super::{make_dir, path, read_table};
+use super::files::{make_dir, path, read_table};
 use crate::error::Error;
 use crate::results::names::EVIDENCE_DIR;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,8 @@ pub struct Crop {
     pub photo: String,
     /// Half the edge of the window, metres. Right is along the wall, up is up the face.
     pub half_m: f64,
-    /// Outlines of the stone's mask in this photo, pixels of the crop; empty where the photo's masks do not show it.
+    /// Outlines of the stone's mask in this photo, pixels of the crop; empty where the photo's masks do not
+    /// show it.
     pub rings: Vec<Vec<[f32; 2]>>,
 }
 
@@ -51,7 +52,8 @@ pub fn crop_side_px(stones: usize, wanted_px: f64) -> u32 {
     steps.clamp(SIDE_PX[0], SIDE_PX[1])
 }
 
-/// Writes `evidence/crops_E.parquet`, `evidence/crop_outlines_E.parquet` and the pictures `evidence/crops_E_NNN.jpg`.
+/// Writes `evidence/crops_E.parquet`, `evidence/crop_outlines_E.parquet` and the pictures
+/// `evidence/crops_E_NNN.jpg`.
 ///
 /// `tiles`: the pixels of each crop, row by row, `side_px` squared.
 ///

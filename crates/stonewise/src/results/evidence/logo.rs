@@ -1,6 +1,6 @@
 //! The picture of the report's first page.
 
-use super::make_dir;
+use super::files::make_dir;
 use crate::error::{Error, Result};
 use crate::files::read_bytes;
 use crate::results::names::EVIDENCE_DIR;

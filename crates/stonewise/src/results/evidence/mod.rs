@@ -1,11 +1,12 @@
 //! What the report shows of the survey itself: photo crops, sections, thinned clouds, cameras.
 //!
-//! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the survey. Files
-//! are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
+//! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the
+//! survey. Files are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
 
 mod cameras;
 mod cloud;
 mod crops;
+mod files;
 mod logo;
 mod sections;
 
@@ -15,11 +16,9 @@ pub use crops::{Crop, crop_side_px, write_crops};
 pub use logo::{Logo, write_logo};
 pub use sections::{Cut, SectionPoint, write_sections};
 
-use super::names::EVIDENCE_DIR;
 use crate::error::Error;
 use crops::StoredCrops;
-use std::path::{Path, PathBuf};
-use stonewise_io::table::{Table, read_parquet};
+use std::path::Path;
 
 /// The excerpts of one pair of epochs; whatever is missing is empty.
 #[derive(Clone, Debug, Default)]
@@ -54,23 +53,4 @@ impl Evidence {
             logo: logo::read_logo(dir)?,
         })
     }
-}
-
-/// A file of the folder.
-fn path(dir: &Path, stem: &str, epoch: usize, extension: &str) -> PathBuf {
-    dir.join(EVIDENCE_DIR).join(format!("{stem}_{epoch}.{extension}"))
-}
-
-/// Makes the folder.
-fn make_dir(dir: &Path) -> Result<(), Error> {
-    let folder = dir.join(EVIDENCE_DIR);
-    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))
-}
-
-/// A table, or `None` where the file is missing.
-fn read_table(path: &Path) -> Result<Option<Table>, Error> {
-    if !path.exists() {
-        return Ok(None);
-    }
-    Ok(Some(read_parquet(path)?))
 }

@@ -1,6 +1,6 @@
 //! Points of a stone along two lines through its middle, in both epochs.
 
-use super::{make_dir, path, read_table};
+use super::files::{make_dir, path, read_table};
 use crate::error::Error;
 use std::path::Path;
 use stonewise_io::table::{Table, write_parquet};

@@ -15,7 +15,8 @@ pub enum DatumState {
     Stated,
     /// From how stations and strips of one epoch differ.
     Sources,
-    /// Nothing is known: uncertainties hold for motions against the common rigid motion of the measured stones.
+    /// Nothing is known: uncertainties hold for motions against the common rigid motion of the measured
+    /// stones.
     Unknown,
 }
 
@@ -44,11 +45,11 @@ pub struct Datum {
     pub state: DatumState,
     /// Place that the covariance refers to, world, metres.
     pub centre: [f64; 3],
-    /// Covariance of the registration error at the centre as (shift x, y, z; rotation vector x, y, z), m^2, m rad, rad^2; absent
-    /// where the state is unknown.
+    /// Covariance of the registration error at the centre as (shift x, y, z; rotation vector x, y, z), m^2, m
+    /// rad, rad^2; absent where the state is unknown.
     pub covariance_6x6: Option<[[f64; 6]; 6]>,
-    /// Where the state is unknown: the common rigid motion of the measured stones that motions are tested against, as (shift at the centre x, y, z;
-    /// rotation vector x, y, z), m, rad.
+    /// Where the state is unknown: the common rigid motion of the measured stones that motions are tested
+    /// against, as (shift at the centre x, y, z; rotation vector x, y, z), m, rad.
     #[serde(default)]
     pub common_motion: Option<[f64; 6]>,
     /// Errors of single stations and strips, where they were estimated.
@@ -97,7 +98,8 @@ impl Datum {
         }
     }
 
-    /// The same with the common rigid motion that motions are tested against; only where nothing else is known.
+    /// The same with the common rigid motion that motions are tested against; only where nothing else is
+    /// known.
     pub fn against(mut self, common: Option<&SmallMotion>) -> Self {
         if self.state == DatumState::Unknown {
             let centre = Point3::from(self.centre);

@@ -16,7 +16,8 @@ pub struct RegistrationRecord {
     pub estimator: EstimatorRecord,
     /// The registration of the later epoch.
     pub datum: Datum,
-    /// What stations, strips and stable areas show of the error of the later epoch; absent where nothing was compared.
+    /// What stations, strips and stable areas show of the error of the later epoch; absent where nothing was
+    /// compared.
     pub observers: Option<ObserversRecord>,
 }
 
@@ -35,8 +36,8 @@ pub struct ObserversRecord {
     pub compared_stones: [usize; 2],
     /// Plane cells in stable areas.
     pub stable_cells: usize,
-    /// Apparent shift of the middle of the wall and rotation vector about it, m, rad; what is taken off the motions where the datum is
-    /// known from stable areas or sources.
+    /// Apparent shift of the middle of the wall and rotation vector about it, m, rad; what is taken off the
+    /// motions where the datum is known from stable areas or sources.
     pub error: [f64; 6],
 }
 

@@ -2,7 +2,7 @@
 
 use super::{DatumState, Headlines, Timestamp};
 use crate::part::Part;
-use crate::project::Settings;
+use crate::settings::Settings;
 use crate::warnings::Warning;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

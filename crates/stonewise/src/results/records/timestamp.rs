@@ -7,8 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 const MS_PER_DAY: i64 = 86_400_000;
 
-/// A moment in UTC, in files as `2026-04-30T12:00:00.000Z`: ISO 8601 in the form that the GeoPackage standard prescribes
-/// (OGC 12-128, table of data types, DATETIME).
+/// A moment in UTC, in files as `2026-04-30T12:00:00.000Z`: ISO 8601 in the form that the GeoPackage standard
+/// prescribes (OGC 12-128, table of data types, DATETIME).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Timestamp {

@@ -20,6 +20,7 @@ mod variance_components;
 
 pub(crate) use component_estimate::estimate_components;
 pub(crate) use cracks::{Crack, find_crack};
+pub(crate) use field_vector::FieldVector;
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::LoosePrior;
 pub(crate) use mixture::probabilities_with_field;

@@ -34,20 +34,42 @@ struct Job<'a> {
     instances: BTreeSet<u32>,
 }
 
-/// Cuts a crop of every stone out of the photo of this epoch that shows it largest, writes them, and colours the
-/// points from the same photos.
+/// An epoch as the report shows it.
+#[derive(Clone, Copy)]
+pub struct ShownEpoch<'a> {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Its photos.
+    pub photos: &'a Segmented,
+    /// Its points and stones.
+    pub labelled: &'a Labelled,
+}
+
+/// A photo with its masks.
+struct OpenPhoto<'a> {
+    name: &'a str,
+    view: &'a View,
+    picture: &'a RgbImage,
+    labels: &'a LabelImage,
+}
+
+/// Cuts a crop of every stone out of the photo of this epoch that shows it largest, writes them, and colours
+/// the points from the same photos.
 ///
-/// `rows`: of a later epoch against the first. A stone without a partner is shown too, without the outline of a mask.
-/// Photos that cannot be read any more are named in the warnings, and their crops left out.
+/// `rows`: of a later epoch against the first. A stone without a partner is shown too, without the outline of
+/// a mask. Photos that cannot be read any more are named in the warnings, and their crops left out.
 pub fn write_epoch_crops(
     context: &Context,
-    epoch: usize,
-    photos: &Segmented,
-    labelled: &Labelled,
+    epoch: ShownEpoch,
     windows: &[Window],
     rows: Option<&[StoneRow]>,
     points: &mut [Candidate],
 ) -> Result<()> {
+    let ShownEpoch {
+        number,
+        photos,
+        labelled,
+    } = epoch;
     let motion = labelled.ingested.tiles.motion.as_ref();
     let instances = instances_by_stone(labelled, windows, rows);
     let jobs: Vec<Job> = windows
@@ -80,17 +102,13 @@ pub fn write_epoch_crops(
             };
             let labels = photos.labels(ImageId(photo as u32))?;
             let view = &photos.views[photo];
-            let cut = |job: &&Job| {
-                cut(
-                    job,
-                    view,
-                    &picture,
-                    &labels,
-                    motion,
-                    side_px,
-                    &photos.photos[photo].camera,
-                )
+            let open = OpenPhoto {
+                name: &photos.photos[photo].camera,
+                view,
+                picture: &picture,
+                labels: &labels,
             };
+            let cut = |job: &&Job| cut(job, &open, motion, side_px);
             let crops: Vec<(Crop, Vec<[u8; 3]>)> = jobs.iter().map(cut).collect();
             context.progress.advance(1);
             Ok((photo, crops, Some(colours(points, photo, view, &picture))))
@@ -105,7 +123,7 @@ pub fn write_epoch_crops(
     }
     crops.sort_by_key(|(crop, _)| crop.stone_id);
     let (crops, tiles): (Vec<Crop>, Vec<Vec<[u8; 3]>>) = crops.into_iter().unzip();
-    write_crops(&context.out, epoch, side_px, &crops, &tiles)
+    write_crops(&context.out, number, side_px, &crops, &tiles)
 }
 
 /// Instances that make up each stone of the first epoch, by its id; of its partner in a later epoch.
@@ -132,7 +150,8 @@ fn instances_by_stone<'a>(
     }
 }
 
-/// The photo that shows the window largest: of those whose masks show the stone, else of all. `None` where none does.
+/// The photo that shows the window largest: of those whose masks show the stone, else of all. `None` where
+/// none does.
 fn job<'a>(
     window: &'a Window,
     instances: Option<&&[(ImageId, stonewise_core::id::InstanceId)]>,
@@ -169,7 +188,8 @@ fn photographed(p: Point3<f64>, motion: Option<&MotionField>) -> Point3<f64> {
     p - field.displacement_at(&first)
 }
 
-/// Area of the window in a photo, square pixels; `None` where a corner lies outside or it is seen from behind.
+/// Area of the window in a photo, square pixels; `None` where a corner lies outside or it is seen from
+/// behind.
 fn area_px(window: &Window, view: &View, motion: Option<&MotionField>) -> Option<f64> {
     let h = window.half_m;
     let mut corners = Vec::with_capacity(4);
@@ -191,15 +211,13 @@ fn natural_px(window: &Window, view: &View, motion: Option<&MotionField>) -> f64
 }
 
 /// Resamples a photo on the plane of a stone's face, and outlines its mask there.
-fn cut(
-    job: &Job,
-    view: &View,
-    picture: &RgbImage,
-    labels: &LabelImage,
-    motion: Option<&MotionField>,
-    side_px: u32,
-    camera: &str,
-) -> (Crop, Vec<[u8; 3]>) {
+fn cut(job: &Job, open: &OpenPhoto, motion: Option<&MotionField>, side_px: u32) -> (Crop, Vec<[u8; 3]>) {
+    let OpenPhoto {
+        name,
+        view,
+        picture,
+        labels,
+    } = *open;
     let step = 2.0 * job.window.half_m / f64::from(side_px);
     let samples =
         ((natural_px(job.window, view, motion) / f64::from(side_px)).ceil() as usize).clamp(1, MAX_SAMPLES);
@@ -226,7 +244,7 @@ fn cut(
     let large = rings.into_iter().filter(|r| ring_area(r).abs() >= MIN_PIECE_PX);
     let crop = Crop {
         stone_id: job.window.stone_id,
-        photo: camera.to_owned(),
+        photo: name.to_owned(),
         half_m: job.window.half_m,
         rings: large
             .map(|r| {
@@ -260,8 +278,8 @@ fn mean_colour(samples: usize, picture: &RgbImage, pixel: impl Fn(f64, f64) -> O
     }
 }
 
-/// Gives every point the photo with the finest ground sampling distance; a stone's points only photos that voted for it, where any
-/// did: none votes for a stone that was added by hand.
+/// Gives every point the photo with the finest ground sampling distance; a stone's points only photos that
+/// voted for it, where any did: none votes for a stone that was added by hand.
 fn assign_photos(points: &mut [Candidate], views: &[View], labelled: &Labelled) {
     let voting: BTreeMap<u32, BTreeSet<usize>> = labelled
         .transfer

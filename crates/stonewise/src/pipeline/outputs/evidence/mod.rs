@@ -14,7 +14,7 @@ use crate::report_params::logo_type;
 use crate::results::{
     PosedPhoto, StoneOutline, StoneRow, write_cameras, write_logo, write_sections, write_thin_cloud,
 };
-use crops::write_epoch_crops;
+use crops::{ShownEpoch, write_epoch_crops};
 use sections::sections;
 use std::collections::BTreeMap;
 use thin::thin_cloud;
@@ -39,7 +39,12 @@ pub fn write_evidence(
         let posed: Vec<PosedPhoto> = photos.views.iter().map(PosedPhoto::of).collect();
         write_cameras(&context.out, epoch, &posed)?;
         let mut points = thin_cloud(context, labelled)?;
-        write_epoch_crops(context, epoch, photos, labelled, &windows, rows, &mut points)?;
+        let shown = ShownEpoch {
+            number: epoch,
+            photos,
+            labelled,
+        };
+        write_epoch_crops(context, shown, &windows, rows, &mut points)?;
         let points: Vec<_> = points.into_iter().map(|p| p.point).collect();
         write_thin_cloud(&context.out, epoch, &points)?;
     }

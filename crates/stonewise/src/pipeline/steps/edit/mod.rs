@@ -1,7 +1,8 @@
 //! Corrections by hand, applied to the labelled clouds of all epochs.
 //!
-//! They come after the vote of the photos and before the stones are tabulated, so that photos, masks and votes are taken over
-//! from a run without them, and stones that no edit touches keep their points and their number.
+//! They come after the vote of the photos and before the stones are tabulated, so that photos, masks and
+//! votes are taken over from a run without them, and stones that no edit touches keep their points and their
+//! number.
 
 mod photo_places;
 
@@ -12,8 +13,8 @@ use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::outputs::outlines::{OUTLINES_STEP, make_outlines};
-use crate::pipeline::storage::step::Key;
 use crate::results::{Facade, facade_of, read_outlines};
+use crate::storage::step::Key;
 use nalgebra::Point3;
 use photo_places::{Places, photo_places};
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +34,8 @@ pub struct Edited {
 /// What each edit of the file did in an epoch; `None` where it does not concern the epoch.
 pub type Effects = Vec<Option<std::result::Result<EditEffect, NoEffect>>>;
 
-/// Applies the project's edits to all epochs; an epoch that none changes stays as it is. `None` where there are no edits.
+/// Applies the project's edits to all epochs; an epoch that none changes stays as it is. `None` where there
+/// are no edits.
 pub fn edit(
     context: &Context,
     photos: &[Segmented],
@@ -47,26 +49,39 @@ pub fn edit(
     let facade = facade_of(found, &outlines);
     let drawn_on = file.facade.as_ref().unwrap_or(&facade);
     let places = photo_places(context, file, drawn_on, photos, &labelled)?;
+    let drawn = Drawn {
+        file,
+        places: &places,
+        wall: drawn_on,
+    };
     let mut effects = Vec::new();
     let mut edited = Vec::new();
     for ((number, photos), labelled) in (1..).zip(photos).zip(labelled) {
-        let (epoch, done) = edit_epoch(context, number, file, &places, drawn_on, photos, labelled)?;
+        let (epoch, done) = edit_epoch(context, number, &drawn, photos, labelled)?;
         edited.push(epoch);
         effects.push(done);
     }
     Ok((edited, Some(Edited { facade, effects })))
 }
 
+/// The edits with their shapes on the wall.
+struct Drawn<'a> {
+    file: &'a EditsFile,
+    /// One per edit.
+    places: &'a [Places],
+    /// The unrolled wall on which they were drawn.
+    wall: &'a Facade,
+}
+
 /// Applies the edits that concern one epoch.
 fn edit_epoch(
     context: &Context,
     number: usize,
-    file: &EditsFile,
-    places: &[Places],
-    wall: &Facade,
+    drawn: &Drawn,
     photos: &Segmented,
     labelled: Labelled,
 ) -> Result<(Labelled, Effects)> {
+    let Drawn { file, places, wall } = *drawn;
     let epoch = &context.project.epochs[number - 1].name;
     let mut effects = vec![None; file.edits.len()];
     let mut asked: Vec<(usize, LabelEdit)> = Vec::new();

@@ -6,18 +6,19 @@ use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::step::Key;
 use crate::results::Facade;
+use crate::storage::step::Key;
 use nalgebra::{Point2, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{Bounds, Plane, View, cell_of};
 use stonewise_core::transfer::NoEffect;
 
-/// Points of stones this far from the ray of a pixel say where the face is, metres: the neighbourhood in which a stone's normal is
-/// found.
+/// Points of stones this far from the ray of a pixel say where the face is, metres: the neighbourhood in
+/// which a stone's normal is found.
 const REACH_M: f64 = 0.75;
-/// Of points in a cube of this edge the first counts, metres, so that dense clouds do not crowd out the neighbourhood.
+/// Of points in a cube of this edge the first counts, metres, so that dense clouds do not crowd out the
+/// neighbourhood.
 const THIN_M: f64 = 0.05;
 /// Nearest points to which the face is fitted: about three stones.
 const NEAREST: usize = 60;
@@ -27,8 +28,8 @@ const RELIEF_M: f64 = 0.1;
 /// Where an edit lies on the wall, or why it lies nowhere.
 pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
-/// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their rays onto the stones
-/// that the photo's epoch shows there.
+/// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their
+/// rays onto the stones that the photo's epoch shows there.
 pub(super) fn photo_places(
     context: &Context,
     file: &EditsFile,
@@ -188,7 +189,8 @@ impl Ray {
     }
 }
 
-/// Finds the points of stones around the rays that face the camera. Cost: one pass over the tiles that the rays meet.
+/// Finds the points of stones around the rays that face the camera. Cost: one pass over the tiles that the
+/// rays meet.
 fn gather(context: &Context, rays: &mut [Ray], labelled: &Labelled) -> Result<()> {
     let Some(ray) = rays.first() else { return Ok(()) };
     let centre = ray.centre;

@@ -7,10 +7,11 @@ use nalgebra::{Matrix6, Point3};
 use stonewise_core::registration::observers::{self, EpochErrors};
 use stonewise_core::stone::Stone;
 
-/// The registration error of a later epoch, from the first of these that there is: stable areas, the error that the project states,
-/// differences between the sources of each epoch.
+/// The registration error of a later epoch, from the first of these that there is: stable areas, the error
+/// that the project states, differences between the sources of each epoch.
 ///
-/// `number`: of the later epoch, from 1. `stones`: of the first epoch; their middle is the centre of a stated error.
+/// `number`: of the later epoch, from 1. `stones`: of the first epoch; their middle is the centre of a stated
+/// error.
 pub fn datum(project: &Project, number: usize, registered: &Registered, stones: &[Stone]) -> Datum {
     let mut datum = of_errors(project, number, registered.epoch_errors.as_ref(), stones);
     if let Some(errors) = &registered.epoch_errors {

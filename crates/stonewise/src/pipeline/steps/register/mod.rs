@@ -4,6 +4,7 @@ mod datum;
 mod off_wall;
 mod pairs;
 mod photos;
+mod registered;
 mod sights;
 mod windows;
 
@@ -13,44 +14,22 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::step::Key;
-use crate::project::Estimator;
 use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord, PhotosRecord};
+use crate::settings::Estimator;
+use crate::storage::step::Key;
 pub use datum::datum;
 use nalgebra::Point3;
 use off_wall::OffWall;
 use pairs::DiskPairs;
 use photos::DiskPhotos;
-use serde::{Deserialize, Serialize};
+pub use registered::Registered;
+use registered::STEP;
 use sights::Sights;
-use std::collections::BTreeMap;
-use stonewise_core::id::StoneId;
-use stonewise_core::registration::observers::{
-    self, EpochErrorParams, EpochErrors, EpochPair, ErrorAt, epoch_errors,
-};
+use stonewise_core::registration::observers::{self, EpochErrorParams, EpochPair, epoch_errors};
 use stonewise_core::registration::photos::PhotoSource;
 use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 use windows::align_windows;
-
-/// Name of the step.
-const STEP: &str = "register";
-
-/// Motions of a pair of epochs.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Registered {
-    /// One result per matched stone, ascending by stone of the first epoch.
-    pub results: Vec<PairResult>,
-    /// What the estimator says about itself.
-    pub estimator: EstimatorRecord,
-    /// Error of the later epoch against the reference, as sources and stable areas show it.
-    pub epoch_errors: Option<EpochErrors>,
-    /// The stones at which that error is given, in its order.
-    pub error_stones: Vec<StoneId>,
-    /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty where nobody asked.
-    #[serde(default)]
-    pub off_wall: Vec<[Point3<f64>; 2]>,
-}
 
 /// Measures the motion of every matched stone.
 pub fn register(
@@ -61,7 +40,8 @@ pub fn register(
     number: usize,
 ) -> Result<Registered> {
     let params = &context.project.settings.registration;
-    // The pairs themselves, not how they were found: other parameters of the matching that find the same pairs cost nothing.
+    // The pairs themselves, not how they were found: other parameters of the matching that find the same
+    // pairs cost nothing.
     let matches = matched.pairs();
     let mut inputs = vec![first.key.as_str().to_owned(), second.key.as_str().to_owned()];
     if params.photos.enabled {
@@ -123,7 +103,6 @@ pub fn register(
             number,
             &matches,
             params.auto_stable.then_some(&off_wall),
-            params.observers.contrasts.max_stones,
             context.progress,
         )?;
         let pair = EpochPair {
@@ -145,29 +124,6 @@ pub fn register(
     report_datum(context, number, &registered);
     report_off_wall(context, number, &registered);
     Ok(registered)
-}
-
-impl Registered {
-    /// Error of the later epoch against the reference, by stone of the reference.
-    pub fn errors(&self) -> BTreeMap<StoneId, &ErrorAt> {
-        let errors = self.epoch_errors.iter().flat_map(|e| &e.at);
-        self.error_stones.iter().copied().zip(errors).collect()
-    }
-
-    /// Noise of single points along the normal, metres: the larger of the epochs'.
-    fn noise_m(&self) -> f64 {
-        match &self.estimator {
-            EstimatorRecord::Adjustment(adjustment) => {
-                adjustment.noise_m.iter().flatten().copied().fold(0.0, f64::max)
-            }
-            EstimatorRecord::Gicp(_) => {
-                let motions = self.results.iter().filter_map(|r| r.motion.as_ref().ok());
-                let mut residuals: Vec<f64> = motions.map(|m| m.rmse_m).filter(|r| r.is_finite()).collect();
-                residuals.sort_by(f64::total_cmp);
-                residuals.get(residuals.len() / 2).copied().unwrap_or(0.0)
-            }
-        }
-    }
 }
 
 /// Names surfaces off the wall that could show, or that showed, the registration of the epochs.

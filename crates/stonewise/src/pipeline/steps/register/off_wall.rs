@@ -13,8 +13,8 @@ use stonewise_core::stone::Stone;
 const CELL_M: f64 = 0.25;
 /// Edge of an area, metres: the smallest piece that is left out when it has moved.
 const AREA_M: f64 = 2.0;
-/// A cell whose middle lies closer to the face, or to its continuation, may hold points of the wall, metres: half its diagonal
-/// and 0.3 m.
+/// A cell whose middle lies closer to the face, or to its continuation, may hold points of the wall, metres:
+/// half its diagonal and 0.3 m.
 const LEAST_DISTANCE_M: f64 = 0.52;
 /// Surfaces at most this many cells apart across their plane are one area: their layers touch.
 const SAME_AREA_CELLS: i64 = 2;
@@ -25,8 +25,9 @@ const FACE_STONES: usize = 400;
 
 /// Cells off the wall, and the area that each belongs to.
 ///
-/// A cell's neighbours in front of and behind its surface belong to the same area. Without them, a surface that lies on the boundary of two
-/// cells would lose the noise of its points on one side, or be cut into two areas along it, and both pull its mean plane.
+/// A cell's neighbours in front of and behind its surface belong to the same area. Without them, a surface
+/// that lies on the boundary of two cells would lose the noise of its points on one side, or be cut into two
+/// areas along it, and both pull its mean plane.
 #[derive(Clone, Debug, Default)]
 pub struct OffWall {
     cells: HashMap<[i64; 3], usize>,
@@ -123,7 +124,8 @@ fn middle(cell: &[i64; 3]) -> Point3<f64> {
     Point3::from(cell.map(|k| (k as f64 + 0.5) * CELL_M))
 }
 
-/// The points of a cell: how many of each epoch, and their sums of places and of products about the cell's middle.
+/// The points of a cell: how many of each epoch, and their sums of places and of products about the cell's
+/// middle.
 #[derive(Clone, Default)]
 struct CellPoints {
     counts: [u32; 2],

@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::storage::spill::{Spill, SpillBins};
-use crate::pipeline::storage::step::StepDir;
+use crate::storage::spill::{Spill, SpillBins};
+use crate::storage::step::StepDir;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -1,12 +1,13 @@
 //! The parts of the photos that show matched stones, cut out once and read back batch by batch.
 
 use super::pairs::DiskPairs;
+use super::registered::STEP;
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::spill::{Spill, SpillBins};
-use crate::pipeline::storage::step::StepDir;
+use crate::storage::spill::{Spill, SpillBins};
+use crate::storage::step::StepDir;
 use crate::warnings::Warnings;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -18,7 +19,8 @@ use stonewise_core::registration::PairSource;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoCamera, PhotoParams, PhotoSource};
 use stonewise_io::image_io::read_rgb;
 
-/// Largest tangent of the angle between a photo's ray and the face's normal: beyond 63 degrees a stone shows its joints.
+/// Largest tangent of the angle between a photo's ray and the face's normal: beyond 63 degrees a stone shows
+/// its joints.
 const LARGEST_TANGENT: f64 = 2.0;
 /// Pixels around a stone that interpolation needs.
 const BORDER_PX: f64 = 3.0;
@@ -46,7 +48,8 @@ struct Boxed {
 }
 
 impl DiskPhotos {
-    /// Cuts out what the photos of both epochs show of the matched stones, one photo at a time. `None` where an epoch has none.
+    /// Cuts out what the photos of both epochs show of the matched stones, one photo at a time. `None` where
+    /// an epoch has none.
     pub fn gather(
         context: &Context,
         photos: [&Segmented; 2],
@@ -89,7 +92,7 @@ impl DiskPhotos {
                         }
                     }
                     Err(error) => warnings.notice(
-                        super::STEP,
+                        STEP,
                         path.to_string_lossy(),
                         format!("{error}: it does not help to measure stones"),
                     ),
@@ -150,7 +153,8 @@ fn boxes(pairs: &DiskPairs) -> Result<(Vec<Boxed>, Vec<usize>)> {
 /// The part of an image: lowest pixel, and one beyond the highest.
 type Corners = [[u32; 2]; 2];
 
-/// For each photo the stones that it shows, with the part of it: for each stone the sharpest photos of either epoch.
+/// For each photo the stones that it shows, with the part of it: for each stone the sharpest photos of either
+/// epoch.
 fn choose(
     boxes: &[Boxed],
     photos: &[Photo],
@@ -188,8 +192,8 @@ fn choose(
 }
 
 impl Boxed {
-    /// Size of a photo's pixel on the stone, and the part of the photo that shows it with a margin; `None` where the photo shows it
-    /// from behind, too obliquely or not wholly.
+    /// Size of a photo's pixel on the stone, and the part of the photo that shows it with a margin; `None`
+    /// where the photo shows it from behind, too obliquely or not wholly.
     fn seen_by(&self, photo: &Photo, view: &View, margin_m: f64) -> Option<(f64, Corners)> {
         let shift = if photo.epoch == 1 {
             self.shift

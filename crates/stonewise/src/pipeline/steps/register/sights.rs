@@ -1,10 +1,11 @@
-//! What each station and strip shows of the matched stones and of the stable areas, gathered in one pass over the tiles.
+//! What each station and strip shows of the matched stones and of the stable areas, gathered in one pass over
+//! the tiles.
 
 use super::off_wall::OffWall;
 use crate::error::Result;
-use crate::pipeline::sources::EpochSources;
 use crate::pipeline::steps::label::Labelled;
 use crate::project::Project;
+use crate::sources::EpochSources;
 use crate::stable::StableArea;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -15,7 +16,8 @@ use stonewise_core::progress::Progress;
 use stonewise_core::registration::observers::{SeenStone, Source, SourcePoints, StablePoints};
 use stonewise_core::stone::Stone;
 
-/// Edge of the cells in which the points of a stable area are counted, metres, and the most that one source keeps in a cell.
+/// Edge of the cells in which the points of a stable area are counted, metres, and the most that one source
+/// keeps in a cell.
 const STABLE_CELL_M: f64 = 0.1;
 const STABLE_POINTS: u32 = 40;
 
@@ -23,7 +25,8 @@ const STABLE_POINTS: u32 = 40;
 pub struct Sights {
     /// Those of the reference epoch, then those of the later one.
     pub sources: Vec<Source>,
-    /// For each source, the one whose error it shares: itself, or for halves of one survey that of the first half.
+    /// For each source, the one whose error it shares: itself, or for halves of one survey that of the first
+    /// half.
     pub same_as: Vec<usize>,
     /// Stones of the reference epoch, in the order of `seen`.
     pub stones: Vec<StoneId>,
@@ -34,14 +37,15 @@ pub struct Sights {
 }
 
 impl Sights {
-    /// `number`: of the later epoch, from 1. `off_wall`: areas that count as stable beside those of the project. At most `most_stones` keep their points, evenly chosen among the matches.
+    /// `number`: of the later epoch, from 1. `off_wall`: areas that count as stable beside those of the
+    /// project. The project's parameters say how many stones keep their points, evenly chosen among the
+    /// matches.
     pub fn gather(
         project: &Project,
         epochs: [&Labelled; 2],
         number: usize,
         matches: &[(StoneId, StoneId)],
         off_wall: Option<&OffWall>,
-        most_stones: usize,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let numbers = [1, number];
@@ -70,6 +74,7 @@ impl Sights {
             stable: Vec::new(),
             sources,
         };
+        let most_stones = project.settings.registration.observers.contrasts.max_stones;
         let stride = places.len().div_ceil(most_stones.max(1)).max(1);
         let mut collected: Vec<BTreeMap<usize, Collected>> = vec![BTreeMap::new(); places.len()];
         for (e, epoch) in epochs.iter().enumerate() {

@@ -4,8 +4,8 @@ use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::storage::step::{Key, StepDir};
 use crate::project::Epoch;
+use crate::storage::step::{Key, StepDir};
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;

@@ -3,8 +3,8 @@
 use super::voting_photo::{Instance, STEP, VotingPhoto, check_any, label_path, posed_photos};
 use crate::error::Result;
 use crate::pipeline::context::Context;
-use crate::pipeline::storage::step::StepDir;
 use crate::project::Epoch;
+use crate::storage::step::StepDir;
 use crate::warnings::Warnings;
 use rayon::prelude::*;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! A photo that can vote, and how photos and cameras find each other.
 
 use crate::error::{Error, Result};
-use crate::pipeline::storage::step::StepDir;
 use crate::project::Epoch;
+use crate::storage::step::StepDir;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -1,16 +1,17 @@
 //! The labels of an epoch in batches of tiles, for processes that share the step `label`.
 //!
-//! `prepare` keeps what all batches need; each batch labels its tiles; the step itself gathers them. The files are those that one
-//! process makes, to the byte.
+//! `prepare` keeps what all batches need; each batch labels its tiles; the step itself gathers them. The
+//! files are those that one process makes, to the byte.
 
+use super::disk_labels::DiskLabels;
+use super::step_key::{label_key, label_name};
 use crate::error::{Error, Result};
 use crate::files::read_bytes;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::label::{DiskLabels, label_key, label_name};
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::step::{Key, StepDir};
-use crate::pipeline::storage::tiles::DiskTiles;
+use crate::storage::step::{Key, StepDir};
+use crate::storage::tiles::DiskTiles;
 use std::path::{Path, PathBuf};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::transfer::{Election, KeptParts, Occupancy, PreparedTransfer, Transfer, finish_transfer};

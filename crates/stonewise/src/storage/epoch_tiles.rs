@@ -1,7 +1,7 @@
 //! The points of an epoch as every step after labelling sees them.
 
 use crate::error::Error;
-use crate::pipeline::storage::tiles::DiskTiles;
+use crate::storage::tiles::DiskTiles;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::evaluate::{MotionField, MovedTiles};
 use stonewise_core::geometry::Bounds;

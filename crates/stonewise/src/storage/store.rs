@@ -11,7 +11,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 /// How many versions of a step's files are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeps {
-    /// One: a step that is done under another key replaces its files. For a project that is run again and again.
+    /// One: a step that is done under another key replaces its files. For a project that is run again and
+    /// again.
     Newest,
     /// One for each key. For experiments, whose variants share what they have in common.
     Every,
@@ -71,7 +72,8 @@ impl StepStore {
         })
     }
 
-    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan lists them.
+    /// The store of a run of which this process does one unit; `digests`: of the inputs, as the plan lists
+    /// them.
     pub fn of_unit(folder: &Path, scope: Scope, digests: BTreeMap<PathBuf, String>) -> Result<Self> {
         Ok(Self {
             scope: Some(scope),
@@ -82,9 +84,10 @@ impl StepStore {
 
     /// Does a step with `make`, unless its files are there under this key, as they were left.
     ///
-    /// `published`: files outside the step's folder that it makes too. Of several threads that start the same step one
-    /// does it and the others wait: call it from threads that no thread pool lends out, or they may wait for themselves.
-    /// Cost of a step that is taken over: its files are read once to compare their digests.
+    /// `published`: files outside the step's folder that it makes too. Of several threads that start the same
+    /// step one does it and the others wait: call it from threads that no thread pool lends out, or they may
+    /// wait for themselves. Cost of a step that is taken over: its files are read once to compare their
+    /// digests.
     pub fn step(
         &self,
         name: &str,

@@ -1,22 +1,25 @@
 //! An epoch's points with the stone of each.
 
+pub mod batches;
+mod disk_labels;
+mod step_key;
+
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::label_batch::LabelBatches;
 use crate::pipeline::steps::segment::Segmented;
-use crate::pipeline::storage::step::{Key, StepDir};
-use crate::pipeline::storage::tiles::DiskTiles;
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use crate::storage::step::{Key, StepDir};
+use batches::LabelBatches;
+pub use disk_labels::DiskLabels;
+use std::collections::BTreeMap;
+use step_key::{label_key, label_name};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
-use stonewise_io::table::{Table, read_columns, write_parquet};
 
 /// What was decided about the instances, in the step's folder.
 const TRANSFER: &str = "transfer.json";
@@ -107,22 +110,6 @@ pub fn gather_labels(
     context.store.remove_parts(&name, &key)
 }
 
-/// Name of the step.
-pub fn label_name(number: usize) -> String {
-    format!("label-{number}")
-}
-
-/// Its key.
-pub fn label_key(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Key {
-    let params = &context.project.settings.label;
-    let map = &context.project.epochs[number - 1].map;
-    Key::new(
-        "label",
-        &(params, &map.crs, map.false_origin),
-        &[ingested.step.key().as_str(), photos.step.key().as_str()],
-    )
-}
-
 /// The labels of an epoch, before its stones are tabulated.
 pub(super) struct Labels {
     pub(super) transfer: Transfer,
@@ -177,53 +164,4 @@ pub(super) fn tabulate(
         key: step.key().clone(),
         store,
     })
-}
-
-/// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
-#[derive(Clone)]
-pub struct DiskLabels {
-    files: Vec<PathBuf>,
-}
-
-impl DiskLabels {
-    /// Those in a folder.
-    pub fn new(dir: &Path, tiles: &DiskTiles) -> Self {
-        let file = |tile| dir.join(Self::file_name(tiles, tile));
-        Self {
-            files: (0..tiles.tile_count()).map(file).collect(),
-        }
-    }
-
-    /// Takes these tiles from another store.
-    pub(super) fn replace(&mut self, tiles: &BTreeSet<usize>, from: &Self) {
-        for &tile in tiles {
-            self.files[tile].clone_from(&from.files[tile]);
-        }
-    }
-
-    /// Name of the file of a tile.
-    pub fn file_name(tiles: &DiskTiles, tile: usize) -> String {
-        format!("{}.parquet", tiles.name(tile))
-    }
-}
-
-impl LabelStore for DiskLabels {
-    type Error = Error;
-
-    fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<()> {
-        let mut table = Table::new();
-        table.push("stone", labels.stone.clone())?;
-        table.push("confidence", labels.confidence.clone())?;
-        table.push("seen", labels.seen.clone())?;
-        Ok(write_parquet(&self.files[tile], &table)?)
-    }
-
-    fn read(&self, tile: usize) -> Result<TileLabels> {
-        let table = read_columns(&self.files[tile], &["stone", "confidence", "seen"])?;
-        Ok(TileLabels {
-            stone: table.required("stone")?.to_vec(),
-            confidence: table.required("confidence")?.to_vec(),
-            seen: table.required("seen")?.to_vec(),
-        })
-    }
 }

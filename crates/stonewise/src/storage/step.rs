@@ -1,8 +1,9 @@
 //! The folder of a step.
 //!
-//! `step.json` in it names the key its files were made under: the digest of everything that the result depends on. `done` lists length
-//! and digest of every file that the step stands for, and a step whose files differ from it is done again. The work is done in a folder
-//! beside it, which takes its place when everything is there.
+//! `step.json` in it names the key its files were made under: the digest of everything that the result
+//! depends on. `done` lists length and digest of every file that the step stands for, and a step whose files
+//! differ from it is done again. The work is done in a folder beside it, which takes its place when
+//! everything is there.
 
 use crate::error::{Error, Result};
 use crate::files::{write_json, write_text};
@@ -71,7 +72,8 @@ const DONE: &str = "done";
 impl StepDir {
     /// Opens the folder of a step, emptied first if it was made under another key.
     ///
-    /// Errors: something lies there that no step made; a file cannot be written or removed.
+    /// # Errors
+    /// Something lies there that no step made; a file cannot be written or removed.
     pub fn open(path: PathBuf, key: Key) -> Result<Self> {
         let dir = Self { path, key };
         if !dir.is_of_key() {
@@ -91,8 +93,8 @@ impl StepDir {
 
     /// Does the step's work in a folder beside its own, and puts that in its place when everything is there.
     ///
-    /// Where another process has done the same in the meantime, its folder stays. Errors: something lies there that no step made; the
-    /// work fails; a file cannot be written or removed.
+    /// Where another process has done the same in the meantime, its folder stays. Errors: something lies
+    /// there that no step made; the work fails; a file cannot be written or removed.
     pub(super) fn replace(
         &self,
         published: &[PathBuf],
@@ -205,7 +207,8 @@ impl StepDir {
         serde_json::from_slice(&fs::read(self.file(name)).ok()?).ok()
     }
 
-    /// Takes a file of another step, which stays there, under a name of its own. Cost: a link, where the file system has them.
+    /// Takes a file of another step, which stays there, under a name of its own. Cost: a link, where the file
+    /// system has them.
     pub fn take(&self, from: &Self, file: &str, name: &str) -> Result<()> {
         let (from, to) = (from.file(file), self.file(name));
         match fs::hard_link(&from, &to) {
@@ -237,8 +240,8 @@ impl Drop for Begun {
     }
 }
 
-/// Digest of a file, or of all files of a folder and below with their names. A link that leads back to a folder above
-/// itself is left out.
+/// Digest of a file, or of all files of a folder and below with their names. A link that leads back to a
+/// folder above itself is left out.
 pub fn path_digest(path: &Path) -> Result<String> {
     digest_below(path, &mut Vec::new())
 }
@@ -273,8 +276,8 @@ fn digest_below(path: &Path, above: &mut Vec<PathBuf>) -> Result<String> {
 /// The file that this code was loaded from, where it is not the program itself.
 static LOADED_FROM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Says which file this code was loaded from, before any work: a module of Python lies beside its interpreter, whose digest tells nothing
-/// about it.
+/// Says which file this code was loaded from, before any work: a module of Python lies beside its
+/// interpreter, whose digest tells nothing about it.
 pub fn set_program(file: PathBuf) {
     // The first word counts; nobody says two.
     let _ = LOADED_FROM.set(file);

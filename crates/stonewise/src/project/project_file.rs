@@ -1,14 +1,14 @@
-//! The project file: which surveys, and every parameter of every step.
+//! How a project file is read and checked.
 
+use super::{Epoch, Project};
 use crate::edits::EditsFile;
 use crate::error::{Error, Result};
 use crate::limits::impossible;
-use crate::part::Part;
-use crate::pipeline::SourceRule;
 use crate::report_params::{ReportParams, logo_type};
-use crate::stable::StableArea;
+use crate::settings::{IngestParams, RENAMED, RegistrationParams, SegmentParams, Settings};
+use crate::sources::SourceRule;
 use crate::thresholds::Thresholds;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,208 +17,15 @@ use std::path::{Path, PathBuf};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
-use stonewise_core::registration::observers::EpochErrorParams;
-use stonewise_core::registration::photos::PhotoParams;
-use stonewise_core::registration::{AdjustmentParams, GicpParams};
 use stonewise_core::transfer::{StoneParams, TransferParams};
-use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
-use stonewise_io::cloud::cloud_crs;
+use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::MapSystem;
 use stonewise_segment::Weights;
-use stonewise_segment::tiling::TilingOptions;
 use toml::Spanned;
 use toml::value::Datetime;
 
 /// What to do about backslashes.
 const SLASHES: &str = "use / or single quotes in paths";
-
-/// A checked project: paths exist, values are possible.
-#[derive(Clone, Debug)]
-pub struct Project {
-    /// The project file itself.
-    pub path: PathBuf,
-    /// Name of the structure.
-    pub name: String,
-    /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in time order.
-    pub epochs: Vec<Epoch>,
-    /// Parameters of all steps.
-    pub settings: Settings,
-    /// What a user should know about how the file was read, one sentence each: keys with a new name, another numbering of epochs.
-    pub notes: Vec<String>,
-    /// Corrections by hand; absent where the project names none.
-    pub edits: Option<EditsFile>,
-    /// Which points take part; all where absent. No key of the file: commands set it.
-    pub part: Option<Part>,
-}
-
-/// One survey.
-#[derive(Clone, Debug)]
-pub struct Epoch {
-    /// Name, as reports show it.
-    pub name: String,
-    /// Date of the survey, ISO 8601.
-    pub date: Option<String>,
-    /// Conditions during the survey by name, such as `reservoir_level_m`.
-    pub conditions: BTreeMap<String, f64>,
-    /// Point clouds, all in one frame.
-    pub clouds: Vec<PathBuf>,
-    /// Folder of the photos.
-    pub images: PathBuf,
-    /// Camera file or COLMAP folder.
-    pub cameras: PathBuf,
-    /// COCO json or folder of label PNGs.
-    pub masks: Option<PathBuf>,
-    /// Known motion of the points, applied after labelling.
-    pub motion: Option<MotionField>,
-    /// What counts as one station or strip.
-    pub sources: SourceRule,
-    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same error in both.
-    pub same_survey_as: Option<usize>,
-    /// What the project file says about where the clouds lie on the map.
-    pub map: MapFrame,
-}
-
-impl Epoch {
-    /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
-    pub fn read_cameras(&self) -> Result<CameraFile> {
-        let mut map = self.map.clone();
-        for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {
-            map.crs = map.crs.or(cloud_crs(cloud)?);
-        }
-        Ok(read_cameras_on_map(&self.cameras, &map)?)
-    }
-}
-
-/// How stones are found in photos without masks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SegmentParams {
-    /// The detector: `built-in`, or a file that `stonewise train` wrote.
-    pub model: PathBuf,
-    /// How photos are cut into tiles.
-    pub tiling: TilingOptions,
-}
-
-impl Default for SegmentParams {
-    fn default() -> Self {
-        Self {
-            model: PathBuf::from("built-in"),
-            tiling: TilingOptions::default(),
-        }
-    }
-}
-
-/// Parameters of all steps, one table each in the project file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Settings {
-    /// How clouds are cut.
-    #[serde(alias = "tiles")]
-    pub ingest: IngestParams,
-    /// Stones in photos without masks.
-    pub segment: SegmentParams,
-    /// Photo labels to points.
-    #[serde(alias = "transfer")]
-    pub label: TransferParams,
-    /// The table of stones.
-    pub stones: StoneParams,
-    /// Stones across epochs.
-    #[serde(alias = "matching")]
-    pub r#match: MatchParams,
-    /// One motion per stone.
-    pub registration: RegistrationParams,
-    /// Comparison along normals.
-    pub m3c2: M3c2Params,
-    /// Scoring against a known motion.
-    #[serde(alias = "evaluation")]
-    pub evaluate: EvaluationParams,
-    /// Which motions call for attention, and which for an alarm.
-    pub thresholds: Thresholds,
-    /// The first page of the report.
-    pub report: ReportParams,
-}
-
-/// Tables of the project file by the names that they had, with the names of today; both are read.
-pub(crate) const RENAMED: [(&str, &str); 5] = [
-    ("tiles", "ingest"),
-    ("transfer", "label"),
-    ("matching", "match"),
-    ("evaluation", "evaluate"),
-    ("registration.network", "registration.adjustment"),
-];
-
-/// How clouds are cut into tiles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct IngestParams {
-    /// Edge of a tile, metres. 4 m keeps offsets exact to a micrometre and a dense tile under 20 MB.
-    pub size_m: f64,
-}
-
-impl Default for IngestParams {
-    fn default() -> Self {
-        Self { size_m: 4.0 }
-    }
-}
-
-/// How the motion of a stone is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Estimator {
-    /// All stones together, each sharing with its neighbours as much as the noise demands.
-    #[default]
-    #[serde(alias = "network")]
-    Adjustment,
-    /// Each stone by itself with its surroundings, by plane-to-plane ICP: the paper's way.
-    Gicp,
-}
-
-/// Which estimator measures the stones, and its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RegistrationParams {
-    /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move singly.
-    pub estimator: Estimator,
-    /// Standard deviation of the registration of an epoch, per axis, metres, as the user states it; 0 states that there is none.
-    /// Absent: not stated, and without stable areas uncertainties hold for motions against the common motion of the stones.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub epoch_error_m: Option<f64>,
-    /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs' registration.
-    /// It is reported apart and enters absolute uncertainty. Default: none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub stable: Vec<StableArea>,
-    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false: only a person knows what did not move.
-    pub auto_stable: bool,
-    /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its place and not by
-    /// its label. 3: farther inside, noise does not change a label; with 0 (labels alone) the whole wall of a UAV survey
-    /// seems to move by 1 to 2 mm.
-    pub border_noises: f64,
-    /// Parameters of the adjustment of all stones together.
-    #[serde(alias = "network")]
-    pub adjustment: AdjustmentParams,
-    /// Stones tracked from photo to photo, as part of the adjustment.
-    pub photos: PhotoParams,
-    /// Parameters of plane-to-plane ICP.
-    pub gicp: GicpParams,
-    /// How the errors of stations, strips and whole epochs are found.
-    pub observers: EpochErrorParams,
-}
-
-impl Default for RegistrationParams {
-    fn default() -> Self {
-        Self {
-            estimator: Estimator::default(),
-            epoch_error_m: None,
-            stable: Vec::new(),
-            auto_stable: false,
-            border_noises: 3.0,
-            adjustment: AdjustmentParams::default(),
-            photos: PhotoParams::default(),
-            gicp: GicpParams::default(),
-            observers: EpochErrorParams::default(),
-        }
-    }
-}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -284,12 +91,43 @@ struct RawEpoch {
 impl Project {
     /// Reads and checks a project file.
     ///
-    /// Errors name the line: a key that is not known, a file that does not exist, a value that cannot be.
+    /// ```
+    /// use stonewise::Project;
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("stonewise.toml");
+    /// # for file in ["a.laz", "b.laz", "cameras.xml"] {
+    /// #     std::fs::write(folder.path().join(file), "")?;
+    /// # }
+    /// std::fs::write(&path, r#"
+    ///     [project]
+    ///     name = "Lower dam"
+    ///     [[epochs]]
+    ///     name = "2024"
+    ///     clouds = ["a.laz"]
+    ///     images = "."
+    ///     cameras = "cameras.xml"
+    ///     [[epochs]]
+    ///     name = "2025"
+    ///     clouds = ["b.laz"]
+    ///     images = "."
+    ///     cameras = "cameras.xml"
+    /// "#)?;
+    /// let project = Project::read(&path)?;
+    /// assert_eq!(project.epochs[1].name, "2025");
+    /// assert_eq!(project.settings.ingest.size_m, 4.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// With the line: a key that is not known, a file that does not exist, a value that cannot be.
     pub fn read(path: &Path) -> Result<Self> {
         Self::read_with(path, 2)
     }
 
     /// The same for a project that may have a single epoch, which is to be split.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
     pub fn read_for_split(path: &Path) -> Result<Self> {
         Self::read_with(path, 1)
     }
@@ -340,61 +178,12 @@ impl Project {
             part: None,
         })
     }
-}
-
-impl Project {
-    /// Every file and folder that the project reads, the project file first.
-    pub fn inputs(&self) -> Vec<PathBuf> {
-        let mut inputs = vec![self.path.clone()];
-        for epoch in &self.epochs {
-            inputs.extend(epoch.clouds.iter().cloned());
-            inputs.extend([epoch.images.clone(), epoch.cameras.clone()]);
-            inputs.extend(epoch.masks.clone());
-        }
-        if let Weights::File(file) = Weights::named(&self.settings.segment.model) {
-            inputs.push(file);
-        }
-        inputs.extend(self.settings.report.logo.clone());
-        inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
-        // Comparisons of clouds alone have neither photos nor cameras.
-        inputs.retain(|path| !path.as_os_str().is_empty());
-        inputs
-    }
 
     /// Name of the structure in a project file that need not be valid otherwise.
     pub(crate) fn name_in(path: &Path) -> Option<String> {
         let text = fs::read_to_string(path).ok()?;
         let table: toml::Table = toml::from_str(&text).ok()?;
         Some(table.get("project")?.get("name")?.as_str()?.to_owned())
-    }
-
-    /// Two clouds without photos, for comparisons of clouds alone.
-    pub fn of_clouds(before: &Path, after: &Path, m3c2: M3c2Params) -> Self {
-        let epoch = |name: &str, cloud: &Path| Epoch {
-            name: name.to_owned(),
-            date: None,
-            conditions: BTreeMap::new(),
-            clouds: vec![cloud.to_path_buf()],
-            images: PathBuf::new(),
-            cameras: PathBuf::new(),
-            masks: None,
-            motion: None,
-            sources: SourceRule::default(),
-            same_survey_as: None,
-            map: MapFrame::default(),
-        };
-        Self {
-            path: before.to_path_buf(),
-            name: "clouds".to_owned(),
-            epochs: vec![epoch("before", before), epoch("after", after)],
-            settings: Settings {
-                m3c2,
-                ..Settings::default()
-            },
-            notes: Vec::new(),
-            edits: None,
-            part: None,
-        }
     }
 }
 
@@ -631,6 +420,7 @@ impl Source<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Estimator;
 
     #[test]
     fn former_names_are_read_and_noted() {

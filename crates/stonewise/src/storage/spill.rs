@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 /// Bytes kept in memory before bins are appended to their files.
 const BUFFER_BYTES: usize = 256 << 20;
 
-/// Bins of fixed-size records on disk: written in any order of bins, read back bin by bin in order of writing.
+/// Bins of fixed-size records on disk: written in any order of bins, read back bin by bin in order of
+/// writing.
 pub struct Spill<K> {
     dir: PathBuf,
     name: fn(&K) -> String,

@@ -1,14 +1,14 @@
 //! An epoch's cloud on disk, cut into cubic tiles.
 //!
 //! Each tile is a Parquet file of x, y, z (f32 offsets from the tile's origin, metres), file (which of the
-//! epoch's clouds), index (which record of it), source (which entry of `sources.json`) and time (seconds since that
-//! source's first point). `tiles.json` lists origins, bounds and counts.
+//! epoch's clouds), index (which record of it), source (which entry of `sources.json`) and time (seconds
+//! since that source's first point). `tiles.json` lists origins, bounds and counts.
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
-use crate::pipeline::sources::{PointSource, RawSource, SourceList, SourceRule};
-use crate::pipeline::storage::spill::Spill;
-use crate::pipeline::storage::step::StepDir;
+use crate::sources::{PointSource, RawSource, SourceList, SourceRule};
+use crate::storage::spill::Spill;
+use crate::storage::step::StepDir;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -93,7 +93,8 @@ impl DiskTiles {
     }
 }
 
-/// The first tile of a batch: those before it hold at most as many of all points as the batches before it should.
+/// The first tile of a batch: those before it hold at most as many of all points as the batches before it
+/// should.
 fn start_of_batch(points: &[u64], number: usize, count: usize) -> usize {
     if number >= count {
         return points.len();
@@ -110,7 +111,8 @@ fn start_of_batch(points: &[u64], number: usize, count: usize) -> usize {
         .count()
 }
 
-/// Of each point of a tile: its number in the epoch's list of sources, and its time since that source began, seconds.
+/// Of each point of a tile: its number in the epoch's list of sources, and its time since that source began,
+/// seconds.
 pub struct TileOrigins {
     /// Entry of `sources.json`.
     pub source: Vec<u32>,
@@ -176,7 +178,8 @@ impl TileSource for DiskTiles {
 
 /// Cuts clouds into tiles in one streaming pass; points of a tile keep the order of files and records.
 ///
-/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of records without finite coordinates, which no tile holds.
+/// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of
+/// records without finite coordinates, which no tile holds.
 pub fn cut_into_tiles(
     clouds: &[PathBuf],
     rule: SourceRule,

@@ -1,0 +1,16 @@
+//! What a camera file holds.
+
+use stonewise_core::geometry::View;
+
+/// What a camera file holds.
+#[derive(Clone, Debug, Default)]
+pub struct CameraFile {
+    /// Posed photos, in the file's order.
+    pub views: Vec<View>,
+    /// Photos that cannot be used, with the reason: not aligned, disabled.
+    pub skipped: Vec<(String, String)>,
+    /// Coordinate reference system of the world frame as the file writes it, where it says.
+    pub crs: Option<String>,
+    /// What a person should know about how the file was read.
+    pub warnings: Vec<String>,
+}

@@ -1,0 +1,101 @@
+//! Camera files of any of the known formats.
+
+use super::{CameraError, CameraFile, MapFrame, colmap, malformed, metashape, opensfm};
+use std::path::Path;
+use stonewise_core::geometry::View;
+
+/// Pixels of the largest photo that is believed in.
+const MAX_PIXELS: u64 = 1 << 30;
+
+/// Reads a camera file of any of the known formats.
+///
+/// - Metashape: the XML of File > Export > Export Cameras.
+/// - COLMAP: a folder with cameras and images as .bin or .txt (.bin wins, as in COLMAP), or one of these
+///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
+/// - OpenSfM: reconstruction.json.
+///
+/// ```
+/// use stonewise_io::cameras::read_cameras;
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path();
+/// std::fs::write(path.join("cameras.txt"), "1 SIMPLE_PINHOLE 4000 3000 3200 2000 1500\n")?;
+/// std::fs::write(path.join("images.txt"), "1 1 0 0 0 0 0 5 1 wall.jpg\n\n")?;
+/// let file = read_cameras(path)?;
+/// // World to camera is a shift by 5 m along the viewing direction: the camera lies 5 m behind the origin.
+/// assert_eq!((file.views[0].name.as_str(), file.views[0].centre().z), ("wall.jpg", -5.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// The file cannot be read or is none of these, a value is missing or impossible, a lens model or reference
+/// system is not supported, or no photo has a pose.
+pub fn read_cameras(path: &Path) -> Result<CameraFile, CameraError> {
+    read_cameras_on_map(path, &MapFrame::default())
+}
+
+/// As [`read_cameras`], for clouds whose place on the map is known.
+///
+/// Metashape stores the poses of georeferenced chunks earth-centred. They are brought to the system of the
+/// clouds; without one, to the chunk's own if it is a projected one. Transverse Mercator grids and Lambert's
+/// cone are covered, and no shift between geodetic datums. The other formats are read as they are.
+///
+/// # Errors
+/// As [`read_cameras`].
+pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
+    let file = if path.is_dir() {
+        colmap::read_folder(path)?
+    } else {
+        match extension(path).as_str() {
+            "xml" => metashape::read(path, map)?,
+            "json" => opensfm::read(path)?,
+            "txt" | "bin" => colmap::read_folder(path.parent().unwrap_or(Path::new(".")))?,
+            _ => {
+                return Err(CameraError::UnknownFormat {
+                    path: path.to_owned(),
+                });
+            }
+        }
+    };
+    if file.views.is_empty() {
+        return Err(CameraError::NoPoses {
+            path: path.to_owned(),
+            skipped: file.skipped.len(),
+        });
+    }
+    check_sizes(&file, path)?;
+    check_places(&file, path)?;
+    Ok(file)
+}
+
+/// Refuses photos that no memory holds.
+fn check_sizes(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
+    let pixels = |view: &&View| u64::from(view.camera.width) * u64::from(view.camera.height);
+    let Some(view) = file.views.iter().find(|view| pixels(view) > MAX_PIXELS) else {
+        return Ok(());
+    };
+    let problem = format!(
+        "its camera has {}x{} pixels, more than any photo",
+        view.camera.width, view.camera.height
+    );
+    Err(malformed(path, format!("photo {}", view.name), problem))
+}
+
+/// Refuses cameras whose place is beyond all numbers.
+fn check_places(file: &CameraFile, path: &Path) -> Result<(), CameraError> {
+    let is_lost = |view: &&View| !view.centre().iter().all(|c| c.is_finite());
+    let Some(view) = file.views.iter().find(is_lost) else {
+        return Ok(());
+    };
+    let place = format!("photo {}", view.name);
+    Err(malformed(
+        path,
+        place,
+        "its rotation and translation give no place",
+    ))
+}
+
+fn extension(path: &Path) -> String {
+    path.extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .unwrap_or_default()
+}

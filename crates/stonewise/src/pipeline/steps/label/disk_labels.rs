@@ -1,0 +1,58 @@
+//! Labels of points on disk.
+
+use crate::error::{Error, Result};
+use crate::storage::tiles::DiskTiles;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use stonewise_core::cloud::TileSource;
+use stonewise_core::transfer::{LabelStore, TileLabels};
+use stonewise_io::table::{Table, read_columns, write_parquet};
+
+/// Labels beside the tiles, one Parquet file each: stone (u32), confidence (f32), seen (bool).
+#[derive(Clone)]
+pub struct DiskLabels {
+    files: Vec<PathBuf>,
+}
+
+impl DiskLabels {
+    /// Those in a folder.
+    pub fn new(dir: &Path, tiles: &DiskTiles) -> Self {
+        let file = |tile| dir.join(Self::file_name(tiles, tile));
+        Self {
+            files: (0..tiles.tile_count()).map(file).collect(),
+        }
+    }
+
+    /// Takes these tiles from another store.
+    pub fn replace(&mut self, tiles: &BTreeSet<usize>, from: &Self) {
+        for &tile in tiles {
+            self.files[tile].clone_from(&from.files[tile]);
+        }
+    }
+
+    /// Name of the file of a tile.
+    pub fn file_name(tiles: &DiskTiles, tile: usize) -> String {
+        format!("{}.parquet", tiles.name(tile))
+    }
+}
+
+impl LabelStore for DiskLabels {
+    type Error = Error;
+
+    fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<()> {
+        let mut table = Table::new();
+        table.push("stone", labels.stone.clone())?;
+        table.push("confidence", labels.confidence.clone())?;
+        table.push("seen", labels.seen.clone())?;
+        Ok(write_parquet(&self.files[tile], &table)?)
+    }
+
+    fn read(&self, tile: usize) -> Result<TileLabels> {
+        let table = read_columns(&self.files[tile], &["stone", "confidence", "seen"])?;
+        Ok(TileLabels {
+            stone: table.required("stone")?.to_vec(),
+            confidence: table.required("confidence")?.to_vec(),
+            seen: table.required("seen")?.to_vec(),
+        })
+    }
+}

@@ -1,0 +1,22 @@
+//! Name and key of the step, which whole epochs and batches share.
+
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::ingest::Ingested;
+use crate::pipeline::steps::segment::Segmented;
+use crate::storage::step::Key;
+
+/// Name of the step.
+pub fn label_name(number: usize) -> String {
+    format!("label-{number}")
+}
+
+/// Its key.
+pub fn label_key(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Key {
+    let params = &context.project.settings.label;
+    let map = &context.project.epochs[number - 1].map;
+    Key::new(
+        "label",
+        &(params, &map.crs, map.false_origin),
+        &[ingested.step.key().as_str(), photos.step.key().as_str()],
+    )
+}

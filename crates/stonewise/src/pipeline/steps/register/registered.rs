@@ -1,0 +1,52 @@
+//! Motions of a pair of epochs.
+
+use crate::results::records::EstimatorRecord;
+use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use stonewise_core::id::StoneId;
+use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
+use stonewise_core::stone::PairResult;
+
+/// Name of the step.
+pub(super) const STEP: &str = "register";
+
+/// Motions of a pair of epochs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Registered {
+    /// One result per matched stone, ascending by stone of the first epoch.
+    pub results: Vec<PairResult>,
+    /// What the estimator says about itself.
+    pub estimator: EstimatorRecord,
+    /// Error of the later epoch against the reference, as sources and stable areas show it.
+    pub epoch_errors: Option<EpochErrors>,
+    /// The stones at which that error is given, in its order.
+    pub error_stones: Vec<StoneId>,
+    /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty where nobody
+    /// asked.
+    #[serde(default)]
+    pub off_wall: Vec<[Point3<f64>; 2]>,
+}
+
+impl Registered {
+    /// Error of the later epoch against the reference, by stone of the reference.
+    pub fn errors(&self) -> BTreeMap<StoneId, &ErrorAt> {
+        let errors = self.epoch_errors.iter().flat_map(|e| &e.at);
+        self.error_stones.iter().copied().zip(errors).collect()
+    }
+
+    /// Noise of single points along the normal, metres: the larger of the epochs'.
+    pub(super) fn noise_m(&self) -> f64 {
+        match &self.estimator {
+            EstimatorRecord::Adjustment(adjustment) => {
+                adjustment.noise_m.iter().flatten().copied().fold(0.0, f64::max)
+            }
+            EstimatorRecord::Gicp(_) => {
+                let motions = self.results.iter().filter_map(|r| r.motion.as_ref().ok());
+                let mut residuals: Vec<f64> = motions.map(|m| m.rmse_m).filter(|r| r.is_finite()).collect();
+                residuals.sort_by(f64::total_cmp);
+                residuals.get(residuals.len() / 2).copied().unwrap_or(0.0)
+            }
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! The folder of excerpts and its files.
+
+use crate::error::Error;
+use crate::results::names::EVIDENCE_DIR;
+use std::path::{Path, PathBuf};
+use stonewise_io::table::{Table, read_parquet};
+
+/// A file of the folder.
+pub(super) fn path(dir: &Path, stem: &str, epoch: usize, extension: &str) -> PathBuf {
+    dir.join(EVIDENCE_DIR).join(format!("{stem}_{epoch}.{extension}"))
+}
+
+/// Makes the folder.
+pub(super) fn make_dir(dir: &Path) -> Result<(), Error> {
+    let folder = dir.join(EVIDENCE_DIR);
+    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))
+}
+
+/// A table, or `None` where the file is missing.
+pub(super) fn read_table(path: &Path) -> Result<Option<Table>, Error> {
+    if !path.exists() {
+        return Ok(None);
+    }
+    Ok(Some(read_parquet(path)?))
+}
