@@ -112,6 +112,14 @@ test("the chosen stone keeps its colour in space", async () => {
   await close();
 });
 
+for (const name of ["200", "10000", "german"]) {
+  test(`nothing reaches beyond the edge of a phone: ${name}`, async () => {
+    const { page, close } = await open(browser, report(name), { width: 390, height: 844 });
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+    await close();
+  });
+}
+
 test("photos lie behind the map when they are asked for, those of either epoch", async () => {
   const { page, trouble, close } = await open(browser, report(200));
   const canvas = ".wall-map canvas";
