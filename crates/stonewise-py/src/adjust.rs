@@ -10,8 +10,8 @@ use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::{BTreeMap, HashSet};
-use stonewise::{MatchedPair, PairPlaces, Settings};
 use stonewise::results::{Reference, StoneRow, stone_table};
+use stonewise::{MatchedPair, PairPlaces, Settings};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{Bounds, Camera, DisplacementSample, Plane, SmallMotion, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
@@ -208,7 +208,9 @@ fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f
         let places = PairPlaces::new(&pairs, is_later, &extents);
         let mut near: Vec<Vec<NearPoint>> = vec![Vec::new(); pairs.len()];
         for (point, stone) in epoch.points() {
-            places.near(point, stone).for_each(|(k, point)| near[k].push(point));
+            places
+                .near(point, stone)
+                .for_each(|(k, point)| near[k].push(point));
         }
         near
     };

@@ -7,9 +7,7 @@ use crate::figure::{count, mm, number, percent};
 use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
-pub(crate) use doubts::{
-    BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, doubt_in,
-};
+pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, doubt_in};
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };

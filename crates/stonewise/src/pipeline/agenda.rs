@@ -45,7 +45,12 @@ impl Agenda {
     }
 
     /// The steps of a comparison of two clouds: those of `epochs` are cut into tiles, then comes `compare` under the name `step`.
-    pub fn of_clouds(project: &Project, epochs: std::ops::RangeInclusive<usize>, step: &str, compare: &str) -> Self {
+    pub fn of_clouds(
+        project: &Project,
+        epochs: std::ops::RangeInclusive<usize>,
+        step: &str,
+        compare: &str,
+    ) -> Self {
         let mut agenda = Self::default();
         agenda.push(project, epochs, "ingest", "clouds of");
         agenda.0.push((step.to_owned(), compare.to_owned()));

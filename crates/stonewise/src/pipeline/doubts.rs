@@ -47,9 +47,7 @@ fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(Stri
     let of_first = offsets.first.filter(|_| number == 2);
     let within = [(first, &of_first), (second, &offsets.second)]
         .into_iter()
-        .filter_map(|(name, offset)| {
-            Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?))
-        });
+        .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
     let within: Vec<(String, String)> = within.collect();
     let between = || {
         let offset = offsets.between.as_ref()?;

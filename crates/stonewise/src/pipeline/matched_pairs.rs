@@ -144,9 +144,8 @@ impl PairPlaces {
 
 fn cells_of(extent: &Bounds) -> impl Iterator<Item = [i64; 3]> + use<> {
     let (low, high) = (cell_of(&extent.min, BOX_CELL_M), cell_of(&extent.max, BOX_CELL_M));
-    (low[0]..=high[0]).flat_map(move |x| {
-        (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z]))
-    })
+    (low[0]..=high[0])
+        .flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z])))
 }
 
 #[cfg(test)]

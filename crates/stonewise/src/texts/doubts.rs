@@ -107,7 +107,10 @@ mod tests {
                 .collect();
             let said = fill(doubt.english, &pairs);
             let german = doubt_in(Language::German, &said).unwrap();
-            assert!(values.iter().all(|v| german.contains(v)) && !german.contains('{'), "{german}");
+            assert!(
+                values.iter().all(|v| german.contains(v)) && !german.contains('{'),
+                "{german}"
+            );
             assert_ne!(german, said);
             assert_eq!(doubt_in(Language::English, &said), Some(said));
         }

@@ -109,7 +109,11 @@ impl Speaker<'_> {
             R::JointsAttention => self.joints(c.joints_attention, Level::Attention),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
             R::MotionShown if wall.moved > 0 => {
-                let text = if self.case.has_datum() { c.moved } else { c.moved_common };
+                let text = if self.case.has_datum() {
+                    c.moved
+                } else {
+                    c.moved_common
+                };
                 counted(text, wall.moved, &[("m", &count(wall.measured))])
             }
             R::MotionShown => counted(c.loose, wall.loose, &[]),

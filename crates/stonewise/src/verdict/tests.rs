@@ -160,7 +160,9 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
     moving.datum = Some(DatumState::Unknown);
     let sentence = judge(&moving, &Thresholds::default()).sentence;
     assert!(
-        sentence.contains(" measured stones moved against the common motion of the wall; the largest of these motions is "),
+        sentence.contains(
+            " measured stones moved against the common motion of the wall; the largest of these motions is "
+        ),
         "{sentence}"
     );
     // Only motions against neighbours are asked for: a common motion does not matter.

@@ -39,14 +39,15 @@ pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
             used.extend(photo_files(epoch)?);
         }
     }
-    used.into_iter().map(|path| {
-        Ok(PlannedInput {
-            look: look_of(&path)?,
-            blake3: context.digest(&path)?,
-            path,
+    used.into_iter()
+        .map(|path| {
+            Ok(PlannedInput {
+                look: look_of(&path)?,
+                blake3: context.digest(&path)?,
+                path,
+            })
         })
-    })
-    .collect()
+        .collect()
 }
 
 /// Digests of the inputs, if all of them are as they were; `plan`: the file to name otherwise.

@@ -162,7 +162,10 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         );
         list.add(Stage::Offsets, n, &[format!("match-{n}")], 2, 0, &[]);
         let photos = match project.settings.registration.photos.enabled {
-            true => vec![project.epochs[0].images.clone(), project.epochs[n - 1].images.clone()],
+            true => vec![
+                project.epochs[0].images.clone(),
+                project.epochs[n - 1].images.clone(),
+            ],
             false => Vec::new(),
         };
         list.add(
