@@ -124,7 +124,8 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
         motion_map(results, facts)
     };
     format!(
-        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}<h3>{}</h3>{}</div><div>{map}{}</div></div>\
+        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}</div><div class=\"first rest\"><h3>{}</h3>{}</div>\
+         <div class=\"beside\">{map}{}</div></div>\
          <div class=\"sign\"><p>{}</p><p>{}</p><p>{}</p></div>",
         limit(facts),
         page.look_first,
