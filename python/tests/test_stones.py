@@ -57,9 +57,10 @@ def label_image(results, number: int) -> np.ndarray:
     return np.asarray(Image.open(results.path / "work" / "segment-1" / f"{number:05}.png")).astype(np.int64)
 
 
-def test_adjust_is_a_run_whose_motions_are_not_corrected(survey, results, epochs, clouds, tmp_path):
+def test_adjust_is_a_run_without_photos_whose_motions_are_not_corrected(survey, results, epochs, clouds, tmp_path):
     shutil.copytree(results.path, tmp_path / "out")
-    stated = stonewise.run(survey / "stonewise.toml", out=tmp_path / "out", registration={"epoch_error_m": 0.001})
+    points_alone = {"epoch_error_m": 0.001, "photos": {"enabled": False}}
+    stated = stonewise.run(survey / "stonewise.toml", out=tmp_path / "out", registration=points_alone)
     views = stonewise.read_cameras(survey / epochs[0]["cameras"])
     (first, labels_1), (second, labels_2) = clouds
     motion = stonewise.adjust(first, labels_1, second, labels_2, viewpoints=[view.centre for view in views])

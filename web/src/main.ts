@@ -25,11 +25,12 @@ async function start(): Promise<void> {
   // The largest motion is what a reader wants to see first.
   const largest = byMotion(report.stones)[0] ?? -1;
   const store = new Store({
-    quantity: "out", fade: true, arrows: false, view: "map", tool: "move", hover: -1,
+    quantity: "out", fade: true, arrows: false, behind: "none", view: "map", tool: "move", hover: -1,
     chosen: largest >= 0 && isMeasured(report.stones, largest) ? largest : -1, follow: 0, profile: null,
   });
   const shown = quantities(report);
-  const map = new WallMap(report, store, shown);
+  const photos = new Photos(report);
+  const map = new WallMap(report, store, shown, photos);
   const pictures = el("div", { class: "pictures" }, map.element);
   let scene: WallScene | null = null;
   const showScene = () => {
@@ -46,7 +47,7 @@ async function start(): Promise<void> {
   store.on((state, before) => {
     if (state.view !== before.view) showScene();
   });
-  const panel = new StonePanel(report, store, new Photos(report), new Sections(report), (stone, upright) =>
+  const panel = new StonePanel(report, store, photos, new Sections(report), (stone, upright) =>
     store.set({ profile: map.lineThrough(stone, upright) }));
   place.append(
     toolbar(report, store, shown, () => (store.get().view === "scene" && scene ? scene : map)),

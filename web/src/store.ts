@@ -15,6 +15,8 @@ export interface State {
   /** Fade what is below its detection limit. */
   readonly fade: boolean;
   readonly arrows: boolean;
+  /** Whose photos lie behind the map: of no epoch, of the first or of the later one. */
+  readonly behind: "none" | "first" | "later";
   /** Which picture is shown. */
   readonly view: "map" | "scene";
   /** What dragging on the map does. */

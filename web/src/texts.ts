@@ -35,6 +35,8 @@ const TEXTS = {
   "show": ["Show ", "Zeige "],
   "fade": [" fade below the limit", " unter der Grenze blass"],
   "arrows": [" in-plane arrows", " Pfeile in der Ebene"],
+  "photosBehind": ["photos behind ", "Fotos dahinter "],
+  "noPhotos": ["none", "keine"],
   "searchStone": ["Stone ", "Stein "],
   "number": ["number", "Nummer"],
   "drawProfile": ["Draw a profile", "Profil ziehen"],

@@ -112,6 +112,40 @@ test("the chosen stone keeps its colour in space", async () => {
   await close();
 });
 
+for (const name of ["200", "10000", "german"]) {
+  test(`nothing reaches beyond the edge of a phone: ${name}`, async () => {
+    const { page, close } = await open(browser, report(name), { width: 390, height: 844 });
+    assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
+    await close();
+  });
+}
+
+test("photos lie behind the map when they are asked for, those of either epoch", async () => {
+  const { page, trouble, close } = await open(browser, report(200));
+  const canvas = ".wall-map canvas";
+  await page.waitForSelector(`${canvas}[data-behind=none]`);
+  // Mean brightness in the middle of the chosen stone's surroundings: made-up crops of the second epoch are 20 levels lighter.
+  const light = () => page.$eval(canvas, (c) => {
+    const data = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+    let sum = 0;
+    for (let i = 0; i < data.length; i += 4) sum += data[i + 1];
+    return sum / (data.length / 4);
+  });
+  const seen = [await light()];
+  for (const epoch of ["first", "later"]) {
+    await page.selectOption("#behind", epoch);
+    await page.waitForSelector(`${canvas}[data-behind=${epoch}]`, { timeout: 60_000 });
+    seen.push(await light());
+  }
+  const [without, first, later] = seen;
+  assert.ok(without > first + 10 && later > first + 3, `${seen}`);
+  await page.selectOption("#behind", "none");
+  await page.waitForSelector(`${canvas}[data-behind=none]`);
+  assert.ok(Math.abs((await light()) - without) < 0.5);
+  assert.deepEqual(trouble, []);
+  await close();
+});
+
 test("a German report speaks German", async () => {
   const { page, trouble, close } = await open(browser, report("german"));
   assert.equal(await page.getAttribute("html", "lang"), "de");

@@ -236,3 +236,42 @@ fn a_plan_holds_for_its_inputs_only_and_keeps_what_is_done() {
             .all(|u| u["done"] == false)
     );
 }
+
+/// Photos among the inputs of a plan, and folders that the registration reads.
+fn photos_of(plan: &Value) -> (usize, usize) {
+    let inputs = plan["inputs"].as_array().unwrap().iter();
+    let photos = inputs.filter(|i| i["path"].as_str().unwrap().ends_with(".jpg"));
+    let units = plan["units"].as_array().unwrap().iter();
+    let register = units.clone().find(|u| u["id"] == "register-2").unwrap();
+    let folders = strings(&register["inputs"]);
+    let folders = folders.iter().filter(|path| path.ends_with("images"));
+    (photos.count(), folders.count())
+}
+
+#[test]
+fn photos_in_which_stones_are_tracked_are_inputs_of_the_plan_beside_masks() {
+    let survey = copy_of(survey());
+    let out = tempfile::tempdir().unwrap();
+    // Two photos an epoch.
+    assert_eq!(photos_of(&plan(survey.path(), out.path())), (4, 2));
+    let images = survey.path().join("epoch2/images");
+    let photo = fs::read_dir(&images).unwrap().next().unwrap().unwrap().path();
+    let mut bytes = fs::read(&photo).unwrap();
+    bytes.push(0);
+    fs::write(&photo, bytes).unwrap();
+    let (code, log) = unit(out.path(), "ingest-1");
+    let name = photo.file_name().unwrap().to_string_lossy();
+    assert!(
+        code == 2 && log.contains(&*name) && log.contains("stonewise plan"),
+        "{log}"
+    );
+
+    let project = survey.path().join("stonewise.toml");
+    let text = fs::read_to_string(&project).unwrap();
+    fs::write(
+        &project,
+        format!("{text}\n[registration.photos]\nenabled = false\n"),
+    )
+    .unwrap();
+    assert_eq!(photos_of(&plan(survey.path(), out.path())), (0, 0));
+}

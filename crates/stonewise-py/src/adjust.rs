@@ -5,31 +5,27 @@ use crate::attended::{Listeners, attended};
 use crate::clouds::Tiled;
 use crate::command::parameters_of;
 use crate::error::{error, explained};
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::{BTreeMap, HashSet};
-use std::sync::Arc;
-use stonewise::Settings;
 use stonewise::results::{Reference, StoneRow, stone_table};
-use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise::{MatchedPair, PairPlaces, Settings};
+use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::{Bounds, Camera, Plane, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::{
-    AdjustmentReport, MemoryPairs, NearPoint, PairPoints, adjust as adjust_pairs, local_shifts, stone_points,
+    AdjustmentReport, MemoryPairs, NearPoint, PairPoints, adjust as adjust_pairs,
 };
 use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
 use stonewise_core::transfer::{LabelStore, MemoryLabels, TileLabels, build_stones};
 use stonewise_io::table::{Column, Table};
 
-/// As in the steps `match` and `register` of a run.
+/// As in the step `match` of a run.
 const COVERAGE_CELL_M: f64 = 0.1;
-const NEIGHBOURHOOD_M: f64 = 4.0;
-const BOX_CELL_M: f64 = 0.5;
-const BOX_MARGIN_M: f64 = 0.02;
 /// Where a viewpoint is put that the caller does not give, metres in front of the wall.
 const FAR_M: f64 = 1e4;
 /// Points on which the wall's plane is fitted, for such a viewpoint.
@@ -197,118 +193,34 @@ fn handed_over(stones: &[Stone]) -> Result<Vec<Stone>, stonewise::Error> {
     serde_json::from_slice(&serde_json::to_vec(stones).map_err(failed)?).map_err(failed)
 }
 
-/// A matched stone in both epochs.
-struct Pair {
-    first: Stone,
-    second: Stone,
-    /// How the stones around it moved, metres.
-    shift: Vector3<f64>,
-    /// Box of its points in the first epoch, somewhat larger.
-    extent: Option<Bounds>,
-}
-
 /// The points of all matched stones, in the order of a run.
 fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f64) -> Vec<PairPoints> {
-    let pairs = pairs(first, second, matched, border_noises);
-    let near = [
-        near_points(first, &pairs, |p| (p.first.id, Vector3::zeros())),
-        near_points(second, &pairs, |p| (p.second.id, p.shift)),
-    ];
-    let [ones, twos] = near;
-    let chosen = pairs.into_iter().zip(ones.iter().zip(&twos));
-    chosen
-        .map(|(pair, (one, two))| {
-            let chosen = stone_points([one, two], &pair.first.normal, &pair.shift, border_noises);
-            let centroid = pair.first.centroid;
-            PairPoints {
-                first: pair.first.id,
-                second: pair.second.id,
-                centroid,
-                centroid_second: pair.second.centroid,
-                normal: pair.first.normal,
-                points_first: Cloud::new(centroid, chosen.first),
-                points_second: Cloud::new(centroid, chosen.second),
-                nearby_second: Cloud::new(centroid, chosen.nearby_second),
-                window: chosen.window.map(Arc::new),
-            }
-        })
-        .collect()
-}
-
-fn pairs(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f64) -> Vec<Pair> {
-    let by_id = |stones: &[Stone]| {
-        stones
-            .iter()
-            .map(|s| (s.id, s.clone()))
-            .collect::<BTreeMap<_, _>>()
-    };
-    let (ones, twos) = (by_id(&first.stones), by_id(&second.stones));
-    let partners = matched.outcomes.iter().filter_map(|(id, outcome)| match outcome {
-        MatchOutcome::Matched { second } => Some((ones.get(id)?.clone(), twos.get(second)?.clone())),
+    let partner = |(id, outcome): &(StoneId, MatchOutcome)| match outcome {
+        MatchOutcome::Matched { second } => Some((*id, *second)),
         MatchOutcome::Unmatched(_) => None,
-    });
-    let found: Vec<(Stone, Stone)> = partners.collect();
-    let centroids: Vec<Point3<f64>> = found.iter().map(|(a, _)| a.centroid).collect();
-    let moved: Vec<Vector3<f64>> = found.iter().map(|(a, b)| b.centroid - a.centroid).collect();
+    };
+    let matches: Vec<(StoneId, StoneId)> = matched.outcomes.iter().filter_map(partner).collect();
+    let pairs = MatchedPair::of_matches(&first.stones, &second.stones, &matches);
     let extents = match border_noises > 0.0 {
         true => first.extents(),
         false => BTreeMap::new(),
     };
-    let mut pairs: Vec<Pair> = found
-        .into_iter()
-        .zip(local_shifts(&centroids, &moved))
-        .map(|((first, second), shift)| Pair {
-            extent: extents.get(&first.id.0).map(|e| e.grown(BOX_MARGIN_M)),
-            first,
-            second,
-            shift,
-        })
-        .collect();
-    pairs.sort_by_key(|p| (cell_of(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
-    pairs
-}
-
-/// For each pair its labelled points, and all others in its box; `place`: the stone in this epoch, and the
-/// shift of the box.
-fn near_points(
-    epoch: &Epoch,
-    pairs: &[Pair],
-    place: impl Fn(&Pair) -> (StoneId, Vector3<f64>),
-) -> Vec<Vec<NearPoint>> {
-    let mut near = vec![Vec::new(); pairs.len()];
-    let mut of_stone: BTreeMap<u32, usize> = BTreeMap::new();
-    let mut boxes: Vec<Option<Bounds>> = Vec::with_capacity(pairs.len());
-    let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
-    for (k, pair) in pairs.iter().enumerate() {
-        let (stone, shift) = place(pair);
-        of_stone.insert(stone.0, k);
-        let bounds = pair.extent.map(|e| e.moved(&shift));
-        if let Some(bounds) = &bounds {
-            let (low, high) = (cell_of(&bounds.min, BOX_CELL_M), cell_of(&bounds.max, BOX_CELL_M));
-            for x in low[0]..=high[0] {
-                for y in low[1]..=high[1] {
-                    for z in low[2]..=high[2] {
-                        cells.entry([x, y, z]).or_default().push(k);
-                    }
-                }
-            }
+    let near = |epoch: &Epoch, is_later| {
+        let places = PairPlaces::new(&pairs, is_later, &extents);
+        let mut near: Vec<Vec<NearPoint>> = vec![Vec::new(); pairs.len()];
+        for (point, stone) in epoch.points() {
+            places
+                .near(point, stone)
+                .for_each(|(k, point)| near[k].push(point));
         }
-        boxes.push(bounds);
-    }
-    for (point, stone) in epoch.points() {
-        let own = of_stone.get(&stone).copied();
-        let here = cells.get(&cell_of(&point, BOX_CELL_M)).into_iter().flatten();
-        let others = here
-            .copied()
-            .filter(|&k| Some(k) != own && boxes[k].is_some_and(|b| b.contains(&point)));
-        for k in own.into_iter().chain(others) {
-            near[k].push(NearPoint {
-                offset: (point - pairs[k].first.centroid).cast::<f32>().into(),
-                labelled: Some(k) == own,
-            });
-        }
-    }
-    near
+        near
+    };
+    let (ones, twos) = (near(first, false), near(second, true));
+    let near = ones.iter().zip(&twos);
+    let points = pairs.iter().zip(near);
+    points
+        .map(|(pair, (one, two))| pair.points([one, two], border_noises))
+        .collect()
 }
 
 /// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of

@@ -37,8 +37,8 @@ pub use init::{Initialised, init};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{
-    Comparison, Coordinator, PairSummary, Plan, PlanOptions, Stage, Summary, Unit, UnitDone, Until,
-    compare_clouds, do_unit, plan, run, tile_clouds,
+    Comparison, Coordinator, MatchedPair, PairPlaces, PairSummary, Plan, PlanOptions, Stage, Summary, Unit,
+    UnitDone, Until, compare_clouds, do_unit, plan, run, tile_clouds,
 };
 pub use project::{Epoch, Project};
 pub use report_params::{Language, ReportParams};

@@ -1,11 +1,13 @@
 //! The texts of the verdict and of the report, in each language.
 
+mod doubts;
 mod report;
 
 use crate::figure::{count, mm, number, percent};
 use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
+pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, doubt_in};
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
@@ -56,10 +58,12 @@ pub(crate) struct Clauses {
     pub joints_alarm: Number,
     pub joints_attention: Number,
     pub moved: Number,
+    pub moved_common: Number,
     pub loose: Number,
     pub lost: Number,
     pub largest: &'static str,
     pub largest_common: &'static str,
+    pub largest_of_these: &'static str,
     pub nothing_measured: &'static str,
     pub few_measured: Number,
     pub datum_unknown: &'static str,
@@ -87,10 +91,12 @@ pub(crate) struct PageTexts {
     pub of_not_measured: Number,
     pub look_first: &'static str,
     pub nothing_first: &'static str,
+    pub none_stands_out: &'static str,
     pub stone: &'static str,
     pub along_up: &'static str,
     pub lost_stone: &'static str,
     pub moved_stone: &'static str,
+    pub moved_stone_common: &'static str,
     pub loose_stone: &'static str,
     pub zones: &'static str,
     pub zone: &'static str,
@@ -104,10 +110,12 @@ pub(crate) struct PageTexts {
     pub place_date: &'static str,
     pub tile_measured: &'static str,
     pub tile_moved: &'static str,
+    pub tile_moved_common: &'static str,
     pub tile_above: &'static str,
     pub tile_loose: &'static str,
     pub tile_limit: &'static str,
     pub tile_largest: &'static str,
+    pub tile_largest_common: &'static str,
     pub tile_no_motion: &'static str,
     pub registration_included: &'static str,
     pub registration_unknown: &'static str,
@@ -119,6 +127,7 @@ pub(crate) struct PageTexts {
     pub finished: &'static str,
     pub map_title: &'static str,
     pub map_note: &'static str,
+    pub map_as_measured: &'static str,
     pub no_registration: &'static str,
 }
 
@@ -166,6 +175,10 @@ static ENGLISH: Texts = Texts {
             "{n} of {m} measured stones moved",
             "{n} of {m} measured stones moved",
         ],
+        moved_common: [
+            "{n} of {m} measured stones moved against the common motion of the wall",
+            "{n} of {m} measured stones moved against the common motion of the wall",
+        ],
         loose: [
             "{n} stone is loose: it moved unlike its neighbours",
             "{n} stones are loose: they moved unlike their neighbours",
@@ -176,6 +189,7 @@ static ENGLISH: Texts = Texts {
         ],
         largest: "the largest motion is {length} mm (95 % interval {low} to {high} mm), stone {id}",
         largest_common: "the largest motion against the common motion of the wall is {length} mm (95 % interval {low} to {high} mm), stone {id}",
+        largest_of_these: "the largest of these motions is {length} mm (95 % interval {low} to {high} mm), stone {id}",
         nothing_measured: "no stone was measured",
         few_measured: [
             "only {n} of {m} stones was measured",
@@ -212,10 +226,12 @@ static ENGLISH: Texts = Texts {
         ],
         look_first: "What to look at first",
         nothing_first: "No stone calls for a closer look.",
+        none_stands_out: "No stone stands out; that does not mean that none moved.",
         stone: "Stone",
         along_up: "{along} m along, {up} m up",
         lost_stone: "lost",
         moved_stone: "moved {length} mm (95 %: {low} to {high} mm)",
+        moved_stone_common: "moved {length} mm against the common motion (95 %: {low} to {high} mm)",
         loose_stone: "loose: {length} mm against its neighbours (95 %: {low} to {high} mm)",
         zones: "Zones",
         zone: "Zone",
@@ -228,12 +244,14 @@ static ENGLISH: Texts = Texts {
         signature: "Signature",
         place_date: "Place and date",
         tile_measured: "of {m} stones measured",
-        tile_moved: "moved (false discovery rate 5 %)",
-        tile_above: "above their own 95 % limit",
+        tile_moved: "moved (false discovery rate 5\u{a0}%)",
+        tile_moved_common: "moved against the common motion (false discovery rate 5\u{a0}%)",
+        tile_above: "above their own 95\u{a0}% limit",
         tile_loose: "loose: move unlike their neighbours",
-        tile_limit: "detection limit (95 %, median)",
+        tile_limit: "detection limit (95\u{a0}%, median)",
         tile_largest: "largest motion of a stone that moved",
-        tile_no_motion: "no stone moved",
+        tile_largest_common: "largest motion against the common motion",
+        tile_no_motion: "no motion is shown",
         registration_included: "Registration error between the surveys is included in the limits: {note}.",
         registration_unknown: "Registration error between the surveys is unknown and is <b>not</b> included in the limits below: limits, \
             intervals and significance hold for motions against the common rigid motion of the measured stones. A motion of the wall \
@@ -248,6 +266,7 @@ static ENGLISH: Texts = Texts {
         map_title: "Length of the motion, with in-plane arrows",
         map_note: "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
             not measured.",
+        map_as_measured: " Motions are drawn as measured: with the common motion of the wall, which may be an error of the registration.",
         no_registration: "Nothing is recorded about the registration of the epochs.",
     },
     sections: SectionTexts::ENGLISH,
@@ -314,6 +333,10 @@ static GERMAN: Texts = Texts {
             "{n} von {m} gemessenen Steinen hat sich bewegt",
             "{n} von {m} gemessenen Steinen haben sich bewegt",
         ],
+        moved_common: [
+            "{n} von {m} gemessenen Steinen hat sich gegen die gemeinsame Bewegung der Mauer bewegt",
+            "{n} von {m} gemessenen Steinen haben sich gegen die gemeinsame Bewegung der Mauer bewegt",
+        ],
         loose: [
             "{n} Stein ist lose: er hat sich anders bewegt als seine Nachbarn",
             "{n} Steine sind lose: sie haben sich anders bewegt als ihre Nachbarn",
@@ -324,6 +347,7 @@ static GERMAN: Texts = Texts {
         ],
         largest: "die gr\u{f6}\u{df}te Bewegung ist {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
         largest_common: "die gr\u{f6}\u{df}te Bewegung gegen die gemeinsame Bewegung der Mauer ist {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        largest_of_these: "die gr\u{f6}\u{df}te dieser Bewegungen ist {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
         nothing_measured: "kein Stein wurde gemessen",
         few_measured: [
             "nur {n} von {m} Steinen wurde gemessen",
@@ -360,10 +384,12 @@ static GERMAN: Texts = Texts {
         ],
         look_first: "Was zuerst anzusehen ist",
         nothing_first: "Kein Stein verlangt einen genaueren Blick.",
+        none_stands_out: "Kein Stein f\u{e4}llt auf; das hei\u{df}t nicht, dass sich keiner bewegt hat.",
         stone: "Stein",
         along_up: "{along} m entlang, {up} m hoch",
         lost_stone: "fehlt",
         moved_stone: "hat sich um {length} mm bewegt (95 %: {low} bis {high} mm)",
+        moved_stone_common: "hat sich um {length} mm gegen die gemeinsame Bewegung bewegt (95 %: {low} bis {high} mm)",
         loose_stone: "lose: {length} mm gegen seine Nachbarn (95 %: {low} bis {high} mm)",
         zones: "Zonen",
         zone: "Zone",
@@ -376,12 +402,14 @@ static GERMAN: Texts = Texts {
         signature: "Unterschrift",
         place_date: "Ort und Datum",
         tile_measured: "von {m} Steinen gemessen",
-        tile_moved: "haben sich bewegt (Falscherkennungsrate 5 %)",
+        tile_moved: "haben sich bewegt (Falscherkennungsrate 5\u{a0}%)",
+        tile_moved_common: "haben sich gegen die gemeinsame Bewegung bewegt (Falscherkennungsrate 5\u{a0}%)",
         tile_above: "\u{fc}ber ihrer eigenen 95-%-Grenze",
         tile_loose: "lose: bewegen sich anders als ihre Nachbarn",
-        tile_limit: "Nachweisgrenze (95 %, Median)",
+        tile_limit: "Nachweisgrenze (95\u{a0}%, Median)",
         tile_largest: "gr\u{f6}\u{df}te Bewegung eines bewegten Steins",
-        tile_no_motion: "kein Stein hat sich bewegt",
+        tile_largest_common: "gr\u{f6}\u{df}te Bewegung gegen die gemeinsame Bewegung",
+        tile_no_motion: "keine Bewegung ist nachweisbar",
         registration_included: "Der Registrierungsfehler zwischen den Aufnahmen ist in den Grenzen enthalten: {note}.",
         registration_unknown: "Der Registrierungsfehler zwischen den Aufnahmen ist unbekannt und in den Grenzen unten <b>nicht</b> enthalten: \
             Grenzen, Intervalle und Signifikanz gelten f\u{fc}r Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine. Eine Bewegung \
@@ -396,6 +424,7 @@ static GERMAN: Texts = Texts {
         map_title: "Betrag der Bewegung, mit Pfeilen in der Ebene der Mauer",
         map_note: "Pfeile: Anteil in der Ebene von Bewegungen \u{fc}ber der eigenen Grenze des Steins, ausged\u{fc}nnt, wo sie sich ber\u{fc}hren \
             w\u{fc}rden. Blass: unter der Grenze; schraffiert: nicht gemessen.",
+        map_as_measured: " Die Bewegungen sind gezeichnet wie gemessen: mit der gemeinsamen Bewegung der Mauer, die ein Registrierungsfehler sein kann.",
         no_registration: "\u{dc}ber die Registrierung der Epochen ist nichts festgehalten.",
     },
     sections: SectionTexts::GERMAN,
@@ -429,6 +458,14 @@ impl Language {
 }
 
 impl Texts {
+    /// The language.
+    pub(crate) fn language(&self) -> Language {
+        match self.tag {
+            "de" => Language::German,
+            _ => Language::English,
+        }
+    }
+
     /// The word for a state.
     pub(crate) fn state(&self, state: State) -> &'static str {
         match state {
@@ -503,7 +540,8 @@ mod tests {
     fn both_languages_fill_in_the_same_values() {
         // The same places of both tables, as they are printed for debugging.
         let strings = |texts: &Texts| {
-            let text = format!("{texts:?}");
+            // Debugging writes a space that does not break with braces.
+            let text = format!("{texts:?}").replace("\\u{a0}", " ");
             text.split('"')
                 .skip(1)
                 .step_by(2)

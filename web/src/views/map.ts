@@ -7,12 +7,16 @@ import { Squares, contains } from "../geometry.ts";
 import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Line, Store } from "../store.ts";
 import { t } from "../texts.ts";
+import { Backdrop } from "./backdrop.ts";
+import type { Photos } from "./photos.ts";
 
 /** Length of the longest arrow, least distance between arrows, pixels. */
 const ARROW_PX = 46;
 const ARROW_SPACING_PX = 16;
 /** Opacity of what is below its detection limit. */
 const FADED = 0.28;
+/** Opacity of stones before photos: the stone shows through its colour. */
+const BEFORE_PHOTOS = 0.5;
 /** Outline of loose stones. */
 const LIGHT = "#ffffff";
 const DARK = "#14181c";
@@ -40,6 +44,7 @@ export class WallMap {
   /** Left, low, right, high of every stone, metres. */
   readonly #boxes: Float64Array;
   readonly #squares = new Squares(1);
+  readonly #backdrop: Backdrop;
   readonly #wall: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
   #view: View = { scale: 1, x: 0, y: 0 };
   #width = 0;
@@ -47,7 +52,7 @@ export class WallMap {
   #waiting = false;
   #drag: { x: number; y: number; moved: boolean; line: boolean } | null = null;
 
-  constructor(report: Report, store: Store, quantities: readonly Quantity[]) {
+  constructor(report: Report, store: Store, quantities: readonly Quantity[], photos: Photos) {
     this.#report = report;
     this.#store = store;
     this.#quantities = new Map(quantities.map((q) => [q.key, q]));
@@ -61,6 +66,7 @@ export class WallMap {
     this.element = el("div", { class: "wall-map" }, this.#canvas, this.#tip);
     this.#boxes = new Float64Array(4 * report.stones.count);
     for (let i = 0; i < report.stones.count; i++) this.#build(i);
+    this.#backdrop = new Backdrop(report, photos, this.#paths, () => this.redraw());
     this.#listen();
     store.on((state, before) => {
       if (state.follow !== before.follow) this.#show(state.chosen);
@@ -185,8 +191,10 @@ export class WallMap {
     pen.fillStyle = css("--ground");
     pen.fillRect(0, 0, this.#width, this.#height);
     this.#toMetres();
-    if (quantity.key === "m3c2") this.#drawChange(palette, state.fade);
-    else this.#drawStones(quantity, palette, state.fade);
+    const behind = state.behind !== "none" && this.#backdrop.draw(pen, state.behind === "first" ? 0 : 1);
+    const opacity = behind ? BEFORE_PHOTOS : 1;
+    if (quantity.key === "m3c2") this.#drawChange(palette, state.fade, opacity);
+    else this.#drawStones(quantity, palette, state.fade, opacity);
     if (quantity.key === "opening") this.#drawJoints(palette, state.fade);
     pen.globalAlpha = 1;
     this.#drawOutlines(ink, quantity.key === "m3c2");
@@ -200,6 +208,7 @@ export class WallMap {
     if (state.profile) this.#drawLine(state.profile, ink);
     this.#drawScaleBar(ink);
     this.#canvas.dataset["drawn"] = `${state.quantity} ${state.chosen}`;
+    this.#canvas.dataset["behind"] = behind ? state.behind : "none";
   }
 
   #toScreen(): void {
@@ -221,13 +230,13 @@ export class WallMap {
     }
   }
 
-  #drawStones(quantity: Quantity, palette: Palette, fade: boolean): void {
+  #drawStones(quantity: Quantity, palette: Palette, fade: boolean, opacity: number): void {
     const pen = this.#pen;
     const unknown = this.#hatching();
     const plain = quantity.key === "opening" ? css("--stone") : null;
     for (const i of this.#visible()) {
       const fill = plain ?? stoneColour(this.#report, quantity, palette, i);
-      pen.globalAlpha = fill && !plain && isFaded(this.#report, quantity, fade, i) ? FADED : 1;
+      pen.globalAlpha = opacity * (fill && !plain && isFaded(this.#report, quantity, fade, i) ? FADED : 1);
       pen.fillStyle = fill ?? unknown;
       pen.fill(this.#paths[i]!);
     }
@@ -256,7 +265,7 @@ export class WallMap {
     return pattern;
   }
 
-  #drawChange(palette: Palette, fade: boolean): void {
+  #drawChange(palette: Palette, fade: boolean, opacity: number): void {
     const { a, u, distance, limit } = this.#report.change;
     const pen = this.#pen;
     const [left, low] = this.#toWall(0, this.#height), [right, high] = this.#toWall(this.#width, 0);
@@ -264,7 +273,7 @@ export class WallMap {
     for (let i = 0; i < a.length; i++) {
       const [x, y] = [a[i]!, u[i]!];
       if (!(x >= left && x <= right && y >= low && y <= high)) continue;
-      pen.globalAlpha = fade && Math.abs(distance[i]!) <= limit[i]! ? FADED : 1;
+      pen.globalAlpha = opacity * (fade && Math.abs(distance[i]!) <= limit[i]! ? FADED : 1);
       pen.fillStyle = palette.of(distance[i]! * 1e3);
       pen.fillRect(x - half, y - half, 2 * half, 2 * half);
     }

@@ -20,6 +20,18 @@ interface Epoch {
   readonly pictures: Promise<HTMLImageElement>[];
 }
 
+/** All crops of an epoch with their pictures. */
+export interface PlacedCrops {
+  /** Place of a stone's crop, by the stone's index. */
+  readonly places: ReadonlyMap<number, number>;
+  /** Half the edge of the crop at each place, metres. */
+  readonly half: ArrayLike<number>;
+  /** Edge of a crop, pixels, and crops in a row of a picture. */
+  readonly side: number;
+  readonly perRow: number;
+  readonly pictures: readonly HTMLImageElement[];
+}
+
 /** Crops of the report. */
 export class Photos {
   readonly #report: Report;
@@ -50,6 +62,17 @@ export class Photos {
     return el("div", { class: "card photos" }, el("h4", {}, t("photoTitle")),
       el("div", { class: "pair" }, ...([0, 1] as const).map((k) => el("figure", {}, canvases[k], captions[k]))),
       el("p", { class: "choices" }, el("label", {}, outline, t("outlineOfMask")), el("label", {}, blink, t("blink"))));
+  }
+
+  /** All crops of an epoch, with their pictures; `null` where the report has none. */
+  async placed(epoch: 0 | 1): Promise<PlacedCrops | null> {
+    const crops = await this.#epochs?.[epoch];
+    if (!crops) return null;
+    const { side, perRow, atlases } = crops.document;
+    const pictures = await Promise.all(Array.from({ length: atlases }, (_, number) => this.#picture(crops, epoch, number)));
+    // A crop of no stone of this page has no place on the wall.
+    const known = [...crops.places].filter(([stone]) => stone < this.#report.stones.count);
+    return { places: new Map(known), half: crops.half, side, perRow, pictures };
   }
 
   #canvas(epoch: 0 | 1): HTMLCanvasElement {

@@ -44,7 +44,18 @@ export function toolbar(report: Report, store: Store, quantities: readonly Quant
     button(t("wholeWall"), "", () => current().whole()));
   return el("div", { class: "controls" }, el("span", { class: "group", role: "group", "aria-label": t("viewGroup") }, ...tabs),
     el("label", {}, t("show"), select), check(t("fade"), "fade"), check(t("arrows"), "arrows"),
-    search(report, store), draw, zoom);
+    behind(report, store), search(report, store), draw, zoom);
+}
+
+/** Chooses the photos behind the map; `null` where the report has none. */
+function behind(report: Report, store: Store): HTMLElement | null {
+  const { crops, epochs } = report.document;
+  const given = (["first", "later"] as const).filter((_, epoch) => crops[epoch] !== null);
+  if (given.length === 0) return null;
+  const options = given.map((value) => el("option", { value }, epochs[value === "first" ? 0 : 1]));
+  const select = el("select", { id: "behind" }, el("option", { value: "none" }, t("noPhotos")), ...options);
+  select.addEventListener("change", () => store.set({ view: "map", behind: select.value as State["behind"] }));
+  return el("label", {}, t("photosBehind"), select);
 }
 
 /** Finds a stone by its number. */

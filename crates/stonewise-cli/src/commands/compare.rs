@@ -54,6 +54,7 @@ pub fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome
 
 fn compare(project: &Project, what: Comparison, folder: &OutputFolder, printer: &Printer) -> Result<Outcome> {
     compare_clouds(project, what, folder, printer)?;
+    printer.finish();
     printer.log(&format!("results: {}", folder.path().display()));
     Ok(Outcome::Done)
 }

@@ -59,9 +59,10 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         printer.log(&format!("skipped: {}: {}", warning.subject, warning.message));
     }
     printer.log(&format!(
-        "{} stones in {} photos; look at {}",
+        "{} stones in {} photo{}; look at {}",
         summary.stones,
         summary.photos,
+        if summary.photos == 1 { "" } else { "s" },
         args.out.join("overlays").display()
     ));
     if let Some(evaluation) = &summary.evaluation {

@@ -45,6 +45,19 @@ impl Agenda {
         agenda
     }
 
+    /// The steps of a comparison of two clouds: those of `epochs` are cut into tiles, then comes `compare` under the name `step`.
+    pub fn of_clouds(
+        project: &Project,
+        epochs: std::ops::RangeInclusive<usize>,
+        step: &str,
+        compare: &str,
+    ) -> Self {
+        let mut agenda = Self::default();
+        agenda.push(project, epochs, "ingest", "clouds of");
+        agenda.0.push((step.to_owned(), compare.to_owned()));
+        agenda
+    }
+
     /// Tells the list to the caller, and that its first step begins.
     pub fn announce(&self, progress: &dyn Progress) {
         let words: Vec<String> = self.0.iter().map(|(_, words)| words.clone()).collect();

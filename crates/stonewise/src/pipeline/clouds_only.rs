@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::output::OutputFolder;
+use crate::pipeline::agenda::Agenda;
 use crate::pipeline::context::Context;
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
@@ -14,6 +15,10 @@ use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 use stonewise_io::cloud::{ExtraColumn, read_mesh, write_points_laz};
+
+/// Names of the steps that leave nothing for later runs.
+const C2C: &str = "c2c";
+const C2M: &str = "c2m";
 
 /// What to compare with what.
 #[derive(Clone, Copy, Debug)]
@@ -47,31 +52,40 @@ pub fn compare_clouds(
     folder: &OutputFolder,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let context = Context::new(project, folder, progress)?;
+    let mut context = Context::new(project, folder, progress)?;
+    context.agenda = match what {
+        Comparison::M3c2 => Agenda::of_clouds(project, 1..=2, "m3c2-2", "M3C2"),
+        Comparison::C2c { .. } => Agenda::of_clouds(project, 1..=2, C2C, "C2C"),
+        Comparison::C2m { .. } => Agenda::of_clouds(project, 2..=2, C2M, "C2M"),
+    };
+    context.agenda.announce(progress);
     let out = folder.path();
-    let second = ingest(&context, 2)?;
     match what {
         Comparison::M3c2 => {
+            let epochs = [ingest(&context, 1)?, ingest(&context, 2)?];
             let views = views_of(project)?;
             let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
             let outward = match centres.as_slice() {
                 [] => OutwardReference::Direction(Vector3::z()),
                 centres => OutwardReference::Towards(centres),
             };
-            let change = m3c2(&context, [&ingest(&context, 1)?, &second], 2, &outward)?;
+            let change = m3c2(&context, epochs.each_ref(), 2, &outward)?;
             write_m3c2(out, 1, coordinate_system(project)?.as_ref(), &change)
         }
         Comparison::C2c { max_m } => {
-            let first = ingest(&context, 1)?;
-            let distances =
-                Distances::collect(|sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink))?;
-            distances.write(project, &out.join("c2c.laz"), "c2c_distance")
+            let [first, second] = [ingest(&context, 1)?, ingest(&context, 2)?];
+            context.timed(C2C, || {
+                let measure = |sink: Sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink);
+                Distances::collect(measure)?.write(project, &out.join("c2c.laz"), "c2c_distance")
+            })
         }
         Comparison::C2m { mesh, max_m } => {
-            let index = MeshIndex::new(read_mesh(mesh)?);
-            let distances =
-                Distances::collect(|sink| c2m_survey(&index, &second.tiles, max_m, progress, sink))?;
-            distances.write(project, &out.join("c2m.laz"), "c2m_distance")
+            let second = ingest(&context, 2)?;
+            context.timed(C2M, || {
+                let index = MeshIndex::new(read_mesh(mesh)?);
+                let measure = |sink: Sink| c2m_survey(&index, &second.tiles, max_m, progress, sink);
+                Distances::collect(measure)?.write(project, &out.join("c2m.laz"), "c2m_distance")
+            })
         }
     }
 }

@@ -5,6 +5,7 @@ use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
+use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, fill};
 use stonewise_core::stone::StoneMotion;
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which something other
@@ -42,26 +43,15 @@ pub fn note_doubts(
 /// Labels beside the stones: cameras and clouds do not fit each other.
 fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(String, String)> {
     let [first, second] = [0, number - 1].map(|e| &context.project.epochs[e].name);
-    let advice = "so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
-                  clouds into one frame; `stonewise check` shows the edges of the cloud over a photo";
     // The first epoch takes part in every pair.
     let of_first = offsets.first.filter(|_| number == 2);
     let within = [(first, &of_first), (second, &offsets.second)]
         .into_iter()
-        .filter_map(|(name, offset)| {
-            let place = place_of(offset.as_ref()?)?;
-            Some((
-                name.clone(),
-                format!("the cloud lies {place} off the stones that the photos show, {advice}"),
-            ))
-        });
+        .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
     let within: Vec<(String, String)> = within.collect();
     let between = || {
-        let place = place_of(offsets.between.as_ref()?)?;
-        let message = format!(
-            "the cloud lies {place} off the stones that the photos show, compared with epoch {first:?}, {advice}"
-        );
-        Some((second.clone(), message))
+        let offset = offsets.between.as_ref()?;
+        Some((second.clone(), off_place(&BESIDE_COMPARED, offset, first)?))
     };
     match within.is_empty() {
         true => between().into_iter().collect(),
@@ -70,16 +60,19 @@ fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(Stri
 }
 
 /// An offset in words, if it is clear and large.
-fn place_of(offset: &LabelOffset) -> Option<String> {
+fn off_place(doubt: &Doubt, offset: &LabelOffset, first: &str) -> Option<String> {
     let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
     let is_off = is_clear && offset.length_m() > OFFSET_M;
-    let [along, up] = offset.along_up_m.map(|m| 1e3 * m);
-    is_off.then(|| {
-        format!(
-            "{:.0} mm ({along:+.0} along, {up:+.0} up)",
-            1e3 * offset.length_m()
-        )
-    })
+    let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
+    let length = format!("{:.0}", 1e3 * offset.length_m());
+    let first = format!("{first:?}");
+    let values = [
+        ("length", &*length),
+        ("along", &*along),
+        ("up", &*up),
+        ("first", &*first),
+    ];
+    is_off.then(|| fill(doubt.english, &values))
 }
 
 /// The adjustment stopped before its motions had settled.
@@ -87,14 +80,8 @@ fn unsettled(registered: &Registered) -> Option<String> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
-    let iterations = adjustment.iterations;
-    (!adjustment.converged).then(|| {
-        format!(
-            "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
-             on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at \
-             its pictures"
-        )
-    })
+    let iterations = adjustment.iterations.to_string();
+    (!adjustment.converged).then(|| fill(NOT_CONVERGED.english, &[("iterations", &*iterations)]))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
@@ -109,12 +96,12 @@ fn few_measured(rows: &[StoneRow]) -> Option<String> {
                 .count();
             (n > 0).then(|| format!("{n} {}", status.word()))
         });
-        format!(
-            "only {measured} of the {matched} stones found in both epochs could be measured ({}). That no motion is shown for \
-             the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
-             `stonewise check` on the project and look at its pictures",
-            counts.collect::<Vec<_>>().join(", ")
-        )
+        let values = [
+            ("measured", &*measured.to_string()),
+            ("matched", &*matched.to_string()),
+            ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
+        ];
+        fill(FEW_MEASURED.english, &values)
     })
 }
 
@@ -137,11 +124,8 @@ fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let &(excess, sd) = all.get(all.len() / 2)?;
     (excess > LIMIT_EXCESS).then(|| {
-        format!(
-            "motions below about {:.0} mm cannot be detected in the weakest direction, {excess:.0} times what the spacing and the \
-             noise of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each \
-             other; run `stonewise check` on the project",
-            1e3 * SIGMAS_95 * sd
-        )
+        let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
+        let values = [("limit", &*limit), ("excess", &*format!("{excess:.0}"))];
+        fill(BLIND.english, &values)
     })
 }

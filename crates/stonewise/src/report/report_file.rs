@@ -126,7 +126,9 @@ mod tests {
         // Nothing below contradicts that.
         assert!(html.contains("<p class=\"hedge\">All numbers below are as computed"));
         // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
-        assert!(html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
+        assert!(
+            html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)")
+        );
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
         assert_eq!(
             html.matches("<svg role=\"img\"").count(),
@@ -286,10 +288,10 @@ mod tests {
                 && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)")
         );
         assert!(!html.contains("<p class=\"hedge\">"));
-        assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5 %)"));
+        assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)"));
         assert!(
             html.contains("No stone calls for a closer look.")
-                && html.contains("<span>no stone moved</span>")
+                && html.contains("<span>no motion is shown</span>")
         );
         let html = written(&html);
         for claim in ["moved significantly", "significant motion", "Largest motions"] {

@@ -100,6 +100,8 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
     let detector = StoneFinder::open(job.weights, job.tiling.min_score as f32)?;
     let warnings = Warnings::default();
     let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
+    progress.agenda(&["stones in the photos".to_owned()]);
+    progress.enter(0);
     progress.begin("stones", photos.iter().map(tiles).sum());
     let mut masks = CocoFile::default();
     let (mut count, mut stones) = (0, 0);

@@ -22,8 +22,8 @@ in_both! {
         maps: "Maps", "Karten";
         tables: "Stones", "Steine";
         distributions: "Distributions", "Verteilungen";
-        datum: "Datum", "Datum";
-        datum_title: "Datum check", "Prüfung des Datums";
+        datum: "Datum", "Geodätisches Datum";
+        datum_title: "Datum check", "Prüfung des geodätischen Datums";
         evaluation: "Known motion", "Bekannte Bewegung";
         evaluation_title: "Known motion: how right the results are", "Bekannte Bewegung: wie richtig die Ergebnisse sind";
         method: "Method", "Verfahren";

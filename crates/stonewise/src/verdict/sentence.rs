@@ -108,7 +108,14 @@ impl Speaker<'_> {
             R::JointsAlarm => self.joints(c.joints_alarm, Level::Alarm),
             R::JointsAttention => self.joints(c.joints_attention, Level::Attention),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
-            R::MotionShown if wall.moved > 0 => counted(c.moved, wall.moved, &[("m", &count(wall.measured))]),
+            R::MotionShown if wall.moved > 0 => {
+                let text = if self.case.has_datum() {
+                    c.moved
+                } else {
+                    c.moved_common
+                };
+                counted(text, wall.moved, &[("m", &count(wall.measured))])
+            }
             R::MotionShown => counted(c.loose, wall.loose, &[]),
             R::NothingMeasured => c.nothing_measured.to_owned(),
             R::FewMeasured => counted(c.few_measured, wall.measured, &[("m", &count(wall.stones))]),
@@ -222,10 +229,11 @@ impl Speaker<'_> {
             interval_mm: [low, high],
         } = self.wall.largest?;
         let c = &self.texts.clauses;
-        let text = if self.case.has_datum() {
-            c.largest
-        } else {
-            c.largest_common
+        let says_what_moved = self.deciding().contains(&ReasonCode::MotionShown) && self.wall.moved > 0;
+        let text = match self.case.has_datum() {
+            true => c.largest,
+            false if says_what_moved => c.largest_of_these,
+            false => c.largest_common,
         };
         let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
         Some(fill(

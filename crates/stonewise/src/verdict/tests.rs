@@ -157,6 +157,15 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
             verdict.sentence
         );
     }
+    let mut moving = wall(1, 0.02, 6);
+    moving.datum = Some(DatumState::Unknown);
+    let sentence = judge(&moving, &Thresholds::default()).sentence;
+    assert!(
+        sentence.contains(
+            " measured stones moved against the common motion of the wall; the largest of these motions is "
+        ),
+        "{sentence}"
+    );
     // Only motions against neighbours are asked for: a common motion does not matter.
     let neighbours = thresholds("neighbours = { attention_mm = 3.0, alarm_mm = 6.0 }");
     assert_eq!(judge(&case, &neighbours).state, State::Fine);

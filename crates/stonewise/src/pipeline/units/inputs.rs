@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::kept::files_of;
 use crate::pipeline::context::Context;
+use crate::pipeline::steps::segment::photo_files;
 use crate::storage::step::Key;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -21,7 +22,8 @@ pub(super) struct PlannedInput {
     pub blake3: String,
 }
 
-/// All inputs of a project with their digests. Photos count where no masks do.
+/// All inputs of a project with their digests. The folders of photos count where no masks do; where stones are tracked in photos,
+/// every photo that has a camera counts, too.
 pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
     let project = context.project;
     let images = |path: &PathBuf| {
@@ -30,15 +32,22 @@ pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
             .iter()
             .any(|e| e.masks.is_some() && e.images == *path)
     };
-    let used = project.inputs().into_iter().filter(|path| !images(path));
-    used.map(|path| {
-        Ok(PlannedInput {
-            look: look_of(&path)?,
-            blake3: context.digest(&path)?,
-            path,
+    let mut used: Vec<PathBuf> = project.inputs();
+    used.retain(|path| !images(path));
+    if project.settings.registration.photos.enabled {
+        for epoch in &project.epochs {
+            used.extend(photo_files(epoch)?);
+        }
+    }
+    used.into_iter()
+        .map(|path| {
+            Ok(PlannedInput {
+                look: look_of(&path)?,
+                blake3: context.digest(&path)?,
+                path,
+            })
         })
-    })
-    .collect()
+        .collect()
 }
 
 /// Digests of the inputs, if all of them are as they were; `plan`: the file to name otherwise.

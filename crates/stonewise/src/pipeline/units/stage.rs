@@ -119,7 +119,7 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
     let outlines = Work::of(&stones, 1, 2 * POINT_BYTES * points[0]);
     list.push("outlines".to_owned(), Stage::Outlines, None, outlines);
     for n in 2..=project.epochs.len() {
-        list.add_pair(n, [points[0], points[n - 1]], batch_points);
+        list.add_pair(project, n, [points[0], points[n - 1]], batch_points);
     }
     for n in 1..=project.epochs.len() {
         let needs = match n {
@@ -224,12 +224,17 @@ impl List {
     }
 
     /// A later epoch against the first; `points`: of both.
-    fn add_pair(&mut self, n: usize, points: [u64; 2], batch_points: u64) {
+    fn add_pair(&mut self, project: &Project, n: usize, points: [u64; 2], batch_points: u64) {
         let both = points[0] + points[1];
+        let photos: Vec<PathBuf> = match project.settings.registration.photos.enabled {
+            true => [0, n - 1].map(|e| project.epochs[e].images.clone()).into(),
+            false => Vec::new(),
+        };
         let (outlines, matched) = (["outlines".to_owned()], [format!("match-{n}")]);
         self.add(Stage::Match, n, Work::of(&outlines, 1, POINT_BYTES * both));
         self.add(Stage::Offsets, n, Work::of(&matched, 2, 0));
-        self.add(Stage::Register, n, Work::of(&matched, 8, REGISTER_BYTES * both));
+        let register = Work::of(&matched, 8, REGISTER_BYTES * both);
+        self.add(Stage::Register, n, register.reading(&photos));
         let clouds = [
             "ingest-1".to_owned(),
             format!("ingest-{n}"),

@@ -1,7 +1,7 @@
 //! What must be read before anything else.
 
 use crate::figure::escape;
-use crate::texts::Texts;
+use crate::texts::{Texts, doubt_in};
 use crate::warnings::Warning;
 use std::fmt::Write;
 
@@ -16,11 +16,15 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
+        let (lang, message) = match doubt_in(texts.language(), &warning.message) {
+            Some(message) => ("", message),
+            None => (" lang=\"en\"", warning.message.clone()),
+        };
         let _ = write!(
             out,
-            "<li>{}: {}</li>",
+            "<li{lang}>{}: {}</li>",
             escape(&warning.subject),
-            escape(&warning.message)
+            escape(&message)
         );
     }
     out.push_str("</ul></div>");
@@ -42,5 +46,15 @@ mod tests {
         warnings.doubt("register", "<2026>", "did not converge");
         let html = doubts(&warnings.sorted(), texts);
         assert!(html.contains("<li>&lt;2026&gt;: did not converge</li>") && !html.contains("cut off"));
+        let german = Language::German.texts();
+        let html = doubts(&warnings.sorted(), german);
+        assert!(html.contains("<li lang=\"en\">&lt;2026&gt;: did not converge</li>"));
+        warnings.doubt(
+            "register",
+            "2027",
+            crate::texts::NOT_CONVERGED.english.replace("{iterations}", "30"),
+        );
+        let html = doubts(&warnings.sorted(), german);
+        assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));
     }
 }

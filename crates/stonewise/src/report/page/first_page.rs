@@ -124,7 +124,8 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
         motion_map(results, facts)
     };
     format!(
-        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}<h3>{}</h3>{}</div><div>{map}{}</div></div>\
+        "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}</div><div class=\"first rest\"><h3>{}</h3>{}</div>\
+         <div class=\"beside\">{map}{}</div></div>\
          <div class=\"sign\"><p>{}</p><p>{}</p><p>{}</p></div>",
         limit(facts),
         page.look_first,
@@ -188,19 +189,20 @@ fn look_first(results: &ResultSet, facts: &Summary) -> String {
             "<li><a data-stone=\"{0}\">{1} {0}</a>, {place}: {2}</li>",
             stone.stone_id,
             texts.page.stone,
-            found(stone, texts)
+            found(stone, facts)
         ))
     };
     let items: String = worst.iter().take(FIRST).filter_map(item).collect();
-    if items.is_empty() {
-        format!("<p>{}</p>", texts.page.nothing_first)
-    } else {
-        format!("<ol class=\"look\">{items}</ol>")
+    match (items.is_empty(), facts.verdict.state) {
+        (true, State::CannotTell) => format!("<p>{}</p>", texts.page.none_stands_out),
+        (true, _) => format!("<p>{}</p>", texts.page.nothing_first),
+        _ => format!("<ol class=\"look\">{items}</ol>"),
     }
 }
 
 /// What is the matter with a stone.
-fn found(stone: &StoneVerdict, texts: &Texts) -> String {
+fn found(stone: &StoneVerdict, facts: &Summary) -> String {
+    let texts = facts.texts();
     let mm = |millimetres: f64| texts.mm(millimetres / 1e3);
     let said = |text: &str, length: Option<f64>, interval: Option<[f64; 2]>| {
         let [low, high] = interval.unwrap_or([f64::NAN; 2]);
@@ -217,7 +219,11 @@ fn found(stone: &StoneVerdict, texts: &Texts) -> String {
         all.push(page.lost_stone.to_owned());
     }
     if stone.moved {
-        all.push(said(page.moved_stone, stone.length_mm, stone.interval_mm));
+        let text = match facts.verdict.has_datum() {
+            true => page.moved_stone,
+            false => page.moved_stone_common,
+        };
+        all.push(said(text, stone.length_mm, stone.interval_mm));
     }
     if stone.loose {
         all.push(said(

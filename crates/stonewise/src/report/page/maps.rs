@@ -103,9 +103,14 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         loose: false,
     };
     let class = if layout.is_wide() { "lead wide" } else { "lead" };
+    let as_measured = match facts.verdict.has_datum() {
+        true => "",
+        false => page.map_as_measured,
+    };
+    let note = format!("{}{as_measured}", page.map_note);
     format!(
         "<div class=\"{class}\">{}</div>",
-        figure(title, &stone_map(&layout, &picture), page.map_note)
+        figure(title, &stone_map(&layout, &picture), &note)
     )
 }
 

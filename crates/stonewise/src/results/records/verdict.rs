@@ -107,6 +107,14 @@ pub struct EpochVerdict {
     pub joints: Vec<JointVerdict>,
 }
 
+impl EpochVerdict {
+    /// Whether the registration error of the epoch is known; without, lengths are those against the common motion of the measured
+    /// stones.
+    pub(crate) fn has_datum(&self) -> bool {
+        self.datum.is_some_and(|d| d != DatumState::Unknown)
+    }
+}
+
 /// Why something has its state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reason {

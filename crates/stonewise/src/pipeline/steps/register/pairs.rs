@@ -1,47 +1,32 @@
 //! Points of matched stones, gathered from the tiles of two epochs into batches of neighbours on disk.
 
 use crate::error::{Error, Result};
+use crate::pipeline::matched_pairs::{MatchedPair, PairPlaces};
 use crate::pipeline::steps::label::Labelled;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{NearPoint, PairPoints, PairSource, Window, local_shifts, stone_points};
-use stonewise_core::stone::Stone;
+use stonewise_core::registration::{NearPoint, PairPoints, PairSource, Window, stone_points};
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
 /// Stones in a batch: at 20,000 points an epoch, 30 MB.
 const BATCH: usize = 64;
-/// Edge of the cells by which stones are sorted into neighbourhoods, metres.
-const NEIGHBOURHOOD_M: f64 = 4.0;
-/// Edge of the cells by which a point finds the stones that it may belong to, metres.
-const BOX_CELL_M: f64 = 0.5;
-/// The outline of a stone reaches half a point spacing beyond its points, metres.
-const BOX_MARGIN_M: f64 = 0.02;
-
 /// Matched pairs whose points lie in one file a batch.
 pub struct DiskPairs {
     dir: PathBuf,
-    batches: Vec<Vec<Pair>>,
+    /// All batches are full but the last.
+    batches: Vec<Vec<MatchedPair>>,
     /// Where the points of each pair count, per batch.
     windows: Vec<Vec<Option<Arc<Window>>>>,
-}
-
-/// A matched stone in both epochs.
-#[derive(Clone)]
-struct Pair {
-    first: Stone,
-    second: Stone,
-    /// How the stones around it moved, metres.
-    shift: Vector3<f64>,
 }
 
 impl DiskPairs {
@@ -59,7 +44,10 @@ impl DiskPairs {
     ) -> Result<Self> {
         let mut pairs = Self {
             dir: step.path().to_path_buf(),
-            batches: batches(first, second, matches),
+            batches: MatchedPair::of_matches(&first.stones, &second.stones, matches)
+                .chunks(BATCH)
+                .map(<[_]>::to_vec)
+                .collect(),
             windows: Vec::new(),
         };
         let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
@@ -151,30 +139,18 @@ impl DiskPairs {
         spill: &mut Spill<u32>,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let (places, of_stone) = self.places(which, extents);
-        let cells = by_cell(&places);
+        let places = PairPlaces::new(&self.batches.concat(), which > 0, extents);
         progress.begin("gather stones", epoch.ingested.tiles.tile_count() as u64);
         for tile in 0..epoch.ingested.tiles.tile_count() {
             progress.check()?;
             let bounds = epoch.ingested.tiles.bounds(tile);
             let labels = epoch.labels(tile)?;
-            let concerns = |p: &Place| p.extent.is_some_and(|e| e.intersects(&bounds));
-            if places.iter().any(concerns) || labels.stone.iter().any(|s| of_stone.contains_key(s)) {
+            if places.reach_into(&bounds) || labels.stone.iter().any(|s| places.has(*s)) {
                 let cloud = epoch.ingested.tiles.load(tile)?;
                 for (i, stone) in labels.stone.iter().enumerate() {
-                    let point = cloud.world(i);
-                    let own = of_stone.get(stone).copied();
-                    let others = cells.get(&cell_of(&point, BOX_CELL_M)).into_iter().flatten();
-                    let others = others
-                        .copied()
-                        .filter(|&k| Some(k) != own && places[k].extent.is_some_and(|e| e.contains(&point)));
-                    for k in own.into_iter().chain(others) {
-                        let place = &places[k];
-                        let near = NearPoint {
-                            offset: (point - place.centre).cast::<f32>().into(),
-                            labelled: Some(k) == own,
-                        };
-                        spill.push(place.batch, &encode(place.slot, which, near))?;
+                    for (k, near) in places.near(cloud.world(i), *stone) {
+                        let (batch, slot) = ((k / BATCH) as u32, (k % BATCH) as u16);
+                        spill.push(batch, &encode(slot, which, near))?;
                     }
                 }
             }
@@ -182,56 +158,6 @@ impl DiskPairs {
         }
         Ok(())
     }
-
-    /// Where the matched stones lie in an epoch, and which place is that of which of its stones.
-    fn places(&self, which: u16, extents: &BTreeMap<u32, Bounds>) -> (Vec<Place>, BTreeMap<u32, usize>) {
-        let (mut places, mut of_stone) = (Vec::new(), BTreeMap::new());
-        for (batch, pairs) in self.batches.iter().enumerate() {
-            for (slot, pair) in pairs.iter().enumerate() {
-                let (stone, shift) = match which {
-                    0 => (pair.first.id, Vector3::zeros()),
-                    _ => (pair.second.id, pair.shift),
-                };
-                of_stone.insert(stone.0, places.len());
-                places.push(Place {
-                    batch: batch as u32,
-                    slot: slot as u16,
-                    centre: pair.first.centroid,
-                    extent: extents
-                        .get(&pair.first.id.0)
-                        .map(|e| e.grown(BOX_MARGIN_M).moved(&shift)),
-                });
-            }
-        }
-        (places, of_stone)
-    }
-}
-
-/// Where a matched stone lies in an epoch, and where its points go.
-struct Place {
-    batch: u32,
-    slot: u16,
-    /// What its points are relative to: its centroid in the first epoch.
-    centre: Point3<f64>,
-    /// Box in which all points are of interest; `None`: labelled ones only.
-    extent: Option<Bounds>,
-}
-
-/// Places by the cells that their boxes touch.
-fn by_cell(places: &[Place]) -> BTreeMap<[i64; 3], Vec<usize>> {
-    let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
-    for (k, place) in places.iter().enumerate() {
-        let Some(extent) = &place.extent else { continue };
-        let (low, high) = (cell_of(&extent.min, BOX_CELL_M), cell_of(&extent.max, BOX_CELL_M));
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    cells.entry([x, y, z]).or_default().push(k);
-                }
-            }
-        }
-    }
-    cells
 }
 
 impl PairSource for DiskPairs {
@@ -272,31 +198,6 @@ impl PairSource for DiskPairs {
         });
         Ok(loaded.collect())
     }
-}
-
-/// Pairs in batches of neighbours: sorted by the cell of the first centroid, then by stone.
-fn batches(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<Vec<Pair>> {
-    let by_id = |epoch: &Labelled| {
-        epoch
-            .stones
-            .iter()
-            .map(|s| (s.id, s.clone()))
-            .collect::<BTreeMap<_, _>>()
-    };
-    let (ones, twos) = (by_id(first), by_id(second));
-    let found: Vec<(Stone, Stone)> = matches
-        .iter()
-        .filter_map(|(a, b)| Some((ones.get(a)?.clone(), twos.get(b)?.clone())))
-        .collect();
-    let centroids: Vec<Point3<f64>> = found.iter().map(|(a, _)| a.centroid).collect();
-    let moved: Vec<Vector3<f64>> = found.iter().map(|(a, b)| b.centroid - a.centroid).collect();
-    let mut pairs: Vec<Pair> = found
-        .into_iter()
-        .zip(local_shifts(&centroids, &moved))
-        .map(|((first, second), shift)| Pair { first, second, shift })
-        .collect();
-    pairs.sort_by_key(|p| (cell_of(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
-    pairs.chunks(BATCH).map(<[_]>::to_vec).collect()
 }
 
 /// Parts of a stone's points in a batch's file: the first epoch's, the second's, and those near it in the second without its label.

@@ -14,7 +14,7 @@ use detector::Detection;
 pub use detector::part_name;
 use masks::write_labels;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::LabelImage;
@@ -83,6 +83,12 @@ pub fn photos_to_segment(epoch: &Epoch) -> Result<usize> {
         None => Ok(posed_photos(epoch, &Warnings::default())?.len()),
         Some(_) => Ok(0),
     }
+}
+
+/// The photos of an epoch that have a camera.
+pub fn photo_files(epoch: &Epoch) -> Result<Vec<PathBuf>> {
+    let posed = posed_photos(epoch, &Warnings::default())?;
+    Ok(posed.into_iter().map(|(_, path)| path).collect())
 }
 
 /// Digest of the names and sizes of a folder's files: masks, not photos, decide the labels.
