@@ -9,6 +9,7 @@ use crate::project::{Epoch, Project};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use stonewise_segment::Weights;
 
 /// What a unit does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -98,6 +99,7 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         .iter()
         .map(|e| points_of(&e.clouds))
         .collect::<Result<Vec<u64>>>()?;
+    let takes_relief = Weights::named(&project.settings.segment.model).takes_relief();
     let depth_maps = u64::from(project.settings.label.depth_memory_mib) << 20;
     for (n, epoch) in (1..).zip(&project.epochs) {
         let of_cloud = POINT_BYTES * points[n - 1];
@@ -109,11 +111,13 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         for photo in 0..count {
             let id = format!("segment-{n}.{}", part_name(photo));
             let inputs = [epoch.cameras.clone(), epoch.images.clone()];
+            // A detector that takes relief looks at the clouds, too.
+            let needs = matches!(takes_relief, Ok(true)).then(|| format!("ingest-{n}"));
             list.push(
                 id.clone(),
                 Stage::SegmentPhoto,
                 Some(n),
-                &[],
+                needs.as_slice(),
                 4,
                 photo_bytes,
                 &inputs,
