@@ -87,7 +87,8 @@ mod tests {
     fn joints_of_a_wall_lie_low_and_what_is_hidden_is_left_out() {
         let mut points = Vec::new();
         for (i, j) in (0..300).flat_map(|j| (0..400).map(move |i| (i, j))) {
-            let (x, y) = (0.01 * f64::from(i) - 2.0, 0.01 * f64::from(j) - 1.5);
+            // In the middle of the pixels.
+            let (x, y) = (0.01 * f64::from(i) - 1.995, 0.01 * f64::from(j) - 1.495);
             let is_joint = i % 40 < 4;
             points.push(Point3::new(x, y, if is_joint { 10.03 } else { 10.0 }));
             points.push(Point3::new(1.5 * x, 1.5 * y, 15.0));
