@@ -78,6 +78,8 @@ pub(crate) fn open_model_with<B: ModelBackend>(
 ) -> Result<MaskRcnn<B>, WeightsError> {
     match weights {
         Weights::BuiltIn => model_from_bytes(BUILT_IN, NAME, relief, device),
-        Weights::File(path) => model_from_bytes(&weights.bytes()?, &path.display().to_string(), relief, device),
+        Weights::File(path) => {
+            model_from_bytes(&weights.bytes()?, &path.display().to_string(), relief, device)
+        }
     }
 }

@@ -27,7 +27,11 @@ fn neighbours([from, length]: [f64; 2], new: u32, old: u32) -> Vec<(usize, usize
         let at = (from + length * (f64::from(at) + 0.5) / f64::from(new)) * f64::from(old) - 0.5;
         let at = at.clamp(0.0, f64::from(old.max(1) - 1));
         let low = at as usize;
-        (low, (low + 1).min(old.max(1) as usize - 1), (at - low as f64) as f32)
+        (
+            low,
+            (low + 1).min(old.max(1) as usize - 1),
+            (at - low as f64) as f32,
+        )
     };
     (0..new).map(place).collect()
 }

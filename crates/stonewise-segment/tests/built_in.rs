@@ -40,7 +40,10 @@ fn a_plain_image_has_no_stones() {
             .map(|i| [200 - (i / width / 4) as u8; 3])
             .collect();
         let sky: RgbImage = Raster::from_vec(width, height, sky).unwrap();
-        assert!(detector.detect(&sky, None).unwrap().is_empty(), "{width}x{height}, sky");
+        assert!(
+            detector.detect(&sky, None).unwrap().is_empty(),
+            "{width}x{height}, sky"
+        );
         // Rounding noise of one value, from place to place.
         let noisy = (0..width * height)
             .map(|i| [(i * 7919 / 13 % 2) as u8; 3])

@@ -6,8 +6,8 @@ use burn::module::AutodiffModule;
 use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
 use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
 use stonewise_segment::model::{
-    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, RoiConfig, config_from_bytes, model_from_bytes,
-    weights_to_bytes,
+    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, RoiConfig, config_from_bytes,
+    model_from_bytes, weights_to_bytes,
 };
 use stonewise_segment::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo, surveyed_photo_by};
 use stonewise_segment::{Sample, Weights};
@@ -50,7 +50,10 @@ fn clouds_change_nothing_about_photos() {
         assert_eq!(surveyed.clone().with_relief(None), plain);
         assert_eq!(surveyed_photo(seed, 96, 96), surveyed);
     }
-    assert!((8..=18).contains(&without), "{without} of 30 photos have no cloud");
+    assert!(
+        (8..=18).contains(&without),
+        "{without} of 30 photos have no cloud"
+    );
 }
 
 /// Joints lie lower than stones in the map of a dense, exact cloud, wherever light and colours would show them.

@@ -107,7 +107,9 @@ impl RangeImage {
         let depth = near.pixels / near.q;
         let fit = |scale: usize| {
             let half = FACE_M[scale] * (self.focal_px[0] * self.focal_px[1]).sqrt() / depth;
-            let half = (half.round().max(0.0) as usize).max(LEAST_FACE_PX[scale]).max(reach);
+            let half = (half.round().max(0.0) as usize)
+                .max(LEAST_FACE_PX[scale])
+                .max(reach);
             sums.window(at, half).face()
         };
         let wide = fit(1)?;
@@ -136,9 +138,7 @@ impl RangeImage {
             _ => found.pixels >= LEAST_POINTS,
         };
         let windows = SEARCH_PX.into_iter().map(|half| (half, sums.window(at, half)));
-        windows
-            .into_iter()
-            .find(|(half, found)| is_enough(*half, found))
+        windows.into_iter().find(|(half, found)| is_enough(*half, found))
     }
 
     /// Plane vector of a face: normal over distance from the camera, 1/m; its product with a ray of depth 1 is the inverse depth.
@@ -375,7 +375,11 @@ mod tests {
         let relief = seen(|x, y| (!is_gap(x, y)).then_some(10.0)).relief();
         assert_eq!(*relief.get(60, 50).unwrap(), [0.0; RELIEF_CHANNELS]);
         assert_eq!(relief.get(10, 50).unwrap()[3], 1.0);
-        assert_eq!(relief.get(32, 50).unwrap()[3], 1.0 / 5.0, "three pixels into the gap");
+        assert_eq!(
+            relief.get(32, 50).unwrap()[3],
+            1.0 / 5.0,
+            "three pixels into the gap"
+        );
         assert_eq!(
             *RangeImage::new(&camera()).relief().get(3, 3).unwrap(),
             [0.0; RELIEF_CHANNELS]
@@ -385,7 +389,12 @@ mod tests {
         let value = sparse.get(60, 48).unwrap();
         assert_eq!(value[3], 1.0 / 1.0, "a pixel with points of its own");
         assert_eq!(sparse.get(63, 51).unwrap()[3], 1.0 / 5.0);
-        assert!(sparse.data().iter().all(|v| v[0].abs() < 1e-5 && v[1].abs() < 1e-5));
+        assert!(
+            sparse
+                .data()
+                .iter()
+                .all(|v| v[0].abs() < 1e-5 && v[1].abs() < 1e-5)
+        );
     }
 
     #[test]

@@ -107,7 +107,9 @@ mod tests {
         assert_eq!((relief.width(), relief.height()), (200, 150));
         let wide = |x: f64, y: f64| {
             let pixel = [x, y].map(|v| v * 50.0);
-            relief.get((100.0 + pixel[0]) as u32, (75.0 + pixel[1]) as u32).unwrap()[1]
+            relief
+                .get((100.0 + pixel[0]) as u32, (75.0 + pixel[1]) as u32)
+                .unwrap()[1]
         };
         let metres = |v: f32| 0.04 * f64::from(v) / (1.0 - f64::from(v.abs()));
         // The middle of a joint against that of the stone beside it.
@@ -115,6 +117,10 @@ mod tests {
         assert!((depth + 0.03).abs() < 0.004, "{depth}");
         // The middle of the board is as flat as the wall: nothing of the wall behind it is mixed in.
         assert!(wide(1.0, 0.0) > -0.1, "{}", wide(1.0, 0.0));
-        assert!(wide(0.7, 0.0) < -0.5, "the wall beside the board: {}", wide(0.7, 0.0));
+        assert!(
+            wide(0.7, 0.0) < -0.5,
+            "the wall beside the board: {}",
+            wide(0.7, 0.0)
+        );
     }
 }

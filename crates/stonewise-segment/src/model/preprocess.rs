@@ -1,10 +1,10 @@
 //! From photos to the model's input.
 
 use super::config::{MaskRcnnConfig, Resize};
+use crate::relief::resampled;
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
-use crate::relief::resampled;
 use stonewise_core::raster::{RELIEF_CHANNELS, ReliefMap, RgbImage};
 
 /// Sides of the model's input are multiples of this: the stride of the coarsest features.
@@ -89,9 +89,7 @@ pub fn relief_batch<B: Backend>(
         let relief = resampled(relief, [0.0, 0.0, 1.0, 1.0], seen.size.map(|side| side as u32));
         for (channel, plane) in values.chunks_mut(height * width).enumerate() {
             for (to, from) in plane.chunks_mut(width).zip(relief.data().chunks(seen.size[0])) {
-                to.iter_mut()
-                    .zip(from)
-                    .for_each(|(to, from)| *to = from[channel]);
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = from[channel]);
             }
         }
     }

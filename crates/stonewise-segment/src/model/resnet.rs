@@ -115,8 +115,7 @@ impl<B: ModelBackend> Resnet<B> {
             (0..blocks[stage]).map(block).collect()
         };
         let [layer1, layer2, layer3, layer4] = [0, 1, 2, 3].map(&mut stage);
-        let relief =
-            (relief > 0).then(|| Conv::new(init, [relief, config.width], 7, 2, Spread::Zero, false));
+        let relief = (relief > 0).then(|| Conv::new(init, [relief, config.width], 7, 2, Spread::Zero, false));
         Self {
             conv1,
             bn1,

@@ -143,5 +143,6 @@ fn rendered(style: &MasonryStyle, survey: Option<&Survey>, seed: u64, width: u32
         .camera
         .develop(radiance, samples, canvas.scale, [width, height], &mut rng);
     let (labels, ignore) = labels::finish(&canvas, style.camera.blur_px, width, height);
-    Sample::from_pixels(width, height, |i| (pixels[i], labels.data()[i], ignore.data()[i])).with_relief(relief)
+    Sample::from_pixels(width, height, |i| (pixels[i], labels.data()[i], ignore.data()[i]))
+        .with_relief(relief)
 }

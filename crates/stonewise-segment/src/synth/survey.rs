@@ -90,13 +90,27 @@ impl Survey {
     }
 
     /// The relief of a painted photo of `size` pixels.
-    pub(super) fn relief(&self, canvas: &Canvas, style: &MasonryStyle, seed: u64, size: [u32; 2]) -> ReliefMap {
+    pub(super) fn relief(
+        &self,
+        canvas: &Canvas,
+        style: &MasonryStyle,
+        seed: u64,
+        size: [u32; 2],
+    ) -> ReliefMap {
         let mut rng = rng(seed, 3);
-        let smallest = style.layers.iter().map(Layer::stone_px).fold(f32::INFINITY, f32::min);
+        let smallest = style
+            .layers
+            .iter()
+            .map(Layer::stone_px)
+            .fold(f32::INFINITY, f32::min);
         let stone_px = if smallest.is_finite() { smallest } else { 60.0 };
         let pixel_m = (self.stone_m / stone_px).clamp(PIXEL_M[0], PIXEL_M[1]);
         let scene = Scene::new(style, pixel_m, size, &mut rng);
-        let unit = if self.kind == SurveyKind::Stereo { pixel_m } else { 1.0 };
+        let unit = if self.kind == SurveyKind::Stereo {
+            pixel_m
+        } else {
+            1.0
+        };
         let (spacing, noise) = (self.spacing_m * unit, self.noise_m * unit);
         let holes = Field::isotropic(&mut rng, Grain::Fractal, 0.4 * size[0].max(size[1]) as f32);
         let waves = Field::isotropic(&mut rng, Grain::Fractal, 40.0);
@@ -186,7 +200,11 @@ struct Piece {
 
 impl Scene {
     fn new(style: &MasonryStyle, pixel_m: f32, size: [u32; 2], rng: &mut Rng) -> Self {
-        let main = style.layers.iter().find_map(viewpoint).unwrap_or(Viewpoint::FRONTAL);
+        let main = style
+            .layers
+            .iter()
+            .find_map(viewpoint)
+            .unwrap_or(Viewpoint::FRONTAL);
         let focal_px = main.focal * size[0].max(size[1]) as f32;
         let plane = |viewpoint: &Viewpoint| {
             let turned = Viewpoint {
@@ -205,7 +223,11 @@ impl Scene {
         let mut pieces = vec![on_the_wall];
         for (i, layer) in style.layers.iter().enumerate() {
             let own = viewpoint(layer).map_or(on_the_wall.plane, |v| plane(&v));
-            let off_m = if i == 0 { 0.0 } else { sometimes(rng, 0.5, -1.0, 0.5) };
+            let off_m = if i == 0 {
+                0.0
+            } else {
+                sometimes(rng, 0.5, -1.0, 0.5)
+            };
             let piece = Piece {
                 plane: own,
                 off_m,
@@ -270,13 +292,19 @@ impl Piece {
 
     fn object(self, object: &Object, rng: &mut Rng) -> Self {
         let (off_m, rough_m) = match object.kind {
-            ObjectKind::Railing | ObjectKind::Person | ObjectKind::Building => (log_between(rng, 0.1, 3.0), 0.0),
+            ObjectKind::Railing | ObjectKind::Person | ObjectKind::Building => {
+                (log_between(rng, 0.1, 3.0), 0.0)
+            }
             ObjectKind::Plant => (log_between(rng, 0.03, 1.0), log_between(rng, 0.01, 0.15)),
             ObjectKind::Pipe => (log_between(rng, 0.01, 0.3), 0.0),
             ObjectKind::Window => (-log_between(rng, 0.02, 0.4), 0.0),
             _ => (0.0, 0.0),
         };
-        Self { off_m, rough_m, ..self }
+        Self {
+            off_m,
+            rough_m,
+            ..self
+        }
     }
 }
 

@@ -26,13 +26,15 @@ impl Rendered {
     /// Photos of another stream of seeds, to measure on.
     pub fn validation(&self, count: u64) -> Vec<Sample> {
         let seed = mix(!self.seed, 0);
-        (0..count)
-            .map(|number| self.photo(mix(seed, number)))
-            .collect()
+        (0..count).map(|number| self.photo(mix(seed, number))).collect()
     }
 
     fn photo(&self, seed: u64) -> Sample {
-        let render = if self.relief { surveyed_photo } else { masonry_photo };
+        let render = if self.relief {
+            surveyed_photo
+        } else {
+            masonry_photo
+        };
         render(seed, self.size_px, self.size_px)
     }
 }

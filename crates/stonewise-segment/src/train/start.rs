@@ -5,9 +5,9 @@ use super::error::TrainError;
 use super::params::{TrainConfig, TrainParams};
 use super::schedule::Total;
 use super::trainer::Trainer;
+use crate::Weights;
 use crate::built_in::open_model_with;
 use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend};
-use crate::Weights;
 use burn::tensor::Device;
 use std::path::Path;
 
@@ -66,7 +66,11 @@ pub fn open_training<B: TrainBackend>(
     let model = match start {
         Start::Nothing(config) => {
             let config = MaskRcnnConfig::clone(config);
-            let config = if training.relief { config.with_relief() } else { config };
+            let config = if training.relief {
+                config.with_relief()
+            } else {
+                config
+            };
             MaskRcnn::init(&config, training.seed, device)?
         }
         Start::Weights(weights) => open_model_with(weights, training.relief, device)?,
