@@ -52,7 +52,7 @@ impl Detector {
         let photo = photo(&image).ok_or_else(|| error("an image of shape (height, width, 3) is needed"))?;
         let found = attended(py, &Listeners::progress(progress), |progress| {
             progress.begin("stones", self.tiling.tile_count(photo.width(), photo.height()));
-            segment_photo(&self.finder, &photo, &self.tiling, progress).map_err(stonewise::Error::from)
+            segment_photo(&self.finder, &photo, None, &self.tiling, progress).map_err(stonewise::Error::from)
         })?;
         let found = found.map_err(explained)?;
         let labels = found.labels.data().iter().map(|&l| l as i32).collect();

@@ -23,7 +23,7 @@ fn main() {
         let image = read(&path);
         let megapixels = f64::from(image.width()) * f64::from(image.height()) * 1e-6;
         let start = Instant::now();
-        let found = model.instances(&image);
+        let found = model.instances(&image, None);
         let seconds = start.elapsed().as_secs_f64();
         println!(
             "{}: {} objects, {seconds:.2} s, {:.2} s/MP",

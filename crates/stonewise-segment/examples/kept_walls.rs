@@ -1,14 +1,15 @@
-//! Scores a detector on rendered walls whose seeds are kept for this: `kept_walls [FIRST_SEED COUNT [WEIGHTS]]`. Prints a table by size
+//! Scores a detector on rendered walls whose seeds are kept for this: `kept_walls [FIRST_SEED COUNT [WEIGHTS [CLOUD]]]`, CLOUD: none,
+//! terrestrial, drone or stereo. Prints a table by size
 //! of the stones, light and contrast of the joints, for docs/src/method/segmentation.md.
 //!
 //! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other seeds then, and say so.
-#![allow(clippy::expect_used, clippy::print_stdout)]
+#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, RgbImage};
-use stonewise_segment::synth::masonry_photo;
+use stonewise_segment::synth::{Survey, SurveyKind, surveyed_photo_by};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
@@ -50,9 +51,17 @@ fn main() {
         .map_or(Weights::BuiltIn, |w| Weights::named(Path::new(w)));
     let options = TilingOptions::default();
     let detector = StoneFinder::open(&weights, options.min_score as f32).expect("weights");
+    let kind = match args.get(3).map_or("none", String::as_str) {
+        "none" => None,
+        "terrestrial" => Some(SurveyKind::Terrestrial),
+        "drone" => Some(SurveyKind::Drone),
+        "stereo" => Some(SurveyKind::Stereo),
+        other => panic!("{other}: none, terrestrial, drone or stereo"),
+    };
     let mut table: BTreeMap<(usize, usize), Score> = BTreeMap::new();
     for seed in first..first + count {
-        let wall = masonry_photo(seed, SIDE_PX, SIDE_PX);
+        let survey = kind.map(|kind| Survey::random(kind, seed));
+        let wall = surveyed_photo_by(survey.as_ref(), seed, SIDE_PX, SIDE_PX);
         score(&detector, &wall, &options, &mut table);
     }
     println!(
@@ -98,7 +107,7 @@ fn score(
     options: &TilingOptions,
     table: &mut BTreeMap<(usize, usize), Score>,
 ) {
-    let Ok(found) = segment_photo(detector, wall.image(), options, &Silent) else {
+    let Ok(found) = segment_photo(detector, wall.image(), wall.relief(), options, &Silent) else {
         return;
     };
     let ignored = |label: u32, labels: &LabelImage| {

@@ -76,7 +76,7 @@ fn main() {
                 ..TilingOptions::whole(sample.image())
             };
             let found =
-                segment_photo(&detector, sample.image(), &options, &Silent).expect("nothing stops it");
+                segment_photo(&detector, sample.image(), None, &options, &Silent).expect("nothing stops it");
             pair_masks(&found, sample.labels(), sample.ignore())
         })
         .collect();

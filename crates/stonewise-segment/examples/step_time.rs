@@ -66,7 +66,7 @@ fn main() {
     let model = model.valid().for_inference();
     for step in 0..2 {
         let start = Instant::now();
-        let found = model.detect(wall(side, step).image());
+        let found = model.detect(wall(side, step).image(), None);
         println!("{} detections in {:.2?}", found.len(), start.elapsed());
     }
 }

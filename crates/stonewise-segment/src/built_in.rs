@@ -1,6 +1,6 @@
 //! The detector that comes with the program.
 
-use crate::model::{MaskRcnn, ModelBackend, WeightsError, load_model, model_from_bytes};
+use crate::model::{MaskRcnn, ModelBackend, WeightsError, config_from_bytes, model_from_bytes};
 use burn::tensor::Device;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +42,18 @@ impl Weights {
             }),
         }
     }
+
+    /// Whether the detector takes relief beside colour.
+    ///
+    /// # Errors
+    /// The file cannot be read, or does not state its configuration.
+    pub fn takes_relief(&self) -> Result<bool, WeightsError> {
+        let config = match self {
+            Self::BuiltIn => config_from_bytes(BUILT_IN, NAME)?,
+            Self::File(path) => config_from_bytes(&self.bytes()?, &path.display().to_string())?,
+        };
+        Ok(config.relief_channels > 0)
+    }
 }
 
 /// The detector, ready to run.
@@ -52,8 +64,22 @@ pub fn open_model<B: ModelBackend>(
     weights: &Weights,
     device: &Device<B>,
 ) -> Result<MaskRcnn<B>, WeightsError> {
+    open_model_with(weights, false, device)
+}
+
+/// The same, made to take relief where it is wanted and the weights have not learnt it.
+///
+/// # Errors
+/// As [`open_model`]; or the model cannot take relief.
+pub(crate) fn open_model_with<B: ModelBackend>(
+    weights: &Weights,
+    relief: bool,
+    device: &Device<B>,
+) -> Result<MaskRcnn<B>, WeightsError> {
     match weights {
-        Weights::BuiltIn => model_from_bytes(BUILT_IN, NAME, device),
-        Weights::File(path) => load_model(path, device),
+        Weights::BuiltIn => model_from_bytes(BUILT_IN, NAME, relief, device),
+        Weights::File(path) => {
+            model_from_bytes(&weights.bytes()?, &path.display().to_string(), relief, device)
+        }
     }
 }

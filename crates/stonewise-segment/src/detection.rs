@@ -1,6 +1,6 @@
 //! What a detector says about a photo.
 
-use stonewise_core::raster::{Raster, RgbImage};
+use stonewise_core::raster::{Raster, ReliefMap, RgbImage};
 
 /// One stone found in an image.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +29,15 @@ pub trait Detector: Sync {
     /// What went wrong.
     type Error: Send;
 
-    /// The stones of an image, best score first.
+    /// The stones of an image, best score first. `relief`: what a cloud says about the surface that the image shows, at any resolution,
+    /// where there is a cloud; a detector that has not learnt relief leaves it alone.
     ///
     /// # Errors
     /// The detector could not run.
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Self::Error>;
+    fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Result<Vec<Detection>, Self::Error>;
+
+    /// Whether relief makes a difference.
+    fn takes_relief(&self) -> bool {
+        false
+    }
 }

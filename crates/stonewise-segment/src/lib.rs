@@ -10,6 +10,7 @@ mod jpeg;
 pub mod model;
 #[cfg(feature = "onnx")]
 pub mod onnx;
+mod relief;
 mod sample;
 mod seed;
 mod segmentation;

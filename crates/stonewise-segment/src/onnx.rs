@@ -7,7 +7,7 @@ use ort::session::{Session, SessionOutputs};
 use ort::value::Tensor;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use stonewise_core::raster::{Raster, RgbImage};
+use stonewise_core::raster::{Raster, ReliefMap, RgbImage};
 
 /// Probability from which a pixel is part of a stone.
 const THRESHOLD: f32 = 0.5;
@@ -97,7 +97,7 @@ fn environment(library: &Path) -> Result<Environment, OnnxError> {
 impl Detector for OnnxDetector {
     type Error = OnnxError;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, OnnxError> {
+    fn detect(&self, image: &RgbImage, _: Option<&ReliefMap>) -> Result<Vec<Detection>, OnnxError> {
         let [width, height] = [image.width(), image.height()];
         let mut values = Vec::with_capacity(image.data().len() * 3);
         for channel in 0..3 {

@@ -1,6 +1,6 @@
 //! A photo whose stones are known.
 
-use stonewise_core::raster::{LabelImage, Raster, RgbImage};
+use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
 
 /// An image with its stones, for training and evaluation.
 #[derive(Clone, Debug, PartialEq)]
@@ -8,6 +8,7 @@ pub struct Sample {
     image: RgbImage,
     labels: LabelImage,
     ignore: Raster<bool>,
+    relief: Option<ReliefMap>,
 }
 
 /// The parts of a sample do not fit together.
@@ -34,6 +35,7 @@ impl Sample {
             image,
             labels,
             ignore,
+            relief: None,
         })
     }
 
@@ -47,6 +49,7 @@ impl Sample {
             image: Raster::filled(width, height, [0; 3]),
             labels: Raster::filled(width, height, 0),
             ignore: Raster::filled(width, height, false),
+            relief: None,
         };
         let parts = sample
             .image
@@ -60,6 +63,12 @@ impl Sample {
         sample
     }
 
+    /// The same photo with what a cloud says about its surface; the map may have any resolution.
+    #[must_use]
+    pub fn with_relief(self, relief: Option<ReliefMap>) -> Self {
+        Self { relief, ..self }
+    }
+
     /// The photo.
     pub fn image(&self) -> &RgbImage {
         &self.image
@@ -68,6 +77,11 @@ impl Sample {
     /// Stone of every pixel, 0 where there is none.
     pub fn labels(&self) -> &LabelImage {
         &self.labels
+    }
+
+    /// What a cloud says about its surface, where there is one.
+    pub fn relief(&self) -> Option<&ReliefMap> {
+        self.relief.as_ref()
     }
 
     /// True where nothing is known.

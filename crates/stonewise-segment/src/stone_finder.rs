@@ -4,7 +4,7 @@ use crate::backend::{Compute, device};
 use crate::built_in::{Weights, open_model};
 use crate::detection::{Detection, Detector};
 use crate::model::{StoneDetector, WeightsError};
-use stonewise_core::raster::RgbImage;
+use stonewise_core::raster::{ReliefMap, RgbImage};
 
 /// Mask R-CNN on [`Compute`], ready to run.
 ///
@@ -27,7 +27,11 @@ impl StoneFinder {
 impl Detector for StoneFinder {
     type Error = std::convert::Infallible;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Self::Error> {
-        self.0.detect(image)
+    fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Result<Vec<Detection>, Self::Error> {
+        self.0.detect(image, relief)
+    }
+
+    fn takes_relief(&self) -> bool {
+        self.0.takes_relief()
     }
 }

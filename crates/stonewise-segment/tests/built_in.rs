@@ -31,7 +31,7 @@ fn a_plain_image_has_no_stones() {
         for grey in [0u8, 90, 255] {
             let plain: RgbImage = Raster::filled(width, height, [grey; 3]);
             assert!(
-                detector.detect(&plain).unwrap().is_empty(),
+                detector.detect(&plain, None).unwrap().is_empty(),
                 "{width}x{height}, {grey}"
             );
         }
@@ -40,14 +40,17 @@ fn a_plain_image_has_no_stones() {
             .map(|i| [200 - (i / width / 4) as u8; 3])
             .collect();
         let sky: RgbImage = Raster::from_vec(width, height, sky).unwrap();
-        assert!(detector.detect(&sky).unwrap().is_empty(), "{width}x{height}, sky");
+        assert!(
+            detector.detect(&sky, None).unwrap().is_empty(),
+            "{width}x{height}, sky"
+        );
         // Rounding noise of one value, from place to place.
         let noisy = (0..width * height)
             .map(|i| [(i * 7919 / 13 % 2) as u8; 3])
             .collect();
         let noisy: RgbImage = Raster::from_vec(width, height, noisy).unwrap();
         assert!(
-            detector.detect(&noisy).unwrap().is_empty(),
+            detector.detect(&noisy, None).unwrap().is_empty(),
             "{width}x{height}, noise"
         );
     }

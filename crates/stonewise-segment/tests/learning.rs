@@ -75,7 +75,7 @@ fn a_picture_is_learnt_by_heart() {
     }
     assert!(totals[119] < 0.2 * totals[0], "{totals:?}");
     let found = StoneDetector::new(model.valid())
-        .detect(sample[0].image())
+        .detect(sample[0].image(), None)
         .unwrap();
     for (stone, bounds) in STONES.iter().enumerate() {
         let overlap = |patch: &stonewise_segment::Patch| {
@@ -148,7 +148,7 @@ fn weights_come_back_from_a_file() {
         let path = folder.path().join("model.safetensors");
         save_weights(&trained, &path, precision).unwrap();
         let again = load_weights(other(), &path).unwrap();
-        let [a, b] = [&trained, &again].map(|model| model.instances(picture.image()));
+        let [a, b] = [&trained, &again].map(|model| model.instances(picture.image(), None));
         assert_eq!(a.len(), b.len());
         assert!((a[0].score - b[0].score).abs() <= tolerance);
     }

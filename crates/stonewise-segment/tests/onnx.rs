@@ -24,7 +24,7 @@ fn bright_pixels_in_given_boxes_are_found() {
         }
     };
     let image: RgbImage = Raster::from_vec(10, 8, (0..80).map(pixel).collect()).unwrap();
-    let found = detector.detect(&image).unwrap();
+    let found = detector.detect(&image, None).unwrap();
     assert_eq!(
         found.iter().map(|found| found.score).collect::<Vec<_>>(),
         [0.75, 0.25]

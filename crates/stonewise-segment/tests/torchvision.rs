@@ -152,7 +152,7 @@ fn model(depth: ResnetDepth) -> MaskRcnn<Flex> {
 }
 
 fn compare(model: &MaskRcnn<Flex>, expected: &[Object]) {
-    let found = model.instances(&image(150, 110));
+    let found = model.instances(&image(150, 110), None);
     assert_eq!(found.len(), expected.len());
     for (found, expected) in found.iter().zip(expected) {
         assert_eq!(found.class, expected.class);

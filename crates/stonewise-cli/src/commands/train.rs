@@ -64,6 +64,7 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
     let rendered = Rendered {
         seed: training.seed,
         size_px: training.crop_px,
+        relief: training.relief,
     };
     let (source, validation): (&dyn SampleSource, Vec<Sample>) = match (&args.data, &args.images) {
         (Some(masks), Some(images)) => {

@@ -4,6 +4,7 @@ mod components;
 mod contour;
 mod polygon;
 mod raster_type;
+mod relief;
 mod rle;
 mod srgb;
 
@@ -11,5 +12,6 @@ pub use components::{Component, connected_components};
 pub use contour::{Ring, label_outlines, ring_area};
 pub use polygon::fill_polygon;
 pub use raster_type::{DepthMap, LabelImage, Raster, RgbImage};
+pub use relief::{RELIEF_CHANNELS, RangeImage, ReliefMap};
 pub use rle::{Rle, RleError};
 pub use srgb::{linear_from_srgb, srgb_from_linear};

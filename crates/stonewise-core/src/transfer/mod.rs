@@ -24,6 +24,7 @@ mod labels;
 mod majority;
 mod overlap;
 mod params;
+mod relief;
 mod run_labels;
 mod stones;
 mod surface_cells;
@@ -39,6 +40,7 @@ pub use error::TransferError;
 pub use islands::Occupancy;
 pub use labels::{LabelStore, MemoryLabels, TileLabels};
 pub use params::TransferParams;
+pub use relief::photo_relief;
 pub use stones::{StoneParams, build_stones};
 pub use transfer_labels::{
     KeptParts, PhotoVotes, PreparedTransfer, StoneInstances, Transfer, finish_transfer, transfer_labels,

@@ -1,7 +1,7 @@
 //! Local spacing, noise and orientation of a tile's surface.
 
-use super::TransferError;
 use super::bytes::{Reader, Writer};
+use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, GridIndex};
 use crate::geometry::{CellMap, cell_of, floor};
 use crate::statistics::upper_median;
@@ -19,6 +19,27 @@ pub(super) struct LocalSurface {
     pub noise_m: f32,
     /// Points of the cell.
     points: u32,
+}
+
+impl LocalSurface {
+    /// Cosine of the angle between a line of sight (unit vector) and the face's normal. A cell without a normal (one or two points) says
+    /// nothing about incidence: 0.5.
+    #[inline]
+    pub(super) fn cosine(&self, line: &Vector3<f64>) -> f64 {
+        if self.normal == Vector3::zeros() {
+            0.5
+        } else {
+            line.dot(&self.normal.cast()).abs()
+        }
+    }
+
+    /// How far behind the nearest depth of its pixel a point of this surface still counts as visible, metres.
+    #[inline]
+    pub(super) fn tolerance_m(&self, cosine: f64, params: &TransferParams) -> f64 {
+        let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
+        params.tolerance_spacings * f64::from(self.spacing_m) * (1.0 + tangent)
+            + params.tolerance_noises * f64::from(self.noise_m)
+    }
 }
 
 /// Local surface in cubic cells of a tile.

@@ -148,19 +148,11 @@ impl<'a> Observer<'a> {
             return None;
         }
         let line = (world - self.centres[p]).normalize();
-        let cosine = line.dot(&surface.normal.cast()).abs();
-        // A cell without a normal (one or two points) says nothing about incidence.
-        let cosine = if surface.normal == nalgebra::Vector3::zeros() {
-            0.5
-        } else {
-            cosine
-        };
+        let cosine = surface.cosine(&line);
         if cosine < self.least_cosine {
             return None;
         }
-        let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
-        let tolerance = self.params.tolerance_spacings * f64::from(surface.spacing_m) * (1.0 + tangent)
-            + self.params.tolerance_noises * f64::from(surface.noise_m);
+        let tolerance = surface.tolerance_m(cosine, self.params);
         let (depth, here) = (seen.depth_m, self.depths[p].at(seen.pixel)?);
         if depth > f64::from(here) + tolerance {
             return None;

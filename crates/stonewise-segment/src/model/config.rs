@@ -1,6 +1,7 @@
 //! What a Mask R-CNN looks like and how it is trained.
 
 use serde::{Deserialize, Serialize};
+use stonewise_core::raster::RELIEF_CHANNELS;
 
 /// Layers of a residual network (He et al. 2016, table 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -111,6 +112,11 @@ pub struct MaskRcnnConfig {
     pub pixel_mean: [f32; 3],
     /// Each channel is divided by this.
     pub pixel_std: [f32; 3],
+    /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it has not learnt relief. They
+    /// have a convolution of their own, whose output is added to that of the colours: a wider first layer, of which colour alone uses its
+    /// part.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub relief_channels: usize,
     /// Size at which images are looked at; `None` as they are.
     pub resize: Option<Resize>,
     /// Residual network.
@@ -151,6 +157,7 @@ impl MaskRcnnConfig {
             classes: 91,
             pixel_mean: [0.485, 0.456, 0.406],
             pixel_std: [0.229, 0.224, 0.225],
+            relief_channels: 0,
             resize: Some(Resize {
                 shorter: 800,
                 longest: 1333,
@@ -236,6 +243,15 @@ impl MaskRcnnConfig {
         }
     }
 
+    /// The same model with all channels of relief.
+    #[must_use]
+    pub fn with_relief(self) -> Self {
+        Self {
+            relief_channels: RELIEF_CHANNELS,
+            ..self
+        }
+    }
+
     /// Refuses configurations from which no model can be built.
     ///
     /// # Errors
@@ -273,6 +289,12 @@ impl MaskRcnnConfig {
         if self.pixel_std.iter().any(|std| !std.is_finite() || *std <= 0.0) {
             return fail("pixel_std must be finite and above 0");
         }
+        let is_frozen = matches!(self.backbone.norm, Norm::FrozenBatch { .. });
+        if self.relief_channels != 0 && (self.relief_channels != RELIEF_CHANNELS || is_frozen) {
+            return Err(ConfigError(format!(
+                "relief_channels must be 0 or {RELIEF_CHANNELS}, the latter with group normalisation only"
+            )));
+        }
         if self
             .resize
             .is_some_and(|resize| resize.shorter == 0 || resize.longest == 0)
@@ -286,4 +308,9 @@ impl MaskRcnnConfig {
     pub(super) fn head_norm(&self) -> Option<Norm> {
         self.head_groups.map(|groups| Norm::Group { groups })
     }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands over a reference")]
+fn is_zero(channels: &usize) -> bool {
+    *channels == 0
 }

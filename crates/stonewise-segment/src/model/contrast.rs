@@ -12,9 +12,9 @@ const APART_PX: u32 = 4;
 
 /// Whether the part of an image in a box shows an edge or a texture.
 ///
-/// The network normalises its features to one spread in every image (group normalisation, Wu & He 2018). In an image that shows nothing
-/// all spread comes from the zeros with which its layers are padded at the border: that is enlarged until it looks like a wall, and stones are
-/// reported with scores of up to 1.00. Where the box of a stone has neither a joint nor a texture, there is nothing that could be one.
+/// In images that show nothing, stones are reported with scores of up to 1.00. The likely cause, not tested apart from others: the network
+/// normalises its features to one spread in every image (group normalisation, Wu & He 2018), and there all spread comes from the zeros with
+/// which its layers are padded at the border. Where the box of a stone has neither a joint nor a texture, there is nothing that could be one.
 pub(super) fn has_contrast(image: &RgbImage, [left, top, right, bottom]: Bounds) -> bool {
     let range =
         |low: f32, high: f32, size: u32| (low.max(0.0) as u32)..(high.ceil().max(0.0) as u32).min(size);

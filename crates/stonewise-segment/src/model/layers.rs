@@ -18,6 +18,8 @@ pub enum Spread {
     Normal(f32),
     /// Uniform within one over the root of an output's inputs.
     Default,
+    /// All zero: an input that makes no difference before it has been learnt.
+    Zero,
 }
 
 /// Convolution: weight [out, in, size, size].
@@ -47,6 +49,7 @@ impl<B: ModelBackend> Conv<B> {
             Spread::KaimingUniform => init.uniform(shape, (3.0 / fan_in).sqrt()),
             Spread::Normal(std) => init.normal(shape, std),
             Spread::Default => init.uniform(shape, 1.0 / fan_in.sqrt()),
+            Spread::Zero => init.constant(shape, 0.0),
         };
         Self {
             weight,

@@ -12,7 +12,7 @@ use super::losses::{Losses, binary_cross_entropy, cross_entropy, smooth_l1};
 use super::matcher::match_boxes;
 use super::nms::suppress;
 use super::paste::paste_mask;
-use super::preprocess::{Seen, batch};
+use super::preprocess::{Seen, batch, relief_batch};
 use super::resnet::{Resnet, channels};
 use super::roi_align::{FeatureRows, RoiAlign};
 use super::rpn::{AnchorScores, Rpn, proposals};
@@ -25,7 +25,7 @@ use burn::tensor::backend::Backend;
 use burn::tensor::{Int, Tensor, TensorData};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use stonewise_core::raster::RgbImage;
+use stonewise_core::raster::{ReliefMap, RgbImage};
 
 /// Shorter sides make no detection, pixels.
 const MIN_SIDE: f32 = 1e-2;
@@ -92,7 +92,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
         let norm = config.head_norm();
         Ok(Self {
             backbone: Backbone {
-                body: Resnet::new(init, &config.backbone),
+                body: Resnet::new(init, &config.backbone, config.relief_channels),
                 fpn: Fpn::new(init, channels(&config.backbone), config.fpn_channels, norm),
             },
             rpn: Rpn::new(init, config.fpn_channels, shapes, norm),
@@ -113,8 +113,9 @@ impl<B: ModelBackend> MaskRcnn<B> {
         self
     }
 
-    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture.
-    pub fn detect(&self, image: &RgbImage) -> Vec<Detection> {
+    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture. `relief`: that of the whole
+    /// image, at any resolution.
+    pub fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Vec<Detection> {
         let size = [image.width(), image.height()];
         let detection = |instance: Instance| Detection {
             bounds: instance.bounds,
@@ -126,7 +127,7 @@ impl<B: ModelBackend> MaskRcnn<B> {
                 size,
             ),
         };
-        let instances = self.instances(image).into_iter();
+        let instances = self.instances(image, relief).into_iter();
         instances
             .filter(|i| has_contrast(image, i.bounds))
             .map(detection)
@@ -134,10 +135,11 @@ impl<B: ModelBackend> MaskRcnn<B> {
     }
 
     /// The objects of an image, best score first, their masks still on the model's grid.
-    pub fn instances(&self, image: &RgbImage) -> Vec<Instance> {
+    pub fn instances(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Vec<Instance> {
         let device = &self.devices()[0];
         let seen = Seen::new(image, self.config.resize);
-        let sight = self.look(batch(&[image], &[seen], &self.config, device));
+        let images = batch(&[image], &[seen], &self.config, device);
+        let sight = self.look(images, &[relief], &[seen]);
         let objectness = floats(sight.scores.objectness);
         let offsets = floats(sight.scores.offsets);
         let [before, after] = [
@@ -174,9 +176,15 @@ impl<B: ModelBackend> MaskRcnn<B> {
         found
     }
 
-    fn look(&self, images: Tensor<B, 4>) -> Sight<B> {
+    fn look(&self, images: Tensor<B, 4>, relief: &[Option<&ReliefMap>], seen: &[Seen]) -> Sight<B> {
         let [_, _, rows, columns] = images.dims();
-        let levels = self.backbone.fpn.forward(self.backbone.body.forward(images));
+        let body = &self.backbone.body;
+        let relief = if body.takes_relief() {
+            relief_batch(relief, seen, [columns, rows], &images.device())
+        } else {
+            None
+        };
+        let levels = self.backbone.fpn.forward(body.forward(images, relief));
         let grids: Vec<[usize; 2]> = levels
             .iter()
             .map(|level| [level.dims()[3], level.dims()[2]])
@@ -251,7 +259,8 @@ impl<B: TrainBackend> MaskRcnn<B> {
             .collect();
         let target = |(sample, &seen)| Targets::new(sample, seen, self.config.min_stone_pixels);
         let targets: Vec<Targets> = samples.iter().zip(&seen).map(target).collect();
-        let sight = self.look(batch(&images, &seen, &self.config, device));
+        let relief: Vec<Option<&ReliefMap>> = samples.iter().map(Sample::relief).collect();
+        let sight = self.look(batch(&images, &seen, &self.config, device), &relief, &seen);
         let regions = self.propose(&sight, &targets, &seen);
         let (rpn_objectness, rpn_box) =
             self.proposal_losses(sight.scores, &sight.anchors.concat(), &targets, rng);
@@ -431,8 +440,12 @@ where
 {
     type Error = std::convert::Infallible;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Self::Error> {
-        Ok(self.model.detect(image))
+    fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Result<Vec<Detection>, Self::Error> {
+        Ok(self.model.detect(image, relief))
+    }
+
+    fn takes_relief(&self) -> bool {
+        self.model.backbone.body.takes_relief()
     }
 }
 

@@ -35,7 +35,7 @@ pub use config::{
 pub use kernels::{ModelBackend, TrainBackend};
 pub use losses::Losses;
 pub use mask_rcnn::{Instance, MaskRcnn, StoneDetector};
-pub use model_file::{load_model, model_from_bytes, save_model};
+pub use model_file::{config_from_bytes, load_model, model_from_bytes, save_model};
 pub use paste::paste_mask;
 pub use sparse::SparseMatrix;
 pub use weights::{

@@ -34,29 +34,43 @@ pub fn load_model<B: ModelBackend>(path: &Path, device: &Device<B>) -> Result<Ma
         path: path.to_owned(),
         source,
     })?;
-    model_from_bytes(&bytes, &path.display().to_string(), device)
+    model_from_bytes(&bytes, &path.display().to_string(), false, device)
 }
 
-/// A model from the bytes of its file; `name` stands for it in errors.
+/// A model from the bytes of its file; `name` stands for it in errors. `relief`: it takes relief, with weights of zero where the file has
+/// none.
 ///
 /// # Errors
 /// As [`load_model`].
 pub fn model_from_bytes<B: ModelBackend>(
     bytes: &[u8],
     name: &str,
+    relief: bool,
     device: &Device<B>,
 ) -> Result<MaskRcnn<B>, WeightsError> {
+    let config = config_from_bytes(bytes, name)?;
+    let config = if relief { config.with_relief() } else { config };
+    let model = MaskRcnn::init(&config, 0, device).map_err(|e| config_error(name, &e))?;
+    weights_from_bytes(model, bytes, name)
+}
+
+/// What the model of a file looks like; `name` stands for the file in errors.
+///
+/// # Errors
+/// It is no safetensors file, or does not state the configuration of its model.
+pub fn config_from_bytes(bytes: &[u8], name: &str) -> Result<MaskRcnnConfig, WeightsError> {
     let (_, header) = SafeTensors::read_metadata(bytes).map_err(|source| WeightsError::Format {
         name: name.to_owned(),
         source,
     })?;
-    let config_error = |problem: String| WeightsError::Config {
-        name: name.to_owned(),
-        problem,
-    };
     let config = header.metadata().as_ref().and_then(|m| m.get(CONFIG_KEY));
-    let config = config.ok_or_else(|| config_error("it was not written by stonewise".to_owned()))?;
-    let config: MaskRcnnConfig = serde_json::from_str(config).map_err(|e| config_error(e.to_string()))?;
-    let model = MaskRcnn::init(&config, 0, device).map_err(|e| config_error(e.to_string()))?;
-    weights_from_bytes(model, bytes, name)
+    let config = config.ok_or_else(|| config_error(name, &"it was not written by stonewise"))?;
+    serde_json::from_str(config).map_err(|e| config_error(name, &e))
+}
+
+fn config_error(name: &str, problem: &dyn std::fmt::Display) -> WeightsError {
+    WeightsError::Config {
+        name: name.to_owned(),
+        problem: problem.to_string(),
+    }
 }

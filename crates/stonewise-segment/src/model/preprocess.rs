@@ -1,10 +1,11 @@
 //! From photos to the model's input.
 
 use super::config::{MaskRcnnConfig, Resize};
+use crate::relief::resampled;
 use burn::tensor::backend::Backend;
 use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
-use stonewise_core::raster::RgbImage;
+use stonewise_core::raster::{RELIEF_CHANNELS, ReliefMap, RgbImage};
 
 /// Sides of the model's input are multiples of this: the stride of the coarsest features.
 const STRIDE: usize = 32;
@@ -67,6 +68,33 @@ pub fn batch<B: Backend>(
             fill(values, width, images[image], seen[image].size, channel, normalise);
         });
     Tensor::from_data(TensorData::new(values, [images.len(), 3, height, width]), device)
+}
+
+/// Relief [batch, channels, rows, columns] of a batch of images that has so many columns and rows, zeros where an image has none;
+/// `None` where no image has any.
+pub fn relief_batch<B: Backend>(
+    reliefs: &[Option<&ReliefMap>],
+    seen: &[Seen],
+    [width, height]: [usize; 2],
+    device: &B::Device,
+) -> Option<Tensor<B, 4>> {
+    reliefs.iter().flatten().next()?;
+    let mut values = vec![0.0f32; reliefs.len() * RELIEF_CHANNELS * height * width];
+    for ((values, relief), seen) in values
+        .chunks_mut(RELIEF_CHANNELS * height * width)
+        .zip(reliefs)
+        .zip(seen)
+    {
+        let Some(relief) = relief else { continue };
+        let relief = resampled(relief, [0.0, 0.0, 1.0, 1.0], seen.size.map(|side| side as u32));
+        for (channel, plane) in values.chunks_mut(height * width).enumerate() {
+            for (to, from) in plane.chunks_mut(width).zip(relief.data().chunks(seen.size[0])) {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = from[channel]);
+            }
+        }
+    }
+    let shape = [reliefs.len(), RELIEF_CHANNELS, height, width];
+    Some(Tensor::from_data(TensorData::new(values, shape), device))
 }
 
 /// One channel of an image, resampled bilinearly between pixel centres.

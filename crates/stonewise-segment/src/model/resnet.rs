@@ -91,10 +91,12 @@ pub struct Resnet<B: Backend> {
     layer2: Vec<Block<B>>,
     layer3: Vec<Block<B>>,
     layer4: Vec<Block<B>>,
+    relief: Option<Conv<B>>,
 }
 
 impl<B: ModelBackend> Resnet<B> {
-    pub fn new(init: &mut Init<B>, config: &BackboneConfig) -> Self {
+    /// `relief`: channels beside colour; their weights begin as zeros.
+    pub fn new(init: &mut Init<B>, config: &BackboneConfig, relief: usize) -> Self {
         let blocks = match config.depth {
             ResnetDepth::R18 => [2, 2, 2, 2],
             ResnetDepth::R34 | ResnetDepth::R50 => [3, 4, 6, 3],
@@ -113,6 +115,7 @@ impl<B: ModelBackend> Resnet<B> {
             (0..blocks[stage]).map(block).collect()
         };
         let [layer1, layer2, layer3, layer4] = [0, 1, 2, 3].map(&mut stage);
+        let relief = (relief > 0).then(|| Conv::new(init, [relief, config.width], 7, 2, Spread::Zero, false));
         Self {
             conv1,
             bn1,
@@ -120,12 +123,27 @@ impl<B: ModelBackend> Resnet<B> {
             layer2,
             layer3,
             layer4,
+            relief,
         }
     }
 
-    /// Features at strides 4, 8, 16 and 32 of an image batch [batch, 3, rows, columns].
-    pub fn forward(&self, x: Tensor<B, 4>) -> [Tensor<B, 4>; 4] {
-        let x = relu(normalised(&self.conv1, &self.bn1, x));
+    /// Whether relief makes a difference.
+    pub fn takes_relief(&self) -> bool {
+        self.relief.is_some()
+    }
+
+    /// Features at strides 4, 8, 16 and 32 of an image batch [batch, 3, rows, columns] and, where there is any, its relief
+    /// [batch, relief, rows, columns].
+    pub fn forward(&self, x: Tensor<B, 4>, relief: Option<Tensor<B, 4>>) -> [Tensor<B, 4>; 4] {
+        let colour = self.conv1.forward(x);
+        let x = match (&self.relief, relief) {
+            (Some(conv), Some(relief)) => colour + conv.forward(relief),
+            _ => colour,
+        };
+        let x = relu(match &self.bn1 {
+            Some(norm) => norm.forward(x),
+            None => x,
+        });
         let mut x = max_pool2d(x, [3; 2], [2; 2], [1; 2], [1; 2], false);
         [&self.layer1, &self.layer2, &self.layer3, &self.layer4].map(|layer| {
             for block in layer {

@@ -13,6 +13,9 @@ use std::path::{Path, PathBuf};
 /// Key of the model's configuration in a file's metadata.
 pub(super) const CONFIG_KEY: &str = "stonewise_model";
 
+/// Name of the weights of relief, which files of colour alone do not have.
+const RELIEF_KEY: &str = "backbone.body.relief.weight";
+
 /// How weights are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
@@ -96,7 +99,8 @@ pub enum WeightsError {
     },
 }
 
-/// Replaces all parameters of a model by those of a file.
+/// Replaces all parameters of a model by those of a file. A file of colour alone fits a model with relief, too: the weights of relief
+/// become zeros, and the model does what it did without.
 ///
 /// # Errors
 /// The file cannot be read, lacks a parameter, has one too many or one of another shape.
@@ -275,6 +279,11 @@ impl Reader<'_> {
         let key = key_of(&self.path);
         let name = self.name.to_owned();
         let Some(view) = self.tensors.get(&key) else {
+            if key == RELIEF_KEY {
+                // Weights that have not learnt relief: it makes no difference.
+                let count = expected.iter().product();
+                return Ok(TensorData::new(vec![0.0f32; count], expected));
+            }
             return Err(WeightsError::Missing { name, key });
         };
         if view.shape() != expected {

@@ -108,6 +108,7 @@ impl Backdrop {
                 canvas.facing[i] = 1.0;
                 canvas.label[i] = 0;
                 canvas.doubtful[i] = false;
+                canvas.piece[i] = canvas.current;
                 canvas.sky[i] = self.kind == BackdropKind::Sky;
             }
         }

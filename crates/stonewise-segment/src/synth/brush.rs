@@ -31,6 +31,7 @@ impl Object {
                     canvas.openness[i] = 1.0;
                     canvas.label[i] = 0;
                     canvas.doubtful[i] = false;
+                    canvas.piece[i] = canvas.current;
                     canvas.sky[i] = false;
                 }
             }

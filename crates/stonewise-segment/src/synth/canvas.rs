@@ -20,6 +20,10 @@ pub(super) struct Canvas {
     pub(super) label: Vec<u32>,
     /// True where a person could not say what is there.
     pub(super) doubtful: Vec<bool>,
+    /// What was painted there last: 0 nothing, then the layers, then the objects.
+    pub(super) piece: Vec<u8>,
+    /// What is painted now.
+    pub(super) current: u8,
     /// Number of stones so far: the largest label.
     pub(super) stones: u32,
 }
@@ -41,6 +45,8 @@ impl Canvas {
             sky: vec![false; count],
             label: vec![0; count],
             doubtful: vec![false; count],
+            piece: vec![0; count],
+            current: 0,
             stones: 0,
         }
     }

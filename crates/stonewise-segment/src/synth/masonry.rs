@@ -85,6 +85,7 @@ impl Masonry {
                     _ => 0,
                 };
                 canvas.doubtful[i] = false;
+                canvas.piece[i] = canvas.current;
                 canvas.facing[i] = self.facing;
                 canvas.sky[i] = false;
             }

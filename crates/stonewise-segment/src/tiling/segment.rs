@@ -5,11 +5,12 @@ use super::grid::{Rect, tiles};
 use super::merge::merge;
 use super::options::TilingOptions;
 use super::pyramid::{at_scale, crop};
+use crate::relief::resampled;
 use crate::{Detector, Segmentation};
 use std::cmp::Ordering;
 use stonewise_core::parallel::{in_parallel, on_one_thread};
 use stonewise_core::progress::{Interrupted, Progress};
-use stonewise_core::raster::RgbImage;
+use stonewise_core::raster::{ReliefMap, RgbImage};
 
 /// Why a photo could not be segmented.
 #[derive(Debug, thiserror::Error)]
@@ -22,7 +23,7 @@ pub enum TilingError<E> {
     Interrupted(#[from] Interrupted),
 }
 
-/// The stones of a photo of any size.
+/// The stones of a photo of any size. `relief`: what a cloud says about its surface, at any resolution; `None` without a cloud.
 ///
 /// The photo is looked at as it is first; where its stones are too small or too large for the detector, also
 /// enlarged or reduced ([`TilingOptions::stone_px`]). `progress` advances by one for every tile,
@@ -35,6 +36,7 @@ pub enum TilingError<E> {
 pub fn segment_photo<D: Detector>(
     detector: &D,
     photo: &RgbImage,
+    relief: Option<&ReliefMap>,
     options: &TilingOptions,
     progress: &dyn Progress,
 ) -> Result<Segmentation, TilingError<D::Error>> {
@@ -66,7 +68,7 @@ pub fn segment_photo<D: Detector>(
         };
         let (needed, others): (Vec<Rect>, Vec<Rect>) = size.tiles(options).into_iter().partition(is_needed);
         progress.advance(others.len() as u64);
-        let found = size.look(detector, &needed, options, progress)?;
+        let found = size.look(detector, relief, &needed, options, progress)?;
         candidates.extend(found.into_iter().filter(|c| longer_side(c) >= least));
     }
     Ok(merge(candidates, photo.width(), photo.height(), options))
@@ -98,19 +100,33 @@ impl Size {
         )
     }
 
+    /// The relief of a tile.
+    fn relief(&self, relief: &ReliefMap, tile: &Rect) -> ReliefMap {
+        let [width, height] = self.scaling.scaled.map(f64::from);
+        let part = [
+            f64::from(tile.left) / width,
+            f64::from(tile.top) / height,
+            f64::from(tile.width) / width,
+            f64::from(tile.height) / height,
+        ];
+        resampled(relief, part, [tile.width, tile.height])
+    }
+
     /// What the detector finds in some tiles, in their order. Tiles side by side take half of the time of
     /// threads in a layer.
     fn look<D: Detector>(
         &self,
         detector: &D,
+        relief: Option<&ReliefMap>,
         tiles: &[Rect],
         options: &TilingOptions,
         progress: &dyn Progress,
     ) -> Result<Vec<Candidate>, TilingError<D::Error>> {
         let in_tile = |tile: &Rect| -> Result<Vec<Candidate>, TilingError<D::Error>> {
             progress.check()?;
+            let relief = relief.map(|relief| self.relief(relief, tile));
             let found = detector
-                .detect(&crop(&self.image, tile))
+                .detect(&crop(&self.image, tile), relief.as_ref())
                 .map_err(TilingError::Detector)?;
             progress.advance(1);
             let good = found.iter().filter(|d| f64::from(d.score) >= options.min_score);

@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::sync::atomic::AtomicU32;
 use std::sync::atomic::Ordering::Relaxed;
 use stonewise_core::progress::Silent;
-use stonewise_core::raster::{LabelImage, Raster, RgbImage, connected_components};
+use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage, connected_components};
 
 /// Levels of a colour channel, far enough apart to be told when pixels are averaged.
 const LEVELS: [u8; 4] = [0, 85, 170, 255];
@@ -59,7 +59,7 @@ const SPECK_PX: u32 = 30;
 impl Detector for Oracle {
     type Error = Infallible;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Infallible> {
+    fn detect(&self, image: &RgbImage, _: Option<&ReliefMap>) -> Result<Vec<Detection>, Infallible> {
         let label = |c: &[u8; 3]| {
             let level = |v: u8| (u32::from(v) + 42) / 85;
             level(c[0]) | level(c[1]) << 2 | level(c[2]) << 4
@@ -107,7 +107,7 @@ fn options(tile_px: u32, overlap_px: u32, scales: &[f64]) -> TilingOptions {
 }
 
 fn segmented(labels: &LabelImage, options: &TilingOptions) -> Segmentation {
-    segment_photo(&Oracle, &coloured(labels), options, &Silent).unwrap()
+    segment_photo(&Oracle, &coloured(labels), None, options, &Silent).unwrap()
 }
 
 /// The share of the pixels of stones that the same stone covers, where stones are paired by most pixels.
@@ -185,8 +185,8 @@ struct Shortsighted;
 impl Detector for Shortsighted {
     type Error = Infallible;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Infallible> {
-        let all = Oracle.detect(image)?;
+    fn detect(&self, image: &RgbImage, _: Option<&ReliefMap>) -> Result<Vec<Detection>, Infallible> {
+        let all = Oracle.detect(image, None)?;
         let is_large = |d: &Detection| d.mask.pixels.data().iter().filter(|p| **p).count() >= 400;
         Ok(all.into_iter().filter(is_large).collect())
     }
@@ -209,7 +209,7 @@ fn small_stones_are_found_enlarged_and_only_their_part_of_the_photo_is() {
             stone_px: 60.0,
             ..options(200, 60, scales)
         };
-        segment_photo(&detector, &photo, &options, &Silent)
+        segment_photo(&detector, &photo, None, &options, &Silent)
             .unwrap()
             .scores
             .len()
@@ -231,8 +231,8 @@ struct Counting<'a>(&'a AtomicU32);
 impl Detector for Counting<'_> {
     type Error = Infallible;
 
-    fn detect(&self, image: &RgbImage) -> Result<Vec<Detection>, Infallible> {
+    fn detect(&self, image: &RgbImage, _: Option<&ReliefMap>) -> Result<Vec<Detection>, Infallible> {
         self.0.fetch_add(1, Relaxed);
-        Shortsighted.detect(image)
+        Shortsighted.detect(image, None)
     }
 }

@@ -33,6 +33,9 @@ pub struct TrainParams {
     pub schedule: Schedule,
     /// The optimiser.
     pub optimizer: AdamWParams,
+    /// Whether the detector learns relief beside colour. Rendered photos come with clouds then, of all kinds and none; weights that have
+    /// not learnt relief start with zeros for it.
+    pub relief: bool,
     /// How images cut from labelled photos vary; rendered photos vary by themselves.
     pub augment: AugmentParams,
     /// Minutes between checkpoints.
@@ -50,6 +53,7 @@ impl Default for TrainParams {
             accumulate: 4,
             schedule: Schedule::default(),
             optimizer: AdamWParams::default(),
+            relief: false,
             augment: AugmentParams::default(),
             checkpoint_minutes: 5.0,
             evaluate_steps: 500,

@@ -145,7 +145,7 @@ pub fn evaluate_samples<D: Detector>(
     let mut pairs = Vec::new();
     for sample in samples {
         let options = TilingOptions::whole(sample.image());
-        let found = segment_photo(detector, sample.image(), &options, &Silent)?;
+        let found = segment_photo(detector, sample.image(), sample.relief(), &options, &Silent)?;
         pairs.push(pair_masks(&found, sample.labels(), sample.ignore()));
     }
     Ok(MaskScore::of(&pairs))

@@ -5,8 +5,9 @@ use super::error::TrainError;
 use super::params::{TrainConfig, TrainParams};
 use super::schedule::Total;
 use super::trainer::Trainer;
+use crate::Weights;
+use crate::built_in::open_model_with;
 use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend};
-use crate::{Weights, open_model};
 use burn::tensor::Device;
 use std::path::Path;
 
@@ -63,8 +64,16 @@ pub fn open_training<B: TrainBackend>(
         return Err(TrainError::Data(problem));
     }
     let model = match start {
-        Start::Nothing(config) => MaskRcnn::init(config.as_ref(), training.seed, device)?,
-        Start::Weights(weights) => open_model(weights, device)?,
+        Start::Nothing(config) => {
+            let config = MaskRcnnConfig::clone(config);
+            let config = if training.relief {
+                config.with_relief()
+            } else {
+                config
+            };
+            MaskRcnn::init(&config, training.seed, device)?
+        }
+        Start::Weights(weights) => open_model_with(weights, training.relief, device)?,
     };
     let config = TrainConfig {
         model: model.config().clone(),

@@ -123,7 +123,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
                         continue;
                     }
                 };
-                let segmented = segment_photo(&detector, &image, job.tiling, progress)?;
+                let segmented = segment_photo(&detector, &image, None, job.tiling, progress)?;
                 let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
                 write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
                 let labels = label_path(job, name)?;

@@ -9,6 +9,7 @@ use crate::storage::tiles::most_records;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use stonewise_segment::Weights;
 
 /// What a unit does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -102,13 +103,14 @@ pub(super) fn units_of(project: &Project, batch_points: u64) -> Result<Vec<Unit>
         .iter()
         .map(|e| points_of(&e.clouds))
         .collect::<Result<Vec<u64>>>()?;
+    let takes_relief = Weights::named(&project.settings.segment.model).takes_relief();
     let depth_maps = u64::from(project.settings.label.depth_memory_mib) << 20;
     for (n, epoch) in (1..).zip(&project.epochs) {
         let of_cloud = POINT_BYTES * points[n - 1];
         // Tiles are sorted in a buffer of a quarter of a gibibyte.
         let ingest = Work::of(&[], 2, 256 << 20);
         list.add(Stage::Ingest, n, ingest.reading(&epoch.clouds));
-        list.add_photos(n, epoch)?;
+        list.add_photos(n, epoch, matches!(takes_relief, Ok(true)))?;
         list.add_labels(n, batches_of(points[n - 1], batch_points), depth_maps, of_cloud);
         list.add(Stage::Stones, n, Work::of(&[format!("label-{n}")], 1, of_cloud));
     }
@@ -202,14 +204,16 @@ impl List {
     }
 
     /// The photos of an epoch, one by one where the detector looks at them, and the step that gathers them.
-    fn add_photos(&mut self, n: usize, epoch: &Epoch) -> Result<()> {
+    fn add_photos(&mut self, n: usize, epoch: &Epoch, takes_relief: bool) -> Result<()> {
         let bytes = PIXEL_BYTES * most_pixels(epoch)?;
         let mut photos = Vec::new();
         let count = photos_to_segment(epoch)?;
         for photo in 0..count {
             let id = format!("segment-{n}.{}", part_name(photo));
             let inputs = [epoch.cameras.clone(), epoch.images.clone()];
-            let work = Work::of(&[], 4, bytes).reading(&inputs);
+            // A detector that takes relief looks at the clouds, too.
+            let needs = takes_relief.then(|| format!("ingest-{n}"));
+            let work = Work::of(needs.as_slice(), 4, bytes).reading(&inputs);
             self.push(id.clone(), Stage::SegmentPhoto, Some(n), work);
             self.last(|unit| {
                 (unit.part, unit.parts) = (Some(photo), Some(count));

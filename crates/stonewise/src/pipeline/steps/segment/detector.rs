@@ -4,6 +4,7 @@ use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
+use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
 use crate::warnings::Warnings;
@@ -11,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::path::Path;
 use stonewise_core::geometry::View;
+use stonewise_core::transfer::photo_relief;
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::write_label_png;
 use stonewise_segment::tiling::segment_photo;
@@ -28,6 +30,8 @@ pub struct Detection<'a> {
     name: String,
     key: Key,
     weights: Weights,
+    /// The clouds, where the detector takes relief beside colour.
+    ingested: Option<Ingested>,
     /// Opened for the first photo that needs it.
     detector: OnceCell<StoneFinder>,
 }
@@ -42,8 +46,9 @@ struct Outcome {
 }
 
 impl<'a> Detection<'a> {
-    /// The step `name` of an epoch.
-    pub fn new(context: &'a Context<'a>, epoch: &'a Epoch, name: &str) -> Result<Self> {
+    /// The step of an epoch, counted from 1.
+    pub fn new(context: &'a Context<'a>, number: usize) -> Result<Self> {
+        let epoch = &context.project.epochs[number - 1];
         let params = &context.project.settings.segment;
         let weights = Weights::named(&params.model);
         let digest = match &weights {
@@ -56,17 +61,25 @@ impl<'a> Detection<'a> {
             .to_string(),
             Weights::File(path) => context.digest(path)?,
         };
-        let digests = [
+        let ingested = match weights.takes_relief() {
+            Ok(true) => Some(ingest(context, number)?),
+            // An error is told where the detector is opened.
+            Ok(false) | Err(_) => None,
+        };
+        let mut digests = vec![
             context.digest(&epoch.cameras)?,
             context.digest(&epoch.images)?,
             digest,
         ];
+        digests.extend(ingested.as_ref().map(|i| i.step.key().as_str().to_owned()));
+        let digests: Vec<&str> = digests.iter().map(String::as_str).collect();
         Ok(Self {
             context,
             epoch,
-            name: name.to_owned(),
-            key: Key::new(STEP, &params.tiling, &digests.each_ref().map(String::as_str)),
+            name: format!("{STEP}-{number}"),
+            key: Key::new(STEP, &params.tiling, &digests),
             weights,
+            ingested,
             detector: OnceCell::new(),
         })
     }
@@ -168,7 +181,14 @@ impl<'a> Detection<'a> {
             )));
         }
         let tiling = &self.context.project.settings.segment.tiling;
-        let stones = segment_photo(self.detector()?, &image, tiling, progress)?;
+        let relief = match &self.ingested {
+            Some(ingested) => {
+                let params = &self.context.project.settings.label;
+                Some(photo_relief(&ingested.tiles.surveyed, view, params, progress)?)
+            }
+            None => None,
+        };
+        let stones = segment_photo(self.detector()?, &image, relief.as_ref(), tiling, progress)?;
         write_label_png(&part.file(LABELS), &stones.labels)?;
         Ok(Outcome {
             instances: Some(instances(&stones)),

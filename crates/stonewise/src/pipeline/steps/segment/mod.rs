@@ -44,7 +44,7 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     let epoch = &context.project.epochs[number - 1];
     let name = format!("{STEP}-{number}");
     let step = match &epoch.masks {
-        None => Detection::new(context, epoch, &name)?.all()?,
+        None => Detection::new(context, number)?.all()?,
         Some(masks) => {
             let digests = [
                 context.digest(&epoch.cameras)?,
@@ -73,8 +73,7 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
 
 /// Finds the stones of one posed photo, counted from 0, of an epoch without masks: a part of [`segment`].
 pub fn segment_photo(context: &Context, number: usize, photo: usize) -> Result<()> {
-    let epoch = &context.project.epochs[number - 1];
-    Detection::new(context, epoch, &format!("{STEP}-{number}"))?.photo(photo)
+    Detection::new(context, number)?.photo(photo)
 }
 
 /// Photos of an epoch that the detector has to look at; none where it has masks.

@@ -1,0 +1,139 @@
+//! Relief beside colour: weights of colour alone do what they did, and relief can be learnt.
+#![allow(clippy::unwrap_used)]
+
+use burn::backend::{Autodiff, Flex};
+use burn::module::AutodiffModule;
+use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
+use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
+use stonewise_segment::model::{
+    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, RoiConfig, config_from_bytes,
+    model_from_bytes, weights_to_bytes,
+};
+use stonewise_segment::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo, surveyed_photo_by};
+use stonewise_segment::{Sample, Weights};
+
+const SIDE: u32 = 160;
+
+fn built_in(relief: bool) -> MaskRcnn<Flex> {
+    let bytes = Weights::BuiltIn.bytes().unwrap();
+    model_from_bytes(&bytes, "built-in", relief, &Default::default()).unwrap()
+}
+
+#[test]
+fn weights_of_colour_alone_see_no_relief_to_the_bit() {
+    let photo = surveyed_photo_by(Some(&Survey::random(SurveyKind::Terrestrial, 4)), 4, SIDE, SIDE);
+    let relief = photo.relief().unwrap();
+    let (colour, wider) = (built_in(false), built_in(true));
+    let expected = colour.instances(photo.image(), None);
+    assert!(!expected.is_empty());
+    assert_eq!(colour.instances(photo.image(), Some(relief)), expected);
+    assert_eq!(wider.instances(photo.image(), None), expected);
+    assert_eq!(wider.instances(photo.image(), Some(relief)), expected);
+}
+
+#[test]
+fn a_file_says_how_many_channels_its_model_takes() {
+    assert!(!Weights::BuiltIn.takes_relief().unwrap());
+    let bytes = weights_to_bytes(&built_in(true), Precision::Half).unwrap();
+    assert_eq!(config_from_bytes(&bytes, "wider").unwrap().relief_channels, 4);
+    // Today's files stay as they are.
+    let text = serde_json::to_string(&MaskRcnnConfig::light()).unwrap();
+    assert!(!text.contains("relief"), "{text}");
+}
+
+#[test]
+fn clouds_change_nothing_about_photos() {
+    let mut without = 0;
+    for seed in 0..30 {
+        let (plain, surveyed) = (masonry_photo(seed, 96, 96), surveyed_photo(seed, 96, 96));
+        without += u32::from(surveyed.relief().is_none());
+        assert_eq!(surveyed.clone().with_relief(None), plain);
+        assert_eq!(surveyed_photo(seed, 96, 96), surveyed);
+    }
+    assert!(
+        (8..=18).contains(&without),
+        "{without} of 30 photos have no cloud"
+    );
+}
+
+/// Joints lie lower than stones in the map of a dense, exact cloud, wherever light and colours would show them.
+#[test]
+fn joints_lie_lower_than_stones() {
+    let (mut right, mut walls) = (0, 0);
+    for seed in 0..40 {
+        let survey = Survey {
+            gaps: 0.0,
+            noise_m: 0.001,
+            spacing_m: 0.003,
+            shift_px: [0.0; 2],
+            ..Survey::random(SurveyKind::Drone, seed)
+        };
+        let photo = surveyed_photo_by(Some(&survey), seed, SIDE, SIDE);
+        let relief = photo.relief().unwrap();
+        let mut means = [[0.0; 2]; 2];
+        for (i, value) in relief.data().iter().enumerate() {
+            let (x, y) = (i as u32 % relief.width(), i as u32 / relief.width());
+            let (label, ignored) = (photo.labels().get(2 * x, 2 * y), photo.ignore().get(2 * x, 2 * y));
+            if value[3] > 0.4 && ignored == Some(&false) {
+                let mean = &mut means[usize::from(label != Some(&0))];
+                *mean = [mean[0] + 1.0, mean[1] + f64::from(value[0])];
+            }
+        }
+        let [joint, stone] = means;
+        if joint[0] > 300.0 && stone[0] > 300.0 {
+            walls += 1;
+            right += u32::from(stone[1] / stone[0] > joint[1] / joint[0]);
+        }
+    }
+    assert!(walls > 20 && 10 * right >= 8 * walls, "{right} of {walls} walls");
+}
+
+/// Squares that stand out by relief alone: every pixel of the image has the same colour but for noise.
+fn hidden_square() -> Sample {
+    let noise = |i: u32| [(90 + i.wrapping_mul(2_654_435_761) % 60) as u8; 3];
+    let image: RgbImage = Raster::from_vec(96, 96, (0..96 * 96).map(noise).collect()).unwrap();
+    let mut labels: LabelImage = Raster::filled(96, 96, 0);
+    let mut relief: ReliefMap = Raster::filled(48, 48, [-0.5, -0.3, 0.0, 1.0]);
+    for (left, top) in [(8, 8), (56, 12), (14, 54), (52, 56)] {
+        for (x, y) in (0..30).flat_map(|y| (0..30).map(move |x| (left + x, top + y))) {
+            *labels.get_mut(x, y).unwrap() = 1 + left * 100 + top;
+            *relief.get_mut(x / 2, y / 2).unwrap() = [0.5, 0.3, 0.0, 1.0];
+        }
+    }
+    Sample::new(image, labels, Raster::filled(96, 96, false))
+        .unwrap()
+        .with_relief(Some(relief))
+}
+
+#[test]
+fn stones_that_only_relief_shows_are_learnt() {
+    let light = MaskRcnnConfig::light();
+    let config = MaskRcnnConfig {
+        backbone: BackboneConfig {
+            width: 16,
+            norm: Norm::Group { groups: 4 },
+            ..light.backbone
+        },
+        fpn_channels: 16,
+        head_groups: Some(4),
+        roi: RoiConfig {
+            box_hidden: 32,
+            mask_channels: vec![16],
+            ..light.roi
+        },
+        ..light
+    }
+    .with_relief();
+    let sample = hidden_square();
+    let mut model = MaskRcnn::<Autodiff<Flex>>::init(&config, 1, &Default::default()).unwrap();
+    let mut optimizer = AdamWConfig::new().with_epsilon(1e-8).init();
+    let batch = [sample];
+    for step in 0..80 {
+        let total = model.losses(&batch, step).total();
+        let gradients = GradientsParams::from_grads(total.backward(), &model);
+        model = optimizer.step(3e-3, model, gradients);
+    }
+    let found = model.valid().detect(batch[0].image(), batch[0].relief());
+    let sure = found.iter().filter(|d| d.score > 0.5).count();
+    assert_eq!(sure, 4, "{:?}", found.iter().map(|d| d.score).collect::<Vec<_>>());
+}
