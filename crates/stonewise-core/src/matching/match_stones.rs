@@ -88,7 +88,7 @@ pub struct MatchReport {
 /// let surroundings = Surroundings { covered: &|_| true, overlap: None };
 /// let report = match_stones(&wall(1, 0.0), &wall(101, 0.02), &surroundings, &MatchParams::default());
 /// assert_eq!(report.outcomes[3], (StoneId(4), MatchOutcome::Matched { second: StoneId(104) }));
-/// assert!((report.common_shift.z + 0.02).abs() < 1e-9);
+/// assert!((report.local_shifts[3].z + 0.02).abs() < 1e-9);
 /// ```
 pub fn match_stones(
     first: &[Stone],

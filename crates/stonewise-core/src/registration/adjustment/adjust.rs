@@ -46,7 +46,9 @@ const MAX_CRACKS: usize = 8;
 ///         let point = |i: u32| {
 ///             let (y, z) = ((start + 0.618034 * f64::from(i)).fract(), (start + 0.754878 * f64::from(i)).fract());
 ///             let (y, z) = (0.2 * y - 0.1, 0.16 * z - 0.08);
-///             centroid + Vector3::new(0.004 * ((50.0 * y).sin() + (43.0 * z).cos()), y, z) + by
+///             let noise = 0.002 * ((start + 0.414214 * f64::from(i)).fract() - 0.5);
+///             let relief = 0.004 * ((50.0 * y).sin() + (43.0 * z).cos());
+///             centroid + Vector3::new(relief + noise, y, z) + by
 ///         };
 ///         Cloud::from_world(centroid, (0..600).map(point))
 ///     };
