@@ -1,5 +1,6 @@
 //! The texts of the verdict and of the report, in each language.
 
+mod braces;
 mod doubts;
 mod report;
 
@@ -7,6 +8,7 @@ use crate::figure::{count, mm, number, percent};
 use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
+pub(crate) use braces::fill;
 pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, doubt_in};
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
@@ -506,13 +508,6 @@ impl Texts {
         let rounded = (millimetres * 1e3).round() / 1e3;
         rounded.to_string().replace('.', self.decimal)
     }
-}
-
-/// A text with its braces filled in.
-pub(crate) fn fill(text: &str, values: &[(&str, &str)]) -> String {
-    values.iter().fold(text.to_owned(), |text, (name, value)| {
-        text.replace(&format!("{{{name}}}"), value)
-    })
 }
 
 /// The text for so many, with `{n}` filled in.
