@@ -7,7 +7,15 @@ mod module_graph;
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 6] = [
-    &["backend", "detection", "jpeg", "sample", "seed", "segmentation"],
+    &[
+        "backend",
+        "detection",
+        "jpeg",
+        "relief",
+        "sample",
+        "seed",
+        "segmentation",
+    ],
     &["evaluation", "model", "synth", "tiling"],
     &["built_in", "onnx"],
     &["stone_finder", "augment"],
