@@ -26,6 +26,7 @@ mod object;
 mod rubble;
 mod scene;
 mod stone;
+mod style;
 mod survey;
 mod view;
 mod wall;
@@ -40,65 +41,18 @@ pub use material::{FaceRelief, Material, Mortar};
 pub use object::{Object, ObjectKind};
 pub use scene::{Content, Layer, Region};
 pub use stone::StoneShape;
+pub use style::MasonryStyle;
 pub use survey::{Survey, SurveyKind};
 pub use view::Viewpoint;
 pub use wall::Wall;
 
 use crate::Sample;
 use canvas::Canvas;
-use draw::{Rng, chance};
+use draw::Rng;
 use rand::SeedableRng;
-use std::f32::consts::FRAC_PI_2;
 
 /// Samples per pixel along an axis.
 const CANVAS_SCALE: f32 = 1.5;
-/// Most things in front of a wall.
-const MAX_OBJECTS: usize = 4;
-
-/// Everything that is drawn for a photo, but for the single stones and the noise.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MasonryStyle {
-    /// What is where, from back to front.
-    pub layers: Vec<Layer>,
-    /// What lies on the surfaces.
-    pub dirt: Dirt,
-    /// Things in front, from back to front.
-    pub objects: Vec<Object>,
-    /// The light.
-    pub light: Light,
-    /// What camera and file format do.
-    pub camera: Camera,
-}
-
-impl MasonryStyle {
-    /// A style for a photo of `width` x `height` pixels.
-    pub fn random(seed: u64, width: u32, height: u32) -> Self {
-        // A stream apart from that of the single stones.
-        let mut rng = Rng::seed_from_u64(seed);
-        rng.set_stream(1);
-        let viewpoint = Viewpoint::random(&mut rng);
-        let layers = scene::random_layers(viewpoint, width, height, &mut rng);
-        let shorter = width.min(height) as f32;
-        let smallest_px = layers.iter().map(Layer::stone_px).fold(shorter, f32::min);
-        let often = if chance(&mut rng, 0.45) { 0.45 } else { 0.08 };
-        let count = (0..MAX_OBJECTS).filter(|_| chance(&mut rng, often)).count();
-        let colour = layers.first().map_or([0.3; 3], Layer::colour);
-        let mut objects = if chance(&mut rng, 0.06) {
-            Object::carvings(shorter, colour, &mut rng)
-        } else {
-            Vec::new()
-        };
-        objects.extend((0..count).map(|_| Object::random(shorter, colour, &mut rng)));
-        Self {
-            layers,
-            dirt: Dirt::random(&mut rng, FRAC_PI_2 + viewpoint.roll),
-            objects,
-            light: Light::random(&mut rng),
-            camera: Camera::random(smallest_px, &mut rng),
-        }
-    }
-}
-
 /// A photo of masonry drawn from a seed, `width` x `height` pixels (at least 1), with the visible face of
 /// every stone.
 ///

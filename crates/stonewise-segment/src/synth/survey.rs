@@ -1,11 +1,13 @@
 //! The cloud of a rendered photo: what a scanner, a drone or stereo photos would know about its surface.
 
+use super::backdrop::{Backdrop, BackdropKind};
 use super::canvas::Canvas;
 use super::draw::{Rng, between, chance, log_between, normal, sometimes};
 use super::noise::{Field, Grain};
 use super::object::{Object, ObjectKind};
+use super::scene::{Content, Layer};
+use super::style::MasonryStyle;
 use super::view::{View, Viewpoint};
-use super::{Backdrop, BackdropKind, Content, Layer, MasonryStyle};
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use stonewise_core::geometry::Camera;
