@@ -87,9 +87,15 @@ fn detection_limit(spread_m: [Option<f64>; 2], counts: [u32; 2], params: &M3c2Pa
     if counts.iter().any(|&n| n < params.min_points) {
         return None;
     }
+    let [first, second] = variances_of_means(spread_m, counts)?;
+    Some(Z95 * ((first + second).sqrt() + params.registration_error_m))
+}
+
+/// Variances of the mean positions along the normal, s^2 / n; `None` where a spread is missing.
+pub(super) fn variances_of_means(spread_m: [Option<f64>; 2], counts: [u32; 2]) -> Option<[f64; 2]> {
     let [s1, s2] = [spread_m[0]?, spread_m[1]?];
     let [n1, n2] = counts.map(f64::from);
-    Some(Z95 * ((s1 * s1 / n1 + s2 * s2 / n2).sqrt() + params.registration_error_m))
+    Some([s1 * s1 / n1, s2 * s2 / n2])
 }
 
 #[cfg(test)]

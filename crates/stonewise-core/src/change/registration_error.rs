@@ -1,5 +1,6 @@
 //! Detection limits of M3C2 under a registration error that differs from place to place.
 
+use super::m3c2::variances_of_means;
 use super::{ChangeField, ChangePoint};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
@@ -21,13 +22,9 @@ impl ChangeField {
     pub fn with_registration_errors(mut self, error_m: impl Fn(&ChangePoint) -> f64 + Sync) -> Self {
         let z95 = Normal::standard().inverse_cdf(UPPER_95);
         self.points.par_iter_mut().for_each(|point| {
-            let [Some(s1), Some(s2)] = point.spread_m else {
-                return;
-            };
-            if point.detection_limit_m.is_some() {
-                let [n1, n2] = point.counts.map(f64::from);
-                let of_means = [s1 * s1 / n1, s2 * s2 / n2];
-                let quantile = student_95(freedom(of_means, [n1, n2]), z95);
+            let of_means = variances_of_means(point.spread_m, point.counts);
+            if let (Some(_), Some(of_means)) = (point.detection_limit_m, of_means) {
+                let quantile = student_95(freedom(of_means, point.counts.map(f64::from)), z95);
                 let random = quantile * (of_means[0] + of_means[1]).sqrt();
                 point.detection_limit_m = Some(random + z95 * error_m(point));
             }
