@@ -9,6 +9,7 @@ use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::sight::{SeenStone, Sight, Source, SourcePoints};
 use super::stable::{StableParams, StablePoints, stable_observations};
+use crate::geometry::lever;
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -76,8 +77,7 @@ pub struct RigidError {
 impl RigidError {
     /// The error at a place, world, metres.
     pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
-        let turn: Vector3<f64> = self.error.fixed_rows::<3>(3).into_owned();
-        self.error.fixed_rows::<3>(0) + turn.cross(&(place - self.centre))
+        lever(&(place - self.centre)) * self.error
     }
 }
 
@@ -352,17 +352,10 @@ impl Averaged {
         let stones: Vec<&SeenStone> = pair.stones.iter().step_by(stride).collect();
         let count = stones.len().max(1) as f64;
         let centre = Point3::from(stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / count);
-        let lever = |stone: &SeenStone| {
-            let mut j = SMatrix::<f64, 3, 6>::zeros();
-            j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
-            let turn = -(stone.centroid - centre).cross_matrix();
-            j.fixed_view_mut::<3, 3>(0, 3).copy_from(&turn);
-            j
-        };
         let mut normal = Matrix6::identity() * 1e-9;
         let mut parts: BTreeMap<usize, SMatrix<f64, 6, 3>> = BTreeMap::new();
         for stone in &stones {
-            let j = lever(stone).transpose();
+            let j = lever(&(stone.centroid - centre)).transpose();
             normal += j * j.transpose();
             for (first, coefficients) in difference_row(stone, pair.sources, unknowns) {
                 *parts.entry(first).or_default() += j * coefficients;
