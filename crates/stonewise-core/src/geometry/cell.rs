@@ -11,6 +11,12 @@ pub fn cell_of(point: &Point3<f64>, size_m: f64) -> [i64; 3] {
     [0, 1, 2].map(|axis| floor(point[axis] / size_m))
 }
 
+/// All cells from `low` to `high`, both included.
+pub fn cells_between(low: [i64; 3], high: [i64; 3]) -> impl Iterator<Item = [i64; 3]> {
+    (low[0]..=high[0])
+        .flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z])))
+}
+
 /// The largest whole number that is not above `value`; without the call that `f64::floor` is on processors of
 /// before 2008, which the program must run on.
 #[inline]

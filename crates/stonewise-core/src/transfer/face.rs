@@ -1,7 +1,7 @@
 //! The wall's face around a stone, without the stones' own bumps.
 
 use super::islands::Voxel;
-use crate::geometry::{Plane, cell_of};
+use crate::geometry::{Plane, cell_of, cells_between};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::HashMap;
 
@@ -68,17 +68,13 @@ impl FaceCells {
         let low = cell_of(&centre.map(|c| c - radius_m), CELL_M);
         let high = cell_of(&centre.map(|c| c + radius_m), CELL_M);
         let mut found = Vec::new();
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let Some((count, sum)) = self.cells.get(&[x, y, z]) else {
-                        continue;
-                    };
-                    let mean = corner([x, y, z]) + sum / f64::from(*count);
-                    if (mean - centre).norm() <= radius_m {
-                        found.push(mean);
-                    }
-                }
+        for cell in cells_between(low, high) {
+            let Some((count, sum)) = self.cells.get(&cell) else {
+                continue;
+            };
+            let mean = corner(cell) + sum / f64::from(*count);
+            if (mean - centre).norm() <= radius_m {
+                found.push(mean);
             }
         }
         found

@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stonewise_core::cloud::Cloud;
-use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_core::geometry::{Bounds, cell_of, cells_between};
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::{NearPoint, PairPoints, local_shifts, stone_points};
 use stonewise_core::stone::Stone;
@@ -30,13 +30,15 @@ pub struct MatchedPair {
 impl MatchedPair {
     /// The stones of two epochs that `matches` names, in neighbourhoods: sorted by the cell of the first centroid, then by stone.
     pub fn of_matches(first: &[Stone], second: &[Stone], matches: &[(StoneId, StoneId)]) -> Vec<Self> {
-        let by_id = |stones: &[Stone]| -> BTreeMap<StoneId, Stone> {
-            stones.iter().map(|s| (s.id, s.clone())).collect()
-        };
-        let (ones, twos) = (by_id(first), by_id(second));
+        let [ones, twos] = [first, second].map(|stones| {
+            stones
+                .iter()
+                .map(|s| (s.id, s))
+                .collect::<BTreeMap<StoneId, &Stone>>()
+        });
         let found: Vec<(Stone, Stone)> = matches
             .iter()
-            .filter_map(|(a, b)| Some((ones.get(a)?.clone(), twos.get(b)?.clone())))
+            .filter_map(|(a, b)| Some(((*ones.get(a)?).clone(), (*twos.get(b)?).clone())))
             .collect();
         let centroids: Vec<Point3<f64>> = found.iter().map(|(a, _)| a.centroid).collect();
         let moved: Vec<Vector3<f64>> = found.iter().map(|(a, b)| b.centroid - a.centroid).collect();
@@ -103,7 +105,11 @@ impl PairPlaces {
             found.of_stone.insert(stone.0, k);
             let extent = extents.get(&pair.first.id.0);
             let extent = extent.map(|e| e.grown(BOX_MARGIN_M).moved(&shift));
-            for cell in extent.iter().flat_map(cells_of) {
+            let corners = extent.map(|e| (cell_of(&e.min, BOX_CELL_M), cell_of(&e.max, BOX_CELL_M)));
+            for cell in corners
+                .into_iter()
+                .flat_map(|(low, high)| cells_between(low, high))
+            {
                 found.cells.entry(cell).or_default().push(k);
             }
             found.places.push(Place {
@@ -140,12 +146,6 @@ impl PairPlaces {
             (k, near)
         })
     }
-}
-
-fn cells_of(extent: &Bounds) -> impl Iterator<Item = [i64; 3]> + use<> {
-    let (low, high) = (cell_of(&extent.min, BOX_CELL_M), cell_of(&extent.max, BOX_CELL_M));
-    (low[0]..=high[0])
-        .flat_map(move |x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| [x, y, z])))
 }
 
 #[cfg(test)]
