@@ -2,12 +2,11 @@
 
 use super::camera::Camera;
 use super::dirt::Dirt;
-use super::draw::{Rng, chance};
+use super::draw::{chance, stream};
 use super::light::Light;
 use super::object::Object;
 use super::scene::{Layer, random_layers};
 use super::view::Viewpoint;
-use rand::SeedableRng;
 use std::f32::consts::FRAC_PI_2;
 
 /// Most things in front of a wall.
@@ -32,8 +31,7 @@ impl MasonryStyle {
     /// A style for a photo of `width` x `height` pixels.
     pub fn random(seed: u64, width: u32, height: u32) -> Self {
         // A stream apart from that of the single stones.
-        let mut rng = Rng::seed_from_u64(seed);
-        rng.set_stream(1);
+        let mut rng = stream(seed, 1);
         let viewpoint = Viewpoint::random(&mut rng);
         let layers = random_layers(viewpoint, width, height, &mut rng);
         let shorter = width.min(height) as f32;

@@ -1,15 +1,14 @@
-//! The cloud of a rendered photo: what a scanner, a drone or stereo photos would know about its surface.
+//! The cloud of a rendered photo: what a scanner, a drone or stereo photos would show of its surface.
 
 use super::backdrop::{Backdrop, BackdropKind};
 use super::canvas::Canvas;
-use super::draw::{Rng, between, chance, log_between, normal, sometimes};
+use super::draw::{Rng, between, chance, log_between, normal, sometimes, stream};
 use super::noise::{Field, Grain};
 use super::object::{Object, ObjectKind};
 use super::scene::{Content, Layer};
 use super::style::MasonryStyle;
 use super::view::{View, Viewpoint};
 use nalgebra::Vector3;
-use rand::SeedableRng;
 use stonewise_core::geometry::Camera;
 use stonewise_core::raster::{RangeImage, ReliefMap};
 
@@ -56,12 +55,12 @@ pub struct Survey {
 impl Survey {
     /// A survey of this kind, drawn at random.
     pub fn random(kind: SurveyKind, seed: u64) -> Self {
-        Self::drawn(kind, &mut rng(seed, 2))
+        Self::drawn(kind, &mut stream(seed, 2))
     }
 
     /// A survey of a kind drawn at random, in two of five cases none.
     pub(super) fn sometimes(seed: u64) -> Option<Self> {
-        let mut rng = rng(seed, 2);
+        let mut rng = stream(seed, 2);
         let kind = match between(&mut rng, 0.0, 1.0) {
             p if p < 0.40 => return None,
             p if p < 0.65 => SurveyKind::Terrestrial,
@@ -74,7 +73,7 @@ impl Survey {
     fn drawn(kind: SurveyKind, rng: &mut Rng) -> Self {
         let mut range = |low, high| log_between(rng, low, high);
         let stone_m = range(STONE_M[0], STONE_M[1]);
-        // Of stereo photos in pixels; `relief` knows their size.
+        // Of stereo photos in pixels, which `relief` takes to metres.
         let (spacing_m, noise_m) = match kind {
             SurveyKind::Terrestrial => (range(0.003, 0.01), range(0.001, 0.006)),
             SurveyKind::Drone => (range(0.015, 0.04), range(0.005, 0.02)),
@@ -99,7 +98,7 @@ impl Survey {
         seed: u64,
         size: [u32; 2],
     ) -> ReliefMap {
-        let mut rng = rng(seed, 3);
+        let mut rng = stream(seed, 3);
         let smallest = style
             .layers
             .iter()
@@ -170,13 +169,6 @@ impl Survey {
             }
         }
     }
-}
-
-/// A stream of random numbers of its own: clouds change nothing about photos.
-fn rng(seed: u64, stream: u64) -> Rng {
-    let mut rng = Rng::seed_from_u64(seed);
-    rng.set_stream(stream);
-    rng
 }
 
 /// The painted photo in metres.
