@@ -123,17 +123,20 @@ impl Adjustment {
     }
 
     /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
-    /// (few noisy points have optima far away), and those of which one half contradicts it.
+    /// (few noisy points have optima far away), and those of which one half contradicts it, unless photos show it.
     fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
         let own = self.loose.own_variances(&self.components);
-        for ((stone, equations), prediction) in self.stones.iter_mut().zip(equations).zip(&field.from_others)
-        {
+        for (i, (equations, prediction)) in equations.iter().zip(&field.from_others).enumerate() {
             let at_optimum = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let loose = posterior(at_optimum, prediction, &own);
             let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
             let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
-            stone.is_undecided = largest_m > UNCERTAIN_SHARE * self.loose.move_m;
-            if stone.is_undecided || stone.ratio.is_contradicted {
+            let is_open = largest_m > UNCERTAIN_SHARE * self.loose.move_m;
+            let is_contradicted =
+                self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
+            let stone = &mut self.stones[i];
+            stone.is_undecided = is_open || is_contradicted;
+            if stone.is_undecided {
                 stone.p_with_field = 1.0;
             }
         }

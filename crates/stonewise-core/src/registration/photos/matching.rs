@@ -193,7 +193,7 @@ impl FaceCells {
     }
 
     /// Correlation of a photo with the template at a shift of whole cells; `None` where it does not show the face.
-    fn correlation_at(
+    pub fn correlation_at(
         &self,
         template: &Template,
         patch: &Patch,
@@ -364,7 +364,6 @@ mod tests {
             heights: vec![0.0; side * side],
             inside: (0..side * side).map(inside).collect(),
             middle: [0.0015 * (side - 1) as f64; 2],
-            reach: [0.05; 2],
         }
     }
 

@@ -9,7 +9,9 @@ mod params;
 mod patch;
 mod photo;
 mod surface;
+mod template;
 mod track;
+mod verify;
 
 pub use params::PhotoParams;
 pub(crate) use patch::FaceMotion;

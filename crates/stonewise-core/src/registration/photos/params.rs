@@ -18,8 +18,8 @@ pub struct PhotoParams {
     pub min_photos: usize,
     /// Width of a stone's rim that is left out, metres. 0.02: shadows in the joints and the neighbours' edges move with the sun.
     pub rim_m: f64,
-    /// Standard deviation of the window in which contrast is normalised, metres. 0.015: shorter than shadows and damp patches, longer
-    /// than the grain of stone.
+    /// Standard deviation of the window in which contrast is normalised, metres. 0.009: shorter than shadows, damp patches and the relief
+    /// that the sun's direction changes, longer than the grain of stone.
     pub normalise_m: f64,
     /// Correlation of a photo with the stone's template below which the photo is left out for this stone. 0.4: that of equal parts of
     /// signal and of something else.
@@ -39,7 +39,7 @@ impl Default for PhotoParams {
             max_photos: 8,
             min_photos: 2,
             rim_m: 0.02,
-            normalise_m: 0.015,
+            normalise_m: 0.009,
             min_correlation: 0.4,
             search_m: 0.01,
             max_search_m: 0.04,
@@ -50,9 +50,12 @@ impl Default for PhotoParams {
 impl PhotoParams {
     /// How far beyond a stone's face photos are looked at, metres: the search, and the window in which contrast is normalised.
     pub fn margin_m(&self) -> f64 {
-        self.max_search_m + WINDOW_SDS * self.normalise_m
+        self.max_search_m + WINDOW_SDS * OTHER_WINDOW * self.normalise_m
     }
 }
 
 /// Reach of the window in which contrast is normalised, standard deviations: beyond three its weights are below one percent.
 pub(super) const WINDOW_SDS: f64 = 3.0;
+/// Width of the window of the other normalisation, which must agree, over that of the first: different enough to weigh other parts of
+/// the picture, and still narrower than a stone.
+pub(super) const OTHER_WINDOW: f64 = 5.0 / 3.0;

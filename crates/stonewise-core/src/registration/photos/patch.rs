@@ -18,6 +18,14 @@ pub(crate) struct FaceMotion {
 }
 
 impl FaceMotion {
+    /// No motion.
+    pub fn none() -> Self {
+        Self {
+            translation: Vector3::zeros(),
+            rotation: Vector3::zeros(),
+        }
+    }
+
     /// Displacement of a place on the face, small angles, metres.
     pub fn at(&self, place: [f64; 2]) -> Vector3<f64> {
         self.translation + self.rotation.cross(&Vector3::new(place[0], place[1], 0.0))
@@ -46,21 +54,20 @@ impl Placed<'_> {
         self.centroid + self.face_from_world.transpose() * at
     }
 
-    /// The photo on the moved face, its contrast normalised.
-    pub fn patch(&self, photo: &Photo, chip: &Chip, motion: &FaceMotion, window_m: f64) -> Patch {
+    /// Grey values of a photo on the moved face; `None` where the photo does not show it.
+    pub fn grey(&self, photo: &Photo, chip: &Chip, motion: &FaceMotion) -> Vec<Option<f32>> {
         let turn = UnitQuaternion::from_scaled_axis(motion.rotation);
-        let grey: Vec<Option<f32>> = (0..self.surface.heights.len())
+        (0..self.surface.heights.len())
             .map(|k| {
                 let pixel = photo.camera.project(&self.world(k, motion, &turn))?;
                 chip.sample(pixel)
             })
-            .collect();
-        normalised(&grey, self.surface, window_m)
+            .collect()
     }
 }
 
-/// Differences from the local mean over the local standard deviation.
-fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64) -> Patch {
+/// Differences from the local mean over the local standard deviation, in a Gaussian window of this standard deviation.
+pub(super) fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64) -> Patch {
     let (columns, rows) = (surface.columns, surface.rows);
     let valid: Vec<bool> = grey.iter().map(Option::is_some).collect();
     let weight: Vec<f64> = valid.iter().map(|v| f64::from(u8::from(*v))).collect();

@@ -33,8 +33,6 @@ pub(crate) struct Surface {
     pub inside: Vec<bool>,
     /// Middle of those cells: along, up, metres.
     pub middle: [f64; 2],
-    /// Root mean square distance of those cells from the middle: along, up, metres.
-    pub reach: [f64; 2],
 }
 
 impl Surface {
@@ -63,7 +61,6 @@ impl Surface {
             heights: Vec::with_capacity(columns * rows),
             inside: Vec::with_capacity(columns * rows),
             middle: [0.0; 2],
-            reach: [0.0; 2],
         };
         for k in 0..columns * rows {
             let [u, v] = surface.place(k);
@@ -92,9 +89,7 @@ impl Surface {
             return None;
         }
         let mean = |value: &dyn Fn(&[f64; 2]) -> f64| places.iter().map(value).sum::<f64>() / count;
-        let middle: [f64; 2] = std::array::from_fn(|a| mean(&|p| p[a]));
-        self.reach = std::array::from_fn(|a| mean(&|p| (p[a] - middle[a]).powi(2)).sqrt());
-        self.middle = middle;
+        self.middle = std::array::from_fn(|a| mean(&|p| p[a]));
         Some(())
     }
 }

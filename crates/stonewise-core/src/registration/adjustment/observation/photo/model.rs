@@ -3,27 +3,19 @@
 use super::poses::{CloudMotion, PoseProblem, PoseStone};
 use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
-use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Sight, Track};
+use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
 use crate::statistics::upper_median;
-use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Strains that stand for as many more before those of a stone count by themselves: four known degrees of freedom hold a factor on a
-/// variance within a half and three.
-const PRIOR_STRAINS: f64 = 4.0;
-/// Error of an entry of a warp's matrix: a third of a cell at the rim of a face of a hundred cells.
-const WARP_SD: f64 = 0.005;
-/// Tilt of a face against its cloud, radians: that of a loose stone whose tilt the clouds do not show.
-const TILT_SD: f64 = 0.03;
-/// Information on a warp before any photo, as good as none.
-const OPEN_WARP: f64 = 1e-6;
-/// Components of a strain.
-const STRAINS: usize = 3;
-/// Least strain that counts as usual, so that a survey without any keeps factors of one.
-const LEAST_STRAIN_M: f64 = 2e-5;
-/// Least and most of the factor on the variance of the appearance bias that a face's area makes: light that falls on all of a face does
-/// not average out, and six is two and a half in the standard deviation.
-const AREA_FACTORS: [f64; 2] = [0.7, 6.0];
+/// Disagreements of two normalisations that stand for as many more before those of a stone count by themselves.
+const PRIOR_DISAGREEMENTS: f64 = 8.0;
+/// Components of a disagreement.
+const DISAGREEMENTS: f64 = 2.0;
+/// Median of the sum of two squared standard normal variables, 2 ln 2.
+const MEDIAN_SQUARE: f64 = 2.0 * std::f64::consts::LN_2;
+/// Least median of squared disagreements over formal variances, so that a survey without any keeps factors of one.
+const LEAST_RATIO: f64 = 1e-6;
 /// Distance from the wall where no stone shows one, metres; nothing depends on it then.
 const USUAL_DISTANCE_M: f64 = 10.0;
 
@@ -159,51 +151,36 @@ impl PhotoModel {
         self.tracks[i].place
     }
 
-    /// Factors on the variance of the stones' appearance bias. What strains a face by chance also shifts it, and what changes over a few
-    /// centimetres averages out over large faces. About one for the median stone.
+    /// Factors on the variance of the stones' appearance bias, about one for the median stone.
+    ///
+    /// What changed on a stone leaves residuals in its matches and shifts them: the bias follows their formal variance. Where two
+    /// normalisations of contrast disagree by more than is usual for that variance, it is larger.
     fn bias_factors(&self) -> Vec<f64> {
-        let strains: Vec<Option<[f64; STRAINS]>> = self.tracks.iter().map(|t| self.strain_m(t)).collect();
-        let known: Vec<[f64; STRAINS]> = strains.iter().flatten().copied().collect();
-        let middle = |pick: &dyn Fn(&[f64; STRAINS]) -> f64| {
-            let mut values: Vec<f64> = known.iter().map(pick).collect();
-            upper_median(&mut values).unwrap_or(0.0)
+        let known: Vec<Option<[f64; 2]>> = self.tracks.iter().map(|t| self.change_of(t)).collect();
+        let usual = |pick: &dyn Fn(&[f64; 2]) -> f64| {
+            let mut values: Vec<f64> = known.iter().flatten().map(pick).collect();
+            upper_median(&mut values).unwrap_or(1.0)
         };
-        let centre: [f64; STRAINS] = std::array::from_fn(|c| middle(&|s| s[c]));
-        // The median of a normal variable's size is 0.674 standard deviations.
-        let spread: [f64; STRAINS] =
-            std::array::from_fn(|c| (middle(&|s| (s[c] - centre[c]).abs()) / 0.674).max(LEAST_STRAIN_M));
-        let mut areas: Vec<f64> = self
-            .tracks
-            .iter()
-            .map(|t| t.area_m2)
-            .filter(|a| *a > 0.0)
-            .collect();
-        let usual_m2 = upper_median(&mut areas).unwrap_or(0.0);
-        let of_stone = |(track, strain): (&Track, &Option<[f64; STRAINS]>)| {
-            strain.map_or(1.0, |s| {
-                let square: f64 = (0..STRAINS)
-                    .map(|c| ((s[c] - centre[c]) / spread[c]).powi(2))
-                    .sum();
-                let of_area = (usual_m2 / track.area_m2).clamp(AREA_FACTORS[0], AREA_FACTORS[1]);
-                of_area * (PRIOR_STRAINS + square) / (PRIOR_STRAINS + STRAINS as f64)
-            })
+        let usual_m2 = usual(&|[formal, _]| *formal);
+        let ratio = (usual(&|[formal, apart]| apart / formal) / MEDIAN_SQUARE).max(LEAST_RATIO);
+        let of_stone = |[formal, apart]: [f64; 2]| {
+            let square = apart / (formal * ratio);
+            formal / usual_m2 * (PRIOR_DISAGREEMENTS + square) / (PRIOR_DISAGREEMENTS + DISAGREEMENTS)
         };
-        self.tracks.iter().zip(&strains).map(of_stone).collect()
+        known.into_iter().map(|k| k.map_or(1.0, of_stone)).collect()
     }
 
-    /// Strain of a stone's face from one epoch to the other, times its reach, metres.
-    fn strain_m(&self, track: &Track) -> Option<[f64; STRAINS]> {
-        if track.status != PhotoStatus::Tracked {
-            return None;
-        }
-        let [before, after] = [0, 1].map(|epoch| {
-            let of_epoch = track.sights.iter().filter(|s| self.epochs[s.photo] == epoch);
-            untilted_strain(of_epoch)
-        });
-        let [u, v] = track.reach;
-        let reach = [u, v, (u * v).sqrt()];
-        let (before, after) = (before?, after?);
-        Some(std::array::from_fn(|c| (after[c] - before[c]) * reach[c]))
+    /// Mean formal variance of the second epoch's matches, and squared disagreement of two normalisations, m^2.
+    fn change_of(&self, track: &Track) -> Option<[f64; 2]> {
+        let variances: Vec<f64> = track
+            .sights
+            .iter()
+            .filter(|s| self.epochs[s.photo] == 1)
+            .map(|s| 0.5 * s.covariance.trace())
+            .collect();
+        let formal = variances.iter().sum::<f64>() / variances.len() as f64;
+        let apart = track.apart_m.iter().map(|a| a * a).sum();
+        (formal > 0.0).then_some([formal, apart])
     }
 
     /// What the photos contributed. `bias_m`: appearance bias.
@@ -242,33 +219,6 @@ impl PhotoModel {
     }
 }
 
-/// Strain of a stone's face in the photos of one epoch, less what a tilt of the face makes: that is the parallax of each photo times the
-/// tilt, and differs from photo to photo.
-fn untilted_strain<'a>(sights: impl Iterator<Item = &'a Sight>) -> Option<[f64; STRAINS]> {
-    // Unknowns: the warp's matrix row by row, then the tilt along and up, each over its standard deviation.
-    let mut normal = SMatrix::<f64, 6, 6>::identity() * OPEN_WARP;
-    let mut right = SVector::<f64, 6>::zeros();
-    (4..6).for_each(|k| normal[(k, k)] = 1.0);
-    let mut add = |row: SVector<f64, 6>, value: f64| {
-        normal += row * row.transpose() / (WARP_SD * WARP_SD);
-        right += row * (value / (WARP_SD * WARP_SD));
-    };
-    for sight in sights {
-        let [x, y, across] = sight.strain;
-        let values = [[x, across - sight.turn], [across + sight.turn, y]];
-        for (r, row_values) in values.iter().enumerate() {
-            for (c, value) in row_values.iter().enumerate() {
-                let mut row = SVector::<f64, 6>::zeros();
-                row[2 * r + c] = 1.0;
-                row[4 + c] = sight.parallax[r] * TILT_SD;
-                add(row, *value);
-            }
-        }
-    }
-    let warp = normal.cholesky()?.solve(&right);
-    Some([warp[0], warp[3], 0.5 * (warp[1] + warp[2])])
-}
-
 /// Median size of a pixel on the stones that a photo shows, and median distance of these, metres.
 fn scale(photo: usize, photos: &[Photo], stones: &[StoneInPhotos], tracks: &[Track]) -> [f64; 2] {
     let (mut sizes, mut distances) = (Vec::new(), Vec::new());
@@ -294,32 +244,58 @@ fn is_finite(pair: &[f64; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::registration::photos::{FaceMotion, Sight};
     use nalgebra::{Matrix2, Vector2};
 
-    #[test]
-    fn a_tilted_face_is_not_taken_for_a_strained_one() {
-        let (tilt, strain) = (
-            Vector2::new(0.02, -0.03),
-            Matrix2::new(0.004, 0.001, 0.001, -0.002),
-        );
-        let parallaxes = [[0.4, 0.1], [-0.5, 0.2], [0.1, -0.4], [0.3, 0.5]];
-        let sights: Vec<Sight> = parallaxes
-            .iter()
-            .map(|q| {
-                let m = strain + Vector2::from(*q) * tilt.transpose();
-                Sight {
-                    photo: 0,
+    fn model(stones: &[(f64, f64)]) -> PhotoModel {
+        let track = |&(sd_m, apart_m): &(f64, f64)| Track {
+            status: PhotoStatus::Tracked,
+            sights: [0, 1]
+                .map(|photo| Sight {
+                    photo,
                     shift: Vector2::zeros(),
-                    covariance: Matrix2::identity(),
-                    turn: 0.5 * (m[(1, 0)] - m[(0, 1)]),
-                    strain: [m[(0, 0)], m[(1, 1)], 0.5 * (m[(0, 1)] + m[(1, 0)])],
-                    parallax: *q,
+                    covariance: Matrix2::identity() * (if photo == 0 { 1.0 } else { sd_m * sd_m }),
+                    parallax: [0.0; 2],
                     correlation: 0.9,
-                }
-            })
-            .collect();
-        let [x, y, across] = untilted_strain(sights.iter()).unwrap();
-        let found = [x - 0.004, y + 0.002, across - 0.001];
-        assert!(found.iter().all(|d| d.abs() < 6e-4), "{found:?}");
+                })
+                .to_vec(),
+            place: [0.0; 2],
+            apart_m: [apart_m, 0.0],
+            start: FaceMotion::none(),
+        };
+        PhotoModel {
+            params: PhotoParams::default(),
+            names: vec![String::new(); 2],
+            epochs: vec![0, 1],
+            centres: vec![Point3::origin(); 2],
+            scales: vec![[1.0; 2]; 2],
+            tracks: stones.iter().map(track).collect(),
+            stones: vec![None; stones.len()],
+            factor: 1.0,
+            poses_px: vec![0.0; 2],
+        }
+    }
+
+    #[test]
+    fn the_bias_follows_the_formal_variance_and_the_disagreement_of_normalisations() {
+        // Disagreements of 1.5 standard deviations are usual here.
+        let usual = (1e-4, 1.5e-4);
+        let factors = model(&[usual, usual, usual, (3e-4, 4.5e-4), (1e-4, 6e-4)]).bias_factors();
+        let typical = (8.0 + MEDIAN_SQUARE) / 10.0;
+        for factor in &factors[..3] {
+            assert!((factor - typical).abs() < 1e-9, "{factors:?}");
+        }
+        assert!((factors[3] - 9.0 * typical).abs() < 1e-9, "{factors:?}");
+        assert!(
+            (factors[4] - (8.0 + 16.0 * MEDIAN_SQUARE) / 10.0).abs() < 1e-9,
+            "{factors:?}"
+        );
+    }
+
+    #[test]
+    fn a_stone_without_sights_or_disagreements_keeps_a_factor_about_one() {
+        let mut model = model(&[(1e-4, 0.0), (1e-4, 0.0)]);
+        model.tracks[1].sights.clear();
+        assert_eq!(model.bias_factors(), vec![0.8, 1.0]);
     }
 }

@@ -337,8 +337,6 @@ mod tests {
                     photo,
                     shift: Vector2::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
                     covariance: Matrix2::new(2.0, 0.4, 0.4, 1.0) * 1e-8,
-                    turn: 0.0,
-                    strain: [0.0; 3],
                     parallax: [-ray.x / ray.z, -ray.y / ray.z],
                     correlation: 0.9,
                 }
@@ -347,8 +345,7 @@ mod tests {
                 status: PhotoStatus::Tracked,
                 sights: sights.collect(),
                 place: [0.0; 2],
-                reach: [0.05; 2],
-                area_m2: 0.03,
+                apart_m: [0.0; 2],
                 start: FaceMotion {
                     translation: Vector3::zeros(),
                     rotation: Vector3::zeros(),

@@ -1,0 +1,237 @@
+//! What a match must pass: more correlation than chance gives, the way back, and another normalisation of contrast.
+//!
+//! Photos of one epoch resemble each other, so a wrong match, on a shadow's edge or on a neighbour's, can be the same in all of them
+//! and correlate well. It is rarely the same from the second epoch to the first, or in another window.
+
+use super::matching::{Match, Template};
+use super::patch::Patch;
+use super::template::Face;
+use nalgebra::Vector2;
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::f64::consts::PI;
+
+/// Probability that the best of all places sought correlates as well by chance.
+const CHANCE: f64 = 0.05;
+/// Correlation that still counts as grain: below, sums over longer distances would only add noise.
+const LEAST_GRAIN: f64 = 0.05;
+/// Reach over which grain is summed, cells: beyond, contrast normalisation leaves none.
+const LONGEST_GRAIN: usize = 12;
+
+/// Cells by which the way back and the other normalisation may lead elsewhere. Half a pixel: of 1,457 tracked stones on ten simulated
+/// walls that leaves out 12 of 19 that were wrong by more than 4 mm, and 3 of 1,347 that were right to 1.5 mm.
+const MOST_APART: f64 = 0.5;
+
+/// The photos of both epochs and how they lie on the template.
+pub(super) struct Verification<'a> {
+    pub face: &'a Face,
+    pub patches: [&'a [Patch]; 2],
+    pub matches: [&'a [Option<Match>]; 2],
+}
+
+impl Verification<'_> {
+    /// What the match differs by under the other normalisation `others`, cells; `None` where the match fails: the way back or the other
+    /// normalisation lead elsewhere or nowhere. The way back is sought within `reach` cells.
+    pub fn verified(&self, others: [&[Patch]; 2], reach: isize) -> Option<Vector2<f64>> {
+        let way_back = self.way_back(reach)?;
+        let other = self.under(others)?;
+        (way_back.norm() <= MOST_APART && other.norm() <= MOST_APART).then_some(other)
+    }
+
+    /// How far the first epoch's photos lie from their place when they are sought by the mean of the second epoch's.
+    fn way_back(&self, reach: isize) -> Option<Vector2<f64>> {
+        let [first, second] = self.patches;
+        let [ones, twos] = self.matches;
+        let template = self.face.mean(second, twos)?;
+        let views: Vec<&Patch> = first.iter().collect();
+        let near = self.face.sought(&template, &views, reach)?;
+        let back: Vec<Option<Match>> = first
+            .iter()
+            .map(|patch| self.face.matched(&template, patch, near))
+            .collect();
+        apart(&back, ones)
+    }
+
+    /// The second epoch's shift against the first's in photos of another normalisation, less that in these.
+    fn under(&self, others: [&[Patch]; 2]) -> Option<Vector2<f64>> {
+        let template = self.face.mean(others[0], self.matches[0])?;
+        let [first, second] = [0, 1].map(|epoch| {
+            let again: Vec<Option<Match>> = others[epoch]
+                .iter()
+                .zip(self.matches[epoch])
+                .map(|(patch, found)| self.face.matched(&template, patch, found.as_ref()?.warp))
+                .collect();
+            apart(&again, self.matches[epoch])
+        });
+        Some(second? - first?)
+    }
+}
+
+/// Whether matches found within `reach` cells correlate better with a template than the best of chance.
+///
+/// A face of n independent grains has Fisher's z with a standard deviation of 1 / sqrt(n) (Fisher 1921); the search tries as many
+/// independent places as grains fit into its circle.
+pub(super) fn is_beyond_chance(
+    face: &Face,
+    template: &Template,
+    matches: &[Option<Match>],
+    reach: isize,
+) -> bool {
+    let correlations: Vec<f64> = matches.iter().flatten().map(|m| m.correlation).collect();
+    let mean = correlations.iter().sum::<f64>() / correlations.len() as f64;
+    let grain_area = grain_cells(face, &template.patch).powi(2);
+    let grains = face.cells.count() as f64 / grain_area;
+    let places = (PI * (reach * reach) as f64 / grain_area).max(1.0);
+    let z = mean.clamp(-MOST_CORRELATION, MOST_CORRELATION).atanh() * grains.sqrt();
+    z > Normal::standard().inverse_cdf(1.0 - CHANCE / places)
+}
+
+/// Keeps Fisher's z finite.
+const MOST_CORRELATION: f64 = 0.999;
+
+/// Integral of a patch's autocorrelation along a line, cells: the side of what counts as one independent value.
+fn grain_cells(face: &Face, patch: &Patch) -> f64 {
+    let (inside, columns) = (&face.surface.inside, face.surface.columns);
+    let shows = |k: usize| inside.get(k) == Some(&true) && patch.valid[k];
+    let correlation = |distance: usize| {
+        let (mut product, mut square) = (0.0, 0.0);
+        for k in (0..patch.values.len()).filter(|&k| shows(k)) {
+            for to in [k + distance, k + distance * columns] {
+                if shows(to) {
+                    product += f64::from(patch.values[k] * patch.values[to]);
+                    square += f64::from(patch.values[k] * patch.values[k]);
+                }
+            }
+        }
+        if square > 0.0 { product / square } else { 0.0 }
+    };
+    let beside: f64 = (1..LONGEST_GRAIN)
+        .map(correlation)
+        .take_while(|c| *c > LEAST_GRAIN)
+        .sum();
+    1.0 + 2.0 * beside
+}
+
+/// Median difference of the shifts of photos that both lists match, cells, each coordinate by itself.
+fn apart(matches: &[Option<Match>], from: &[Option<Match>]) -> Option<Vector2<f64>> {
+    let differences: Vec<Vector2<f64>> = matches
+        .iter()
+        .zip(from)
+        .filter_map(|(a, b)| Some(a.as_ref()?.warp.shift - b.as_ref()?.warp.shift))
+        .collect();
+    let median = |axis: usize| {
+        let mut values: Vec<f64> = differences.iter().map(|d| d[axis]).collect();
+        crate::statistics::median(&mut values)
+    };
+    Some(Vector2::new(median(0)?, median(1)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::surface::Surface;
+    use super::*;
+    use crate::registration::photos::matching::Warp;
+    use crate::statistics::split_mix;
+    use nalgebra::Matrix2;
+
+    const SIDE: usize = 48;
+
+    fn face() -> Face {
+        let inside = |k: usize| {
+            let (c, r) = (k % SIDE, k / SIDE);
+            (12..SIDE - 12).contains(&c) && (12..SIDE - 12).contains(&r)
+        };
+        let surface = Surface {
+            cell_m: 0.003,
+            columns: SIDE,
+            rows: SIDE,
+            first: [0.0; 2],
+            heights: vec![0.0; SIDE * SIDE],
+            inside: (0..SIDE * SIDE).map(inside).collect(),
+            middle: [0.0015 * (SIDE - 1) as f64; 2],
+        };
+        Face::new(surface, 0.0)
+    }
+
+    /// Noise of grains of about `grain` cells; `shift`: columns by which it is moved.
+    fn drawn(seed: u64, grain: f64, shift: f64) -> Patch {
+        let node = |i: i64, j: i64| {
+            let number = split_mix(seed ^ split_mix((i as u64) << 32 ^ (j as u64 & 0xffff_ffff)));
+            number as f64 / u64::MAX as f64 - 0.5
+        };
+        let value = |x: f64, y: f64| {
+            let (x, y) = (x / grain, y / grain);
+            let (i, j) = (x.floor(), y.floor());
+            let (u, v) = (x - i, y - j);
+            let (i, j) = (i as i64, j as i64);
+            let line = |j: i64| node(i, j) * (1.0 - u) + node(i + 1, j) * u;
+            line(j) * (1.0 - v) + line(j + 1) * v
+        };
+        Patch {
+            values: (0..SIDE * SIDE)
+                .map(|k| value((k % SIDE) as f64 - shift + 200.0, (k / SIDE) as f64 + 200.0) as f32)
+                .collect(),
+            valid: vec![true; SIDE * SIDE],
+        }
+    }
+
+    fn matched(correlation: f64) -> Option<Match> {
+        Some(Match {
+            warp: Warp::shift(Vector2::zeros()),
+            covariance: Matrix2::identity(),
+            correlation,
+        })
+    }
+
+    #[test]
+    fn the_best_of_chance_passes_as_rarely_as_stated() {
+        let face = face();
+        let (mut passed, reach) = (0, 8);
+        for seed in 0..120 {
+            let template = Template::new(drawn(2 * seed, 3.0, 0.0), &face.surface);
+            let other = drawn(2 * seed + 1, 3.0, 0.0);
+            let best = face
+                .sought(&template, &[&other], reach)
+                .and_then(|near| {
+                    let cells = &face.cells;
+                    let shift = [near.shift.x as isize, near.shift.y as isize];
+                    cells.correlation_at(&template, &other, &face.surface, shift)
+                })
+                .unwrap();
+            passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)], reach));
+        }
+        // 5 % of 120 are 6, standard deviation 2.4.
+        assert!(passed <= 14, "{passed}");
+        let template = Template::new(drawn(1, 3.0, 0.0), &face.surface);
+        assert!(is_beyond_chance(&face, &template, &[matched(0.8)], reach));
+    }
+
+    #[test]
+    fn a_coarse_picture_needs_more_correlation_than_a_fine_one() {
+        let face = face();
+        let [fine, coarse] = [2.0, 9.0].map(|grain| Template::new(drawn(3, grain, 0.0), &face.surface));
+        let found = [matched(0.5)];
+        assert!(is_beyond_chance(&face, &fine, &found, 8));
+        assert!(!is_beyond_chance(&face, &coarse, &found, 8));
+    }
+
+    #[test]
+    fn a_match_that_leads_elsewhere_on_the_way_back_is_refused() {
+        let face = face();
+        let [first, second] = [0.0, 3.0].map(|shift| vec![drawn(5, 3.0, shift)]);
+        let (template, ones) = face.template(&first).unwrap();
+        let verified = |start: f64| {
+            let start = Warp::shift(Vector2::new(start, 0.0));
+            let twos = [face
+                .matched(&template, &second[0], start)
+                .or_else(|| matched(0.5).map(|m| Match { warp: start, ..m }))];
+            Verification {
+                face: &face,
+                patches: [&first, &second],
+                matches: [&ones, &twos],
+            }
+            .verified([&first, &second], 8)
+        };
+        assert!(verified(3.0).is_some_and(|apart| apart.norm() < 0.05));
+        assert_eq!(verified(-6.0), None);
+    }
+}
