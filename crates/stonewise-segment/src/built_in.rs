@@ -67,7 +67,7 @@ pub fn open_model<B: ModelBackend>(
     open_model_with(weights, false, device)
 }
 
-/// The same, made to take relief where it is wanted and the weights have not learnt it.
+/// The same; with `relief`, weights that were trained on colour alone get input channels for it.
 ///
 /// # Errors
 /// As [`open_model`]; or the model cannot take relief.

@@ -56,8 +56,9 @@ fn clouds_change_nothing_about_photos() {
     );
 }
 
-/// Joints lie lower than stones in the map of a dense, exact cloud of most walls: 27 of 38 when this was written. Some walls have proud or
-/// flush joints, and what stands before or beside a wall is no stone either.
+/// Joints lie lower than stones in the map of a dense, exact cloud of most walls: 27 of 38 when this was
+/// written. Some walls have proud or flush joints, and what stands before or beside a wall is no stone
+/// either.
 #[test]
 fn joints_lie_lower_than_stones() {
     let (mut right, mut walls) = (0, 0);

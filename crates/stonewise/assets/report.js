@@ -1,4 +1,4 @@
-/* stonewise report; sources 1c60cbad5aebbb19, bundle 231fcd6e89350e8d */
+/* stonewise report; sources ef7ac673b1bcfada, bundle 231fcd6e89350e8d */
 /* This bundle contains three.js.
 The MIT License
 

@@ -7,29 +7,33 @@ use rayon::prelude::*;
 /// Values of a pixel of a [`ReliefMap`].
 pub const RELIEF_CHANNELS: usize = 4;
 
-/// Relief of a photo, at its own or a lower resolution: pixel (x, y) of a map of `width` columns covers the same share of the photo.
+/// Relief of a photo, at its own or a lower resolution: pixel (x, y) of a map of `width` columns covers the
+/// same share of the photo.
 ///
 /// Each pixel holds
 ///
-/// 0. height above the face within 6 cm, `h / (|h| + 1 cm)`: edges and joints, -1 to 1, positive towards the camera,
-/// 1. height above the face within 30 cm, `h / (|h| + 4 cm)`: stones before and behind their neighbours, -1 to 1,
+/// 0. height above the face within 6 cm, `h / (|h| + 1 cm)`: edges and joints, -1 to 1, positive towards the
+///    camera,
+/// 1. height above the face within 30 cm, `h / (|h| + 4 cm)`: stones before and behind their neighbours, -1
+///    to 1,
 /// 2. slope: sine of the angle between the two faces, 0 to 1,
-/// 3. confidence: 1 where points fall into the pixel itself, else one over one plus the distance, in pixels, within which points were
-///    found; 0 where there are none, and then all others are 0, too.
+/// 3. confidence: 1 where points fall into the pixel itself, else one over one plus the distance, in pixels,
+///    within which points were found; 0 where there are none, and then all others are 0, too.
 pub type ReliefMap = Raster<[f32; RELIEF_CHANNELS]>;
 
 /// Map pixels per pixel of the photo: a half, as clouds are coarser than photos.
 const MAP_SCALE: f64 = 0.5;
 /// Most pixels of a map. 4 million: the sums of a map take 300 MB.
 const MAX_PIXELS: f64 = 4e6;
-/// Half the side of the windows in which the face is sought, metres on the face. 0.06: wider than a joint, narrower than a stone; 0.3: a
-/// stone and its neighbours.
+/// Half the side of the windows in which the face is sought, metres on the face. 0.06: wider than a joint,
+/// narrower than a stone; 0.3: a stone and its neighbours.
 const FACE_M: [f64; 2] = [0.06, 0.3];
 /// Least half sides of these windows, map pixels: a plane needs that many.
 const LEAST_FACE_PX: [usize; 2] = [2, 6];
 /// Heights that are brought to a half, metres: those of an open joint and of a stone that stands out.
 const HALF_HEIGHT_M: [f64; 2] = [0.01, 0.04];
-/// Half sides of the windows that are searched for points one after the other, map pixels; farther points say nothing about a pixel.
+/// Half sides of the windows that are searched for points one after the other, map pixels; farther points say
+/// nothing about a pixel.
 const SEARCH_PX: [usize; 6] = [0, 1, 2, 4, 8, 16];
 /// Points of which a height is the mean, at least: takes 40 % off the noise.
 const LEAST_POINTS: f64 = 3.0;
@@ -51,7 +55,8 @@ pub struct RangeImage {
 }
 
 impl RangeImage {
-    /// An empty one for the photos of a camera, at half their resolution or such that it has 4 million pixels.
+    /// An empty one for the photos of a camera, at half their resolution or such that it has 4 million
+    /// pixels.
     pub fn new(camera: &Camera) -> Self {
         let photo = [camera.width, camera.height].map(f64::from);
         let scale = MAP_SCALE.min((MAX_PIXELS / (photo[0] * photo[1]).max(1.0)).sqrt());
@@ -79,10 +84,11 @@ impl RangeImage {
 
     /// The relief.
     ///
-    /// The inverse depth of a plane is linear in the pixel coordinates of a pinhole camera (Hartley & Zisserman 2004, section 13.1: the
-    /// plane n X = d is seen at depth d / (n r) along the ray r), so the face around a pixel is the plane of least squares through the
-    /// inverse depths of a window, and a height is measured along its normal. Windows have the same size on the face, whatever the
-    /// distance; their sums come from tables (Crow 1984). Of a lens's distortion only the change within a window is ignored.
+    /// The inverse depth of a plane is linear in the pixel coordinates of a pinhole camera (Hartley &
+    /// Zisserman 2004, section 13.1: the plane n X = d is seen at depth d / (n r) along the ray r), so the
+    /// face around a pixel is the plane of least squares through the inverse depths of a window, and a height
+    /// is measured along its normal. Windows have the same size on the face, whatever the distance; their
+    /// sums come from tables (Crow 1984). Of a lens's distortion only the change within a window is ignored.
     ///
     /// Cost: two fits of a plane for every pixel; 72 bytes a pixel.
     pub fn relief(&self) -> ReliefMap {
@@ -141,7 +147,8 @@ impl RangeImage {
         windows.into_iter().find(|(half, found)| is_enough(*half, found))
     }
 
-    /// Plane vector of a face: normal over distance from the camera, 1/m; its product with a ray of depth 1 is the inverse depth.
+    /// Plane vector of a face: normal over distance from the camera, 1/m; its product with a ray of depth 1
+    /// is the inverse depth.
     fn normal(&self, face: &Face, at: [usize; 2]) -> nalgebra::Vector3<f64> {
         let [x, y] = [0, 1].map(|axis| at[axis] as f64 + 0.5 - self.center_px[axis]);
         let [u, v] = face.gradient;
@@ -220,7 +227,8 @@ impl Sums {
 struct SumTable {
     /// Columns and rows of pixels; the table has one more of each.
     size: [usize; 2],
-    /// Of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to their mean, which keeps digits.
+    /// Of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to their mean,
+    /// which keeps digits.
     sums: Vec<[f64; 9]>,
     mean: f64,
 }
@@ -290,7 +298,8 @@ mod tests {
         Camera::pinhole(240, 200, 2500.0)
     }
 
-    /// A range image whose pixels hold three points each, at the depth that a function of the map pixel gives.
+    /// A range image whose pixels hold three points each, at the depth that a function of the map pixel
+    /// gives.
     fn seen(depth: impl Fn(usize, usize) -> Option<f64>) -> RangeImage {
         let mut image = RangeImage::new(&camera());
         for (x, y) in (0..100).flat_map(|y| (0..120).map(move |x| (x, y))) {
@@ -303,7 +312,8 @@ mod tests {
         image
     }
 
-    /// Depth of the plane through (0, 0, 10 m) with a normal, at a map pixel, by the intersection of ray and plane.
+    /// Depth of the plane through (0, 0, 10 m) with a normal, at a map pixel, by the intersection of ray and
+    /// plane.
     fn plane(normal: Vector3<f64>, lifted_m: f64, x: usize, y: usize) -> f64 {
         let pixel = [2.0 * x as f64 + 1.0, 2.0 * y as f64 + 1.0];
         let ray = camera().unproject(pixel).unwrap();
@@ -331,8 +341,8 @@ mod tests {
         }
     }
 
-    /// A pixel of a stone whose face lies 2 cm before the joint around it: what the faces fitted to wall and stone together must leave is
-    /// computed by hand from the shares of the window.
+    /// A pixel of a stone whose face lies 2 cm before the joint around it: what the faces fitted to wall and
+    /// stone together must leave is computed by hand from the shares of the window.
     #[test]
     fn a_step_is_as_high_as_it_is() {
         for normal in [Vector3::z(), Vector3::new(0.7, -0.3, 1.0)] {
@@ -340,9 +350,11 @@ mod tests {
             let relief = seen(step).relief();
             let row = &relief.data()[50 * 120..51 * 120];
             let heights: Vec<f64> = row.iter().map(|v| metres(v[1], 0.04)).collect();
-            // The fitted face is the same on both sides of the edge: between neighbours across it the whole step shows.
+            // The fitted face is the same on both sides of the edge: between neighbours across it the whole
+            // step shows.
             let at_edge = heights[59] - heights[60];
-            // The face itself turns by 1.5 h / side a pixel under a step (least squares through a sign function).
+            // The face itself turns by 1.5 h / side a pixel under a step (least squares through a sign
+            // function).
             assert!((at_edge - 0.02).abs() < 0.0015, "{normal}: {at_edge}");
             assert!(heights[59] > 0.0085 && heights[60] < -0.0085);
             assert!(row[59][0] > 0.4 && row[60][0] < -0.4, "{:?}", &row[58..62]);

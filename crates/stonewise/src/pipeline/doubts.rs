@@ -8,18 +8,20 @@ use crate::results::{Status, StoneRow};
 use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, fill};
 use stonewise_core::stone::StoneMotion;
 
-/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which something other
-/// than noise hides the motions.
+/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
+/// something other than noise hides the motions.
 const LIMIT_EXCESS: f64 = 100.0;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
 
-/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a tenth of a small
-/// stone.
+/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a
+/// tenth of a small stone.
 const OFFSET_M: f64 = 0.03;
-/// Labels lie beside the stones where the surface at their own place is less alike than this share of the best place's.
+/// Labels lie beside the stones where the surface at their own place is less alike than this share of the
+/// best place's.
 const UNLIKE: f64 = 0.6;
-/// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same surface is about 0.9.
+/// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same
+/// surface is about 0.9.
 const LIKE: f64 = 0.3;
 
 /// Warns where the motions of a pair of epochs cannot be relied on.

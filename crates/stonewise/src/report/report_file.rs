@@ -9,9 +9,9 @@ use stonewise_io::atomic::write_atomically;
 
 /// Makes `report/index.html` from the result files in `dir` alone and returns its path.
 ///
-/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of the third
-/// against the first is `report/index_2.html`, and so on; each links to the others. The same results give the same
-/// bytes.
+/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of
+/// the third against the first is `report/index_2.html`, and so on; each links to the others. The same
+/// results give the same bytes.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or the report cannot be written.

@@ -1,4 +1,5 @@
-//! The columns of the stone table: one list, from which every file with stones is written, read and described.
+//! The columns of the stone table: one list, from which every file with stones is written, read and
+//! described.
 
 use super::{RowMotion, Status, StoneRow};
 use crate::error::{Error, Result};
@@ -137,7 +138,8 @@ impl StoneColumn {
     /// Puts the cells of a table into rows; cells of motions only into rows that have one.
     ///
     /// # Errors
-    /// The table lacks the column or has another type in it, a word is no status, or a measured stone's cell is empty.
+    /// The table lacks the column or has another type in it, a word is no status, or a measured stone's cell
+    /// is empty.
     pub(super) fn fill(&self, rows: &mut [StoneRow], table: &Table, path: &Path) -> Result<()> {
         let name = self.name;
         match &self.cells {

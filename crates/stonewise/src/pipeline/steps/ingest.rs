@@ -57,7 +57,7 @@ pub fn ingest(context: &Context, number: usize) -> Result<Ingested> {
             "the clouds of epoch {:?} hold no points{}",
             epoch.name,
             if part.is_some() {
-                " in the part that was asked for"
+                " in the part that takes part"
             } else {
                 ""
             }

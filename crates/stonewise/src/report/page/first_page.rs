@@ -1,4 +1,5 @@
-//! The first page: the verdict, who measured what and when, what was not measured, what to look at first, a place to sign.
+//! The first page: the verdict, who measured what and when, what was not measured, what to look at first, a
+//! place to sign.
 
 use super::html::table;
 use super::maps::motion_map;
@@ -304,7 +305,8 @@ pub(super) fn registration(datum: Option<&Datum>, texts: &Texts) -> String {
     }
 }
 
-/// Where the registration error is known from; the run's own sentence, where the language is the one it speaks.
+/// Where the registration error is known from; the run's own sentence, where the language is the one it
+/// speaks.
 pub(super) fn datum_note(datum: &Datum, texts: &Texts) -> String {
     let shift = |k: usize| datum.covariance_6x6.map_or(f64::NAN, |c| c[k][k]);
     let size = ((shift(0) + shift(1) + shift(2)) / 3.0).max(0.0).sqrt();

@@ -19,7 +19,8 @@ pub enum State {
     #[default]
     #[serde(rename = "cannot tell")]
     CannotTell,
-    /// A motion lies beyond the threshold of attention, or stones are lost; without thresholds: motion is shown.
+    /// A motion lies beyond the threshold of attention, or stones are lost; without thresholds: motion is
+    /// shown.
     #[serde(rename = "attention")]
     Attention,
     /// A motion lies beyond the alarm threshold.
@@ -103,13 +104,14 @@ pub struct EpochVerdict {
     pub zones: Vec<ZoneVerdict>,
     /// Every stone of the first epoch.
     pub stones: Vec<StoneVerdict>,
-    /// Joints that opened, closed or may have opened beyond a threshold; empty where no joint has a threshold.
+    /// Joints that opened, closed or may have opened beyond a threshold; empty where no joint has a
+    /// threshold.
     pub joints: Vec<JointVerdict>,
 }
 
 impl EpochVerdict {
-    /// Whether the registration error of the epoch is known; without, lengths are those against the common motion of the measured
-    /// stones.
+    /// Whether the registration error of the epoch is known; without, lengths are those against the common
+    /// motion of the measured stones.
     pub(crate) fn has_datum(&self) -> bool {
         self.datum.is_some_and(|d| d != DatumState::Unknown)
     }
