@@ -1,7 +1,7 @@
 //! The columns of the stone table: one list, from which every file with stones is written, read and
 //! described.
 
-use super::{RowMotion, Status, StoneRow};
+use super::{ColumnNote, RowMotion, Status, StoneRow};
 use crate::error::{Error, Result};
 use std::path::Path;
 use stonewise_io::table::{Column, Table};
@@ -207,8 +207,18 @@ impl StoneColumn {
         })
     }
 
+    /// What the column of the text table holds.
+    pub(super) fn note(&self) -> ColumnNote {
+        ColumnNote {
+            name: self.name,
+            datatype: self.datatype(),
+            unit: self.unit,
+            meaning: self.meaning,
+        }
+    }
+
     /// Type of the cells in the words of XML Schema.
-    pub(super) fn datatype(&self) -> &'static str {
+    fn datatype(&self) -> &'static str {
         match &self.cells {
             Cells::Count(_) | Cells::OptionalCount(_) | Cells::Flag(_) => "integer",
             Cells::Status(_) => "string",
