@@ -46,6 +46,8 @@ export interface ReportDocument {
   };
   /** Decimals that a millimetre of these motions is worth. */
   readonly decimals: number;
+  /** Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be told. */
+  readonly sound: boolean;
   /** Whether uncertainties hold the error of the registration of the epochs. */
   readonly registrationKnown: boolean;
   /** Known in-plane translation (along, up), millimetres. */

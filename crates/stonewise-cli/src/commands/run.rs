@@ -131,6 +131,12 @@ fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>) -> String {
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
     let above = motions().filter(|m| m.significant).count();
+    if verdict.is_some_and(|v| !v.is_sound()) {
+        return format!(
+            "{} stones, {matched} matched, {measured} measured; which of them moved or are loose cannot be told",
+            rows.len()
+        );
+    }
     let loose = motions().filter(|m| m.loose).count();
     let moved = verdict.map_or(String::new(), |v| format!("{} moved, ", v.wall.moved));
     format!(

@@ -5,7 +5,7 @@ use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, fill};
+use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, Message, NOT_CONVERGED};
 use stonewise_core::stone::StoneMotion;
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
@@ -62,7 +62,7 @@ fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(Stri
 }
 
 /// An offset in words, if it is clear and large.
-fn off_place(doubt: &Doubt, offset: &LabelOffset, first: &str) -> Option<String> {
+fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<String> {
     let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
     let is_off = is_clear && offset.length_m() > OFFSET_M;
     let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
@@ -74,7 +74,7 @@ fn off_place(doubt: &Doubt, offset: &LabelOffset, first: &str) -> Option<String>
         ("up", &*up),
         ("first", &*first),
     ];
-    is_off.then(|| fill(doubt.english, &values))
+    is_off.then(|| doubt.say(&values))
 }
 
 /// The adjustment stopped before its motions had settled.
@@ -83,7 +83,7 @@ fn unsettled(registered: &Registered) -> Option<String> {
         return None;
     };
     let iterations = adjustment.iterations.to_string();
-    (!adjustment.converged).then(|| fill(NOT_CONVERGED.english, &[("iterations", &*iterations)]))
+    (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
@@ -103,7 +103,7 @@ fn few_measured(rows: &[StoneRow]) -> Option<String> {
             ("matched", &*matched.to_string()),
             ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
         ];
-        fill(FEW_MEASURED.english, &values)
+        FEW_MEASURED.say(&values)
     })
 }
 
@@ -128,6 +128,6 @@ fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
     (excess > LIMIT_EXCESS).then(|| {
         let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
         let values = [("limit", &*limit), ("excess", &*format!("{excess:.0}"))];
-        fill(BLIND.english, &values)
+        BLIND.say(&values)
     })
 }

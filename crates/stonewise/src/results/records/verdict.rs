@@ -115,6 +115,15 @@ impl EpochVerdict {
     pub(crate) fn has_datum(&self) -> bool {
         self.datum.is_some_and(|d| d != DatumState::Unknown)
     }
+
+    /// Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be
+    /// told, and the counts of such stones are only what was computed.
+    pub fn is_sound(&self) -> bool {
+        !self
+            .reasons
+            .iter()
+            .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt))
+    }
 }
 
 /// Why something has its state.
@@ -177,7 +186,8 @@ pub struct Area {
     pub measured: usize,
     /// Measured stones above their own 95 % limit, of which chance alone gives 5 % on a still wall.
     pub above_limit: usize,
-    /// Stones that moved: with the false discovery rate over all stones of the wall controlled at 5 %.
+    /// Stones that moved: with the false discovery rate over all stones of the wall controlled at 5 %. Of a
+    /// run that is in doubt, like all numbers here, only what was computed.
     pub moved: usize,
     /// Stones that move unlike their neighbours, with the false discovery rate controlled.
     pub loose: usize,
