@@ -1,6 +1,7 @@
 //! Relief of a photo: what a cloud says about the surface behind each pixel, whatever the light.
 
 use super::raster_type::Raster;
+use super::sum_table::SumTable;
 use crate::geometry::Camera;
 use rayon::prelude::*;
 
@@ -93,7 +94,7 @@ impl RangeImage {
     /// Cost: two fits of a plane for every pixel; 72 bytes a pixel.
     pub fn relief(&self) -> ReliefMap {
         let (width, height) = (self.cells.width() as usize, self.cells.height() as usize);
-        let sums = SumTable::of(&self.cells);
+        let sums = FaceSums::of(&self.cells);
         let mut relief = Raster::filled(width as u32, height as u32, [0.0; RELIEF_CHANNELS]);
         relief
             .data_mut()
@@ -108,7 +109,7 @@ impl RangeImage {
     }
 
     /// The values of a pixel; `None` where nothing is known.
-    fn at(&self, sums: &SumTable, at: [usize; 2]) -> Option<[f32; RELIEF_CHANNELS]> {
+    fn at(&self, sums: &FaceSums, at: [usize; 2]) -> Option<[f32; RELIEF_CHANNELS]> {
         let (reach, near) = self.nearest(sums, at)?;
         let depth = near.pixels / near.q;
         let fit = |scale: usize| {
@@ -137,7 +138,7 @@ impl RangeImage {
     }
 
     /// The points nearest to a pixel, and within how many pixels they lie.
-    fn nearest(&self, sums: &SumTable, at: [usize; 2]) -> Option<(usize, Sums)> {
+    fn nearest(&self, sums: &FaceSums, at: [usize; 2]) -> Option<(usize, Sums)> {
         let width = self.cells.width() as usize;
         let is_enough = |half: usize, found: &Sums| match half {
             0 => f64::from(self.cells.data()[at[1] * width + at[0]].0) >= LEAST_POINTS,
@@ -223,17 +224,14 @@ impl Sums {
     }
 }
 
-/// Sums over all pixels above and to the left of a corner, from which those of any window follow (Crow 1984).
-struct SumTable {
-    /// Columns and rows of pixels; the table has one more of each.
-    size: [usize; 2],
-    /// Of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to their mean,
-    /// which keeps digits.
-    sums: Vec<[f64; 9]>,
+/// Sums over windows of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to
+/// their mean, which keeps digits.
+struct FaceSums {
+    table: SumTable<9>,
     mean: f64,
 }
 
-impl SumTable {
+impl FaceSums {
     fn of(cells: &Raster<(f32, f64)>) -> Self {
         let size = [cells.width() as usize, cells.height() as usize];
         let seen = cells.data().iter().filter(|cell| cell.0 > 0.0);
@@ -241,37 +239,21 @@ impl SumTable {
             (n + 1.0, sum + cell.1 / f64::from(cell.0))
         });
         let mean = if count > 0.0 { total / count } else { 0.0 };
-        let stride = size[0] + 1;
-        let mut sums = vec![[0.0; 9]; stride * (size[1] + 1)];
         let middle = size.map(|side| 0.5 * side as f64);
-        for y in 0..size[1] {
-            let mut row = [0.0; 9];
-            for x in 0..size[0] {
-                let (points, sum) = cells.data()[y * size[0] + x];
-                if points > 0.0 {
-                    let q = sum / f64::from(points) - mean;
-                    let (x, y) = (x as f64 - middle[0], y as f64 - middle[1]);
-                    let terms = [1.0, q, x, y, x * x, x * y, y * y, x * q, y * q];
-                    row.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                }
-                let above = sums[y * stride + x + 1];
-                let here = &mut sums[(y + 1) * stride + x + 1];
-                *here = std::array::from_fn(|i| above[i] + row[i]);
-            }
-        }
-        Self { size, sums, mean }
+        let table = SumTable::new(size, |x, y| {
+            let (points, sum) = cells.data()[y * size[0] + x];
+            let q = sum / f64::from(points) - mean;
+            let (x, y) = (x as f64 - middle[0], y as f64 - middle[1]);
+            (points > 0.0).then_some([1.0, q, x, y, x * x, x * y, y * y, x * q, y * q])
+        });
+        Self { table, mean }
     }
 
     /// Sums of the window of `2 half + 1` pixels around a pixel, cut at the border.
     fn window(&self, at: [usize; 2], half: usize) -> Sums {
-        let stride = self.size[0] + 1;
-        let low = at.map(|c| c.saturating_sub(half));
-        let high = [0, 1].map(|axis| (at[axis] + half + 1).min(self.size[axis]));
-        let corner = |x: usize, y: usize| &self.sums[y * stride + x];
-        let (a, b) = (corner(low[0], low[1]), corner(high[0], low[1]));
-        let (c, d) = (corner(low[0], high[1]), corner(high[0], high[1]));
-        let [n, q, x, y, xx, xy, yy, xq, yq]: [f64; 9] = std::array::from_fn(|i| d[i] - b[i] - c[i] + a[i]);
-        let [px, py] = [0, 1].map(|axis| at[axis] as f64 - 0.5 * self.size[axis] as f64);
+        let [n, q, x, y, xx, xy, yy, xq, yq] = self.table.window(at, half);
+        let size = self.table.size();
+        let [px, py] = [0, 1].map(|axis| at[axis] as f64 - 0.5 * size[axis] as f64);
         let (rx, ry) = (x - n * px, y - n * py);
         Sums {
             pixels: n,
