@@ -7,7 +7,7 @@ import sys
 
 
 def main() -> None:
-    """Does what the arguments ask for and ends with the command's exit code."""
+    """Runs the command of the arguments and ends with its exit code."""
     # Until the work listens for Ctrl-C itself, it ends the program as always; the handler of Python would only take a note.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from ._native import command

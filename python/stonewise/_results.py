@@ -33,7 +33,7 @@ class Warning:  # noqa: A001
     message: str
     """What happened, and what to do about it."""
     skipped_input: bool
-    """An input that was asked for was left out."""
+    """An input of the project was left out."""
     doubt: bool
     """The results as a whole cannot be relied on."""
 
@@ -146,7 +146,7 @@ class Pair:
 
     @property
     def evaluation(self) -> Optional[dict[str, Any]]:
-        """``evaluation.json``, where the project knows the motion, else ``None``."""
+        """``evaluation.json``, where the project prescribes a motion, else ``None``."""
         return _read_json_if_there(self._file("evaluation", "json"))
 
     def _file(self, stem: str, extension: str) -> Path:

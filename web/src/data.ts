@@ -1,4 +1,4 @@
-// What the report knows: the document that the page carries and its blocks of columns.
+// The report's data: the document that the page carries and its blocks of columns.
 
 import { type ColumnEntry, type Columns, unpack } from "./blocks.ts";
 
@@ -46,6 +46,8 @@ export interface ReportDocument {
   };
   /** Decimals that a millimetre of these motions is worth. */
   readonly decimals: number;
+  /** Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be told. */
+  readonly sound: boolean;
   /** Whether uncertainties hold the error of the registration of the epochs. */
   readonly registrationKnown: boolean;
   /** Known in-plane translation (along, up), millimetres. */
@@ -142,7 +144,7 @@ export async function readReport(page: Document): Promise<Report | null> {
       const entries = document.blocks[name];
       const element = page.getElementById(`block-${name}`);
       columns = entries && element ? unpack(entries, element.textContent ?? "") : Promise.resolve(null);
-      // The text has done its duty; its memory is worth more.
+      // The text is not used again: its memory is freed.
       element?.remove();
       opened.set(name, columns);
     }

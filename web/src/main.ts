@@ -22,7 +22,7 @@ async function start(): Promise<void> {
   const place = document.getElementById("explore");
   const report = place ? await readReport(document) : null;
   if (!place || !report) return;
-  // The largest motion is what a reader wants to see first.
+  // The stone of the largest motion is shown first.
   const largest = byMotion(report.stones)[0] ?? -1;
   const store = new Store({
     quantity: "out", fade: true, arrows: false, behind: "none", view: "map", tool: "move", hover: -1,

@@ -112,6 +112,7 @@ const TEXTS = {
   "nothingDrag": ["Drag moves the map; the wheel zooms once the map was clicked; a double click zooms in.",
     "Ziehen verschiebt die Karte; das Rad vergrößert, wenn die Karte angeklickt wurde; ein Doppelklick vergrößert."],
   "badgeMoved": ["moved", "bewegt"],
+  "badgeCannotTell": ["cannot tell whether it moved", "ob bewegt, ist nicht zu sagen"],
   "badgeAbove": ["above its limit", "über seiner Grenze"],
   "badgeBelow": ["below its limit", "unter seiner Grenze"],
   "panelName": ["Chosen stone", "Gewählter Stein"],

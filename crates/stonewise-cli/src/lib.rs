@@ -12,7 +12,7 @@ mod steps;
 pub use commands::measure;
 use std::ffi::OsString;
 
-/// Everything that was asked for was done.
+/// Everything was done.
 const DONE: u8 = 0;
 /// Something failed.
 const FAILED: u8 = 1;
@@ -20,10 +20,10 @@ const FAILED: u8 = 1;
 const WRONG_USAGE: u8 = 2;
 /// Finished, but some inputs were left out, or the results as a whole are in doubt.
 const IN_DOUBT: u8 = 3;
-/// The verdict is one that `--exit-on` asks for.
+/// The verdict is at or above the state of `--exit-on`.
 const VERDICT: u8 = 4;
 
-/// Does what the arguments ask for, the first of which is the program's name; the exit code.
+/// Runs the command of these arguments, the first of which is the program's name; returns the exit code.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
     say_panics_once();
     let args = match <args::Args as clap::Parser>::try_parse_from(args) {

@@ -23,13 +23,13 @@ pub trait Progress: Sync {
     fn detail(&self, _unit: &str) {}
     /// Something that a person should read now, in one line.
     fn note(&self, _line: &str) {}
-    /// True once the caller wants the work to stop.
+    /// True once the work is to stop.
     fn is_cancelled(&self) -> bool;
 
-    /// `Err(Interrupted)` once the caller wants the work to stop.
+    /// `Err(Interrupted)` once the work is to stop.
     ///
     /// # Errors
-    /// The caller wants the work to stop.
+    /// The caller has cancelled the work.
     fn check(&self) -> Result<(), Interrupted> {
         if self.is_cancelled() {
             Err(Interrupted)

@@ -366,7 +366,7 @@ fn a_station_scans_no_further_than_it_reaches() {
         let station = -4.5 + 3.0 * f64::from(scan.source[i] - 1);
         assert!((exact(&scan, i).y - station).abs() < 3.01);
     }
-    // Two stations see each place but for the ends; square on the merged spacing is as asked.
+    // Two stations see each place but for the ends; square on the merged spacing is the one that was set.
     let middle = (0..scan.len()).filter(|&i| {
         let f = world.wall.face.face_of(&scan.cloud.world(i));
         f.a.abs() < 1.5 && (0.4..1.2).contains(&f.u)

@@ -13,7 +13,7 @@ use stonewise_io::cloud::{
     write_points_laz,
 };
 
-/// Keeps a file for `testdata/clouds/check_written.py`, where asked to.
+/// Keeps a file for `testdata/clouds/check_written.py`, where an environment variable names its folder.
 fn keep(path: &Path) {
     if let Some(folder) = std::env::var_os("STONEWISE_KEEP").map(PathBuf::from) {
         std::fs::create_dir_all(&folder).unwrap();

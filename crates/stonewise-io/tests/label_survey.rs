@@ -282,7 +282,7 @@ fn judge(report: &MatchReport, first: &BTreeMap<u32, u32>, second: &BTreeMap<u32
             (Some(s), Some(t)) if s == t => {
                 pairs.right.insert(*s);
             }
-            // A stone that the truth does not know is neither right nor wrong.
+            // A stone without a true one is neither right nor wrong.
             (Some(_), Some(_)) => pairs.wrong += 1,
             _ => {}
         }

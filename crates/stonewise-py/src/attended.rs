@@ -13,7 +13,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// As much as the main thread of a program has.
 pub const STACK_BYTES: usize = 8 << 20;
 
-/// Python functions that want to know how the work goes on.
+/// Python functions that are called while the work goes on.
 pub struct Listeners {
     /// Called with the name of a piece of work, the units that are done, and all of them.
     pub progress: Option<Py<PyAny>>,
@@ -22,7 +22,7 @@ pub struct Listeners {
 }
 
 impl Listeners {
-    /// Those who want to know about progress alone.
+    /// A function for progress alone.
     pub fn progress(progress: Option<Py<PyAny>>) -> Self {
         Self { progress, note: None }
     }
@@ -105,7 +105,7 @@ enum Event {
     Note(String),
 }
 
-/// What the listeners know.
+/// What the listeners were told last.
 #[derive(Default)]
 struct Told {
     what: Option<(String, u64)>,

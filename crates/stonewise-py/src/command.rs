@@ -8,8 +8,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use stonewise::{OutputFolder, Project, Until};
 
-/// Does what the arguments of the command line ask for, the first of which is the program's name; the exit
-/// code.
+/// Runs the command line of these arguments, the first of which is the program's name; returns the exit code.
 #[pyfunction]
 pub fn command(py: Python<'_>, args: Vec<OsString>) -> u8 {
     py.detach(|| stonewise_cli::main_with_args(args))

@@ -1,8 +1,9 @@
-//! Scores a detector on rendered walls whose seeds are kept for this: `kept_walls [FIRST_SEED COUNT [WEIGHTS [CLOUD]]]`, CLOUD: none,
-//! terrestrial, drone or stereo. Prints a table by size
-//! of the stones, light and contrast of the joints, for docs/src/method/segmentation.md.
+//! Scores a detector on rendered walls whose seeds are kept for this: `kept_walls [FIRST_SEED COUNT [WEIGHTS
+//! [CLOUD]]]`, CLOUD: none, terrestrial, drone or stereo. Prints a table by size of the stones, light and
+//! contrast of the joints, for docs/src/method/segmentation.md.
 //!
-//! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other seeds then, and say so.
+//! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other
+//! seeds then, and say so.
 #![allow(clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +14,8 @@ use stonewise_segment::synth::{Survey, SurveyKind, surveyed_photo_by};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
-/// First of the seeds that are kept; training draws 64-bit numbers, the test of the built-in weights has 9,000 to 9,011.
+/// First of the seeds that are kept; training draws 64-bit numbers, the test of the built-in weights has
+/// 9,000 to 9,011.
 const FIRST_SEED: u64 = 20_000;
 const COUNT: u64 = 60;
 /// Edge of a photo, pixels: several stones of the largest class.

@@ -2,6 +2,7 @@
 
 use crate::model::{MaskRcnn, ModelBackend, WeightsError, config_from_bytes, model_from_bytes};
 use burn::tensor::Device;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Weights trained on rendered photos, see docs/src/method/segmentation.md. A static, because a constant
@@ -48,11 +49,16 @@ impl Weights {
     /// # Errors
     /// The file cannot be read, or does not state its configuration.
     pub fn takes_relief(&self) -> Result<bool, WeightsError> {
-        let config = match self {
-            Self::BuiltIn => config_from_bytes(BUILT_IN, NAME)?,
-            Self::File(path) => config_from_bytes(&self.bytes()?, &path.display().to_string())?,
-        };
-        Ok(config.relief_channels > 0)
+        let (bytes, name) = self.named_bytes()?;
+        Ok(config_from_bytes(&bytes, &name)?.relief_channels > 0)
+    }
+
+    /// All bytes, and what messages call them.
+    fn named_bytes(&self) -> Result<(Cow<'static, [u8]>, String), WeightsError> {
+        Ok(match self {
+            Self::BuiltIn => (Cow::Borrowed(BUILT_IN), NAME.to_owned()),
+            Self::File(path) => (Cow::Owned(self.bytes()?), path.display().to_string()),
+        })
     }
 }
 
@@ -67,7 +73,7 @@ pub fn open_model<B: ModelBackend>(
     open_model_with(weights, false, device)
 }
 
-/// The same, made to take relief where it is wanted and the weights have not learnt it.
+/// The same; with `relief`, weights that were trained on colour alone get input channels for it.
 ///
 /// # Errors
 /// As [`open_model`]; or the model cannot take relief.
@@ -76,10 +82,6 @@ pub(crate) fn open_model_with<B: ModelBackend>(
     relief: bool,
     device: &Device<B>,
 ) -> Result<MaskRcnn<B>, WeightsError> {
-    match weights {
-        Weights::BuiltIn => model_from_bytes(BUILT_IN, NAME, relief, device),
-        Weights::File(path) => {
-            model_from_bytes(&weights.bytes()?, &path.display().to_string(), relief, device)
-        }
-    }
+    let (bytes, name) = weights.named_bytes()?;
+    model_from_bytes(&bytes, &name, relief, device)
 }

@@ -29,8 +29,9 @@ pub trait Detector: Sync {
     /// What went wrong.
     type Error: Send;
 
-    /// The stones of an image, best score first. `relief`: what a cloud says about the surface that the image shows, at any resolution,
-    /// where there is a cloud; a detector that has not learnt relief leaves it alone.
+    /// The stones of an image, best score first. `relief`: what a cloud says about the surface that the image
+    /// shows, at any resolution, where there is a cloud; a detector that has not learnt relief leaves it
+    /// alone.
     ///
     /// # Errors
     /// The detector could not run.

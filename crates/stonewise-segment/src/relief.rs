@@ -2,7 +2,8 @@
 
 use stonewise_core::raster::{RELIEF_CHANNELS, Raster, ReliefMap};
 
-/// A part of a map with other columns and rows, interpolated between pixel centres. `part`: left, top, width, height in parts of the map.
+/// A part of a map with other columns and rows, interpolated between pixel centres. `part`: left, top, width,
+/// height in parts of the map.
 pub fn resampled(relief: &ReliefMap, part: [f64; 4], [width, height]: [u32; 2]) -> ReliefMap {
     let columns = neighbours([part[0], part[2]], width, relief.width());
     let rows = neighbours([part[1], part[3]], height, relief.height());

@@ -1,4 +1,5 @@
-//! The weights that come with the program, on walls that they were not trained on and on images that show nothing.
+//! The weights that come with the program, on walls that they were not trained on and on images that show
+//! nothing.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail here")]
 

@@ -1,5 +1,5 @@
-//! Keeps the modules of the detector's crate in their order: a module uses only those below it, and no files use
-//! each other in a circle.
+//! Keeps the modules of the detector's crate in their order: a module uses only those below it, and no files
+//! use each other in a circle.
 #![allow(clippy::unwrap_used, clippy::panic)] // a test that cannot read the sources must stop
 
 #[path = "../../../testing/module_graph.rs"]

@@ -114,8 +114,8 @@ pub struct RegistrationParams {
     /// registration. It is reported apart and enters absolute uncertainty. Default: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub stable: Vec<StableArea>,
-    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false: only a person
-    /// knows what did not move.
+    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false, because
+    /// clouds alone do not show whether ground and rock kept their place.
     pub auto_stable: bool,
     /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its
     /// place and not by its label. 3: farther inside, noise does not change a label; with 0 (labels alone)

@@ -2,17 +2,22 @@
 
 mod braces;
 mod doubts;
+mod message;
+pub(crate) mod notices;
 mod report;
+mod translation;
 
 use crate::figure::{count, mm, number, percent};
 use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
 pub(crate) use braces::fill;
-pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, doubt_in};
+pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, NOT_CONVERGED};
+pub(crate) use message::Message;
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
+pub(crate) use translation::message_in;
 
 /// A text for one and a text for several.
 type Number = [&'static str; 2];
@@ -93,6 +98,7 @@ pub(crate) struct PageTexts {
     pub of_not_measured: Number,
     pub look_first: &'static str,
     pub nothing_first: &'static str,
+    pub look_at_doubt: &'static str,
     pub none_stands_out: &'static str,
     pub stone: &'static str,
     pub along_up: &'static str,
@@ -119,6 +125,9 @@ pub(crate) struct PageTexts {
     pub tile_largest: &'static str,
     pub tile_largest_common: &'static str,
     pub tile_no_motion: &'static str,
+    pub tile_cannot_tell: &'static str,
+    pub limit_unknown: &'static str,
+    pub above_as_computed: &'static str,
     pub registration_included: &'static str,
     pub registration_unknown: &'static str,
     pub chance: &'static str,
@@ -228,6 +237,7 @@ static ENGLISH: Texts = Texts {
         ],
         look_first: "What to look at first",
         nothing_first: "No stone calls for a closer look.",
+        look_at_doubt: "At what puts the results in doubt. Until that is mended, no stone can be named.",
         none_stands_out: "No stone stands out; that does not mean that none moved.",
         stone: "Stone",
         along_up: "{along} m along, {up} m up",
@@ -254,6 +264,9 @@ static ENGLISH: Texts = Texts {
         tile_largest: "largest motion of a stone that moved",
         tile_largest_common: "largest motion against the common motion",
         tile_no_motion: "no motion is shown",
+        tile_cannot_tell: "which stones moved or are loose cannot be told",
+        limit_unknown: "Detection limit: cannot be stated for results in doubt",
+        above_as_computed: "As computed, {above} stones are above their own 95 % limit. Which stones moved or are loose cannot be told.",
         registration_included: "Registration error between the surveys is included in the limits: {note}.",
         registration_unknown: "Registration error between the surveys is unknown and is <b>not</b> included in the limits below: limits, \
             intervals and significance hold for motions against the common rigid motion of the measured stones. A motion of the wall \
@@ -386,6 +399,7 @@ static GERMAN: Texts = Texts {
         ],
         look_first: "Was zuerst anzusehen ist",
         nothing_first: "Kein Stein verlangt einen genaueren Blick.",
+        look_at_doubt: "Was die Ergebnisse zweifelhaft macht. Solange das nicht behoben ist, kann kein Stein genannt werden.",
         none_stands_out: "Kein Stein f\u{e4}llt auf; das hei\u{df}t nicht, dass sich keiner bewegt hat.",
         stone: "Stein",
         along_up: "{along} m entlang, {up} m hoch",
@@ -412,6 +426,9 @@ static GERMAN: Texts = Texts {
         tile_largest: "gr\u{f6}\u{df}te Bewegung eines bewegten Steins",
         tile_largest_common: "gr\u{f6}\u{df}te Bewegung gegen die gemeinsame Bewegung",
         tile_no_motion: "keine Bewegung ist nachweisbar",
+        tile_cannot_tell: "welche Steine sich bewegt haben oder lose sind, ist nicht zu sagen",
+        limit_unknown: "Nachweisgrenze: bei zweifelhaften Ergebnissen nicht anzugeben",
+        above_as_computed: "Wie berechnet liegen {above} Steine \u{fc}ber ihrer eigenen 95-%-Grenze. Welche Steine sich bewegt haben oder lose sind, ist nicht zu sagen.",
         registration_included: "Der Registrierungsfehler zwischen den Aufnahmen ist in den Grenzen enthalten: {note}.",
         registration_unknown: "Der Registrierungsfehler zwischen den Aufnahmen ist unbekannt und in den Grenzen unten <b>nicht</b> enthalten: \
             Grenzen, Intervalle und Signifikanz gelten f\u{fc}r Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine. Eine Bewegung \
@@ -449,6 +466,24 @@ static GERMAN: Texts = Texts {
     ],
 };
 
+/// Usual conditions of an epoch, English and German.
+static CONDITIONS: [(&str, &str); 14] = [
+    ("temperature", "Temperatur"),
+    ("air temperature", "Lufttemperatur"),
+    ("water temperature", "Wassertemperatur"),
+    ("wall temperature", "Mauertemperatur"),
+    ("reservoir level", "Stauspiegel"),
+    ("water level", "Wasserstand"),
+    ("tailwater level", "Unterwasserstand"),
+    ("seepage", "Sickerwasser"),
+    ("humidity", "Luftfeuchte"),
+    ("pressure", "Luftdruck"),
+    ("wind", "Wind"),
+    ("wind speed", "Windgeschwindigkeit"),
+    ("rain", "Niederschlag"),
+    ("snow", "Schneeh\u{f6}he"),
+];
+
 impl Language {
     /// The texts of the language.
     pub(crate) fn texts(self) -> &'static Texts {
@@ -475,6 +510,19 @@ impl Texts {
             State::Attention => self.states.attention,
             State::Alarm => self.states.alarm,
             State::CannotTell => self.states.cannot_tell,
+        }
+    }
+
+    /// What a project calls a condition of an epoch, without its unit, in words; names that are not in the
+    /// list stay as they are.
+    pub(crate) fn condition(&self, name: &str) -> String {
+        let words = name.replace('_', " ");
+        let known = CONDITIONS
+            .iter()
+            .find(|(english, _)| *english == words.to_lowercase());
+        match (self.language(), known) {
+            (Language::German, Some((_, german))) => (*german).to_owned(),
+            _ => words,
         }
     }
 

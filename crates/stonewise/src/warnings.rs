@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, PoisonError};
 
-/// One thing a user should know about.
+/// One thing that a user must be told.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Warning {
     /// The step that met it.
@@ -12,7 +12,7 @@ pub struct Warning {
     pub subject: String,
     /// What happened, and what to do about it.
     pub message: String,
-    /// An input that was asked for was left out: the run ends with exit code 3.
+    /// An input of the project was left out: the run ends with exit code 3.
     pub skipped_input: bool,
     /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything
     /// else.

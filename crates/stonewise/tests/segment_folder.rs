@@ -2,6 +2,9 @@
 //! resuming and threads can be seen.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
+#[path = "../../../testing/narrow_model.rs"]
+mod narrow_model;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise::segmentation::{FolderJob, FolderSummary, segment_folder};
@@ -11,30 +14,12 @@ use stonewise_io::masks::{MaskSource, read_label_png};
 use stonewise_segment::Weights;
 use stonewise_segment::backend::{Compute, device};
 use stonewise_segment::dataset::Reference;
-use stonewise_segment::model::{
-    BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, RoiConfig, save_model,
-};
+use stonewise_segment::model::{MaskRcnn, Precision, save_model};
 use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::tiling::TilingOptions;
 
 fn weights(path: &Path) -> Weights {
-    let light = MaskRcnnConfig::light();
-    let config = MaskRcnnConfig {
-        backbone: BackboneConfig {
-            width: 8,
-            norm: Norm::Group { groups: 4 },
-            ..light.backbone
-        },
-        fpn_channels: 8,
-        head_groups: Some(4),
-        roi: RoiConfig {
-            box_hidden: 16,
-            mask_channels: vec![8],
-            ..light.roi
-        },
-        ..light
-    };
-    let model = MaskRcnn::<Compute>::init(&config, 3, &device()).unwrap();
+    let model = MaskRcnn::<Compute>::init(&narrow_model::narrow(8), 3, &device()).unwrap();
     save_model(&model, path, Precision::Half).unwrap();
     Weights::File(path.to_owned())
 }

@@ -14,7 +14,7 @@ interface Sheet {
   readonly box: readonly [number, number, number, number];
 }
 
-/** Sheets are made when they are first asked for. */
+/** Sheets are made when they are first shown. */
 export class Backdrop {
   readonly #report: Report;
   readonly #photos: Photos;

@@ -16,7 +16,7 @@ export function legend(report: Report, store: Store, quantities: readonly Quanti
     const marks: Node[] = quantity.scale === "outcomes" ? outcomes(report) : [bar(report, quantity)];
     if (quantity.fades && fade) marks.push(mark("pale", t("belowMark")));
     if (quantity.scale !== "outcomes" && quantity.key !== "opening") marks.push(mark("hatched", t("unmeasured")));
-    marks.push(mark("ring", t("loose")));
+    if (report.document.sound) marks.push(mark("ring", t("loose")));
     element.replaceChildren(...marks, el("span", { class: "note" }, quantity.note));
   };
   store.on((state, before) => {

@@ -19,7 +19,7 @@ const FILTERS = ["filterAll", "filterMoved", "filterAbove", "loose", "filterBelo
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
-  const { stones, document: { statuses, decimals } } = report;
+  const { stones, document: { statuses, decimals, sound } } = report;
   const mm = (metres: number) => fixed(metres * 1e3, decimals);
   const move = (title: string, axis: 0 | 1 | 2): Column => ({
     title, value: (i) => stones.move[axis][i]!, text: (i) => signed(stones.move[axis][i]! * 1e3, decimals),
@@ -45,7 +45,7 @@ export function stoneList(report: Report, store: Store): HTMLElement {
     unmeasured: (i) => !isMeasured(stones, i),
   };
   let sortBy = columns[6]!, descending = true, page = 0;
-  const filter = el("select", {}, ...FILTERS.map((f) => el("option", { value: f }, t(f))));
+  const filter = el("select", {}, ...FILTERS.filter((f) => sound || (f !== "filterMoved" && f !== "loose")).map((f) => el("option", { value: f }, t(f))));
   const body = el("div", { class: "scroll", tabindex: 0, role: "group", "aria-label": t("tableOfAll") }), pager = el("p", { class: "choices" });
   const rows = () => {
     const kept = Array.from({ length: stones.count }, (_, i) => i).filter(passes[filter.value as (typeof FILTERS)[number]]);

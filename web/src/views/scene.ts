@@ -67,7 +67,7 @@ export class WallScene {
   #after = false;
   #shown: { clouds: Clouds; stones: boolean; arrows: boolean; cameras: boolean } = { clouds: "before", stones: true, arrows: true, cameras: false };
   #waiting = false;
-  /** Whether the view knows the size of its place. */
+  /** Whether the view has the size of its place. */
   #placed = false;
 
   constructor(report: Report, store: Store, quantities: readonly Quantity[]) {
@@ -345,7 +345,7 @@ export class WallScene {
     this.element.dataset["clouds"] = String(this.#clouds.filter((c) => c !== null).length);
   }
 
-  /** Puts patches and arrows where the switches want them. */
+  /** Places patches and arrows as the switches say. */
   #move(): void {
     const { stones } = this.#report;
     const factor = this.#exaggeration, shift = this.#after ? factor : 0;

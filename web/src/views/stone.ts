@@ -90,12 +90,12 @@ export class StonePanel {
   }
 
   #head(stone: number): Node {
-    const { stones, document: { statuses } } = this.#report;
+    const { stones, document: { statuses, sound } } = this.#report;
     const badge = (text: string, kind: string) => el("span", { class: `badge ${kind}` }, text);
-    const badges = isMeasured(stones, stone)
-      ? [stones.moved[stone] ? badge(t("badgeMoved"), "strong") : badge(t(stones.significant[stone] ? "badgeAbove" : "badgeBelow"), "weak"),
-        ...(stones.loose[stone] ? [badge(t("loose"), "alarm")] : [])]
-      : [badge(statuses[stones.state[stone]!]!.word, "weak")];
+    const badges = !isMeasured(stones, stone) ? [badge(statuses[stones.state[stone]!]!.word, "weak")]
+      : !sound ? [badge(t("badgeCannotTell"), "weak")]
+      : [stones.moved[stone] ? badge(t("badgeMoved"), "strong") : badge(t(stones.significant[stone] ? "badgeAbove" : "badgeBelow"), "weak"),
+        ...(stones.loose[stone] ? [badge(t("loose"), "alarm")] : [])];
     return el("div", { class: "stone-head" },
       el("div", { class: "stone-title" },
         el("h3", {}, t("stoneTitle", { id: stones.id[stone]! })),

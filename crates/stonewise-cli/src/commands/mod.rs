@@ -25,7 +25,7 @@ pub use outcome::Outcome;
 pub use run::measure;
 use stonewise::Until;
 
-/// Runs the command that was asked for.
+/// Runs the command that the arguments name.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()

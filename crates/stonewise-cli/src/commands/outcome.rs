@@ -3,10 +3,10 @@
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Everything that was asked for was done.
+    /// Everything was done.
     Done,
     /// Done, but for inputs that were left out, or with a doubt about the whole.
     InDoubt,
-    /// The verdict on the wall is one that the caller wanted to hear of.
+    /// The verdict on the wall is at or above the state of `--exit-on`.
     Verdict,
 }

@@ -7,7 +7,7 @@ use anyhow::Result;
 use stonewise::OutputFolder;
 use stonewise::report::Pdf;
 
-/// Writes the report and the layers again, from result files alone; as PDF too where that is asked for.
+/// Writes the report and the layers again, from result files alone; with `--pdf` as PDF, too.
 pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let pdf = args.pdf.as_deref().map(|pdf| Pdf::at(pdf, force)).transpose()?;
     let _folder = OutputFolder::of_results(&args.results)?;

@@ -11,7 +11,7 @@ use stonewise::results::{Status, StoneRow};
 use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
 use stonewise_core::progress::Progress;
 
-/// Runs a whole project; the verdict decides the exit code where that is asked for.
+/// Runs a whole project; with `--exit-on` the verdict decides the exit code.
 pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read(&args.project.project)?;
     let folder = OutputFolder::of_project(&args.project.out, &project, force)?;
@@ -25,7 +25,7 @@ pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome
     })
 }
 
-/// Runs a project as far as asked.
+/// Runs a project up to the step `until`.
 pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> Result<Outcome> {
     let project = Project::read(&args.project)?;
     let folder = OutputFolder::of_project(&args.out, &project, force)?;
@@ -41,8 +41,8 @@ pub fn say_verdict(summary: &Summary, printer: &Printer) {
     }
 }
 
-/// Runs a project as far as asked, in a folder that is claimed already, and says what came out but for the
-/// verdict.
+/// Runs a project up to the step `until`, in a folder that is claimed already, and prints what came out,
+/// except the verdict.
 pub fn run_to(
     folder: &OutputFolder,
     project: &Project,
@@ -75,7 +75,7 @@ fn outcome_of(summary: &Summary) -> Outcome {
     }
 }
 
-/// Runs a project as far as asked; an error says where the results of the last finished run are.
+/// Runs a project up to the step `until`; an error says where the results of the last finished run are.
 ///
 /// # Errors
 /// What stops the run; the error says where the results of the last finished run are.
@@ -102,7 +102,7 @@ fn unfinished(out: &Path) -> String {
     }
 }
 
-/// Says in a few lines what came out; doubts first, and also where nothing but errors is wanted.
+/// Prints in a few lines what came out; doubts come first, and are printed with `--quiet`, too.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     for doubt in summary.doubts() {
         note(&format!("DOUBT: {}: {}", doubt.subject, doubt.message));
@@ -131,6 +131,12 @@ fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>) -> String {
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
     let above = motions().filter(|m| m.significant).count();
+    if verdict.is_some_and(|v| !v.is_sound()) {
+        return format!(
+            "{} stones, {matched} matched, {measured} measured; which of them moved or are loose cannot be told",
+            rows.len()
+        );
+    }
     let loose = motions().filter(|m| m.loose).count();
     let moved = verdict.map_or(String::new(), |v| format!("{} moved, ", v.wall.moved));
     format!(

@@ -36,8 +36,8 @@ pub struct Figures {
     pub normalised: [f64; 2],
     /// Tests of stones that are not loose with p below 0.05, and stones of these called loose.
     pub alarms: [f64; 2],
-    /// Motion against the neighbours of stones that are not loose, in units of its covariance: mean square over its expectation, and
-    /// share beyond the 95 % point.
+    /// Motion against the neighbours of stones that are not loose, in units of its covariance: mean square
+    /// over its expectation, and share beyond the 95 % point.
     pub against: [f64; 2],
     /// Medians of the bounds: stone in the face, out of it, window in the face, out of it.
     pub bounds: [f64; 4],

@@ -2,15 +2,15 @@
 //! docs/src/accuracy.md.
 //!
 //! `cargo run -p stonewise-core --example measure_adjustment [WORD ...]`. Words, in any order: cases `still
-//! translation bulge edge crack settlement loose combo datum` (default: all; `edge`: one bulge at the end of a wall that stood still,
-//! `datum`: combo with the true motion taken out again), sensors `tls uav` (default: both), `seeds=N` (simulated walls, default 5), `seed=N` (one
-//! of them), `dam` (the section beside the checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs
-//! without registration and trajectory errors), `masks` (15 % of the second epoch's masks merged, halved or
-//! swapped), `paper` (the paper's estimator and M3C2 beside it), `each` (a line for every seed), `width=M
-//! height=M` (of the wall, default 4 by 3), `coarse=F` (point spacing times F), `border=F` (width of the
-//! border, in noise levels, where a point's place decides and not its label, as in a run; default 3),
-//! `set:KEY=F` (a parameter of the adjustment), `scale=N` (time for about N stones). A row holds medians over
-//! the seeds. Millimetres.
+//! translation bulge edge crack settlement loose combo datum` (default: all; `edge`: one bulge at the end of
+//! a wall that stood still, `datum`: combo with the true motion taken out again), sensors `tls uav` (default:
+//! both), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
+//! checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and trajectory
+//! errors), `masks` (15 % of the second epoch's masks merged, halved or swapped), `paper` (the paper's
+//! estimator and M3C2 beside it), `each` (a line for every seed), `width=M height=M` (of the wall, default 4
+//! by 3), `coarse=F` (point spacing times F), `border=F` (width of the border, in noise levels, where a
+//! point's place decides and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the
+//! adjustment), `scale=N` (time for about N stones). A row holds medians over the seeds. Millimetres.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 mod bound;
@@ -100,7 +100,7 @@ impl Options {
         self.words.iter().find_map(|w| w.strip_prefix(key)?.parse().ok())
     }
 
-    /// Those of the names that are asked for; all where none is.
+    /// Those that are named; all where none is.
     fn chosen<'a>(&self, names: &[&'a str]) -> Vec<&'a str> {
         let some: Vec<&str> = names.iter().copied().filter(|n| self.has(n)).collect();
         if some.is_empty() { names.to_vec() } else { some }

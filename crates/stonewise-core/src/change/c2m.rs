@@ -7,7 +7,8 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// A mesh prepared for signed distances: its triangles sorted into cells, its normals at faces, edges, vertices.
+/// A mesh prepared for signed distances: its triangles sorted into cells, its normals at faces, edges,
+/// vertices.
 pub struct MeshIndex {
     mesh: TriangleMesh,
     face_normals: Vec<Vector3<f64>>,
@@ -134,8 +135,8 @@ impl MeshIndex {
         best
     }
 
-    /// Visits the triangles of all cells that are `shell` cells away from `cell`; false where no such cell exists
-    /// any more.
+    /// Visits the triangles of all cells that are `shell` cells away from `cell`; false where no such cell
+    /// exists any more.
     fn visit_shell(&self, cell: [i64; 3], shell: i64, mut visit: impl FnMut(usize)) -> bool {
         let range = |a: usize| {
             let low = (cell[a] - shell).max(0);

@@ -44,11 +44,11 @@ pub enum CloudCompareError {
 
 /// M3C2 parameters from the text of the file that CloudCompare's M3C2 dialog saves.
 ///
-/// NormalScale and SearchScale are diameters, SearchDepth is a half-length; all three are needed. RegistrationError and
-/// SubsampleRadius count where their ...Enabled key is true; MinPoints4Stat where UseMinPoints4Stat is true (5
-/// otherwise, as in CloudCompare). The divisor of the variance becomes n (`ddof` 0), as CloudCompare's. Normals
-/// are computed at the core points (NormalMode 0) and point out of the wall, so NormalPreferedOri does not count;
-/// neither do other keys, such as those about output.
+/// NormalScale and SearchScale are diameters, SearchDepth is a half-length; all three are needed.
+/// RegistrationError and SubsampleRadius count where their ...Enabled key is true; MinPoints4Stat where
+/// UseMinPoints4Stat is true (5 otherwise, as in CloudCompare). The divisor of the variance becomes n (`ddof`
+/// 0), as CloudCompare's. Normals are computed at the core points (NormalMode 0) and point out of the wall,
+/// so NormalPreferedOri does not count; neither do other keys, such as those about output.
 ///
 /// # Errors
 /// A key is missing or no number, or an option is set that is not supported; the error names it.

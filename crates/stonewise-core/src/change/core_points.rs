@@ -5,9 +5,9 @@ use nalgebra::Point3;
 
 /// Indices of the points that stay when every voxel keeps only the point nearest to its middle.
 ///
-/// Voxels are cubes of `edge_m` counted from the world's origin, so that neighbouring tiles agree on them. Ties
-/// go to the smaller coordinates; the result is sorted by voxel (z, then y, then x) and does not depend on the
-/// order of the points.
+/// Voxels are cubes of `edge_m` counted from the world's origin, so that neighbouring tiles agree on them.
+/// Ties go to the smaller coordinates; the result is sorted by voxel (z, then y, then x) and does not depend
+/// on the order of the points.
 pub fn thin_to_voxels(points: &[Point3<f64>], edge_m: f64) -> Vec<usize> {
     let mut nearest: CellMap<[i64; 3], (f64, usize)> = CellMap::default();
     for (i, p) in points.iter().enumerate() {

@@ -16,8 +16,8 @@ const Z95: f64 = 1.96;
 /// LoD95 = 1.96 (sqrt(s1^2 / n1 + s2^2 / n2) + reg). A cylinder ends `max_depth_m` before and behind the core
 /// point, border included. `core_points` and `normals` (unit, out of the wall) run in parallel.
 ///
-/// Source: Lague, Brodu & Leroux (2013), equation 1. Cost: core points x points per cylinder. The cells of the
-/// indices are best as large as the cylinder's radius.
+/// Source: Lague, Brodu & Leroux (2013), equation 1. Cost: core points x points per cylinder. The cells of
+/// the indices are best as large as the cylinder's radius.
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};

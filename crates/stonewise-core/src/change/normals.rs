@@ -8,14 +8,16 @@ use rayon::prelude::*;
 /// Which side of the surface is outside.
 #[derive(Clone, Copy, Debug)]
 pub enum OutwardReference<'a> {
-    /// Positions that see the surface from outside, such as camera or scanner centres; the nearest one counts.
+    /// Positions that see the surface from outside, such as camera or scanner centres; the nearest one
+    /// counts.
     Towards(&'a [Point3<f64>]),
     /// A direction, of any length, that points out of the surface everywhere.
     Direction(Vector3<f64>),
 }
 
 impl OutwardReference<'_> {
-    /// The normal or its opposite, whichever points outside at `at`; unchanged where the reference says nothing.
+    /// The normal or its opposite, whichever points outside at `at`; unchanged where the reference says
+    /// nothing.
     pub fn orient(&self, at: &Point3<f64>, normal: Vector3<f64>) -> Vector3<f64> {
         let outside = match self {
             Self::Direction(direction) => *direction,
@@ -36,8 +38,8 @@ impl OutwardReference<'_> {
 /// Unit normals of the least-squares planes through all points within `radius_m`, pointing outside; `None`
 /// where under three points, or only a line of them, lie so near.
 ///
-/// Cost: one pass over the cloud; positions x cells of the index in the sphere and points of the cells on its border,
-/// which is least where a cell is about a tenth of the radius.
+/// Cost: one pass over the cloud; positions x cells of the index in the sphere and points of the cells on its
+/// border, which is least where a cell is about a tenth of the radius.
 pub fn estimate_normals(
     cloud: &GridIndex,
     at: &[Point3<f64>],

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// In files the normal scale and the projection scale are given as a radius (`normal_radius_m`,
 /// `cylinder_radius_m`) or as a diameter (`normal_diameter_m`, `cylinder_diameter_m`, the convention of Lague
-/// et al. and of CloudCompare), never both. `max_depth_m` is a half-length: from the core point to either end.
+/// et al. and of CloudCompare), never both. `max_depth_m` is a half-length: from the core point to either
+/// end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Keys")]
 pub struct M3c2Params {

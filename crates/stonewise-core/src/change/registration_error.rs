@@ -5,19 +5,19 @@ use super::{ChangeField, ChangePoint};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
-/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5 of its size; below, it
-/// is sought numerically, which takes longer.
+/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
+/// of its size; below, it is sought numerically, which takes longer.
 const EXPANDED_FROM: f64 = 12.0;
 /// Cumulative probability at the upper end of a 95 % interval.
 const UPPER_95: f64 = 0.975;
 
 impl ChangeField {
-    /// The same distances, with limits for a registration error of each core point:
-    /// LoD95 = t(nu) sqrt(s1^2 / n1 + s2^2 / n2) + 1.96 reg. Student's quantile t takes the place of 1.96 because the spreads come
-    /// from few points; nu after Welch (1947).
+    /// The same distances, with limits for a registration error of each core point: LoD95 = t(nu) sqrt(s1^2 /
+    /// n1 + s2^2 / n2) + 1.96 reg. Student's quantile t takes the place of 1.96 because the spreads come from
+    /// few points; nu after Welch (1947).
     ///
-    /// `error_m`: standard deviation of the error along the normal, metres. Points without a limit stay without one.
-    /// Source: Lague, Brodu & Leroux (2013), equation 1.
+    /// `error_m`: standard deviation of the error along the normal, metres. Points without a limit stay
+    /// without one. Source: Lague, Brodu & Leroux (2013), equation 1.
     #[must_use]
     pub fn with_registration_errors(mut self, error_m: impl Fn(&ChangePoint) -> f64 + Sync) -> Self {
         let z95 = Normal::standard().inverse_cdf(UPPER_95);

@@ -31,7 +31,8 @@ pub enum SurveyError {
     Params(#[from] M3c2ParamsError),
 }
 
-/// M3C2 of two surveys at core points thinned from the first one; hands each tile's results to `sink`, in order.
+/// M3C2 of two surveys at core points thinned from the first one; hands each tile's results to `sink`, in
+/// order.
 ///
 /// Normals are fitted to the first survey. A core point belongs to the tile that holds it, and every tile is
 /// read with as much surroundings as normals and cylinders need, so results do not depend on the tiles.
@@ -119,8 +120,8 @@ where
     Ok(())
 }
 
-/// Cloud to cloud distances of every point of `compared` to `reference`; `sink(tile, points, distances)` gets them
-/// in the order of the tile's points.
+/// Cloud to cloud distances of every point of `compared` to `reference`; `sink(tile, points, distances)` gets
+/// them in the order of the tile's points.
 ///
 /// Memory: one tile of `compared`, and of `reference` what lies within `max_m` of it.
 ///
@@ -144,8 +145,8 @@ where
     })
 }
 
-/// Signed distances of every point of `compared` to a mesh; `sink(tile, points, distances)` gets them in the order
-/// of the tile's points.
+/// Signed distances of every point of `compared` to a mesh; `sink(tile, points, distances)` gets them in the
+/// order of the tile's points.
 ///
 /// # Errors
 /// As [`c2c_survey`].
@@ -190,7 +191,8 @@ where
     Ok((0..cloud.len()).map(|i| cloud.world(i)).collect())
 }
 
-/// All points inside the region but those of the tile `except`; positions are the tiles' own, not rounded again.
+/// All points inside the region but those of the tile `except`; positions are the tiles' own, not rounded
+/// again.
 fn points_around<S: TileSource>(
     source: &S,
     region: &Bounds,

@@ -236,8 +236,8 @@ fn sort_nearest(found: &mut Vec<(usize, f64)>, k: usize) {
     found.sort_unstable_by(order);
 }
 
-/// By how much a radius that holds `found` of `wanted` points of a surface grows: half as many again as
-/// wanted are then to be expected.
+/// Factor by which to enlarge a radius that holds `found` points of a surface where `wanted` are needed;
+/// about 1.5 times `wanted` are then to be expected.
 fn growth(found: usize, wanted: usize) -> f64 {
     (1.5 * wanted as f64 / found.max(1) as f64).sqrt().clamp(1.2, 2.0)
 }

@@ -3,7 +3,7 @@
 use crate::cloud::Cloud;
 use crate::geometry::Bounds;
 
-/// A cloud cut into tiles; only what is asked for is in memory.
+/// A cloud cut into tiles; only the tiles in use are in memory.
 pub trait TileSource: Sync {
     /// Why a tile could not be read.
     type Error: std::error::Error + Send + Sync + 'static;

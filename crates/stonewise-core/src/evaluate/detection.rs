@@ -68,7 +68,7 @@ pub struct LooseDetection {
 }
 
 impl LooseDetection {
-    /// `None` where no sample knows both.
+    /// `None` where no sample has both flags.
     pub(super) fn of(samples: &[MotionSample]) -> Option<Self> {
         let flags: Vec<(bool, bool)> = samples.iter().filter_map(|s| s.loose).collect();
         let count = |f: fn(&(bool, bool)) -> bool| flags.iter().filter(|x| f(x)).count();

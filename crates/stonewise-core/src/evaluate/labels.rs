@@ -16,7 +16,7 @@ pub struct LabelConfusion {
 /// How many points carry the right stone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabelScore {
-    /// Points of true stones (the ones asked for).
+    /// Points of the true stones that are scored.
     pub stone_points: u64,
     /// Of these, points that carry the one label that stands for their stone.
     pub right: u64,

@@ -1,6 +1,7 @@
 //! A square of the wall's face as a raster: its relief, or which of its points belong to stones.
 
 use crate::geometry::FaceFrame;
+use crate::raster::SumTable;
 use crate::statistics::upper_median;
 use nalgebra::{Point3, Vector3};
 
@@ -83,26 +84,14 @@ impl FacePatch {
     /// Takes the mean of the surroundings off every value.
     fn take_off_surroundings(&mut self) {
         let side = self.side;
-        // Summed-area table of values and counts, with a border of zeros.
-        let mut table = vec![(0.0f64, 0.0f64); (side + 1) * (side + 1)];
-        for j in 0..side {
-            let mut row = (0.0, 0.0);
-            for i in 0..side {
-                let v = self.values[j * side + i];
-                if v.is_finite() {
-                    row = (row.0 + f64::from(v), row.1 + 1.0);
-                }
-                let above = table[j * (side + 1) + i + 1];
-                table[(j + 1) * (side + 1) + i + 1] = (above.0 + row.0, above.1 + row.1);
-            }
-        }
+        // Sums of values and counts.
+        let table = SumTable::new([side, side], |i, j| {
+            let v = self.values[j * side + i];
+            v.is_finite().then_some([f64::from(v), 1.0])
+        });
         for j in 0..side {
             for i in 0..side {
-                let (i0, i1) = (i.saturating_sub(WINDOW), (i + WINDOW + 1).min(side));
-                let (j0, j1) = (j.saturating_sub(WINDOW), (j + WINDOW + 1).min(side));
-                let at = |j: usize, i: usize| table[j * (side + 1) + i];
-                let (a, b, c, d) = (at(j1, i1), at(j0, i1), at(j1, i0), at(j0, i0));
-                let (sum, n) = (a.0 - b.0 - c.0 + d.0, a.1 - b.1 - c.1 + d.1);
+                let [sum, n] = table.window([i, j], WINDOW);
                 // NaN stays where no point lies.
                 self.values[j * side + i] -= (sum / n.max(1.0)) as f32;
             }

@@ -14,10 +14,10 @@ use std::collections::BTreeSet;
 /// [`footprint_overlap`](super::footprint_overlap).
 pub type Overlap<'a> = dyn Fn(&Stone, &Stone, &Vector3<f64>) -> Option<f64> + Sync + 'a;
 
-/// Nearest stones of the second epoch whose overlap is asked for.
+/// Nearest stones of the second epoch whose overlap is computed.
 const OVERLAP_CANDIDATES: usize = 5;
 
-/// What the caller knows beside the two tables of stones.
+/// What matching takes beside the two tables of stones.
 #[derive(Clone, Copy)]
 pub struct Surroundings<'a> {
     /// Whether the second epoch has points, and photos that see them, at a place.

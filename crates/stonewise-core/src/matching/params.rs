@@ -23,7 +23,7 @@ pub struct MatchParams {
     /// Matched neighbours whose median is the local shift; 0 for none. 16: two rings of neighbours, of which
     /// half may be wrong or loose.
     pub shift_neighbours: usize,
-    /// Whether each of the two must be the other's nearest. The paper does not ask for it.
+    /// Whether each of the two must be the other's nearest. The paper does not require it.
     pub mutual: bool,
     /// Least overlap, where the caller can tell it, that makes a pair of two stones that centroids and areas
     /// leave alone: ambiguous ones, and stones that one epoch shows only in part. 0.75: of a stone and one

@@ -1,35 +1,40 @@
 //! Relief of a photo: what a cloud says about the surface behind each pixel, whatever the light.
 
 use super::raster_type::Raster;
+use super::sum_table::SumTable;
 use crate::geometry::Camera;
 use rayon::prelude::*;
 
 /// Values of a pixel of a [`ReliefMap`].
 pub const RELIEF_CHANNELS: usize = 4;
 
-/// Relief of a photo, at its own or a lower resolution: pixel (x, y) of a map of `width` columns covers the same share of the photo.
+/// Relief of a photo, at its own or a lower resolution: pixel (x, y) of a map of `width` columns covers the
+/// same share of the photo.
 ///
 /// Each pixel holds
 ///
-/// 0. height above the face within 6 cm, `h / (|h| + 1 cm)`: edges and joints, -1 to 1, positive towards the camera,
-/// 1. height above the face within 30 cm, `h / (|h| + 4 cm)`: stones before and behind their neighbours, -1 to 1,
+/// 0. height above the face within 6 cm, `h / (|h| + 1 cm)`: edges and joints, -1 to 1, positive towards the
+///    camera,
+/// 1. height above the face within 30 cm, `h / (|h| + 4 cm)`: stones before and behind their neighbours, -1
+///    to 1,
 /// 2. slope: sine of the angle between the two faces, 0 to 1,
-/// 3. confidence: 1 where points fall into the pixel itself, else one over one plus the distance, in pixels, within which points were
-///    found; 0 where there are none, and then all others are 0, too.
+/// 3. confidence: 1 where points fall into the pixel itself, else one over one plus the distance, in pixels,
+///    within which points were found; 0 where there are none, and then all others are 0, too.
 pub type ReliefMap = Raster<[f32; RELIEF_CHANNELS]>;
 
 /// Map pixels per pixel of the photo: a half, as clouds are coarser than photos.
 const MAP_SCALE: f64 = 0.5;
 /// Most pixels of a map. 4 million: the sums of a map take 300 MB.
 const MAX_PIXELS: f64 = 4e6;
-/// Half the side of the windows in which the face is sought, metres on the face. 0.06: wider than a joint, narrower than a stone; 0.3: a
-/// stone and its neighbours.
+/// Half the side of the windows in which the face is sought, metres on the face. 0.06: wider than a joint,
+/// narrower than a stone; 0.3: a stone and its neighbours.
 const FACE_M: [f64; 2] = [0.06, 0.3];
 /// Least half sides of these windows, map pixels: a plane needs that many.
 const LEAST_FACE_PX: [usize; 2] = [2, 6];
 /// Heights that are brought to a half, metres: those of an open joint and of a stone that stands out.
 const HALF_HEIGHT_M: [f64; 2] = [0.01, 0.04];
-/// Half sides of the windows that are searched for points one after the other, map pixels; farther points say nothing about a pixel.
+/// Half sides of the windows that are searched for points one after the other, map pixels; farther points say
+/// nothing about a pixel.
 const SEARCH_PX: [usize; 6] = [0, 1, 2, 4, 8, 16];
 /// Points of which a height is the mean, at least: takes 40 % off the noise.
 const LEAST_POINTS: f64 = 3.0;
@@ -51,7 +56,8 @@ pub struct RangeImage {
 }
 
 impl RangeImage {
-    /// An empty one for the photos of a camera, at half their resolution or such that it has 4 million pixels.
+    /// An empty one for the photos of a camera, at half their resolution or such that it has 4 million
+    /// pixels.
     pub fn new(camera: &Camera) -> Self {
         let photo = [camera.width, camera.height].map(f64::from);
         let scale = MAP_SCALE.min((MAX_PIXELS / (photo[0] * photo[1]).max(1.0)).sqrt());
@@ -79,15 +85,16 @@ impl RangeImage {
 
     /// The relief.
     ///
-    /// The inverse depth of a plane is linear in the pixel coordinates of a pinhole camera (Hartley & Zisserman 2004, section 13.1: the
-    /// plane n X = d is seen at depth d / (n r) along the ray r), so the face around a pixel is the plane of least squares through the
-    /// inverse depths of a window, and a height is measured along its normal. Windows have the same size on the face, whatever the
-    /// distance; their sums come from tables (Crow 1984). Of a lens's distortion only the change within a window is ignored.
+    /// The inverse depth of a plane is linear in the pixel coordinates of a pinhole camera (Hartley &
+    /// Zisserman 2004, section 13.1: the plane n X = d is seen at depth d / (n r) along the ray r), so the
+    /// face around a pixel is the plane of least squares through the inverse depths of a window, and a height
+    /// is measured along its normal. Windows have the same size on the face, whatever the distance; their
+    /// sums come from tables (Crow 1984). Of a lens's distortion only the change within a window is ignored.
     ///
     /// Cost: two fits of a plane for every pixel; 72 bytes a pixel.
     pub fn relief(&self) -> ReliefMap {
         let (width, height) = (self.cells.width() as usize, self.cells.height() as usize);
-        let sums = SumTable::of(&self.cells);
+        let sums = FaceSums::of(&self.cells);
         let mut relief = Raster::filled(width as u32, height as u32, [0.0; RELIEF_CHANNELS]);
         relief
             .data_mut()
@@ -102,7 +109,7 @@ impl RangeImage {
     }
 
     /// The values of a pixel; `None` where nothing is known.
-    fn at(&self, sums: &SumTable, at: [usize; 2]) -> Option<[f32; RELIEF_CHANNELS]> {
+    fn at(&self, sums: &FaceSums, at: [usize; 2]) -> Option<[f32; RELIEF_CHANNELS]> {
         let (reach, near) = self.nearest(sums, at)?;
         let depth = near.pixels / near.q;
         let fit = |scale: usize| {
@@ -131,7 +138,7 @@ impl RangeImage {
     }
 
     /// The points nearest to a pixel, and within how many pixels they lie.
-    fn nearest(&self, sums: &SumTable, at: [usize; 2]) -> Option<(usize, Sums)> {
+    fn nearest(&self, sums: &FaceSums, at: [usize; 2]) -> Option<(usize, Sums)> {
         let width = self.cells.width() as usize;
         let is_enough = |half: usize, found: &Sums| match half {
             0 => f64::from(self.cells.data()[at[1] * width + at[0]].0) >= LEAST_POINTS,
@@ -141,7 +148,8 @@ impl RangeImage {
         windows.into_iter().find(|(half, found)| is_enough(*half, found))
     }
 
-    /// Plane vector of a face: normal over distance from the camera, 1/m; its product with a ray of depth 1 is the inverse depth.
+    /// Plane vector of a face: normal over distance from the camera, 1/m; its product with a ray of depth 1
+    /// is the inverse depth.
     fn normal(&self, face: &Face, at: [usize; 2]) -> nalgebra::Vector3<f64> {
         let [x, y] = [0, 1].map(|axis| at[axis] as f64 + 0.5 - self.center_px[axis]);
         let [u, v] = face.gradient;
@@ -216,16 +224,14 @@ impl Sums {
     }
 }
 
-/// Sums over all pixels above and to the left of a corner, from which those of any window follow (Crow 1984).
-struct SumTable {
-    /// Columns and rows of pixels; the table has one more of each.
-    size: [usize; 2],
-    /// Of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to their mean, which keeps digits.
-    sums: Vec<[f64; 9]>,
+/// Sums over windows of 1, q, x, y, xx, xy, yy, xq, yq; places are relative to the middle, inverse depths to
+/// their mean, which keeps digits.
+struct FaceSums {
+    table: SumTable<9>,
     mean: f64,
 }
 
-impl SumTable {
+impl FaceSums {
     fn of(cells: &Raster<(f32, f64)>) -> Self {
         let size = [cells.width() as usize, cells.height() as usize];
         let seen = cells.data().iter().filter(|cell| cell.0 > 0.0);
@@ -233,37 +239,21 @@ impl SumTable {
             (n + 1.0, sum + cell.1 / f64::from(cell.0))
         });
         let mean = if count > 0.0 { total / count } else { 0.0 };
-        let stride = size[0] + 1;
-        let mut sums = vec![[0.0; 9]; stride * (size[1] + 1)];
         let middle = size.map(|side| 0.5 * side as f64);
-        for y in 0..size[1] {
-            let mut row = [0.0; 9];
-            for x in 0..size[0] {
-                let (points, sum) = cells.data()[y * size[0] + x];
-                if points > 0.0 {
-                    let q = sum / f64::from(points) - mean;
-                    let (x, y) = (x as f64 - middle[0], y as f64 - middle[1]);
-                    let terms = [1.0, q, x, y, x * x, x * y, y * y, x * q, y * q];
-                    row.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-                }
-                let above = sums[y * stride + x + 1];
-                let here = &mut sums[(y + 1) * stride + x + 1];
-                *here = std::array::from_fn(|i| above[i] + row[i]);
-            }
-        }
-        Self { size, sums, mean }
+        let table = SumTable::new(size, |x, y| {
+            let (points, sum) = cells.data()[y * size[0] + x];
+            let q = sum / f64::from(points) - mean;
+            let (x, y) = (x as f64 - middle[0], y as f64 - middle[1]);
+            (points > 0.0).then_some([1.0, q, x, y, x * x, x * y, y * y, x * q, y * q])
+        });
+        Self { table, mean }
     }
 
     /// Sums of the window of `2 half + 1` pixels around a pixel, cut at the border.
     fn window(&self, at: [usize; 2], half: usize) -> Sums {
-        let stride = self.size[0] + 1;
-        let low = at.map(|c| c.saturating_sub(half));
-        let high = [0, 1].map(|axis| (at[axis] + half + 1).min(self.size[axis]));
-        let corner = |x: usize, y: usize| &self.sums[y * stride + x];
-        let (a, b) = (corner(low[0], low[1]), corner(high[0], low[1]));
-        let (c, d) = (corner(low[0], high[1]), corner(high[0], high[1]));
-        let [n, q, x, y, xx, xy, yy, xq, yq]: [f64; 9] = std::array::from_fn(|i| d[i] - b[i] - c[i] + a[i]);
-        let [px, py] = [0, 1].map(|axis| at[axis] as f64 - 0.5 * self.size[axis] as f64);
+        let [n, q, x, y, xx, xy, yy, xq, yq] = self.table.window(at, half);
+        let size = self.table.size();
+        let [px, py] = [0, 1].map(|axis| at[axis] as f64 - 0.5 * size[axis] as f64);
         let (rx, ry) = (x - n * px, y - n * py);
         Sums {
             pixels: n,
@@ -290,7 +280,8 @@ mod tests {
         Camera::pinhole(240, 200, 2500.0)
     }
 
-    /// A range image whose pixels hold three points each, at the depth that a function of the map pixel gives.
+    /// A range image whose pixels hold three points each, at the depth that a function of the map pixel
+    /// gives.
     fn seen(depth: impl Fn(usize, usize) -> Option<f64>) -> RangeImage {
         let mut image = RangeImage::new(&camera());
         for (x, y) in (0..100).flat_map(|y| (0..120).map(move |x| (x, y))) {
@@ -303,7 +294,8 @@ mod tests {
         image
     }
 
-    /// Depth of the plane through (0, 0, 10 m) with a normal, at a map pixel, by the intersection of ray and plane.
+    /// Depth of the plane through (0, 0, 10 m) with a normal, at a map pixel, by the intersection of ray and
+    /// plane.
     fn plane(normal: Vector3<f64>, lifted_m: f64, x: usize, y: usize) -> f64 {
         let pixel = [2.0 * x as f64 + 1.0, 2.0 * y as f64 + 1.0];
         let ray = camera().unproject(pixel).unwrap();
@@ -331,8 +323,8 @@ mod tests {
         }
     }
 
-    /// A pixel of a stone whose face lies 2 cm before the joint around it: what the faces fitted to wall and stone together must leave is
-    /// computed by hand from the shares of the window.
+    /// A pixel of a stone whose face lies 2 cm before the joint around it: what the faces fitted to wall and
+    /// stone together must leave is computed by hand from the shares of the window.
     #[test]
     fn a_step_is_as_high_as_it_is() {
         for normal in [Vector3::z(), Vector3::new(0.7, -0.3, 1.0)] {
@@ -340,9 +332,11 @@ mod tests {
             let relief = seen(step).relief();
             let row = &relief.data()[50 * 120..51 * 120];
             let heights: Vec<f64> = row.iter().map(|v| metres(v[1], 0.04)).collect();
-            // The fitted face is the same on both sides of the edge: between neighbours across it the whole step shows.
+            // The fitted face is the same on both sides of the edge: between neighbours across it the whole
+            // step shows.
             let at_edge = heights[59] - heights[60];
-            // The face itself turns by 1.5 h / side a pixel under a step (least squares through a sign function).
+            // The face itself turns by 1.5 h / side a pixel under a step (least squares through a sign
+            // function).
             assert!((at_edge - 0.02).abs() < 0.0015, "{normal}: {at_edge}");
             assert!(heights[59] > 0.0085 && heights[60] < -0.0085);
             assert!(row[59][0] > 0.4 && row[60][0] < -0.4, "{:?}", &row[58..62]);

@@ -1,4 +1,4 @@
-//! Repeatable noise: a function of a place and a seed, never of the order in which it is asked.
+//! Repeatable noise: a function of a place and a seed, never of the order of calls.
 
 use rand::RngExt;
 use std::f64::consts::TAU;

@@ -1,4 +1,4 @@
-//! The part of a wall that is worked on, sampled once so that rays can ask it millions of times.
+//! The part of a wall that is worked on, sampled once for millions of rays.
 
 use crate::simulate::noise::Row;
 use crate::simulate::wall::Wall;
@@ -102,7 +102,7 @@ pub struct Surface {
     pub top_m: f64,
 }
 
-/// Faces of stones that were sampled for one window and may be wanted for the next.
+/// Faces of stones that were sampled for one window and may be needed for the next.
 #[derive(Clone, Debug, Default)]
 pub struct SampledFaces(BTreeMap<usize, Arc<HeightGrid>>);
 

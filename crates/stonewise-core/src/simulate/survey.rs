@@ -78,7 +78,7 @@ pub struct EpochScans {
 }
 
 impl World {
-    /// Builds the wall and moves its stones. Surfaces are sampled when they are asked for.
+    /// Builds the wall and moves its stones. Surfaces are sampled when they are first used.
     pub fn new(params: &SceneParams) -> Self {
         let wall = Wall::new(&params.wall);
         let motions = move_stones(&wall, &params.motions, params.seed);

@@ -10,8 +10,9 @@ use crate::raster::{RangeImage, ReliefMap};
 
 /// The relief of what a photo shows, see [`ReliefMap`].
 ///
-/// Points behind the nearest surface are left out, with the depth map and the tolerance that [`super::transfer_labels`] uses. Cost: three
-/// passes over the tiles that the photo may show; memory holds one of them and the depth map.
+/// Points behind the nearest surface are left out, with the depth map and the tolerance that
+/// [`super::transfer_labels`] uses. Cost: three passes over the tiles that the photo may show; memory holds
+/// one of them and the depth map.
 ///
 /// # Errors
 /// A tile cannot be read, or the caller stopped it.
@@ -82,7 +83,8 @@ mod tests {
     use crate::id::ImageId;
     use nalgebra::Point3;
 
-    /// A wall at 10 m with a joint of 4 cm width and 3 cm depth every 40 cm, a second wall 5 m behind it, and a board 1 m before it.
+    /// A wall at 10 m with a joint of 4 cm width and 3 cm depth every 40 cm, a second wall 5 m behind it, and
+    /// a board 1 m before it.
     #[test]
     fn joints_of_a_wall_lie_low_and_what_is_hidden_is_left_out() {
         let mut points = Vec::new();

@@ -22,8 +22,8 @@ pub(super) struct LocalSurface {
 }
 
 impl LocalSurface {
-    /// Cosine of the angle between a line of sight (unit vector) and the face's normal. A cell without a normal (one or two points) says
-    /// nothing about incidence: 0.5.
+    /// Cosine of the angle between a line of sight (unit vector) and the face's normal. A cell without a
+    /// normal (one or two points) says nothing about incidence: 0.5.
     #[inline]
     pub(super) fn cosine(&self, line: &Vector3<f64>) -> f64 {
         if self.normal == Vector3::zeros() {
@@ -92,14 +92,14 @@ impl SurfaceCells {
         }
     }
 
-    /// The points of the tile, cell by cell. Neighbours then come one after the other, whose pixels lie in the
-    /// processor's cache.
+    /// The points of the tile, cell by cell. Neighbours then come one after the other, whose pixels lie in
+    /// the processor's cache.
     pub(super) fn groups(&self, cloud: &Cloud) -> Vec<SurfaceGroup> {
         self.groups_of(cloud, &(0..cloud.len() as u32).collect::<Vec<u32>>())
     }
 
-    /// Some of the points of the tile, cell by cell; places in `chosen` stand for points. Those without a cell are in
-    /// no group.
+    /// Some of the points of the tile, cell by cell; places in `chosen` stand for points. Those without a
+    /// cell are in no group.
     pub(super) fn groups_of(&self, cloud: &Cloud, chosen: &[u32]) -> Vec<SurfaceGroup> {
         let points: Vec<Point3<f64>> = chosen.iter().map(|&i| cloud.local(i as usize)).collect();
         let group = |(key, points): ([i32; 3], Vec<u32>)| {
@@ -161,8 +161,8 @@ impl SurfaceCells {
     }
 }
 
-/// Takes lone points (leaves, birds, mixed returns) for what they are: points without a surface around them, not the
-/// corners of a large one, which would hide what lies behind.
+/// Takes lone points (leaves, birds, mixed returns) for what they are: points without a surface around them,
+/// not the corners of a large one, which would hide what lies behind.
 ///
 /// A cell's spacing is limited by what is usual in its block of the world, whatever tiles that falls into.
 pub(super) fn limit_spacings(tiles: &mut [SurfaceCells]) {

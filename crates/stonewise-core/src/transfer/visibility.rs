@@ -23,7 +23,7 @@ pub(super) struct Sighting {
     pub weight: f32,
 }
 
-/// Everything needed to ask all photos about any point.
+/// Everything needed to look up any point in all photos.
 pub(super) struct Observer<'a> {
     views: Vec<&'a View>,
     centres: Vec<Point3<f64>>,
@@ -51,8 +51,8 @@ impl<'a> Observer<'a> {
         Ok(Self::of(views, labels, depths, (surfaces, 0), params))
     }
 
-    /// The same from depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles, and the number of the first.
-    /// What no tile of these needs may be empty.
+    /// The same from depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles,
+    /// and the number of the first. What no tile of these needs may be empty.
     pub(super) fn of(
         views: Vec<&'a View>,
         labels: Vec<RunLabels>,
@@ -102,8 +102,8 @@ impl<'a> Observer<'a> {
         all.get(all.len() / 2).copied().map_or(0.0, f64::from)
     }
 
-    /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the order of
-    /// `chosen`.
+    /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the
+    /// order of `chosen`.
     ///
     /// Points come cell by cell: their surface is looked up once, and the photos show them side by side.
     pub(super) fn sight_all<R: Clone + Default + Send>(
@@ -162,7 +162,7 @@ impl<'a> Observer<'a> {
         let step = self.params.silhouette_step_m + tolerance;
         let beside_an_occluder = depth > f64::from(least) + step;
         let on_an_edge = f64::from(greatest) > depth + step;
-        // Precision of a border on the face: finer and less oblique photos know better where a stone ends. The
+        // Precision of a border on the face: finer and less oblique photos place it more precisely. The
         // root keeps one close photo from outvoting the majority.
         let precision = (cosine / view.gsd_m(depth)).sqrt();
         let weight = if beside_an_occluder || on_an_edge {

@@ -74,10 +74,10 @@ impl<'a> Electorate<'a> {
 
     /// Counts the votes at a point; `None` where no photo votes.
     ///
-    /// Background counts against a stone only in photos that show the stone elsewhere: they know where it
-    /// ends. A photo that does not show the stone at all has had its say when the stone as a whole was
-    /// accepted, and only lowers the share. Between a stone and background a tie goes to the stone, between
-    /// stones to the lower index.
+    /// Background counts against a stone only in photos that show the stone elsewhere, because only there a
+    /// border was drawn. A photo that does not show the stone at all was counted when the stone as a whole
+    /// was accepted; here it only lowers the share. Between a stone and background a tie goes to the stone,
+    /// between stones to the lower index.
     pub(super) fn count(&self, sightings: &[Sighting]) -> Option<Verdict> {
         let mut tally: Vec<(u32, f64)> = Vec::with_capacity(4);
         let mut total = 0.0;

@@ -11,6 +11,6 @@ pub struct CameraFile {
     pub skipped: Vec<(String, String)>,
     /// Coordinate reference system of the world frame as the file writes it, where it says.
     pub crs: Option<String>,
-    /// What a person should know about how the file was read.
+    /// How the file was read, where a reader of the results must be told.
     pub warnings: Vec<String>,
 }

@@ -1,8 +1,8 @@
 //! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM.
 //!
-//! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file, first pixel centre at (0.5,
-//! 0.5), poses that take world to camera. Views keep the order of the file, and a view's image id is its
-//! index.
+//! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
+//! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
+//! view's image id is its index.
 
 mod camera_file;
 mod colmap;

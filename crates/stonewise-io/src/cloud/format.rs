@@ -26,7 +26,7 @@ impl CloudFormat {
     /// The format of a file: by its first bytes, else by its extension.
     ///
     /// # Errors
-    /// The file cannot be read, or is none that this crate knows.
+    /// The file cannot be read, or its format is not supported.
     pub fn of(path: &Path) -> Result<Self, CloudError> {
         let mut start = Vec::new();
         File::open(path)

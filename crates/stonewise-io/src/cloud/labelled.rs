@@ -35,7 +35,8 @@ pub fn write_labelled<E: From<CloudError>>(
     })
 }
 
-/// Copies the points that `keep` wants, by the index of their record, to a LAZ file; see [`write_labelled`].
+/// Copies the points that `keep` accepts, by the index of their record, to a LAZ file; see
+/// [`write_labelled`].
 ///
 /// # Errors
 /// As [`write_labelled`], or what `keep` returns.

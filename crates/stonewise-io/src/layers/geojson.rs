@@ -12,8 +12,8 @@ use std::path::Path;
 /// Writes a layer as a feature collection, one feature a line, coordinates rounded to a micrometre.
 ///
 /// RFC 7946 requires longitude and latitude; coordinates here are those of the layer. A layer with a
-/// reference system says so in the member `crs` of the format's 2008 version; of a local frame readers must
-/// be told (QGIS asks). A feature with too few or infinite vertices has geometry null.
+/// reference system says so in the member `crs` of the format's 2008 version; for a local frame the reader
+/// sets it by hand (QGIS opens a dialog). A feature with too few or infinite vertices has geometry null.
 ///
 /// # Errors
 /// Lengths differ, or the file cannot be written; an earlier file is kept then.

@@ -152,14 +152,12 @@ impl CocoMasks {
         let Some(image) = self.find(photo_name)? else {
             return Ok(None);
         };
-        if (image.width, image.height) != (width, height) {
-            return Err(MaskError::WrongSize {
-                path: self.path.clone(),
-                photo: photo_name.to_owned(),
-                found: (image.width, image.height),
-                expected: (width, height),
-            });
-        }
+        MaskError::check_size(
+            &self.path,
+            photo_name,
+            (image.width, image.height),
+            (width, height),
+        )?;
         let annotations = self.annotations.get(&image.id).map_or(&[][..], Vec::as_slice);
         let mut warnings = Vec::new();
         let mut masks: Vec<(u64, u32, Spans)> = Vec::new();

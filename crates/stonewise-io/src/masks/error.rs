@@ -1,7 +1,7 @@
 //! What can go wrong with masks.
 
 use crate::image_io::ImageIoError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why masks could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -116,4 +116,24 @@ pub enum MaskError {
     /// The picture itself is broken or cannot be written.
     #[error(transparent)]
     Image(#[from] ImageIoError),
+}
+
+impl MaskError {
+    /// Refuses masks of another size than the photo's.
+    pub(super) fn check_size(
+        path: &Path,
+        photo: &str,
+        found: (u32, u32),
+        expected: (u32, u32),
+    ) -> Result<(), Self> {
+        match found == expected {
+            true => Ok(()),
+            false => Err(Self::WrongSize {
+                path: path.to_owned(),
+                photo: photo.to_owned(),
+                found,
+                expected,
+            }),
+        }
+    }
 }

@@ -58,14 +58,7 @@ impl LabelFolder {
             return Ok(None);
         };
         let decoder = label_decoder(path)?;
-        if decoder.dimensions() != (width, height) {
-            return Err(MaskError::WrongSize {
-                path: path.clone(),
-                photo: photo_name.to_owned(),
-                found: decoder.dimensions(),
-                expected: (width, height),
-            });
-        }
+        MaskError::check_size(path, photo_name, decoder.dimensions(), (width, height))?;
         let labels = decode_labels(decoder, path)?;
         let ids: BTreeSet<u32> = labels.data().iter().copied().filter(|&id| id != 0).collect();
         let mut warnings = Vec::new();

@@ -20,6 +20,6 @@ pub struct InstanceInfo {
     pub id: u32,
     /// How sure the segmentation was, 0 to 1; 1 where the file does not say.
     pub score: f64,
-    /// The true stone where the file knows it (extra key `stone_id`); for evaluation only.
+    /// The true stone, if the file has the extra key `stone_id`; for evaluation only.
     pub stone_ref: Option<u64>,
 }

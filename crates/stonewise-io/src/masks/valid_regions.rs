@@ -66,14 +66,7 @@ impl ValidRegions {
         let Some((name, photo)) = self.find(photo_name)? else {
             return Ok(None);
         };
-        if (photo.width, photo.height) != (width, height) {
-            return Err(MaskError::WrongSize {
-                path: self.path.clone(),
-                photo: name.clone(),
-                found: (photo.width, photo.height),
-                expected: (width, height),
-            });
-        }
+        MaskError::check_size(&self.path, name, (photo.width, photo.height), (width, height))?;
         let mut outside = Raster::filled(width, height, true);
         for region in &photo.valid {
             let rings: Vec<Vec<[f64; 2]>> = std::iter::once(&region.outer)

@@ -35,7 +35,7 @@ pub enum TableError {
         name: String,
         /// Type in the table.
         found: &'static str,
-        /// Type asked for.
+        /// Type that was to be read.
         expected: &'static str,
     },
     /// A column has empty cells where none are allowed.

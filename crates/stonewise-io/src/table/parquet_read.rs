@@ -25,7 +25,7 @@ pub fn read_parquet(path: &Path) -> Result<Table, TableError> {
     guarded(path, || read_selected(path, None))
 }
 
-/// Reads some columns of a Parquet file, in the order asked for, and all metadata.
+/// Reads some columns of a Parquet file, in the order of the argument, and all metadata.
 ///
 /// # Errors
 /// As [`read_parquet`], or a column is missing.

@@ -13,7 +13,7 @@ pub struct Reference {
     valid: Option<ValidRegions>,
 }
 
-/// Photos whose stones have masks. They stay on disk until they are asked for.
+/// Photos whose stones have masks. They stay on disk until they are read.
 #[derive(Clone, Debug)]
 pub struct LabelledPhotos {
     photos: Vec<PathBuf>,

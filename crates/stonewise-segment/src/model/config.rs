@@ -112,9 +112,9 @@ pub struct MaskRcnnConfig {
     pub pixel_mean: [f32; 3],
     /// Each channel is divided by this.
     pub pixel_std: [f32; 3],
-    /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it has not learnt relief. They
-    /// have a convolution of their own, whose output is added to that of the colours: a wider first layer, of which colour alone uses its
-    /// part.
+    /// Channels of [relief](stonewise_core::raster::ReliefMap) that the model takes beside colour, 0 where it
+    /// has not learnt relief. They have a convolution of their own, whose output is added to that of the
+    /// colours: a wider first layer, of which colour alone uses its part.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub relief_channels: usize,
     /// Size at which images are looked at; `None` as they are.

@@ -3,18 +3,19 @@
 use super::boxes::Bounds;
 use stonewise_core::raster::RgbImage;
 
-/// Least difference of a colour between two places of the box of a stone, of 255. 4: 1.5 %, about the least that an eye tells apart;
-/// rounding and compression of a plain surface stay below it.
+/// Least difference of a colour between two places of the box of a stone, of 255. 4: 1.5 %, about the least
+/// that an eye tells apart; rounding and compression of a plain surface stay below it.
 const LEAST_DIFFERENCE: u8 = 4;
-/// How far apart the two places are along a row or a column, pixels. 4: a blurred edge lies within, and the slow change of a sky or of
-/// a shaded surface does not reach the difference.
+/// How far apart the two places are along a row or a column, pixels. 4: a blurred edge lies within, and the
+/// slow change of a sky or of a shaded surface does not reach the difference.
 const APART_PX: u32 = 4;
 
 /// Whether the part of an image in a box shows an edge or a texture.
 ///
-/// In images that show nothing, stones are reported with scores of up to 1.00. The likely cause, not tested apart from others: the network
-/// normalises its features to one spread in every image (group normalisation, Wu & He 2018), and there all spread comes from the zeros with
-/// which its layers are padded at the border. Where the box of a stone has neither a joint nor a texture, there is nothing that could be one.
+/// In images that show nothing, stones are reported with scores of up to 1.00. The likely cause, not tested
+/// apart from others: the network normalises its features to one spread in every image (group normalisation,
+/// Wu & He 2018), and there all spread comes from the zeros with which its layers are padded at the border.
+/// Where the box of a stone has neither a joint nor a texture, there is nothing that could be one.
 pub(super) fn has_contrast(image: &RgbImage, [left, top, right, bottom]: Bounds) -> bool {
     let range =
         |low: f32, high: f32, size: u32| (low.max(0.0) as u32)..(high.ceil().max(0.0) as u32).min(size);

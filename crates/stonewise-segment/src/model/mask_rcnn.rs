@@ -113,8 +113,8 @@ impl<B: ModelBackend> MaskRcnn<B> {
         self
     }
 
-    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture. `relief`: that of the whole
-    /// image, at any resolution.
+    /// The stones of an image, best score first; none where the image shows neither an edge nor a texture.
+    /// `relief`: that of the whole image, at any resolution.
     pub fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Vec<Detection> {
         let size = [image.width(), image.height()];
         let detection = |instance: Instance| Detection {

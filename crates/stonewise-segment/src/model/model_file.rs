@@ -37,8 +37,8 @@ pub fn load_model<B: ModelBackend>(path: &Path, device: &Device<B>) -> Result<Ma
     model_from_bytes(&bytes, &path.display().to_string(), false, device)
 }
 
-/// A model from the bytes of its file; `name` stands for it in errors. `relief`: it takes relief, with weights of zero where the file has
-/// none.
+/// A model from the bytes of its file; `name` stands for it in errors. `relief`: it takes relief, with
+/// weights of zero where the file has none.
 ///
 /// # Errors
 /// As [`load_model`].

@@ -70,8 +70,8 @@ pub fn batch<B: Backend>(
     Tensor::from_data(TensorData::new(values, [images.len(), 3, height, width]), device)
 }
 
-/// Relief [batch, channels, rows, columns] of a batch of images that has so many columns and rows, zeros where an image has none;
-/// `None` where no image has any.
+/// Relief [batch, channels, rows, columns] of a batch of images that has so many columns and rows, zeros
+/// where an image has none; `None` where no image has any.
 pub fn relief_batch<B: Backend>(
     reliefs: &[Option<&ReliefMap>],
     seen: &[Seen],

@@ -132,8 +132,8 @@ impl<B: ModelBackend> Resnet<B> {
         self.relief.is_some()
     }
 
-    /// Features at strides 4, 8, 16 and 32 of an image batch [batch, 3, rows, columns] and, where there is any, its relief
-    /// [batch, relief, rows, columns].
+    /// Features at strides 4, 8, 16 and 32 of an image batch [batch, 3, rows, columns] and, where there is
+    /// any, its relief [batch, relief, rows, columns].
     pub fn forward(&self, x: Tensor<B, 4>, relief: Option<Tensor<B, 4>>) -> [Tensor<B, 4>; 4] {
         let colour = self.conv1.forward(x);
         let x = match (&self.relief, relief) {

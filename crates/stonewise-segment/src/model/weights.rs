@@ -99,8 +99,8 @@ pub enum WeightsError {
     },
 }
 
-/// Replaces all parameters of a model by those of a file. A file of colour alone fits a model with relief, too: the weights of relief
-/// become zeros, and the model does what it did without.
+/// Replaces all parameters of a model by those of a file. A file of colour alone fits a model with relief,
+/// too: the weights of relief become zeros, and the model does what it did without.
 ///
 /// # Errors
 /// The file cannot be read, lacks a parameter, has one too many or one of another shape.

@@ -6,7 +6,8 @@ use rand_chacha::ChaCha8Rng;
 /// The one source of randomness of a photo.
 pub(super) type Rng = ChaCha8Rng;
 
-/// A stream of numbers of a seed, apart from the others: what is drawn from one changes nothing about the rest.
+/// A stream of numbers of a seed, apart from the others: what is drawn from one changes nothing about the
+/// rest.
 pub(super) fn stream(seed: u64, number: u64) -> Rng {
     let mut rng = Rng::seed_from_u64(seed);
     rng.set_stream(number);

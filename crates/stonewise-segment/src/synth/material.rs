@@ -240,7 +240,7 @@ pub(super) struct Look {
     pub(super) retreat: f32,
 }
 
-/// Noise fields of a wall's materials, ready to be asked.
+/// Noise fields of a wall's materials, ready to be evaluated.
 pub(super) struct Surface {
     material: Material,
     mortar: Mortar,

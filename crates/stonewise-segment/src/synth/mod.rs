@@ -66,8 +66,9 @@ pub fn masonry_photo_of(style: &MasonryStyle, seed: u64, width: u32, height: u32
     rendered(style, None, seed, width, height)
 }
 
-/// The photo of [`masonry_photo`] with the relief that a cloud of a kind drawn at random gives it: in two of five photos none, in a
-/// quarter a terrestrial scan, in a fifth one from a drone, in the others a cloud from stereo photos.
+/// The photo of [`masonry_photo`] with the relief that a cloud of a kind drawn at random gives it: in two of
+/// five photos none, in a quarter a terrestrial scan, in a fifth one from a drone, in the others a cloud from
+/// stereo photos.
 pub fn surveyed_photo(seed: u64, width: u32, height: u32) -> Sample {
     surveyed_photo_by(Survey::sometimes(seed).as_ref(), seed, width, height)
 }

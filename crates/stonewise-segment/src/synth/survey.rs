@@ -39,12 +39,14 @@ pub struct Survey {
     pub kind: SurveyKind,
     /// Size of the wall's median stone, metres, 0.12 to 1.2.
     pub stone_m: f32,
-    /// Distance between points, metres: 3 to 10 mm from the ground, 15 to 40 mm from the air; of stereo photos 1 to 3 pixels.
+    /// Distance between points, metres: 3 to 10 mm from the ground, 15 to 40 mm from the air; of stereo
+    /// photos 1 to 3 pixels.
     pub spacing_m: f32,
-    /// Standard deviation along the line of sight, metres: 1 to 6 mm from the ground, 5 to 20 mm from the air; of stereo photos 0.3 to 1.5
-    /// pixels, most of it waves.
+    /// Standard deviation along the line of sight, metres: 1 to 6 mm from the ground, 5 to 20 mm from the
+    /// air; of stereo photos 0.3 to 1.5 pixels, most of it waves.
     pub noise_m: f32,
-    /// Shift of the cloud in the photo, pixels, within 1.5 along both axes: the errors of poses and registration.
+    /// Shift of the cloud in the photo, pixels, within 1.5 along both axes: the errors of poses and
+    /// registration.
     pub shift_px: [f32; 2],
     /// Direction in the photo towards the scanner, radians, and its height over the wall, 0.4 to 1.3 radians.
     pub scanner: [f32; 2],

@@ -139,8 +139,9 @@ impl View {
         [p.x / p.z + self.middle[0], p.y / p.z + self.middle[1]]
     }
 
-    /// The wall's plane as a camera sees it whose focal length is `focal_px`: normal over distance, one over units of the wall. Its product
-    /// with the ray of depth 1 through a place of the photo is the inverse depth there.
+    /// The wall's plane as a camera sees it whose focal length is `focal_px`: normal over distance, one over
+    /// units of the wall. Its product with the ray of depth 1 through a place of the photo is the inverse
+    /// depth there.
     pub(super) fn plane(&self, focal_px: f32) -> Vector3<f32> {
         let m = &self.wall_from_photo;
         Vector3::new(m[(2, 0)] * focal_px, m[(2, 1)] * focal_px, m[(2, 2)])

@@ -122,10 +122,6 @@ mod tests {
             scales: vec![0.25],
             ..options
         };
-        assert_eq!(
-            coarse.scales_for(300, 500),
-            [0.25],
-            "what was asked for alone is kept"
-        );
+        assert_eq!(coarse.scales_for(300, 500), [0.25], "only what was set is kept");
     }
 }

@@ -23,7 +23,8 @@ pub enum TilingError<E> {
     Interrupted(#[from] Interrupted),
 }
 
-/// The stones of a photo of any size. `relief`: what a cloud says about its surface, at any resolution; `None` without a cloud.
+/// The stones of a photo of any size. `relief`: what a cloud says about its surface, at any resolution;
+/// `None` without a cloud.
 ///
 /// The photo is looked at as it is first; where its stones are too small or too large for the detector, also
 /// enlarged or reduced ([`TilingOptions::stone_px`]). `progress` advances by one for every tile,

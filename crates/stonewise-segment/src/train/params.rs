@@ -33,8 +33,8 @@ pub struct TrainParams {
     pub schedule: Schedule,
     /// The optimiser.
     pub optimizer: AdamWParams,
-    /// Whether the detector learns relief beside colour. Rendered photos come with clouds then, of all kinds and none; weights that have
-    /// not learnt relief start with zeros for it.
+    /// Whether the detector learns relief beside colour. Rendered photos come with clouds then, of all kinds
+    /// and none; weights that have not learnt relief start with zeros for it.
     pub relief: bool,
     /// How images cut from labelled photos vary; rendered photos vary by themselves.
     pub augment: AugmentParams,
@@ -62,8 +62,8 @@ impl Default for TrainParams {
 }
 
 impl TrainParams {
-    /// For a detector that has learnt before: a lower learning rate keeps what it knows, and fewer steps are
-    /// enough.
+    /// For a detector that has learnt before: a lower learning rate keeps what it has learnt, and fewer steps
+    /// are enough.
     pub fn fine_tuning() -> Self {
         let from_scratch = Self::default();
         Self {

@@ -23,9 +23,9 @@ const VALIDATION: &str = "validation.csv";
 pub enum Stop {
     /// The whole training is done.
     Finished,
-    /// The time of this run is over; the same call goes on.
+    /// The time of this run is over; the same call continues.
     TimeIsUp,
-    /// The caller wanted it; the same call goes on.
+    /// The caller cancelled it; the same call continues.
     Interrupted,
 }
 

@@ -6,7 +6,7 @@ use std::thread::Scope;
 
 /// A supply of images without end, each told by its number.
 pub trait SampleSource: Sync {
-    /// The image of this number: the same whenever it is asked for, so that a training that was interrupted
+    /// The image of this number: the same at every call, so that a training that was interrupted
     /// goes on as if it had not been.
     ///
     /// # Errors

@@ -76,7 +76,7 @@ fn train(out: &Path, total: u64, until: u64) -> (Stop, Trainer<B>) {
     (stop, trainer)
 }
 
-/// Cancels when it was asked so often.
+/// Cancels at the call of this number.
 struct StopAfter {
     steps: std::sync::atomic::AtomicU64,
 }

@@ -36,7 +36,7 @@ struct Compared {
     pixel_m: f64,
 }
 
-/// Asks whether photos see the cloud; fully, compares some photos of an epoch with its cloud.
+/// Checks that photos see the cloud; at full depth, compares some photos of an epoch with its cloud, too.
 pub(super) fn look(epoch: &Epoch, survey: &Sample, depth: Depth) -> Result<(Vec<Finding>, Option<Picture>)> {
     let topic = "cameras against cloud";
     let finding = |verdict, text: String| vec![Finding::new(&epoch.name, topic, verdict, text)];

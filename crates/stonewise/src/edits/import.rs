@@ -18,7 +18,7 @@ pub struct Imported {
     pub file: EditsFile,
     /// How many are new.
     pub new: usize,
-    /// What a person should know: features that are no edit, one sentence each.
+    /// Notes for the user, one sentence each: features that are no edit.
     pub notes: Vec<String>,
 }
 

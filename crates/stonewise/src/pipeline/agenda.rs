@@ -8,8 +8,8 @@ use stonewise_core::progress::Progress;
 /// Name of the steps that edit labels, before their numbers.
 const EDITS: &str = "edit";
 
-/// The steps of a run in order: each under the name that the runner gives it, and in words. Work that is not on the
-/// list counts as part of the step before it.
+/// The steps of a run in order: each under the name that the runner gives it, and in words. Work that is not
+/// on the list counts as part of the step before it.
 #[derive(Debug, Default)]
 pub struct Agenda(Vec<(String, String)>);
 
@@ -45,7 +45,8 @@ impl Agenda {
         agenda
     }
 
-    /// The steps of a comparison of two clouds: those of `epochs` are cut into tiles, then comes `compare` under the name `step`.
+    /// The steps of a comparison of two clouds: those of `epochs` are cut into tiles, then comes `compare`
+    /// under the name `step`.
     pub fn of_clouds(
         project: &Project,
         epochs: std::ops::RangeInclusive<usize>,

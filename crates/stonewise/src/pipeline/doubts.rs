@@ -5,21 +5,23 @@ use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, Doubt, FEW_MEASURED, NOT_CONVERGED, fill};
+use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, Message, NOT_CONVERGED};
 use stonewise_core::stone::StoneMotion;
 
-/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which something other
-/// than noise hides the motions.
+/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
+/// something other than noise hides the motions.
 const LIMIT_EXCESS: f64 = 100.0;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
 
-/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a tenth of a small
-/// stone.
+/// Labels that lie further than this beside the stones belong to other surfaces in the two epochs, metres: a
+/// tenth of a small stone.
 const OFFSET_M: f64 = 0.03;
-/// Labels lie beside the stones where the surface at their own place is less alike than this share of the best place's.
+/// Labels lie beside the stones where the surface at their own place is less alike than this share of the
+/// best place's.
 const UNLIKE: f64 = 0.6;
-/// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same surface is about 0.9.
+/// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same
+/// surface is about 0.9.
 const LIKE: f64 = 0.3;
 
 /// Warns where the motions of a pair of epochs cannot be relied on.
@@ -60,7 +62,7 @@ fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(Stri
 }
 
 /// An offset in words, if it is clear and large.
-fn off_place(doubt: &Doubt, offset: &LabelOffset, first: &str) -> Option<String> {
+fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<String> {
     let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
     let is_off = is_clear && offset.length_m() > OFFSET_M;
     let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
@@ -72,7 +74,7 @@ fn off_place(doubt: &Doubt, offset: &LabelOffset, first: &str) -> Option<String>
         ("up", &*up),
         ("first", &*first),
     ];
-    is_off.then(|| fill(doubt.english, &values))
+    is_off.then(|| doubt.say(&values))
 }
 
 /// The adjustment stopped before its motions had settled.
@@ -81,7 +83,7 @@ fn unsettled(registered: &Registered) -> Option<String> {
         return None;
     };
     let iterations = adjustment.iterations.to_string();
-    (!adjustment.converged).then(|| fill(NOT_CONVERGED.english, &[("iterations", &*iterations)]))
+    (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
@@ -101,7 +103,7 @@ fn few_measured(rows: &[StoneRow]) -> Option<String> {
             ("matched", &*matched.to_string()),
             ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
         ];
-        fill(FEW_MEASURED.english, &values)
+        FEW_MEASURED.say(&values)
     })
 }
 
@@ -126,6 +128,6 @@ fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
     (excess > LIMIT_EXCESS).then(|| {
         let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
         let values = [("limit", &*limit), ("excess", &*format!("{excess:.0}"))];
-        fill(BLIND.english, &values)
+        BLIND.say(&values)
     })
 }

@@ -28,7 +28,8 @@ pub struct MatchedPair {
 }
 
 impl MatchedPair {
-    /// The stones of two epochs that `matches` names, in neighbourhoods: sorted by the cell of the first centroid, then by stone.
+    /// The stones of two epochs that `matches` names, in neighbourhoods: sorted by the cell of the first
+    /// centroid, then by stone.
     pub fn of_matches(first: &[Stone], second: &[Stone], matches: &[(StoneId, StoneId)]) -> Vec<Self> {
         let [ones, twos] = [first, second].map(|stones| {
             stones
@@ -51,7 +52,8 @@ impl MatchedPair {
         pairs
     }
 
-    /// Its points out of those near it in both epochs, relative to its centroid in the first; see [`stone_points`].
+    /// Its points out of those near it in both epochs, relative to its centroid in the first; see
+    /// [`stone_points`].
     pub fn points(&self, near: [&[NearPoint]; 2], border_noises: f64) -> PairPoints {
         let chosen = stone_points(near, &self.first.normal, &self.shift, border_noises);
         let cloud = |offsets| Cloud::new(self.first.centroid, offsets);
@@ -89,8 +91,8 @@ struct Place {
 }
 
 impl PairPlaces {
-    /// The places in the first epoch, or in the later one. `extents`: boxes of the first epoch's stones by stone, metres; without a box
-    /// only points with the stone's own label count.
+    /// The places in the first epoch, or in the later one. `extents`: boxes of the first epoch's stones by
+    /// stone, metres; without a box only points with the stone's own label count.
     pub fn new(pairs: &[MatchedPair], is_later: bool, extents: &BTreeMap<u32, Bounds>) -> Self {
         let mut found = Self {
             places: Vec::with_capacity(pairs.len()),
@@ -131,8 +133,8 @@ impl PairPlaces {
         self.of_stone.contains_key(&stone)
     }
 
-    /// The pairs, by their index, that a point may belong to, with the point as they see it: that of its own stone, then those in whose
-    /// box it lies. `stone`: its label, 0 for none.
+    /// The pairs, by their index, that a point may belong to, with the point as they see it: that of its own
+    /// stone, then those in whose box it lies. `stone`: its label, 0 for none.
     pub fn near(&self, point: Point3<f64>, stone: u32) -> impl Iterator<Item = (usize, NearPoint)> + '_ {
         let own = self.of_stone.get(&stone).copied();
         let here = self.cells.get(&cell_of(&point, BOX_CELL_M)).into_iter().flatten();

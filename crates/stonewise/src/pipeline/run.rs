@@ -64,7 +64,7 @@ pub struct PairSummary {
     pub rows: Vec<StoneRow>,
     /// What is known about the registration of the epoch; `None` where the run did not go so far.
     pub datum: Option<Datum>,
-    /// Where the project knows the motion, and the run went so far.
+    /// Where the project prescribes the motion, and the run went so far.
     pub evaluation: Option<Evaluation>,
 }
 
@@ -80,7 +80,8 @@ impl Summary {
     }
 }
 
-/// Runs a project as far as asked, in the folder `out`; takes over whatever an earlier run finished there.
+/// Runs a project up to the step `until`, in the folder `out`; takes over whatever an earlier run finished
+/// there.
 ///
 /// Results of an earlier run lie aside until this one has finished.
 ///
@@ -181,7 +182,7 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     })
 }
 
-/// Stones of the first epoch, before any known motion is asked for.
+/// Stones of the first epoch, before any prescribed motion is applied.
 pub(crate) fn first_stones(context: &Context) -> Result<Vec<Stone>> {
     Ok(labelled(context, 1)?.stones)
 }

@@ -25,7 +25,7 @@ pub struct Project {
     pub epochs: Vec<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
-    /// What a user should know about how the file was read, one sentence each: keys with a new name, another
+    /// Notes for the user on how the file was read, one sentence each: keys with a new name, another
     /// numbering of epochs.
     pub notes: Vec<String>,
     /// Corrections by hand; absent where the project names none.

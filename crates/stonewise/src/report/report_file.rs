@@ -9,9 +9,9 @@ use stonewise_io::atomic::write_atomically;
 
 /// Makes `report/index.html` from the result files in `dir` alone and returns its path.
 ///
-/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of the third
-/// against the first is `report/index_2.html`, and so on; each links to the others. The same results give the same
-/// bytes.
+/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of
+/// the third against the first is `report/index_2.html`, and so on; each links to the others. The same
+/// results give the same bytes.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or the report cannot be written.
@@ -125,10 +125,19 @@ mod tests {
         );
         // Nothing below contradicts that.
         assert!(html.contains("<p class=\"hedge\">All numbers below are as computed"));
-        // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
-        assert!(
-            html.contains("<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)")
-        );
+        assert!(html.contains("<b>\u{2013}</b><span>which stones moved or are loose cannot be told"));
+        assert!(html.contains("As computed, 2 stones are above their own 95 % limit."));
+        assert!(html.contains("<b>Detection limit: cannot be stated for results in doubt</b>"));
+        let text = written(&html);
+        for claim in [
+            "false discovery rate",
+            "Largest motions",
+            "Loose stones",
+            "moved 20",
+            "class=\"loose\"",
+        ] {
+            assert!(!text.contains(claim), "{claim}");
+        }
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
         assert_eq!(
             html.matches("<svg role=\"img\"").count(),
@@ -144,7 +153,7 @@ mod tests {
                 && html.contains("temperature 9.5\u{a0}\u{b0}C")
         );
         assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
-        assert!(html.contains("class=\"hatch\"") && html.contains("class=\"loose\""));
+        assert!(html.contains("class=\"hatch\""));
         let html = written(&html);
         assert!(
             !html.contains("NaN") && !html.contains("inf"),
@@ -319,6 +328,10 @@ mod tests {
             "Detection limit: 1.4 mm (median), 1.4 mm (90th percentile)",
             "<p>Signature</p>",
             "src=\"data:image/png;base64,",
+            // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
+            "<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)",
+            "Largest motions",
+            "class=\"loose\"",
         ] {
             assert!(html.contains(words), "{words}");
         }
@@ -330,7 +343,7 @@ mod tests {
         assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
         for words in [
             "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
-            "temperature 9,5",
+            "Temperatur 9,5",
             "<p>Unterschrift</p>",
             "Nachweisgrenze: 1,4 mm",
         ] {
@@ -360,11 +373,25 @@ mod tests {
             language: Language::German,
             ..crate::ReportParams::default()
         };
-        let both = [crate::ReportParams::default(), german].map(|params| {
+        let languages = [crate::ReportParams::default(), german];
+        let in_doubt = languages.each_ref().map(|params| {
             let mut run = run_record("Wall", &["A", "B"]);
-            run.parameters.report = params;
+            run.parameters.report = params.clone();
             written(&report(&rows(), Some(&run)))
         });
+        let sound = languages
+            .each_ref()
+            .map(|params| written(&settled(&[8, 15], params)));
+        check_headings(&in_doubt);
+        check_headings(&sound);
+        // Numbers of tables and pictures.
+        assert!(
+            sound[1].contains("<td class=\"n\">20,4</td>") && !sound[1].contains("<td class=\"n\">20.4</td>")
+        );
+    }
+
+    /// Every heading of the second page, which is German, differs from that of the first, which is English.
+    fn check_headings(both: &[String; 2]) {
         // Names that are the same in both languages.
         let shared = [
             "Datum",
@@ -409,10 +436,6 @@ mod tests {
                 assert!(e != g || is_shared || (name == "dt" && is_key), "{name}: {g}");
             }
         }
-        // Numbers of tables and pictures.
-        assert!(
-            both[1].contains("<td class=\"n\">20,4</td>") && !both[1].contains("<td class=\"n\">20.4</td>")
-        );
     }
 
     #[test]

@@ -1,6 +1,7 @@
-//! The columns of the stone table: one list, from which every file with stones is written, read and described.
+//! The columns of the stone table: one list, from which every file with stones is written, read and
+//! described.
 
-use super::{RowMotion, Status, StoneRow};
+use super::{ColumnNote, RowMotion, Status, StoneRow};
 use crate::error::{Error, Result};
 use std::path::Path;
 use stonewise_io::table::{Column, Table};
@@ -137,7 +138,8 @@ impl StoneColumn {
     /// Puts the cells of a table into rows; cells of motions only into rows that have one.
     ///
     /// # Errors
-    /// The table lacks the column or has another type in it, a word is no status, or a measured stone's cell is empty.
+    /// The table lacks the column or has another type in it, a word is no status, or a measured stone's cell
+    /// is empty.
     pub(super) fn fill(&self, rows: &mut [StoneRow], table: &Table, path: &Path) -> Result<()> {
         let name = self.name;
         match &self.cells {
@@ -205,8 +207,18 @@ impl StoneColumn {
         })
     }
 
+    /// What the column of the text table holds.
+    pub(super) fn note(&self) -> ColumnNote {
+        ColumnNote {
+            name: self.name,
+            datatype: self.datatype(),
+            unit: self.unit,
+            meaning: self.meaning,
+        }
+    }
+
     /// Type of the cells in the words of XML Schema.
-    pub(super) fn datatype(&self) -> &'static str {
+    fn datatype(&self) -> &'static str {
         match &self.cells {
             Cells::Count(_) | Cells::OptionalCount(_) | Cells::Flag(_) => "integer",
             Cells::Status(_) => "string",

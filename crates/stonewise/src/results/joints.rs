@@ -39,12 +39,14 @@ pub struct Joint {
 pub struct JointMotion {
     /// Across the joint, metres; positive: it opens.
     pub opening_m: f64,
-    /// Along the joint, metres; positive: the second stone moves to the left of a walker from the first to the second.
+    /// Along the joint, metres; positive: the second stone moves to the left of a walker from the first to
+    /// the second.
     pub sliding_m: f64,
     /// Out of the face, metres; positive: the second stone stands out.
     pub step_m: f64,
-    /// Standard deviation of the opening, metres. The registration error of the epochs drops out; the rest of both covariances is added
-    /// as if it were independent. Neighbours share a part of it, so this is an upper bound.
+    /// Standard deviation of the opening, metres. The registration error of the epochs drops out; the rest of
+    /// both covariances is added as if it were independent. Neighbours share a part of it, so this is an
+    /// upper bound.
     pub opening_sigma_m: f64,
 }
 
@@ -57,8 +59,9 @@ impl JointMotion {
 
 /// All joints, ascending by their stones.
 ///
-/// Stones share a joint where one outline is the nearest to the other within the joint's width over at least 5 cm.
-/// The direction of a joint is the principal axis of the points midway between the outlines. Cost: O(length of all outlines).
+/// Stones share a joint where one outline is the nearest to the other within the joint's width over at least
+/// 5 cm. The direction of a joint is the principal axis of the points midway between the outlines. Cost:
+/// O(length of all outlines).
 pub fn joints(results: &ResultSet) -> Vec<Joint> {
     let samples = Samples::of(results);
     let mut contacts: BTreeMap<[usize; 2], Vec<Contact>> = BTreeMap::new();
@@ -142,8 +145,9 @@ fn motion(results: &ResultSet, stones: [usize; 2], across: &Vector2<f64>) -> Opt
     })
 }
 
-/// Variance of a stone's motion in a direction (along, up, out), without the registration error of the epochs, which neighbours share
-/// and which drops out between them; at least that of its motion against its neighbours.
+/// Variance of a stone's motion in a direction (along, up, out), without the registration error of the
+/// epochs, which neighbours share and which drops out between them; at least that of its motion against its
+/// neighbours.
 fn variance_apart(
     results: &ResultSet,
     stone: &StoneRow,
@@ -266,7 +270,8 @@ mod tests {
             assert!((expected - 0.045..expected + 0.005).contains(&length), "{length}");
             assert!((joint.world[1] - joint.world[0]).norm() > 0.9 * length);
         }
-        // Stone 8 (index 7) moved 20 mm along, stone 7 (index 6) did not: the joint between opens by the difference.
+        // Stone 8 (index 7) moved 20 mm along, stone 7 (index 6) did not: the joint between opens by the
+        // difference.
         let opened = all.iter().find(|j| j.stones == [6, 7]).unwrap().motion.unwrap();
         assert!((opened.opening_m - 0.020_2).abs() < 1e-9, "{opened:?}");
         assert!((opened.step_m - 0.0027).abs() < 1e-9 && opened.is_significant());

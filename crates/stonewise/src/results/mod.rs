@@ -20,7 +20,9 @@ mod stone_table;
 pub(crate) mod testing;
 
 pub use change_points::DistancePoint;
-use column_metadata::column_metadata;
+#[cfg(test)]
+pub(crate) use column_metadata::check_csv_metadata;
+pub(crate) use column_metadata::{ColumnNote, INTEGERS, write_csv_metadata};
 pub(crate) use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};
 pub(crate) use comparison::{Comparison, compare};

@@ -43,8 +43,6 @@ pub enum PairFile {
     StonesCsv,
     /// The stone table.
     StonesParquet,
-    /// Units and meanings of the columns of the text table.
-    StonesMetadata,
     /// The M3C2 core points as text.
     M3c2Csv,
     /// The M3C2 core points as a cloud.
@@ -65,7 +63,6 @@ impl PairFile {
         let (stem, extension) = match self {
             Self::StonesCsv => ("stones", "csv"),
             Self::StonesParquet => ("stones", "parquet"),
-            Self::StonesMetadata => ("stones", "csv-metadata.json"),
             Self::M3c2Csv => ("m3c2", "csv"),
             Self::M3c2Laz => ("m3c2", "laz"),
             Self::Matches => ("matches", "json"),
@@ -102,7 +99,7 @@ mod tests {
     #[test]
     fn files_of_later_epochs_count_from_two() {
         assert_eq!(PairFile::StonesCsv.name(1), "stones.csv");
-        assert_eq!(PairFile::StonesMetadata.name(2), "stones_2.csv-metadata.json");
+        assert_eq!(PairFile::M3c2Csv.name(2), "m3c2_2.csv");
         assert_eq!(PairFile::ReportPage.name(2), "index_2.html");
     }
 }

@@ -35,9 +35,11 @@ pub struct ResultSet {
     pub registration: Option<RegistrationRecord>,
     /// `verdict.json`, where there is one.
     pub verdict: Option<Verdict>,
-    /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance, stones, share, points.
+    /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
+    /// stones, share, points.
     pub decisions: Vec<Vec<Vec<String>>>,
-    /// Edits by hand, from `audit_edits.csv`: its head and one row for each edit and epoch; empty where there are none.
+    /// Edits by hand, from `audit_edits.csv`: its head and one row for each edit and epoch; empty where there
+    /// are none.
     pub edits: Vec<Vec<String>>,
     /// Excerpts of the survey; empty where the folder is missing.
     pub evidence: Evidence,
@@ -156,7 +158,8 @@ impl ResultSet {
     }
 }
 
-/// The facade of stones, by their ids and centroids; where outlines are missing, of the mean plane through the centroids.
+/// The facade of stones, by their ids and centroids; where outlines are missing, of the mean plane through
+/// the centroids.
 pub(crate) fn facade_of(
     stones: impl Iterator<Item = (u32, Point3<f64>)>,
     outlines: &BTreeMap<u32, StoneOutline>,

@@ -1,11 +1,10 @@
 //! Files of stone rows: CSV with its metadata and Parquet, with the columns of the contract.
 
-use super::columns::{EDITED, STONE_COLUMNS, columns_of};
+use super::columns::{EDITED, STONE_COLUMNS, StoneColumn, columns_of};
 use super::names::PairFile;
-use super::{RowMotion, StoneRow, column_metadata};
-use crate::error::{Error, Result};
+use super::{RowMotion, StoneRow, write_csv_metadata};
+use crate::error::Result;
 use std::path::Path;
-use stonewise_io::atomic::write_atomically;
 use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parquet};
 
 /// Writes the stones of a pair of epochs into `dir`: `stones.csv` with `stones.csv-metadata.json`, and
@@ -16,14 +15,15 @@ use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parq
 pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     let table = stone_table(rows)?;
     write_parquet(&dir.join(PairFile::StonesParquet.name(pair)), &table)?;
-    let csv = PairFile::StonesCsv.name(pair);
-    write_csv(&dir.join(&csv), &table)?;
-    let metadata = dir.join(PairFile::StonesMetadata.name(pair));
-    write_atomically(&metadata, |partial| {
-        std::fs::write(partial, column_metadata(&csv, columns_of(rows)))
-    })
-    .map_err(Error::io("writing the metadata of the columns", &metadata))
+    let csv = dir.join(PairFile::StonesCsv.name(pair));
+    write_csv(&csv, &table)?;
+    let notes = columns_of(rows).map(StoneColumn::note);
+    write_csv_metadata(&csv, DESCRIPTION, Some("stone_id"), notes)
 }
+
+/// What the stone table as a whole holds.
+const DESCRIPTION: &str = "One row per stone of the first epoch. Displacements are later epoch minus first. \
+    Empty cells: not measured.";
 
 /// Reads a `stones.parquet` back.
 ///

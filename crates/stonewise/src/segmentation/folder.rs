@@ -22,7 +22,7 @@ const STEP: &str = "segment";
 /// Quality of the overlays.
 const JPEG_QUALITY: u8 = 85;
 
-/// Photos whose stones are wanted.
+/// Photos in which stones are to be found.
 #[derive(Clone, Copy, Debug)]
 pub struct FolderJob<'a> {
     /// A folder of photos, or one photo.
@@ -53,7 +53,7 @@ pub struct FolderSummary {
 /// Figures of photos against a reference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MaskEvaluation {
-    /// Each photo that the reference knows.
+    /// Each photo that the reference has masks for.
     pub photos: Vec<PhotoScore>,
     /// All of them together.
     pub total: MaskScore,

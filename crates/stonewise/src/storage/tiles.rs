@@ -29,7 +29,7 @@ const SOURCES: &str = "sources.json";
 const CHUNK: usize = 1 << 20;
 /// Points of a chunk that one thread sorts into tiles at a time.
 const PART: usize = 1 << 15;
-/// Tiles kept in memory by a [`DiskTiles`]: a tile and its neighbours are asked for again and again.
+/// Tiles kept in memory by a [`DiskTiles`]: a tile and its neighbours are read again and again.
 const CACHED_TILES: usize = 12;
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -48,7 +48,7 @@ pub struct Provenance {
     pub index: Vec<u64>,
 }
 
-/// The tiles of one epoch, read when asked for.
+/// The tiles of one epoch, read when they are used.
 pub struct DiskTiles {
     dir: PathBuf,
     tiles: Vec<TileEntry>,

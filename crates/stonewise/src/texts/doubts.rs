@@ -1,17 +1,8 @@
-//! Doubts about a run as a whole: a run says them in English, a report in its own language.
+//! Doubts about a run as a whole.
 
-use super::fill;
-use crate::report_params::Language;
+use super::message::Message;
 
-/// A doubt in both languages; words in braces are filled in.
-#[derive(Debug)]
-pub(crate) struct Doubt {
-    /// As a run says it.
-    pub english: &'static str,
-    german: &'static str,
-}
-
-pub(crate) static NOT_CONVERGED: Doubt = Doubt {
+pub(crate) static NOT_CONVERGED: Message = Message {
     english: "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
               on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
               pictures",
@@ -20,7 +11,7 @@ pub(crate) static NOT_CONVERGED: Doubt = Doubt {
              die Bilder ansehen",
 };
 
-pub(crate) static BESIDE: Doubt = Doubt {
+pub(crate) static BESIDE: Message = Message {
     english: "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
               cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
               `stonewise check` shows the edges of the cloud over a photo",
@@ -29,7 +20,7 @@ pub(crate) static BESIDE: Doubt = Doubt {
              System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto",
 };
 
-pub(crate) static BESIDE_COMPARED: Doubt = Doubt {
+pub(crate) static BESIDE_COMPARED: Message = Message {
     english: "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
               so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
               clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
@@ -38,7 +29,7 @@ pub(crate) static BESIDE_COMPARED: Doubt = Doubt {
              Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto",
 };
 
-pub(crate) static FEW_MEASURED: Doubt = Doubt {
+pub(crate) static FEW_MEASURED: Message = Message {
     english: "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
               the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
               `stonewise check` on the project and look at its pictures",
@@ -47,7 +38,7 @@ pub(crate) static FEW_MEASURED: Doubt = Doubt {
              Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen",
 };
 
-pub(crate) static BLIND: Doubt = Doubt {
+pub(crate) static BLIND: Message = Message {
     english: "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
               of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
               `stonewise check` on the project",
@@ -56,64 +47,5 @@ pub(crate) static BLIND: Doubt = Doubt {
              wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden",
 };
 
-/// All of them; the longer of two that begin alike first.
-static ALL: [&Doubt; 5] = [&NOT_CONVERGED, &BESIDE_COMPARED, &BESIDE, &FEW_MEASURED, &BLIND];
-
-/// A doubt as a run said it, in the language of a report; `None` where it has no words of that language.
-pub(crate) fn doubt_in(language: Language, said: &str) -> Option<String> {
-    match language {
-        Language::English => Some(said.to_owned()),
-        Language::German => ALL
-            .iter()
-            .find_map(|doubt| Some(fill(doubt.german, &values_of(doubt.english, said)?))),
-    }
-}
-
-/// What the braces of `text` were filled with in `said`.
-fn values_of<'a>(text: &'a str, said: &'a str) -> Option<Vec<(&'a str, &'a str)>> {
-    let mut parts = text.split('{');
-    let mut rest = said.strip_prefix(parts.next()?)?;
-    let mut values = Vec::new();
-    for part in parts {
-        let (name, after) = part.split_once('}')?;
-        let end = match after {
-            "" => rest.len(),
-            after => rest.find(after)?,
-        };
-        values.push((name, &rest[..end]));
-        rest = &rest[end + after.len()..];
-    }
-    rest.is_empty().then_some(values)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_a_run_said_is_said_in_german_with_its_values() {
-        for doubt in ALL {
-            let names: Vec<&str> = doubt
-                .english
-                .split('{')
-                .skip(1)
-                .filter_map(|t| Some(t.split_once('}')?.0))
-                .collect();
-            let values: Vec<String> = (0..names.len()).map(|k| format!("<{k}>")).collect();
-            let pairs: Vec<(&str, &str)> = names
-                .iter()
-                .zip(&values)
-                .map(|(name, value)| (*name, value.as_str()))
-                .collect();
-            let said = fill(doubt.english, &pairs);
-            let german = doubt_in(Language::German, &said).unwrap();
-            assert!(
-                values.iter().all(|v| german.contains(v)) && !german.contains('{'),
-                "{german}"
-            );
-            assert_ne!(german, said);
-            assert_eq!(doubt_in(Language::English, &said), Some(said));
-        }
-        assert_eq!(doubt_in(Language::German, "something else"), None);
-    }
-}
+/// All of them; of two that begin alike the longer one first.
+pub(super) static DOUBTS: [&Message; 5] = [&NOT_CONVERGED, &BESIDE_COMPARED, &BESIDE, &FEW_MEASURED, &BLIND];

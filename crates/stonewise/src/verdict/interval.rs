@@ -1,7 +1,8 @@
 //! The 95 % interval of the length of a motion that was measured with an error.
 //!
-//! t is measured, t = m + error, error ~ N(0, C); wanted is the length |m|. The length of t is too long on
-//! average, the more so the smaller the motion, so that |t| +- 1.96 sd would be wrong for small motions.
+//! t is measured, t = m + error, error ~ N(0, C), and the interval is that of the length |m|. The length of t
+//! is too long on average, the more so the smaller the motion, so that |t| +- 1.96 sd would be wrong for
+//! small motions.
 //!
 //! Upper limit: the largest |m| with (t - m)' C^-1 (t - m) <= 1.96^2. Where it falls short of |m|, that
 //! ellipsoid lies inside the ball of radius |m| and so on the inner side of the plane that touches the ball

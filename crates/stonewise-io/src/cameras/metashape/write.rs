@@ -12,7 +12,7 @@ use stonewise_core::geometry::{Camera, Distortion, View};
 /// significant digits, so that poses come back as they were.
 ///
 /// # Errors
-/// The file cannot be written, or a camera has denominator terms, which Metashape does not know.
+/// The file cannot be written, or a camera has denominator terms, which the format does not have.
 pub fn write_metashape(path: &Path, views: &[View], crs: Option<&str>) -> Result<(), CameraError> {
     let mut sensors: Vec<&Camera> = Vec::new();
     let mut cameras = String::new();

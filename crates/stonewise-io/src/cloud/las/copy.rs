@@ -107,7 +107,7 @@ impl RecordCopy {
     }
 }
 
-/// The header of the copy: as the input's, as LAS 1.4, which knows extra dimensions and any number of points.
+/// The header of the copy: as the input's, as LAS 1.4, which has extra dimensions and any number of points.
 fn builder(layout: &Layout, record: &RecordCopy) -> Builder {
     let mut builder = Builder::from(layout.header.clone());
     builder.version = las::Version::new(1, 4);

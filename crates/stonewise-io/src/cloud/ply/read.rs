@@ -57,7 +57,7 @@ pub fn vertex_count(path: &Path) -> Result<u64, CloudError> {
     Ok(vertices.map_or(0, |e| e.count))
 }
 
-/// Places of what is wanted among the properties of a vertex.
+/// Places of the values that are read among the properties of a vertex.
 pub(super) struct Columns {
     pub(super) position: [usize; 3],
     color: Option<[(usize, Scalar); 3]>,

@@ -113,7 +113,7 @@ pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geome
     y
 }
 
-/// Derivatives with regard to image and weight, where wanted, from that with regard to the result.
+/// Derivatives with regard to image and weight, each where `wanted`, from that with regard to the result.
 ///
 /// Each thread takes some of the inputs, whose patches no other thread needs.
 pub fn backward(
@@ -155,7 +155,7 @@ struct Share<'a> {
     /// The first of the inputs, and how many.
     start: usize,
     inputs: usize,
-    /// Derivative with regard to the inputs, image by image; empty where it is not wanted.
+    /// Derivative with regard to the inputs, image by image; empty where it is not needed.
     x: Vec<&'a mut [f32]>,
     /// Derivative with regard to their weights.
     weight: Option<MatMut<'a, f32>>,

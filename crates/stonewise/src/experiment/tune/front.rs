@@ -1,8 +1,8 @@
 //! Which grid points are worth a look: no other is better in both ways.
 
-/// A share of the most stones that the recommended point must measure at least: 0.95, as the paper asks for
-/// the lowest RMSE and for the most matches at once, and a twentieth of the stones is not worth much
-/// accuracy.
+/// A share of the most stones that the recommended point must measure at least: 0.95, because the paper
+/// chooses by the lowest RMSE and by the most matches at once, and a gain in accuracy is not worth more than
+/// a twentieth of the stones.
 const ENOUGH: f64 = 0.95;
 
 /// What a grid point is worth.

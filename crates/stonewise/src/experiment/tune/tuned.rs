@@ -10,7 +10,7 @@ pub struct TuneOptions {
     pub grid: Vec<Dimension>,
     /// Points that take part; all where absent.
     pub part: Option<Part>,
-    /// Which points and photos go to which half, where the project knows no motion.
+    /// Which points and photos go to which half, where the project prescribes no motion.
     pub seed: u64,
 }
 

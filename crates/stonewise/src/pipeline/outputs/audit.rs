@@ -5,19 +5,37 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::names::audit;
+use crate::results::{ColumnNote, INTEGERS, write_csv_metadata};
+use std::path::Path;
 use stonewise_core::id::ImageId;
 use stonewise_core::transfer::AuditEvent;
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `audit_epochN.csv`: what the majority of the photos decided about merged, split and dropped
-/// instances.
+/// What the table as a whole holds.
+const DESCRIPTION: &str = "What the majority of the photos decided about merged, split and dropped instances of an epoch, one row per \
+    decision. Empty cells: the decision has no such number.";
+
+/// The columns of the table: name, type, meaning.
+#[rustfmt::skip]
+const COLUMNS: [(&str, &str, &str); 6] = [
+    ("event", "string", "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
+        outvoted_instance (most photos show something else there), dropped_islands (parts cut off from their stone), dropped_stone (too few points)"),
+    ("photo", "string", "photo of the mask, as the cameras name it"),
+    ("instance", "integer", "number of the mask in the photo"),
+    ("stones", INTEGERS, "stones that the decision is about"),
+    ("share", "number", "share of the mask that the stone won, 0 to 1"),
+    ("points", "integer", "points that lost their label"),
+];
+
+/// Writes `audit_epochN.csv`, what the majority of the photos decided about merged, split and dropped
+/// instances, and the metadata of its columns.
 pub fn write_audit(context: &Context, number: usize, photos: &Segmented, labelled: &Labelled) -> Result<()> {
-    let rows: Vec<AuditRow> = labelled
-        .transfer
-        .audit
-        .iter()
-        .map(|e| AuditRow::new(e, photos))
-        .collect();
+    let events = labelled.transfer.audit.iter();
+    let rows: Vec<AuditRow> = events.map(|e| AuditRow::new(e, photos)).collect();
+    write_rows(&context.out.join(audit(number)), &rows)
+}
+
+fn write_rows(csv: &Path, rows: &[AuditRow]) -> Result<()> {
     let mut table = Table::new();
     table.push(
         "event",
@@ -36,7 +54,14 @@ pub fn write_audit(context: &Context, number: usize, photos: &Segmented, labelle
     )?;
     table.push("share", rows.iter().map(|r| r.share).collect::<Vec<_>>())?;
     table.push("points", rows.iter().map(|r| r.points).collect::<Vec<_>>())?;
-    Ok(write_csv(&context.out.join(audit(number)), &table)?)
+    write_csv(csv, &table)?;
+    let notes = COLUMNS.map(|(name, datatype, meaning)| ColumnNote {
+        name,
+        datatype,
+        unit: "",
+        meaning,
+    });
+    write_csv_metadata(csv, DESCRIPTION, None, notes)
 }
 
 struct AuditRow {
@@ -111,5 +136,19 @@ impl AuditRow {
                 ..empty
             },
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::check_csv_metadata;
+
+    #[test]
+    fn the_metadata_describe_every_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let csv = folder.path().join(audit(1));
+        write_rows(&csv, &[]).unwrap();
+        check_csv_metadata(&csv);
     }
 }

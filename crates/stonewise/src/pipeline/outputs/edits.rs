@@ -5,10 +5,39 @@ use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::edit::Edited;
 use crate::results::names::{EDITS_AUDIT, FACADE};
+use crate::results::{ColumnNote, INTEGERS, write_csv_metadata};
 use stonewise_core::transfer::{EditEffect, NoEffect};
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `audit_edits.csv`, one row for each edit and epoch, and `facade.json`, the wall on which the stones
+/// What the table as a whole holds.
+const DESCRIPTION: &str = "Edits by hand and what each did in each epoch, one row per edit and epoch.";
+
+/// The columns of the table: name, type, meaning.
+const COLUMNS: [(&str, &str, &str); 12] = [
+    ("edit", "integer", "number of the edit in the file, from 1"),
+    ("do", "string", "merge, split, delete, add or ignore"),
+    ("who", "string", "who made the edit"),
+    ("when", "string", "when"),
+    ("why", "string", "why"),
+    ("place", "string", "the file of edits and the place in it"),
+    ("drawn_in", "string", "the photo in which it was drawn, or facade"),
+    ("epoch", "string", "name of the epoch"),
+    ("stones_before", INTEGERS, "stones that it changed"),
+    ("stones_after", INTEGERS, "stones that it left"),
+    (
+        "points",
+        "integer",
+        "points whose label changed; empty without effect",
+    ),
+    (
+        "no_effect",
+        "string",
+        "why it did nothing in this epoch; empty where it did something",
+    ),
+];
+
+/// Writes `audit_edits.csv`, one row for each edit and epoch, with the metadata of its columns, and
+/// `facade.json`, the wall on which the stones
 /// are unrolled; names edits that did nothing in any epoch. Nothing where the project has no edits.
 pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<()> {
     let (Some(edited), Some(file)) = (edited, &context.project.edits) else {
@@ -68,7 +97,15 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
         "no_effect",
         text(&|r| r.2.as_ref().err().map_or(String::new(), NoEffect::to_string)),
     )?;
-    Ok(write_csv(&context.out.join(EDITS_AUDIT), &table)?)
+    let csv = context.out.join(EDITS_AUDIT);
+    write_csv(&csv, &table)?;
+    let notes = COLUMNS.map(|(name, datatype, meaning)| ColumnNote {
+        name,
+        datatype,
+        unit: "",
+        meaning,
+    });
+    write_csv_metadata(&csv, DESCRIPTION, None, notes)
 }
 
 /// Edit, epoch, and what it did there.

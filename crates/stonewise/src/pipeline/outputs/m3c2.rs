@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::results::names::PairFile;
+use crate::results::{ColumnNote, write_csv_metadata};
 use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{ChangeField, ChangePoint};
@@ -9,7 +10,30 @@ use stonewise_io::cloud::{ExtraColumn, write_points_laz};
 use stonewise_io::crs::Crs;
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `m3c2.laz` and `m3c2.csv` (of the third epoch `m3c2_2.laz`, and so on) with PDAL's dimension names.
+/// What the table of core points as a whole holds.
+const DESCRIPTION: &str = "M3C2 (Lague, Brodu & Leroux 2013), one row per core point of the first epoch. Distances are later epoch minus first, \
+    along the normal. Empty cells: not known.";
+
+/// The columns of the table.
+#[rustfmt::skip]
+const COLUMNS: [(&str, &str, &str, &str); 13] = [
+    ("x", "number", "m", "core point, world x"),
+    ("y", "number", "m", "core point, world y"),
+    ("z", "number", "m", "core point, world z"),
+    ("NormalX", "number", "", "unit normal out of the wall, world x"),
+    ("NormalY", "number", "", "unit normal out of the wall, world y"),
+    ("NormalZ", "number", "", "unit normal out of the wall, world z"),
+    ("m3c2_distance", "number", "m", "distance along the normal, positive out of the wall"),
+    ("m3c2_uncertainty", "number", "m", "95 % detection limit of the distance"),
+    ("m3c2_std_dev1", "number", "m", "spread of the first epoch's points along the normal"),
+    ("m3c2_std_dev2", "number", "m", "spread of the later epoch's points along the normal"),
+    ("m3c2_significant", "integer", "", "1 where the distance exceeds its detection limit, else 0"),
+    ("m3c2_count1", "integer", "", "points of the first epoch in the cylinder"),
+    ("m3c2_count2", "integer", "", "points of the later epoch in the cylinder"),
+];
+
+/// Writes `m3c2.laz`, `m3c2.csv` and the metadata of its columns (of the third epoch `m3c2_2.laz`, and so on)
+/// with PDAL's dimension names.
 ///
 /// In the LAZ an unknown number is NaN; in the CSV its cell is empty.
 pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
@@ -40,7 +64,15 @@ pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeFiel
     table.push("m3c2_significant", significant.clone())?;
     table.push("m3c2_count1", counts[0].clone())?;
     table.push("m3c2_count2", counts[1].clone())?;
-    write_csv(&dir.join(PairFile::M3c2Csv.name(pair)), &table)?;
+    let csv = dir.join(PairFile::M3c2Csv.name(pair));
+    write_csv(&csv, &table)?;
+    let notes = COLUMNS.map(|(name, datatype, unit, meaning)| ColumnNote {
+        name,
+        datatype,
+        unit,
+        meaning,
+    });
+    write_csv_metadata(&csv, DESCRIPTION, None, notes)?;
 
     let positions: Vec<Point3<f64>> = points.iter().map(|p| p.position).collect();
     let dense: Vec<(&str, Vec<f64>)> = columns
@@ -60,4 +92,18 @@ pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeFiel
         &positions,
         &extra,
     )?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::check_csv_metadata;
+
+    #[test]
+    fn the_metadata_describe_every_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let field = ChangeField { points: Vec::new() };
+        write_m3c2(folder.path(), 2, None, &field).unwrap();
+        check_csv_metadata(&folder.path().join("m3c2_2.csv"));
+    }
 }

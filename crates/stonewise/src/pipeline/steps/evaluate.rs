@@ -1,4 +1,4 @@
-//! Results against the motion that the project file knows.
+//! Results against the motion that the project file prescribes.
 
 use crate::pipeline::context::Context;
 use crate::results::StoneRow;
@@ -10,8 +10,8 @@ use stonewise_core::cloud::GridIndex;
 use stonewise_core::evaluate::{Evaluation, StoneOutcome, score_change, score_stones};
 use stonewise_core::stone::Stone;
 
-/// Scores stones, and M3C2 where there is any, of epoch `number` against its known motion; `None` where the
-/// project knows none.
+/// Scores stones, and M3C2 where there is any, of epoch `number` against its prescribed motion; `None`
+/// where the project prescribes none.
 ///
 /// The motion is that of the later epoch's points, as a function of where they were; a known motion of epoch
 /// 1 is taken away from it.

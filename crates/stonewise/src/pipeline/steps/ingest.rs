@@ -5,6 +5,7 @@ use crate::pipeline::context::Context;
 use crate::storage::epoch_tiles::EpochTiles;
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::{DiskTiles, cut_into_tiles};
+use crate::texts::notices::INVALID_POINTS;
 use nalgebra::Point3;
 use stonewise_core::cloud::TileSource;
 
@@ -43,7 +44,7 @@ pub fn ingest(context: &Context, number: usize) -> Result<Ingested> {
             context.progress,
         )?;
         if invalid > 0 {
-            let message = format!("{invalid} points without finite coordinates are left out");
+            let message = INVALID_POINTS.say(&[("n", &invalid.to_string())]);
             warnings.notice("ingest", epoch.name.clone(), message);
         }
         Ok(())
@@ -57,7 +58,7 @@ pub fn ingest(context: &Context, number: usize) -> Result<Ingested> {
             "the clouds of epoch {:?} hold no points{}",
             epoch.name,
             if part.is_some() {
-                " in the part that was asked for"
+                " in the part that takes part"
             } else {
                 ""
             }

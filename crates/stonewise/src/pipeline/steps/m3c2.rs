@@ -14,7 +14,8 @@ use stonewise_core::cloud::TileSource;
 use stonewise_core::registration::observers::EpochErrors;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
 
-/// The comparison, one row of about 100 bytes a core point; as JSON it took 295, 1.3 GB for the 4.3 million of a dam.
+/// The comparison, one row of about 100 bytes a core point; as JSON it took 295, 1.3 GB for the 4.3 million
+/// of a dam.
 const FIELD: &str = "field.parquet";
 
 /// Compares two epochs along the normals of the first.
@@ -34,9 +35,10 @@ pub fn m3c2(
 
 /// The comparison with detection limits that hold the registration error of the epochs, point by point.
 ///
-/// Distances stay those of the clouds as they lie, so what the datum shows to be an error counts beside what stays uncertain of it:
-/// reg^2 = n' C n + (n' e)^2, with the error `e` and its covariance `C` at the core point, as registration.json has them. Nothing
-/// changes where the project states an error for M3C2. Where the datum is unknown, only the few points of a cylinder are accounted for.
+/// Distances stay those of the clouds as they lie, so what the datum shows to be an error counts beside what
+/// stays uncertain of it: reg^2 = n' C n + (n' e)^2, with the error `e` and its covariance `C` at the core
+/// point, as registration.json has them. Nothing changes where the project states an error for M3C2. Where
+/// the datum is unknown, only the few points of a cylinder are accounted for.
 pub fn with_datum(
     change: ChangeField,
     params: &M3c2Params,

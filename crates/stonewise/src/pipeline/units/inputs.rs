@@ -16,14 +16,15 @@ use std::time::UNIX_EPOCH;
 pub(super) struct PlannedInput {
     /// File or folder.
     pub path: PathBuf,
-    /// Digest of names, lengths and times of change: compared by every unit, which reads no input that it does not need.
+    /// Digest of names, lengths and times of change: compared by every unit, which reads no input that it
+    /// does not need.
     pub look: String,
     /// Digest of the content.
     pub blake3: String,
 }
 
-/// All inputs of a project with their digests. The folders of photos count where no masks do; where stones are tracked in photos,
-/// every photo that has a camera counts, too.
+/// All inputs of a project with their digests. The folders of photos count where no masks do; where stones
+/// are tracked in photos, every photo that has a camera counts, too.
 pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
     let project = context.project;
     let images = |path: &PathBuf| {

@@ -4,7 +4,7 @@ use super::html::{details, section, table};
 use crate::figure::{count, escape, number};
 use crate::results::ResultSet;
 use crate::results::records::StepTime;
-use crate::texts::{AuditTexts, Texts, fill};
+use crate::texts::{AuditTexts, Texts, fill, message_in};
 use crate::warnings::Warning;
 use serde::Serialize;
 use serde_json::Value;
@@ -17,7 +17,7 @@ const MAX_DECISIONS: usize = 150;
 pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
     let names = &texts.audit;
     let mut out = match &results.run {
-        Some(run) => warnings(&run.warnings, names),
+        Some(run) => warnings(&run.warnings, texts),
         None => format!("<p>{}</p>", names.no_run),
     };
     out.push_str(&edits(&results.edits, names));
@@ -168,7 +168,8 @@ fn decision_list(rows: &[Vec<String>], number: usize, names: &AuditTexts) -> Str
     )
 }
 
-fn warnings(warnings: &[Warning], names: &AuditTexts) -> String {
+fn warnings(warnings: &[Warning], texts: &Texts) -> String {
+    let names = &texts.audit;
     if warnings.is_empty() {
         return format!("<p>{}</p>", names.no_warnings);
     }
@@ -176,7 +177,10 @@ fn warnings(warnings: &[Warning], names: &AuditTexts) -> String {
         vec![
             escape(&w.step),
             escape(&w.subject),
-            escape(&w.message),
+            match message_in(texts.language(), &w.message) {
+                Some(message) => escape(&message),
+                None => format!("<span lang=\"en\">{}</span>", escape(&w.message)),
+            },
             match w.skipped_input {
                 true => format!("<b>{}</b>", names.left_out),
                 false => String::new(),

@@ -1,7 +1,7 @@
 //! What must be read before anything else.
 
 use crate::figure::escape;
-use crate::texts::{Texts, doubt_in};
+use crate::texts::{Texts, message_in};
 use crate::warnings::Warning;
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
-        let (lang, message) = match doubt_in(texts.language(), &warning.message) {
+        let (lang, message) = match message_in(texts.language(), &warning.message) {
             Some(message) => ("", message),
             None => (" lang=\"en\"", warning.message.clone()),
         };

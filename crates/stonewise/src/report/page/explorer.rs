@@ -95,6 +95,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
             "opening": nice_above(Sorted::new(openings).quantile(0.98).unwrap_or(0.0) * 1e3),
         },
         "decimals": facts.decimals(),
+        "sound": facts.verdict.is_sound(),
         "registrationKnown": results.datum().is_some_and(|d| d.state != DatumState::Unknown),
         "truth": known_translation_mm(results),
         "blocks": blocks,
@@ -200,12 +201,15 @@ fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
             .map(move |s| u8::from(s.motion.as_ref().is_some_and(of)))
     };
     block.u8("significant", flag(|m| m.significant));
+    // Which stones moved or are loose, a run in doubt cannot tell.
+    let sound = facts.verdict.is_sound();
     let moved: BTreeSet<u32> = facts.moved.iter().map(|(s, _)| s.stone_id).collect();
     block.u8(
         "moved",
-        rows.iter().map(|s| u8::from(moved.contains(&s.stone_id))),
+        rows.iter()
+            .map(|s| u8::from(sound && moved.contains(&s.stone_id))),
     );
-    block.u8("loose", flag(|m| m.loose));
+    block.u8("loose", flag(|m| m.loose).map(|loose| loose * u8::from(sound)));
 }
 
 /// Joints with their ends on the unrolled wall and in the world.

@@ -1,4 +1,5 @@
-//! The first page: the verdict, who measured what and when, what was not measured, what to look at first, a place to sign.
+//! The first page: the verdict, who measured what and when, what was not measured, what to look at first, a
+//! place to sign.
 
 use super::html::table;
 use super::maps::motion_map;
@@ -109,7 +110,7 @@ pub(super) fn conditions(epoch: &EpochRecord, texts: &Texts) -> Option<String> {
             None => (name.as_str(), String::new()),
         };
         let value = value.to_string().replace('.', texts.decimal);
-        format!("{} {value}{unit}", escape(&stem.replace('_', " ")))
+        format!("{} {value}{unit}", escape(&texts.condition(stem)))
     };
     let list: Vec<String> = epoch.conditions.iter().map(one).collect();
     (!list.is_empty()).then(|| list.join(", "))
@@ -142,6 +143,9 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
 /// The detection limit in plain words.
 fn limit(facts: &Summary) -> String {
     let texts = facts.texts();
+    if !facts.verdict.is_sound() {
+        return format!("<b>{}</b>", texts.page.limit_unknown);
+    }
     let values = facts.limits.median().zip(facts.limits.quantile(0.9));
     let Some((median, high)) = values else {
         return String::new();
@@ -158,9 +162,12 @@ fn limit(facts: &Summary) -> String {
     format!("<b>{first}{}</b>", letters.as_str())
 }
 
-/// The stones that call for a closer look, the worst first.
+/// The stones that call for a closer look, the worst first; of a run in doubt none.
 fn look_first(results: &ResultSet, facts: &Summary) -> String {
     let texts = facts.texts();
+    if !facts.verdict.is_sound() {
+        return format!("<p>{}</p>", texts.page.look_at_doubt);
+    }
     let rows: BTreeMap<u32, &StoneRow> = results.stones.iter().map(|s| (s.stone_id, s)).collect();
     let mut worst: Vec<&StoneVerdict> = facts
         .verdict
@@ -270,14 +277,18 @@ fn zones(facts: &Summary) -> String {
         return String::new();
     }
     let row = |zone: &crate::results::records::ZoneVerdict| {
-        let largest = zone.area.largest.map_or(f64::NAN, |l| l.length_mm / 1e3);
+        let largest = zone.area.largest.filter(|_| facts.verdict.is_sound());
+        let moved = match facts.verdict.is_sound() {
+            true => count(zone.area.moved),
+            false => "\u{2013}".to_owned(),
+        };
         vec![
             escape(&zone.name),
             texts.state(zone.area.state).to_owned(),
             count(zone.area.stones),
             count(zone.area.measured),
-            count(zone.area.moved),
-            texts.mm(largest),
+            moved,
+            texts.mm_or_dash(largest.map(|l| l.length_mm / 1e3)),
         ]
     };
     let rows: Vec<Vec<String>> = facts.verdict.zones.iter().map(row).collect();
@@ -304,7 +315,8 @@ pub(super) fn registration(datum: Option<&Datum>, texts: &Texts) -> String {
     }
 }
 
-/// Where the registration error is known from; the run's own sentence, where the language is the one it speaks.
+/// Where the registration error is known from; the run's own sentence, where the language is the one it
+/// speaks.
 pub(super) fn datum_note(datum: &Datum, texts: &Texts) -> String {
     let shift = |k: usize| datum.covariance_6x6.map_or(f64::NAN, |c| c[k][k]);
     let size = ((shift(0) + shift(1) + shift(2)) / 3.0).max(0.0).sqrt();

@@ -8,8 +8,8 @@ use crate::report::summary::Summary;
 use crate::results::{Joint, ResultSet, StoneRow, nice_scale_m};
 use crate::texts::{MapTexts, fill};
 
-/// What the marks in the maps mean.
-fn legend(names: &MapTexts) -> String {
+/// What the marks in the maps mean; loose stones are marked where they can be told.
+fn legend(names: &MapTexts, tells_loose: bool) -> String {
     let key = |class: &str, words: &str| format!("<span><i class=\"key {class}\"></i>{words}</span>");
     let keys = [
         key("solid", names.above),
@@ -17,7 +17,8 @@ fn legend(names: &MapTexts) -> String {
         key("hatched", names.unmeasured),
         key("ring", names.loose),
     ];
-    format!("<p class=\"legend\">{}</p>", keys.concat())
+    let shown = if tells_loose { &keys[..] } else { &keys[..3] };
+    format!("<p class=\"legend\">{}</p>", shown.concat())
 }
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
@@ -41,7 +42,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
             scale: shared,
             fade: true,
             arrows: false,
-            loose: true,
+            loose: facts.verdict.is_sound(),
         };
         figure(title, &stone_map(&layout, &picture), note)
     };
@@ -63,7 +64,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
     let body = format!(
         "<p>{}{note}</p>{PLACE}{}<div class=\"maps{wide}\">{grid}</div>",
         names.intro,
-        legend(names)
+        legend(names, facts.verdict.is_sound())
     );
     section("maps", texts.sections.maps, &body)
 }
@@ -131,7 +132,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
             scale: Scale::Sequential(limit),
             fade: false,
             arrows: false,
-            loose,
+            loose: loose && facts.verdict.is_sound(),
         };
         figure(title, &stone_map(layout, &picture), note)
     };

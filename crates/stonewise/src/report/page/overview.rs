@@ -4,7 +4,6 @@ use super::first_page;
 use super::html::{details, section, table};
 use crate::figure::{count, escape};
 use crate::report::summary::{FALSE_ALARMS, Summary};
-use crate::results::records::ReasonCode;
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
 use crate::texts::{Texts, fill};
 use nalgebra::Point2;
@@ -36,12 +35,20 @@ fn tiles(facts: &Summary) -> String {
         |value: String, what: &str| format!("<div class=\"tile\"><b>{value}</b><span>{what}</span></div>");
     let share = |n: usize| format!("{} <small>{}</small>", count(n), texts.percent(n, facts.stones));
     let of_measured = |n: usize| {
-        format!(
-            "{} <small>{}</small>",
-            count(n),
-            texts.percent(n, facts.measured.len())
-        )
+        let share = texts.percent(n, facts.measured.len());
+        format!("{} <small>{share}</small>", count(n))
     };
+    let measured = tile(
+        share(facts.measured.len()),
+        &fill(page.tile_measured, &[("m", &count(facts.stones))]),
+    );
+    if !facts.verdict.is_sound() {
+        let unknown = tile("\u{2013}".to_owned(), page.tile_cannot_tell);
+        return format!(
+            "<p class=\"hedge\">{}</p><div class=\"tiles\">{measured}{unknown}</div>",
+            page.as_computed
+        );
+    }
     let mm = |metres: Option<f64>| format!("{} <small>mm</small>", texts.mm(metres.unwrap_or(f64::NAN)));
     let largest = facts.verdict.wall.largest;
     let [what_moved, what_is_largest] = match facts.verdict.has_datum() {
@@ -49,10 +56,7 @@ fn tiles(facts: &Summary) -> String {
         false => [page.tile_moved_common, page.tile_largest_common],
     };
     let tiles = [
-        tile(
-            share(facts.measured.len()),
-            &fill(page.tile_measured, &[("m", &count(facts.stones))]),
-        ),
+        measured,
         tile(of_measured(facts.moved.len()), what_moved),
         tile(of_measured(facts.above_limit), page.tile_above),
         tile(count(facts.loose.len()), page.tile_loose),
@@ -62,16 +66,7 @@ fn tiles(facts: &Summary) -> String {
             None => tile("\u{2013}".to_owned(), page.tile_no_motion),
         },
     ];
-    let is_doubted = facts
-        .verdict
-        .reasons
-        .iter()
-        .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt));
-    let note = match is_doubted {
-        true => format!("<p class=\"hedge\">{}</p>", page.as_computed),
-        false => String::new(),
-    };
-    format!("{note}<div class=\"tiles\">{}</div>", tiles.concat())
+    format!("<div class=\"tiles\">{}</div>", tiles.concat())
 }
 
 fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
@@ -91,6 +86,9 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
     let [along, up, outward] = facts.components.each_ref().map(|c| texts.mm_or_dash(c.median()));
     let values = [("along", &*along), ("up", &*up), ("out", &*outward)];
     out.push(fill(texts.stones.median, &values));
+    if !facts.verdict.is_sound() {
+        return out;
+    }
     if !facts.moved.is_empty() {
         out.extend(places(facts));
     }
@@ -123,8 +121,13 @@ fn places(facts: &Summary) -> Vec<String> {
     out
 }
 
-/// How many stones are above their limit, how many chance alone would bring there, and how many moved.
+/// How many stones are above their limit, how many chance alone would bring there, and how many moved; of a
+/// run that is in doubt the first alone.
 fn chance(facts: &Summary) -> String {
+    if !facts.verdict.is_sound() {
+        let above = count(facts.above_limit);
+        return fill(facts.texts().page.above_as_computed, &[("above", &*above)]);
+    }
     let expected = (FALSE_ALARMS * facts.measured.len() as f64).round() as usize;
     let values = [
         ("above", &*count(facts.above_limit)),
@@ -166,11 +169,12 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
         &rows,
         2,
     ));
-    if !facts.moved.is_empty() {
+    // Which stones moved or are loose, a run in doubt cannot tell.
+    if !facts.moved.is_empty() && facts.verdict.is_sound() {
         let _ = write!(out, "<h3>{}</h3>", names.largest);
         out.push_str(&stone_rows(results, facts, &facts.moved));
     }
-    if !facts.loose.is_empty() {
+    if !facts.loose.is_empty() && facts.verdict.is_sound() {
         let _ = write!(out, "<h3>{}</h3>", names.loose_stones);
         out.push_str(&stone_rows(results, facts, &facts.loose));
     }

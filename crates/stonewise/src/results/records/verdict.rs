@@ -19,7 +19,8 @@ pub enum State {
     #[default]
     #[serde(rename = "cannot tell")]
     CannotTell,
-    /// A motion lies beyond the threshold of attention, or stones are lost; without thresholds: motion is shown.
+    /// A motion lies beyond the threshold of attention, or stones are lost; without thresholds: motion is
+    /// shown.
     #[serde(rename = "attention")]
     Attention,
     /// A motion lies beyond the alarm threshold.
@@ -103,15 +104,25 @@ pub struct EpochVerdict {
     pub zones: Vec<ZoneVerdict>,
     /// Every stone of the first epoch.
     pub stones: Vec<StoneVerdict>,
-    /// Joints that opened, closed or may have opened beyond a threshold; empty where no joint has a threshold.
+    /// Joints that opened, closed or may have opened beyond a threshold; empty where no joint has a
+    /// threshold.
     pub joints: Vec<JointVerdict>,
 }
 
 impl EpochVerdict {
-    /// Whether the registration error of the epoch is known; without, lengths are those against the common motion of the measured
-    /// stones.
+    /// Whether the registration error of the epoch is known; without, lengths are those against the common
+    /// motion of the measured stones.
     pub(crate) fn has_datum(&self) -> bool {
         self.datum.is_some_and(|d| d != DatumState::Unknown)
+    }
+
+    /// Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be
+    /// told, and the counts of such stones are only what was computed.
+    pub fn is_sound(&self) -> bool {
+        !self
+            .reasons
+            .iter()
+            .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt))
     }
 }
 
@@ -175,7 +186,8 @@ pub struct Area {
     pub measured: usize,
     /// Measured stones above their own 95 % limit, of which chance alone gives 5 % on a still wall.
     pub above_limit: usize,
-    /// Stones that moved: with the false discovery rate over all stones of the wall controlled at 5 %.
+    /// Stones that moved: with the false discovery rate over all stones of the wall controlled at 5 %. Of a
+    /// run that is in doubt, like all numbers here, only what was computed.
     pub moved: usize,
     /// Stones that move unlike their neighbours, with the false discovery rate controlled.
     pub loose: usize,

@@ -8,6 +8,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::{Crop, StoneRow, crop_side_px, write_crops};
+use crate::texts::notices::PHOTO_NOT_SHOWN;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -94,7 +95,7 @@ pub fn write_epoch_crops(
                 Ok(picture) => picture,
                 Err(error) => {
                     let subject = photos.photos[photo].path.to_string_lossy();
-                    let message = format!("the photo cannot be shown in the report: {error}");
+                    let message = PHOTO_NOT_SHOWN.say(&[("error", &error.to_string())]);
                     context.warnings.skipped("evidence", subject, message);
                     context.progress.advance(1);
                     return Ok((photo, Vec::new(), None));

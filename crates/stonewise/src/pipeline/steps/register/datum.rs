@@ -3,6 +3,7 @@
 use super::Registered;
 use crate::project::Project;
 use crate::results::records::{Datum, DatumState, SourceError};
+use crate::texts::notices::REGISTRATION_UNKNOWN;
 use nalgebra::{Matrix6, Point3};
 use stonewise_core::registration::observers::{self, EpochErrors};
 use stonewise_core::stone::Stone;
@@ -69,10 +70,7 @@ fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, sto
         );
         return known(DatumState::Sources, errors, note);
     }
-    let note = "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \
-                common rigid motion of the measured stones"
-        .to_owned();
-    Datum::unknown(&centre, note)
+    Datum::unknown(&centre, REGISTRATION_UNKNOWN.say(&[]))
 }
 
 fn middle(stones: &[Stone]) -> Point3<f64> {

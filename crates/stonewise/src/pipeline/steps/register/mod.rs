@@ -17,6 +17,10 @@ use crate::pipeline::steps::segment::Segmented;
 use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord, PhotosRecord};
 use crate::settings::Estimator;
 use crate::storage::step::Key;
+use crate::texts::notices::{
+    AUTO_STABLE, COMMON_MOTION, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
+    STABLE_TOO_FEW,
+};
 pub use datum::datum;
 use nalgebra::Point3;
 use off_wall::OffWall;
@@ -134,17 +138,16 @@ fn report_off_wall(context: &Context, number: usize, registered: &Registered) {
         volume(a).total_cmp(&volume(b))
     });
     let Some([low, high]) = largest else { return };
-    let count = registered.off_wall.len();
+    let count = registered.off_wall.len().to_string();
+    let corners = format!(
+        "[[{:.1}, {:.1}, {:.1}], [{:.1}, {:.1}, {:.1}]]",
+        low.x, low.y, low.z, high.x, high.y, high.z
+    );
     let message = match context.project.settings.registration.auto_stable {
-        true => format!(
-            "auto_stable: {count} areas off the wall are taken for stable, as far as they agree with each other"
-        ),
-        false => format!(
-            "{count} areas off the wall are seen in both epochs and could show their registration: auto_stable = true uses them all, \
-             [[registration.stable]] those that you know did not move, such as corners = [[{:.1}, {:.1}, {:.1}], [{:.1}, {:.1}, {:.1}]]",
-            low.x, low.y, low.z, high.x, high.y, high.z
-        ),
+        true => &AUTO_STABLE,
+        false => &COULD_BE_STABLE,
     };
+    let message = message.say(&[("count", &*count), ("corners", &*corners)]);
     context.warnings.notice(STEP, epoch, message);
 }
 
@@ -161,10 +164,7 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
     if let EstimatorRecord::Adjustment(adjustment) = &registered.estimator {
         let c = &adjustment.common_motion_covariance_m2;
         let common = text(adjustment.common_motion_m, [c[0][0], c[1][1], c[2][2]]);
-        let message = format!(
-            "common motion (mean of the measured stones that are not loose, before any correction of the datum): {common}; \
-             these errors leave out that of the epochs' registration"
-        );
+        let message = COMMON_MOTION.say(&[("common", &*common)]);
         context.warnings.notice(STEP, epoch, message);
     }
     let named = context.project.settings.registration.stable.len();
@@ -175,32 +175,27 @@ fn report_datum(context: &Context, number: usize, registered: &Registered) {
         .is_some_and(|e| e.datum == observers::Datum::Stable);
     let moved = registered.epoch_errors.iter().flat_map(|e| &e.moved_areas);
     for &area in moved {
-        let what = "moved against the other stable areas and is left out";
         match area.checked_sub(named).and_then(|k| registered.off_wall.get(k)) {
             None => {
-                let message = format!("[[registration.stable]] number {} {what}", area + 1);
+                let message = STABLE_MOVED.say(&[("n", &*(area + 1).to_string())]);
                 context.warnings.skipped(STEP, epoch, message);
             }
             Some([low, high]) => {
                 let [x, y, z]: [f64; 3] = nalgebra::center(low, high).into();
-                let message =
-                    format!("auto_stable: the area off the wall around ({x:.1}, {y:.1}, {z:.1}) {what}");
+                let message = OFF_WALL_MOVED.say(&[("place", &*format!("{x:.1}, {y:.1}, {z:.1}"))]);
                 context.warnings.notice(STEP, epoch, message);
             }
         }
     }
+    let cells = cells.to_string();
+    let values = [("cells", &*cells)];
     if named > 0 && !is_stable {
-        let message = format!(
-            "[[registration.stable]] does not show the epochs' registration: {cells} plane cells seen in both epochs are too few; it is \
-             taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m"
-        );
-        context.warnings.skipped(STEP, epoch, message);
+        context.warnings.skipped(STEP, epoch, STABLE_TOO_FEW.say(&values));
     }
     if named == 0 && context.project.settings.registration.auto_stable && !is_stable {
-        let message = format!(
-            "auto_stable: surfaces off the wall do not show the epochs' registration: {cells} plane cells seen in both epochs are too few"
-        );
-        context.warnings.notice(STEP, epoch, message);
+        context
+            .warnings
+            .notice(STEP, epoch, OFF_WALL_TOO_FEW.say(&values));
     }
 }
 

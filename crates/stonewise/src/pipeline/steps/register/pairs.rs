@@ -32,8 +32,8 @@ pub struct DiskPairs {
 impl DiskPairs {
     /// Gathers the points of the matched stones of two epochs into the step's folder.
     ///
-    /// Nearer to the border of a stone than `border_noises` times the noise, points are chosen by their place instead of by their
-    /// label, see [`stone_points`].
+    /// Nearer to the border of a stone than `border_noises` times the noise, points are chosen by their place
+    /// instead of by their label, see [`stone_points`].
     pub fn gather(
         first: &Labelled,
         second: &Labelled,
@@ -78,7 +78,8 @@ impl DiskPairs {
         })
     }
 
-    /// Writes the points of a batch: slot, part ([`FIRST`], [`SECOND`], [`NEARBY`]), x, y, z; the windows in which they count.
+    /// Writes the points of a batch: slot, part ([`FIRST`], [`SECOND`], [`NEARBY`]), x, y, z; the windows in
+    /// which they count.
     fn write_batch(
         &self,
         bins: &SpillBins<u32>,
@@ -129,8 +130,8 @@ impl DiskPairs {
         self.dir.join(format!("pairs-{batch:05}.parquet"))
     }
 
-    /// Sends every point of a matched stone, and every other point in its box, to its batch, relative to the stone's centroid in the
-    /// first epoch. `extents`: boxes of the first epoch's stones.
+    /// Sends every point of a matched stone, and every other point in its box, to its batch, relative to the
+    /// stone's centroid in the first epoch. `extents`: boxes of the first epoch's stones.
     fn spill(
         &self,
         epoch: &Labelled,
@@ -200,7 +201,8 @@ impl PairSource for DiskPairs {
     }
 }
 
-/// Parts of a stone's points in a batch's file: the first epoch's, the second's, and those near it in the second without its label.
+/// Parts of a stone's points in a batch's file: the first epoch's, the second's, and those near it in the
+/// second without its label.
 const FIRST: u32 = 0;
 const SECOND: u32 = 1;
 const NEARBY: u32 = 2;

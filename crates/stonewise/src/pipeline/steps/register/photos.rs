@@ -8,6 +8,7 @@ use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
+use crate::texts::notices::PHOTO_NOT_TRACKED;
 use crate::warnings::Warnings;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -94,7 +95,7 @@ impl DiskPhotos {
                     Err(error) => warnings.notice(
                         STEP,
                         path.to_string_lossy(),
-                        format!("{error}: it does not help to measure stones"),
+                        PHOTO_NOT_TRACKED.say(&[("error", &error.to_string())]),
                     ),
                 }
             }

@@ -22,8 +22,8 @@ pub struct Registered {
     pub epoch_errors: Option<EpochErrors>,
     /// The stones at which that error is given, in its order.
     pub error_stones: Vec<StoneId>,
-    /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty where nobody
-    /// asked.
+    /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty without
+    /// `auto_stable`.
     #[serde(default)]
     pub off_wall: Vec<[Point3<f64>; 2]>,
 }

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::project::Epoch;
 use crate::storage::step::StepDir;
+use crate::texts::notices::NO_MASKS;
 use crate::warnings::Warnings;
 use rayon::prelude::*;
 use std::path::Path;
@@ -34,7 +35,7 @@ pub fn write_labels(
                     warnings.skipped(
                         STEP,
                         path.to_string_lossy(),
-                        format!("no masks for this photo in {}", masks.display()),
+                        NO_MASKS.say(&[("file", &masks.to_string_lossy())]),
                     );
                     None
                 }

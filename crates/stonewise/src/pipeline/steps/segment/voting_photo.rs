@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::project::Epoch;
 use crate::storage::step::StepDir;
+use crate::texts::notices::{CAMERA_NOT_USED, NO_CAMERA, NO_SUCH_PHOTO, UNUSABLE_CAMERA};
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -74,15 +75,11 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
         .for_each(|w| warnings.notice(STEP, file.clone(), w.clone()));
     let photos = find_photos(&epoch.images, &cameras)?;
     for path in &photos.without_camera {
-        let reason = reason_without_camera(path, &cameras.skipped);
-        warnings.skipped(
-            STEP,
-            path.to_string_lossy(),
-            format!("{reason} in {file}; the photo is left out"),
-        );
+        let message = without_camera(path, &cameras.skipped, &file);
+        warnings.skipped(STEP, path.to_string_lossy(), message);
     }
     for (name, reason) in &cameras.skipped {
-        warnings.notice(STEP, name.clone(), format!("camera not used: {reason}"));
+        warnings.notice(STEP, name.clone(), CAMERA_NOT_USED.say(&[("reason", reason)]));
     }
     let mut posed = Vec::new();
     for (view, path) in cameras.views.into_iter().zip(photos.paths) {
@@ -91,21 +88,22 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
             None => warnings.notice(
                 STEP,
                 view.name,
-                format!("camera not used: no such photo in {}", epoch.images.display()),
+                NO_SUCH_PHOTO.say(&[("folder", &epoch.images.to_string_lossy())]),
             ),
         }
     }
     Ok(posed)
 }
 
-fn reason_without_camera(photo: &Path, skipped: &[(String, String)]) -> String {
+fn without_camera(photo: &Path, skipped: &[(String, String)], file: &str) -> String {
     let stem = |name: &str| Path::new(name).file_stem().map(|s| s.to_ascii_lowercase());
     let reason = skipped
         .iter()
         .find(|(name, _)| stem(name) == stem(&photo.to_string_lossy()));
-    reason.map_or("no camera".to_owned(), |(_, reason)| {
-        format!("its camera cannot be used ({reason})")
-    })
+    match reason {
+        Some((_, reason)) => UNUSABLE_CAMERA.say(&[("reason", reason), ("file", file)]),
+        None => NO_CAMERA.say(&[("file", file)]),
+    }
 }
 
 /// Where the label image of a photo lies in the step's folder.

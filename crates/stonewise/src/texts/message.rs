@@ -1,0 +1,19 @@
+//! A sentence that a run says in English and a report in its own language.
+
+use super::braces::fill;
+
+/// A sentence in both languages; words in braces are filled in.
+#[derive(Debug)]
+pub(crate) struct Message {
+    /// As a run says it.
+    pub english: &'static str,
+    /// As a German report says it.
+    pub german: &'static str,
+}
+
+impl Message {
+    /// The sentence as a run says it.
+    pub(crate) fn say(&self, values: &[(&str, &str)]) -> String {
+        fill(self.english, values)
+    }
+}

@@ -1,0 +1,23 @@
+//! A detector small enough for tests.
+
+use stonewise_segment::model::{BackboneConfig, MaskRcnnConfig, Norm, RoiConfig};
+
+/// The light model with `width` channels, a multiple of 4, instead of 64.
+pub fn narrow(width: usize) -> MaskRcnnConfig {
+    let light = MaskRcnnConfig::light();
+    MaskRcnnConfig {
+        backbone: BackboneConfig {
+            width,
+            norm: Norm::Group { groups: 4 },
+            ..light.backbone
+        },
+        fpn_channels: width,
+        head_groups: Some(4),
+        roi: RoiConfig {
+            box_hidden: 2 * width,
+            mask_channels: vec![width],
+            ..light.roi
+        },
+        ..light
+    }
+}
