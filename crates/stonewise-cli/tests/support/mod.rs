@@ -92,7 +92,8 @@ impl Dice {
 
 /// The program under test: this build, or the one that `STONEWISE_PROGRAM` names.
 pub fn program() -> PathBuf {
-    std::env::var_os("STONEWISE_PROGRAM").map_or_else(|| env!("CARGO_BIN_EXE_stonewise").into(), PathBuf::from)
+    std::env::var_os("STONEWISE_PROGRAM")
+        .map_or_else(|| env!("CARGO_BIN_EXE_stonewise").into(), PathBuf::from)
 }
 
 pub fn stonewise() -> Command {
