@@ -268,7 +268,7 @@ fn too_little_address_space_is_said_before_the_work() {
     let (code, log) = outcome(&mut run);
     assert_eq!(code, 1, "{log}");
     assert!(
-        log.contains("error: a run of this survey takes about 0.5 GB of address space"),
+        log.contains("a run of this survey takes about 0.5 GB of address space"),
         "{log}"
     );
     assert!(log.contains("only 0.4 GB are allowed (`ulimit -v`)"), "{log}");
@@ -280,7 +280,7 @@ fn too_little_address_space_is_said_before_the_work() {
     let (code, log) = outcome(&mut segment);
     assert_eq!(code, 1, "{log}");
     assert!(
-        log.contains("error: the search for stones in photos takes about 0.7 GB"),
+        log.contains("the search for stones in photos takes about 0.7 GB"),
         "{log}"
     );
 }
