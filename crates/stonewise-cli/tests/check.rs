@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
-use support::{copy_of, outcome, run, sharp_survey, stonewise};
+use support::{copy_of, outcome, run, sharp_survey, stonewise, tiny_survey};
 
 /// Runs `check`; exit code, table, log.
 fn check(survey: &Path) -> (i32, String, String) {
@@ -246,4 +246,41 @@ fn wrong_projects_are_wrong_usage() {
     let mut command = stonewise();
     let (code, log) = outcome(command.arg("check").arg(dir.path().join("stonewise.toml")));
     assert_eq!(code, 2, "{log}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn too_little_address_space_is_said_before_the_work() {
+    let out = tempfile::tempdir().unwrap();
+    // 200 MB for a small survey and 64 MB for each thread are more than 400,000 KiB.
+    let limited = |command: &str| {
+        let mut shell = assert_cmd::Command::new("sh");
+        shell
+            .args(["-c", "ulimit -v 400000; exec \"$0\" \"$@\""])
+            .arg(support::program())
+            .args([command, "--threads", "2"]);
+        shell
+    };
+    let mut run = limited("run");
+    run.arg(tiny_survey().join("stonewise.toml"))
+        .arg("--out")
+        .arg(out.path().join("results"));
+    let (code, log) = outcome(&mut run);
+    assert_eq!(code, 1, "{log}");
+    assert!(
+        log.contains("a run of this survey takes about 0.5 GB of address space"),
+        "{log}"
+    );
+    assert!(log.contains("only 0.4 GB are allowed (`ulimit -v`)"), "{log}");
+    let mut segment = limited("segment");
+    segment
+        .arg(tiny_survey().join("epoch1/images"))
+        .arg("--out")
+        .arg(out.path().join("stones"));
+    let (code, log) = outcome(&mut segment);
+    assert_eq!(code, 1, "{log}");
+    assert!(
+        log.contains("the search for stones in photos takes about 0.7 GB"),
+        "{log}"
+    );
 }

@@ -79,6 +79,19 @@ pub enum Error {
     /// The check of the survey found an error.
     #[error("{0}")]
     Check(String),
+    /// The program may not take the address space that its work needs.
+    #[error(
+        "{what} takes about {needed_gb:.1} GB of address space, and only {limit_gb:.1} GB are allowed (`ulimit -v`): raise the limit, take \
+         fewer threads (--threads), or try all the same with --force"
+    )]
+    AddressSpace {
+        /// What needs it.
+        what: String,
+        /// How much, GiB.
+        needed_gb: f64,
+        /// How much the program may take, GiB.
+        limit_gb: f64,
+    },
     /// Two epochs have no stone in common.
     #[error(
         "no stone of epoch {:?} was found in epoch {:?} ({} and {} stones): do both show the same wall, in the same coordinates?",

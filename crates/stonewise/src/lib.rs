@@ -1,5 +1,6 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
+mod address_space;
 pub mod check;
 pub mod edits;
 mod error;

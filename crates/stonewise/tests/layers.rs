@@ -17,7 +17,7 @@ const LAYERS: [&[&str]; 9] = [
         "warnings",
     ],
     &["error", "settings"],
-    &["files", "kept", "limits", "part"],
+    &["address_space", "files", "kept", "limits", "part"],
     &["init", "results", "storage"],
     &["edits", "export", "segmentation", "simulate", "texts", "truth"],
     &["project", "verdict"],

@@ -5,7 +5,7 @@ use crate::commands::{Outcome, run};
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
-use stonewise::segmentation::{FolderJob, MaskEvaluation, segment_folder};
+use stonewise::segmentation::{FolderJob, MaskEvaluation, require_memory, segment_folder};
 use stonewise::{OutputFolder, Owner, Until};
 use stonewise_segment::Weights;
 use stonewise_segment::dataset::Reference;
@@ -30,6 +30,9 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     tiling.min_score = args.min_score.unwrap_or(tiling.min_score);
     if let Some((key, what)) = tiling.impossible() {
         bail!("{key} {what}");
+    }
+    if !force {
+        require_memory()?;
     }
     let reference = match &args.reference {
         Some(masks) => Some(Reference::open(masks, args.valid.as_deref())?),

@@ -27,6 +27,26 @@ focal_px = 1100.0
 distance_m = 5.0
 "#;
 
+/// The least that goes through every step: for runs by the hundred.
+const TINY: &str = r#"
+name = "Tiny wall"
+[scene]
+seed = 3
+[scene.wall]
+width_m = 1.2
+height_m = 0.8
+seed = 3
+[scene.tls]
+spacing_m = 0.012
+[photos]
+columns = 2
+rows = 1
+width = 600
+height = 450
+focal_px = 825.0
+distance_m = 5.0
+"#;
+
 /// A wall whose photos and points are fine enough to compare its edges in both.
 const SHARP: &str = r#"
 name = "Sharp wall"
@@ -70,14 +90,26 @@ impl Dice {
     }
 }
 
+/// The program under test: this build, or the one that `STONEWISE_PROGRAM` names.
+pub fn program() -> PathBuf {
+    std::env::var_os("STONEWISE_PROGRAM")
+        .map_or_else(|| env!("CARGO_BIN_EXE_stonewise").into(), PathBuf::from)
+}
+
 pub fn stonewise() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_stonewise"))
+    Command::new(program())
 }
 
 /// The survey, made once for all tests of a program.
 pub fn survey() -> &'static Path {
     static DIR: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
     &DIR.get_or_init(|| simulated(SURVEY)).1
+}
+
+/// The smallest survey, made once for all tests of a program.
+pub fn tiny_survey() -> &'static Path {
+    static DIR: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    &DIR.get_or_init(|| simulated(TINY)).1
 }
 
 /// The finer survey, made once for all tests of a program.

@@ -62,10 +62,10 @@ impl Photos {
     }
 
     /// Labels of all points; units are pairs of a point and a photo.
-    pub fn label(&self) -> (usize, Vec<f64>) {
+    pub fn label(self) -> (usize, Vec<f64>) {
         let mut store = MemoryLabels::default();
-        let mut masks = self.masks.iter();
-        let mask = |_| Ok::<_, Infallible>(masks.next().cloned());
+        let mut masks = self.masks.into_iter();
+        let mask = |_| Ok::<_, Infallible>(masks.next());
         let params = TransferParams::default();
         transfer_labels(&self.tiles, &self.views, mask, &mut store, &params, &Silent).unwrap();
         let values = store

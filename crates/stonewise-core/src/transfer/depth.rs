@@ -123,7 +123,7 @@ impl SplatDepth {
 /// Depth maps of the photos and the local surface of all tiles, from two passes over the cloud: what spacing
 /// is usual is known after the first.
 ///
-/// Cost: one projection a point and photo whose cone touches the tile, and one write a pixel of each splat.
+/// Cost: one projection a point and photo whose cone touches the surface cell, and one write a pixel of each splat.
 pub(super) fn splat_all<T: TileSource>(
     tiles: &T,
     views: &[&View],
@@ -150,17 +150,20 @@ pub(super) fn splat_all<T: TileSource>(
         maps.par_iter_mut()
             .zip(views.par_iter().zip(&cones))
             .filter(|(_, (_, cone))| cone.touches(&bounds))
-            .for_each(|(map, (view, _))| splat_tile(map, view, &cloud, &groups, params));
+            .for_each(|(map, (view, cone))| {
+                let groups = groups.iter().filter(|g| cone.touches(&g.bounds));
+                splat_tile(map, view, &cloud, groups, params);
+            });
         progress.advance(1);
     }
     Ok((maps, surfaces))
 }
 
-fn splat_tile(
+fn splat_tile<'a>(
     map: &mut SplatDepth,
     view: &View,
     cloud: &Cloud,
-    groups: &[SurfaceGroup],
+    groups: impl Iterator<Item = &'a SurfaceGroup>,
     params: &TransferParams,
 ) {
     for group in groups {

@@ -3,7 +3,7 @@
 use super::bytes::{Reader, Writer};
 use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, GridIndex};
-use crate::geometry::{CellMap, cell_of, floor};
+use crate::geometry::{Bounds, CellMap, cell_of, floor};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -57,6 +57,8 @@ pub(super) struct SurfaceCells {
 pub(super) struct SurfaceGroup {
     /// What the surface is like there.
     pub surface: LocalSurface,
+    /// Around its points, world.
+    pub bounds: Bounds,
     /// Ascending indices into the tile.
     pub points: Vec<u32>,
 }
@@ -104,8 +106,12 @@ impl SurfaceCells {
         let points: Vec<Point3<f64>> = chosen.iter().map(|&i| cloud.local(i as usize)).collect();
         let group = |(key, points): ([i32; 3], Vec<u32>)| {
             let at = self.keys.binary_search(&key).ok()?;
-            let surface = self.surfaces[at];
-            Some(SurfaceGroup { surface, points })
+            let bounds = Bounds::of(points.iter().map(|&k| cloud.world(chosen[k as usize] as usize)))?;
+            Some(SurfaceGroup {
+                surface: self.surfaces[at],
+                bounds,
+                points,
+            })
         };
         members(&points, self.cell_m)
             .into_iter()

@@ -5,7 +5,7 @@ use super::TransferParams;
 use super::depth::{SplatDepth, splat_all};
 use super::frustum::Cone;
 use super::run_labels::RunLabels;
-use super::surface_cells::{LocalSurface, SurfaceCells};
+use super::surface_cells::{LocalSurface, SurfaceCells, SurfaceGroup};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::progress::Progress;
@@ -22,6 +22,9 @@ pub(super) struct Sighting {
     /// How much the word counts; only ratios matter.
     pub weight: f32,
 }
+
+/// Radians by which a whole cell must be too oblique before its points are not looked at: rounding must not decide.
+const ANGLE_MARGIN: f64 = 1e-6;
 
 /// Everything needed to look up any point in all photos.
 pub(super) struct Observer<'a> {
@@ -105,7 +108,8 @@ impl<'a> Observer<'a> {
     /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the
     /// order of `chosen`.
     ///
-    /// Points come cell by cell: their surface is looked up once, and the photos show them side by side.
+    /// Points come cell by cell: their surface is looked up once, photos that cannot vote in the cell are left out, and
+    /// the others show its points side by side.
     pub(super) fn sight_all<R: Clone + Default + Send>(
         &self,
         tile: usize,
@@ -118,6 +122,8 @@ impl<'a> Observer<'a> {
         let judged: Vec<Vec<R>> = groups
             .par_iter()
             .map_init(Vec::new, |found, group| {
+                let may_vote = |p: &u32| self.may_vote(*p as usize, group);
+                let candidates: Vec<u32> = candidates.iter().copied().filter(may_vote).collect();
                 let of_point = |&k: &u32| {
                     let world = cloud.world(chosen[k as usize] as usize);
                     found.clear();
@@ -137,6 +143,21 @@ impl<'a> Observer<'a> {
             }
         }
         results
+    }
+
+    /// False only where the photo shows no point of a cell, or all of them at too steep an incidence to vote.
+    fn may_vote(&self, photo: usize, group: &SurfaceGroup) -> bool {
+        if !self.cones[photo].touches(&group.bounds) {
+            return false;
+        }
+        let to_centre = group.bounds.centre() - self.centres[photo];
+        let radius = (group.bounds.max - group.bounds.min).norm() / 2.0;
+        let distance = to_centre.norm();
+        if distance <= radius {
+            return true;
+        }
+        let incidence = group.surface.cosine(&(to_centre / distance)).min(1.0).acos();
+        incidence - (radius / distance).asin() <= self.params.max_incidence_rad + ANGLE_MARGIN
     }
 
     /// What a photo says about a point; what costs least and rules out most comes first.
@@ -175,5 +196,72 @@ impl<'a> Observer<'a> {
             instance,
             weight,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Camera, Rigid3};
+    use crate::id::ImageId;
+    use crate::raster::LabelImage;
+    use nalgebra::{Translation3, UnitQuaternion, Vector3};
+    use rand::{RngExt, SeedableRng};
+
+    /// Cells of a rough wall and photos that look anywhere: photos left out for a cell say nothing about any of its
+    /// points, and enough are left out.
+    #[test]
+    fn photos_left_out_for_a_cell_see_none_of_its_points() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);
+        let points = (0..4000).map(|_| {
+            let (x, z): (f64, f64) = (rng.random_range(0.0..4.0), rng.random_range(0.0..2.0));
+            Point3::new(x, 0.3 * (3.0 * x).sin(), z)
+        });
+        let cloud = Cloud::from_world(Point3::new(2.0, 0.0, 1.0), points.collect::<Vec<_>>());
+        let views: Vec<View> = (0..40)
+            .map(|i| {
+                let mut draw = |reach: f64| Vector3::from_fn(|_, _| rng.random_range(-reach..reach));
+                let centre = Vector3::new(2.0, -3.0, 1.0) + draw(2.5);
+                let turn =
+                    UnitQuaternion::face_towards(&(draw(1.0) + Vector3::y()), &-Vector3::z()).inverse();
+                View {
+                    image: ImageId(i),
+                    name: String::new(),
+                    camera: Camera::pinhole(40, 30, 35.0),
+                    cam_from_world: Rigid3::from_parts(Translation3::from(-(turn * centre)), turn),
+                }
+            })
+            .collect();
+        let labels = || RunLabels::new(&LabelImage::filled(40, 30, 1));
+        let params = TransferParams::default();
+        let surfaces = vec![SurfaceCells::new(&cloud, params.cell_m)];
+        let groups = surfaces[0].groups(&cloud);
+        let observer = Observer::of(
+            views.iter().collect(),
+            views.iter().map(|_| labels()).collect(),
+            views.iter().map(|v| SplatDepth::new(v, 1.0)).collect(),
+            (surfaces, 0),
+            &params,
+        );
+        let (mut left_out, mut seen) = (0, 0);
+        for group in &groups {
+            for photo in 0..views.len() {
+                let sees = |&i: &u32| {
+                    let world = cloud.world(i as usize);
+                    observer.sight_in(photo as u32, &group.surface, &world).is_some()
+                };
+                let some = group.points.iter().any(sees);
+                seen += usize::from(some);
+                if !observer.may_vote(photo, group) {
+                    left_out += 1;
+                    assert!(!some, "photo {photo} sees a cell that it was left out for");
+                }
+            }
+        }
+        let all = groups.len() * views.len();
+        assert!(
+            seen > all / 20 && left_out > all / 2,
+            "{seen} seen, {left_out} left out of {all}"
+        );
     }
 }

@@ -13,7 +13,7 @@ mod sample;
 
 pub use depth::Depth;
 pub use finding::{Finding, Report, Verdict};
-pub(crate) use resources::is_about_this_machine;
+pub(crate) use resources::{is_about_this_machine, require_address_space};
 
 use crate::error::Result;
 use crate::project::Project;

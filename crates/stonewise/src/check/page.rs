@@ -2,7 +2,7 @@
 
 use super::{Report, Verdict};
 use crate::error::Result;
-use crate::figure::{Page, jpeg_element, table};
+use crate::figure::{Page, jpeg_element, words};
 use crate::files::write_text;
 use crate::project::Project;
 use std::path::Path;
@@ -32,7 +32,7 @@ impl Report {
                 ]
             })
             .collect();
-        page.html(&table(&["epoch", "", "", ""], &rows, None));
+        page.html(&words(&["epoch", "what", "verdict", "finding"], &rows));
         if !self.pictures.is_empty() {
             page.heading("Cameras against clouds").note(
                 "Each photo with the edges of the projected cloud in orange. Where camera and cloud belong together they lie on the \

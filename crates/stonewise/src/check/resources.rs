@@ -2,10 +2,14 @@
 
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
+use crate::address_space;
+use crate::error::Result;
 use crate::project::Project;
+use crate::segmentation::detector_memory;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use stonewise_io::cloud::claimed_records;
 
 /// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on
 /// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
@@ -20,7 +24,7 @@ const GIB: f64 = (1u64 << 30) as f64;
 pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Finding> {
     let points: u64 = surveys.iter().map(|s| s.records).sum();
     let amount = |topic: &str, needed: u64, free: Option<u64>, advice: &str| {
-        let needs = format!("about {:.1} GB needed", needed as f64 / GIB);
+        let needs = format!("about {:.1} GB needed", (needed as f64 / GIB).max(0.1));
         match free {
             None => Finding::new(
                 "",
@@ -53,7 +57,7 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
         ),
         amount(
             "memory",
-            MEMORY_BASE + MEMORY_PER_POINT * points,
+            memory(project, points),
             free_memory(),
             "end other programs, or run on a part of the survey",
         ),
@@ -64,6 +68,27 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
             format!("about {:.0} min on {cores} cores{search}", minutes.max(1.0)),
         ),
     ]
+}
+
+/// Refuses to begin a run that the limit on the address space would end; from the heads of the clouds.
+///
+/// # Errors
+/// The limit is too low; a cloud cannot be read.
+pub(crate) fn require_address_space(project: &Project) -> Result<()> {
+    let mut points = 0;
+    for cloud in project.epochs.iter().flat_map(|e| &e.clouds) {
+        points += claimed_records(cloud)?.unwrap_or(0);
+    }
+    address_space::require(memory(project, points), "a run of this survey")
+}
+
+fn memory(project: &Project, points: u64) -> u64 {
+    let detector = match project.epochs.iter().any(|e| e.masks.is_none()) {
+        true => detector_memory(),
+        false => 0,
+    };
+    // The photos are looked at before most points are in memory.
+    (MEMORY_BASE + MEMORY_PER_POINT.saturating_mul(points)).max(detector)
 }
 
 /// Whether a finding concerns free disk or memory, and not the survey.
@@ -98,10 +123,7 @@ fn free_memory() -> Option<u64> {
     let meminfo = fs::read_to_string("/proc/meminfo").ok()?;
     let line = meminfo.lines().find(|l| l.starts_with("MemAvailable:"))?;
     let available = line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024;
-    let limits = fs::read_to_string("/proc/self/limits").unwrap_or_default();
-    let limit = limits.lines().find(|l| l.starts_with("Max address space"));
-    let limit = limit.and_then(|l| l.split_whitespace().nth(3)?.parse::<u64>().ok());
-    Some(available.min(limit.unwrap_or(u64::MAX)))
+    Some(available.min(address_space::room().unwrap_or(u64::MAX)))
 }
 
 #[cfg(test)]

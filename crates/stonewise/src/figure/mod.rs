@@ -16,7 +16,7 @@ pub(crate) use axes::Axes;
 pub(crate) use axis::{Axis, nice_above};
 pub(crate) use colour::{GREY, PALETTE, Ramp, Rgb, diverging, sequential};
 pub(crate) use colour_bar::colour_bar;
-pub(crate) use page::{Page, jpeg_element, table};
+pub(crate) use page::{Page, jpeg_element, table, words};
 pub(crate) use plot::{Item, Plot};
 pub(crate) use scale::{Scale, colours};
 pub(crate) use text::{count, escape, mm, number, percent};

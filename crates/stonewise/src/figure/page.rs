@@ -16,7 +16,7 @@ const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;max-width:1240px;ma
 background:#fff}h1{font-size:1.6rem}h2{font-size:1.2rem;margin-top:2rem}figure{margin:1rem 0;display:inline-block;\
 vertical-align:top;max-width:100%}figcaption{font-weight:600;margin-bottom:.3rem}p.note{color:#555;max-width:60rem}\
 table{border-collapse:collapse;margin:.6rem 0}th,td{padding:.2rem .7rem;border-bottom:1px solid #ddd;text-align:right}\
-th:first-child,td:first-child{text-align:left}thead th{border-bottom:2px solid #888}.scroll{overflow-x:auto}\
+th:first-child,td:first-child,.words th,.words td{text-align:left}thead th{border-bottom:2px solid #888}.scroll{overflow-x:auto}\
 pre{background:#f4f4f4;padding:.7rem;overflow-x:auto}svg,img{max-width:100%;height:auto}tr.best td{background:#e8f3e8}";
 
 impl Page {
@@ -73,9 +73,18 @@ impl Page {
     }
 }
 
-/// A table of plain text; rows whose number is `best` stand out.
+/// A table of numbers, with names in its first column; rows whose number is `best` stand out.
 pub(crate) fn table(head: &[&str], rows: &[Vec<String>], best: Option<usize>) -> String {
-    let mut out = String::from("<div class=\"scroll\"><table><thead><tr>");
+    table_of_class("numbers", head, rows, best)
+}
+
+/// A table of words.
+pub(crate) fn words(head: &[&str], rows: &[Vec<String>]) -> String {
+    table_of_class("words", head, rows, None)
+}
+
+fn table_of_class(class: &str, head: &[&str], rows: &[Vec<String>], best: Option<usize>) -> String {
+    let mut out = format!("<div class=\"scroll\"><table class=\"{class}\"><thead><tr>");
     for name in head {
         let _ = write!(out, "<th>{}</th>", escape(name));
     }
@@ -108,6 +117,20 @@ pub(crate) fn jpeg_element(jpeg: &[u8], description: &str) -> String {
 mod tests {
     use super::*;
     use crate::figure::number;
+
+    #[test]
+    fn words_stand_on_the_left_and_numbers_on_the_right() {
+        let rows = [vec!["all".to_owned(), "<ok>".to_owned()]];
+        let (of_words, of_numbers) = (
+            words(&["epoch", "what"], &rows),
+            table(&["epoch", "mm"], &rows, Some(0)),
+        );
+        assert!(of_words.contains("<table class=\"words\"><thead><tr><th>epoch</th><th>what</th>"));
+        assert!(of_words.contains("<td>&lt;ok&gt;</td>") && !of_words.contains("best"));
+        assert!(of_numbers.contains("class=\"numbers\"") && of_numbers.contains("<tr class=\"best\">"));
+        let page = Page::new("a").finish();
+        assert!(page.contains("text-align:right") && page.contains(".words td{text-align:left}"));
+    }
 
     #[test]
     fn text_is_harmless_and_numbers_read_well() {

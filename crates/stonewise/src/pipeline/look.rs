@@ -1,6 +1,6 @@
 //! The look at a survey with which every run begins.
 
-use crate::check::{Depth, Report, Verdict, check, is_about_this_machine};
+use crate::check::{Depth, Report, Verdict, check, is_about_this_machine, require_address_space};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -14,9 +14,12 @@ const STEP: &str = "check";
 /// run, unless it is forced.
 ///
 /// # Errors
-/// Something cannot be right; a cloud or camera file cannot be read.
+/// Something cannot be right; the address space is too small; a cloud or camera file cannot be read.
 pub fn look(context: &Context, forced: bool) -> Result<()> {
     let project = context.project;
+    if !forced {
+        require_address_space(project)?;
+    }
     let mut inputs = Vec::new();
     for epoch in &project.epochs {
         for cloud in &epoch.clouds {

@@ -20,11 +20,18 @@ pub(crate) static COULD_BE_STABLE: Message = Message {
              corners = {corners}",
 };
 
-pub(crate) static COMMON_MOTION: Message = Message {
-    english: "common motion (mean of the measured stones that are not loose, before any correction of the datum): {common}; \
-              these errors leave out that of the epochs' registration",
-    german: "gemeinsame Bewegung (Mittel der gemessenen Steine, die nicht lose sind, vor jeder Korrektur des Datums): {common}; \
-             der Registrierungsfehler der Epochen ist in diesen Fehlern nicht enthalten",
+pub(crate) static MEAN_MOTION: Message = Message {
+    english: "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations with the error of the \
+              epochs' registration)",
+    german: "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen mit dem \
+             Registrierungsfehler der Epochen)",
+};
+
+pub(crate) static MEAN_MOTION_OF_UNKNOWN_DATUM: Message = Message {
+    english: "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations without the error of the \
+              epochs' registration, which is unknown)",
+    german: "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen ohne den \
+             Registrierungsfehler der Epochen, der unbekannt ist)",
 };
 
 pub(crate) static STABLE_MOVED: Message = Message {
@@ -105,11 +112,12 @@ pub(crate) static PHOTO_NOT_SHOWN: Message = Message {
 };
 
 /// All of them; of two that fit the same words the more particular one first.
-pub(super) static NOTICES: [&Message; 18] = [
+pub(super) static NOTICES: [&Message; 19] = [
     &INVALID_POINTS,
     &AUTO_STABLE,
     &COULD_BE_STABLE,
-    &COMMON_MOTION,
+    &MEAN_MOTION,
+    &MEAN_MOTION_OF_UNKNOWN_DATUM,
     &STABLE_MOVED,
     &OFF_WALL_MOVED,
     &STABLE_TOO_FEW,

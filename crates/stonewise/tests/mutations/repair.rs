@@ -1,5 +1,7 @@
 //! Checksums made right again after a change, so that what lies behind them is reached.
 
+use std::sync::LazyLock;
+
 /// E57: a CRC-32C at the end of every page, big endian (ASTM E2807, section 9.3).
 pub fn e57(bytes: &mut [u8]) {
     let Some(size) = bytes.get(40..48).and_then(|b| b.try_into().ok()) else {
@@ -15,13 +17,16 @@ pub fn e57(bytes: &mut [u8]) {
     }
 }
 
-/// Castagnoli's polynomial, bit by bit.
+/// Castagnoli's polynomial, byte by byte.
 fn crc32c(data: &[u8]) -> u32 {
+    static TABLE: LazyLock<[u32; 256]> = LazyLock::new(|| std::array::from_fn(|byte| by_bit(byte as u32)));
     !data.iter().fold(!0, |crc: u32, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |c, _| {
-            c >> 1 ^ (0x82f6_3b78 & (c & 1).wrapping_neg())
-        })
+        crc >> 8 ^ TABLE[usize::from(crc as u8 ^ byte)]
     })
+}
+
+fn by_bit(byte: u32) -> u32 {
+    (0..8).fold(byte, |c, _| c >> 1 ^ (0x82f6_3b78 & (c & 1).wrapping_neg()))
 }
 
 /// PNG: a CRC-32 behind every chunk (W3C PNG, section 5.3).

@@ -1,6 +1,7 @@
 //! The motion of every matched stone.
 
 mod datum;
+mod mean_motion;
 mod off_wall;
 mod pairs;
 mod photos;
@@ -14,14 +15,14 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::Matched;
 use crate::pipeline::steps::segment::Segmented;
-use crate::results::records::{AdjustmentRecord, EstimatorRecord, GicpRecord, PhotosRecord};
+use crate::results::records::{AdjustmentRecord, Datum, EstimatorRecord, GicpRecord, PhotosRecord};
 use crate::settings::Estimator;
 use crate::storage::step::Key;
 use crate::texts::notices::{
-    AUTO_STABLE, COMMON_MOTION, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
-    STABLE_TOO_FEW,
+    AUTO_STABLE, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED, STABLE_TOO_FEW,
 };
 pub use datum::datum;
+use mean_motion::mean_motion;
 use nalgebra::Point3;
 use off_wall::OffWall;
 use pairs::DiskPairs;
@@ -125,6 +126,12 @@ pub fn register(
         write_json(&step.file("motions.json"), &registered)
     })?;
     let registered: Registered = read_json(&step.file("motions.json"))?;
+    report_mean_motion(
+        context,
+        number,
+        &registered,
+        &datum(context.project, number, &registered, &first.stones),
+    );
     report_datum(context, number, &registered);
     report_off_wall(context, number, &registered);
     Ok(registered)
@@ -151,22 +158,20 @@ fn report_off_wall(context: &Context, number: usize, registered: &Registered) {
     context.warnings.notice(STEP, epoch, message);
 }
 
-/// Says how the stones moved in common, and what is known about the registration of the epochs.
+/// Says how the stones moved on the mean.
+fn report_mean_motion(context: &Context, number: usize, registered: &Registered, datum: &Datum) {
+    let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
+        return;
+    };
+    let epoch = &context.project.epochs[number - 1].name;
+    context
+        .warnings
+        .notice(STEP, epoch, mean_motion(adjustment, datum));
+}
+
+/// Says what the stable areas show of the registration of the epochs, and what they do not.
 fn report_datum(context: &Context, number: usize, registered: &Registered) {
     let epoch = &context.project.epochs[number - 1].name;
-    let text = |mean: [f64; 3], variance: [f64; 3]| {
-        let parts = mean.iter().zip(variance);
-        let parts: Vec<String> = parts
-            .map(|(m, v)| format!("{:.2} +- {:.2}", 1e3 * m, 1e3 * v.max(0.0).sqrt()))
-            .collect();
-        format!("x {}, y {}, z {} mm", parts[0], parts[1], parts[2])
-    };
-    if let EstimatorRecord::Adjustment(adjustment) = &registered.estimator {
-        let c = &adjustment.common_motion_covariance_m2;
-        let common = text(adjustment.common_motion_m, [c[0][0], c[1][1], c[2][2]]);
-        let message = COMMON_MOTION.say(&[("common", &*common)]);
-        context.warnings.notice(STEP, epoch, message);
-    }
     let named = context.project.settings.registration.stable.len();
     let cells = registered.epoch_errors.as_ref().map_or(0, |e| e.observations[2]);
     let is_stable = registered
