@@ -55,7 +55,7 @@ mod tests {
         let size = [7, 5];
         let value = |x: usize, y: usize| {
             let v = ((3 * x + 11 * y) % 13) as f64;
-            ((x + y) % 5 != 0).then_some([v, 1.0])
+            (!(x + y).is_multiple_of(5)).then_some([v, 1.0])
         };
         let table = SumTable::new(size, value);
         for (x, y, half) in (0..7).flat_map(|x| (0..5).flat_map(move |y| (0..9).map(move |h| (x, y, h)))) {
