@@ -218,20 +218,25 @@ mod tests {
     fn a_match_that_leads_elsewhere_on_the_way_back_is_refused() {
         let face = face();
         let [first, second] = [0.0, 3.0].map(|shift| vec![drawn(5, 3.0, shift)]);
-        let (template, ones) = face.template(&first).unwrap();
-        let verified = |start: f64| {
-            let start = Warp::shift(Vector2::new(start, 0.0));
-            let twos = [face
-                .matched(&template, &second[0], start)
-                .or_else(|| matched(0.5).map(|m| Match { warp: start, ..m }))];
-            Verification {
+        let (_, ones) = face.template(&first).unwrap();
+        let at = |shift: f64| {
+            let warp = Warp::shift(Vector2::new(shift, 0.0));
+            let twos = [matched(0.9).map(|m| Match { warp, ..m })];
+            let verification = Verification {
                 face: &face,
                 patches: [&first, &second],
                 matches: [&ones, &twos],
-            }
-            .verified([&first, &second], 8)
+            };
+            let apart = verification.way_back(10).map(|w| w.norm());
+            (apart, verification.verified([&first, &second], 10).is_some())
         };
-        assert!(verified(3.0).is_some_and(|apart| apart.norm() < 0.05));
-        assert_eq!(verified(-6.0), None);
+        let (apart, is_verified) = at(3.0);
+        assert!(apart.is_some_and(|a| a < 0.05) && is_verified, "{apart:?}");
+        // The photo moved by 3 cells and was matched at -2: the way back is 5 cells off.
+        let (apart, is_verified) = at(-2.0);
+        assert!(
+            apart.is_some_and(|a| (a - 5.0).abs() < 0.1) && !is_verified,
+            "{apart:?}"
+        );
     }
 }
