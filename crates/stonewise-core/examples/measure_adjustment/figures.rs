@@ -1,9 +1,9 @@
 //! What is counted of one measured survey.
 
 use crate::trial::{Trial, mean};
-use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
-use stonewise_core::geometry::FaceFrame;
+use stonewise_core::geometry::{FaceFrame, lever};
 use stonewise_core::registration::{Break, PairPoints};
 use stonewise_core::stone::PairResult;
 
@@ -207,13 +207,7 @@ fn row(trial: &Trial, result: &PairResult) -> Option<Row> {
 /// left out).
 fn without_datum(rows: &[Row]) -> Vec<Vector3<f64>> {
     let middle = rows.iter().map(|r| r.centroid.coords).sum::<Vector3<f64>>() / rows.len().max(1) as f64;
-    let design = |r: &Row| {
-        let mut j = SMatrix::<f64, 3, 6>::zeros();
-        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Matrix3::identity());
-        let arm = r.centroid.coords - middle;
-        j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
-        j
-    };
+    let design = |r: &Row| lever(&(r.centroid.coords - middle));
     let (mut h, mut g) = (Matrix6::identity() * 1e-9, Vector6::zeros());
     for r in rows.iter().filter(|r| !r.loose) {
         let j = design(r);

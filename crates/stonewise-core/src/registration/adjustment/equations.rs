@@ -42,11 +42,17 @@ impl Adjustment {
     fn observed(&self, i: usize, candidate: &CandidateMotion, error_m: f64) -> NormalEquations {
         let mut sum = self.observed_by_clouds(i, candidate, error_m);
         if self.stones[i].info.usable
-            && let Some(photos) = self.photos.as_ref().and_then(|p| p.stone(i))
+            && let Some(photos) = self.observed_by_photos(i)
         {
-            sum += photos.normal_equations(&self.common_in(i), self.components.appearance_m());
+            sum += photos;
         }
         sum
+    }
+
+    /// What photos say of a stone, where they show it.
+    pub fn observed_by_photos(&self, i: usize) -> Option<NormalEquations> {
+        let photos = self.photos.as_ref()?.stone(i)?;
+        Some(photos.normal_equations(&self.common_in(i), self.components.appearance_m()))
     }
 
     /// What a stone's own points say at one of its motions.

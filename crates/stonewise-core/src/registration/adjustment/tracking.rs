@@ -1,7 +1,7 @@
 //! Stones tracked in the photos from where the clouds put them.
 
 use super::error::AdjustError;
-use super::field::{Prediction, START_APPEARANCE_M, posterior};
+use super::field::{Prediction, START_APPEARANCE_M, log_odds_of_loose};
 use super::observation::NormalEquations;
 use super::observation::photo::{CloudMotion, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos};
 use super::state::Adjustment;
@@ -110,14 +110,13 @@ impl Adjustment {
 
     /// Whether a stone's photos alone make it more probable that it is loose than that it moves as `prediction` says.
     pub fn photos_show_own_motion(&self, i: usize, prediction: &Prediction) -> bool {
-        let Some(photos) = self.photos.as_ref().and_then(|p| p.stone(i)) else {
-            return false;
-        };
-        let equations = photos.normal_equations(&self.common_in(i), self.components.appearance_m());
-        let evidence = |own: [f64; 9]| posterior(&equations, prediction, &own).log_evidence;
-        let tied = evidence(self.components.own_variances()) + (1.0 - self.loose.share).ln();
-        let loose = evidence(self.loose.own_variances(&self.components)) + self.loose.share.ln();
-        loose > tied
+        let own = [
+            self.components.own_variances(),
+            self.loose.own_variances(&self.components),
+        ];
+        self.observed_by_photos(i).is_some_and(|equations| {
+            log_odds_of_loose([&equations; 2], prediction, &own, self.loose.share) > 0.0
+        })
     }
 
     /// What photos contributed.

@@ -351,22 +351,6 @@ mod tests {
         waves.iter().map(|[a, b, c]| (a * x + b * y + c).sin()).sum()
     }
 
-    fn surface(side: usize, rim: usize) -> Surface {
-        let inside = |k: usize| {
-            let (c, r) = (k % side, k / side);
-            (rim..side - rim).contains(&c) && (rim..side - rim).contains(&r)
-        };
-        Surface {
-            cell_m: 0.003,
-            columns: side,
-            rows: side,
-            first: [0.0; 2],
-            heights: vec![0.0; side * side],
-            inside: (0..side * side).map(inside).collect(),
-            middle: [0.0015 * (side - 1) as f64; 2],
-        }
-    }
-
     fn drawn(side: usize, value: impl Fn(f64, f64) -> f64) -> Patch {
         let at = |k: usize| value((k % side) as f64, (k / side) as f64) as f32;
         Patch {
@@ -377,7 +361,7 @@ mod tests {
 
     /// A face whose texture was warped, with another gain and offset; what the match finds.
     fn found(side: usize, warp: &Warp, dirt: impl Fn(f64, f64) -> f64) -> Option<Match> {
-        let surface = surface(side, 8);
+        let surface = Surface::flat(side, 8);
         let face = FaceCells::new(&surface);
         let template = Template::new(drawn(side, texture), &surface);
         let middle = Vector2::repeat(0.5 * (side - 1) as f64);
@@ -429,7 +413,7 @@ mod tests {
     #[test]
     fn the_formal_error_is_the_scatter_of_matches_of_noisy_photos() {
         let side = 50;
-        let surface = surface(side, 8);
+        let surface = Surface::flat(side, 8);
         let face = FaceCells::new(&surface);
         let template = Template::new(drawn(side, texture), &surface);
         let (mut square, mut expected) = (0.0, 0.0);

@@ -50,7 +50,12 @@ impl Default for PhotoParams {
 impl PhotoParams {
     /// How far beyond a stone's face photos are looked at, metres: the search, and the window in which contrast is normalised.
     pub fn margin_m(&self) -> f64 {
-        self.max_search_m + WINDOW_SDS * OTHER_WINDOW * self.normalise_m
+        self.margin_around_m(self.max_search_m)
+    }
+
+    /// The same for a search that goes this far, metres.
+    pub(super) fn margin_around_m(&self, search_m: f64) -> f64 {
+        search_m + WINDOW_SDS * OTHER_WINDOW * self.normalise_m
     }
 }
 

@@ -71,6 +71,24 @@ impl Surface {
         Some(surface)
     }
 
+    /// A flat square face of `side` cells of 3 mm, of which a rim of so many cells is left out.
+    #[cfg(test)]
+    pub fn flat(side: usize, rim: usize) -> Self {
+        let inside = |k: usize| {
+            let (c, r) = (k % side, k / side);
+            (rim..side - rim).contains(&c) && (rim..side - rim).contains(&r)
+        };
+        Self {
+            cell_m: 0.003,
+            columns: side,
+            rows: side,
+            first: [0.0; 2],
+            heights: vec![0.0; side * side],
+            inside: (0..side * side).map(inside).collect(),
+            middle: [0.0015 * (side - 1) as f64; 2],
+        }
+    }
+
     /// Place of a cell's middle: along, up, metres.
     pub fn place(&self, k: usize) -> [f64; 2] {
         [

@@ -7,8 +7,8 @@ use nalgebra::Vector2;
 
 /// Rounds in which the template follows the photos.
 const ROUNDS: usize = 3;
-/// Error of a pose for which photos of one epoch are searched, pixels: several times what bundle adjustments leave.
-const POSE_REACH_PX: f64 = 4.0;
+/// Error of a pose for which photos of one epoch are searched, cells of a pixel: several times what bundle adjustments leave.
+const POSE_REACH: isize = 4;
 /// Distance in which a least-squares match may end from its start, cells: within the grain that smoothing leaves.
 pub(super) const PULL_IN: f64 = 4.0;
 
@@ -34,7 +34,7 @@ impl Face {
         let mut matches = self.first_matches(patches)?;
         let mut template = self.mean(patches, &matches)?;
         for round in 1..ROUNDS {
-            matches = self.again(&template, patches, &matches);
+            matches = self.matches(&template, patches, &matches);
             if round + 1 < ROUNDS {
                 template = self.mean(patches, &matches)?;
             }
@@ -57,13 +57,7 @@ impl Face {
             let still = Warp::shift(Vector2::zeros());
             let warped = self.cells.warped(&patches[reference], &self.surface, &still);
             let template = Template::new(warped, &self.surface);
-            let found: Vec<Option<Match>> = patches
-                .iter()
-                .map(|patch| {
-                    let start = self.sought(&template, &[patch], POSE_REACH_PX.ceil() as isize)?;
-                    self.matched(&template, patch, start)
-                })
-                .collect();
+            let found = self.matches(&template, patches, &[]);
             if best.as_ref().is_none_or(|b| count(&found) > count(b)) {
                 best = Some(found);
             }
@@ -74,16 +68,34 @@ impl Face {
         best
     }
 
-    /// The photos matched once more, each from where it lay on the template before, or from where it is found.
-    fn again(&self, template: &Template, patches: &[Patch], before: &[Option<Match>]) -> Vec<Option<Match>> {
-        let one = |(patch, before): (&Patch, &Option<Match>)| {
-            let start = match before {
+    /// Photos matched with a template one by one, each from where it lay on it before, or from where it is found.
+    fn matches(
+        &self,
+        template: &Template,
+        patches: &[Patch],
+        before: &[Option<Match>],
+    ) -> Vec<Option<Match>> {
+        let one = |(i, patch): (usize, &Patch)| {
+            let start = match before.get(i).copied().flatten() {
                 Some(found) => found.warp,
-                None => self.sought(template, &[patch], POSE_REACH_PX.ceil() as isize)?,
+                None => self.sought(template, &[patch], POSE_REACH)?,
             };
             self.matched(template, patch, start)
         };
-        patches.iter().zip(before).map(one).collect()
+        patches.iter().enumerate().map(one).collect()
+    }
+
+    /// Photos that share a motion matched with a template, from where they agree best with it within `reach` cells.
+    pub fn matches_together(
+        &self,
+        template: &Template,
+        patches: &[Patch],
+        reach: isize,
+    ) -> Option<Vec<Option<Match>>> {
+        let views: Vec<&Patch> = patches.iter().collect();
+        let start = self.sought(template, &views, reach)?;
+        let one = |patch| self.matched(template, patch, start);
+        Some(patches.iter().map(one).collect())
     }
 
     /// Where photos that share a motion agree best with a template, within `reach` cells.
@@ -129,4 +141,14 @@ impl Face {
         };
         Some(Template::new(patch, &self.surface))
     }
+}
+
+/// Median of shifts, each coordinate by itself; `None` without any.
+pub(super) fn median_shift(shifts: impl Iterator<Item = Vector2<f64>>) -> Option<Vector2<f64>> {
+    let shifts: Vec<Vector2<f64>> = shifts.collect();
+    let median = |axis: usize| {
+        let mut values: Vec<f64> = shifts.iter().map(|s| s[axis]).collect();
+        crate::statistics::median(&mut values)
+    };
+    Some(Vector2::new(median(0)?, median(1)?))
 }

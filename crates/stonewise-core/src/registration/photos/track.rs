@@ -1,11 +1,11 @@
 //! One stone from photo to photo.
 
 use super::matching::{Match, Template};
-use super::params::{OTHER_WINDOW, PhotoParams, WINDOW_SDS};
+use super::params::{OTHER_WINDOW, PhotoParams};
 use super::patch::{FaceMotion, Patch, Placed, normalised};
 use super::photo::{Chip, Photo};
 use super::surface::Surface;
-use super::template::{Face, PULL_IN};
+use super::template::{Face, PULL_IN, median_shift};
 use super::verify::{Verification, is_beyond_chance};
 use crate::registration::points::PairPoints;
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -93,7 +93,7 @@ impl Tracker<'_> {
     fn run(&self, track: &mut Track) -> Result<(), PhotoStatus> {
         let chips = self.chips_by_epoch()?;
         let pixel_m = self.pixel_m().ok_or(PhotoStatus::FewPhotos)?;
-        let margin_m = self.search_m + WINDOW_SDS * OTHER_WINDOW * self.params.normalise_m;
+        let margin_m = self.params.margin_around_m(self.search_m);
         let surface = Surface::new(self.pair, self.face_from_world, pixel_m, margin_m, self.params)
             .ok_or(PhotoStatus::SmallFace)?;
         let face = Face::new(surface, self.params.min_correlation);
@@ -112,7 +112,8 @@ impl Tracker<'_> {
             second = grey(1, &track.start);
             after = self.normalised(&second, &face.surface, 1.0);
             twos = self.found_again(&face, &template, &after, reach)?;
-            let shift = median_shift(&twos) * face.surface.cell_m;
+            let shifts = twos.iter().flatten().map(|m| m.warp.shift);
+            let shift = median_shift(shifts).unwrap_or_else(Vector2::zeros) * face.surface.cell_m;
             if shift.norm() < NEAR_M {
                 break;
             }
@@ -187,14 +188,9 @@ impl Tracker<'_> {
         patches: &[Patch],
         reach: isize,
     ) -> Result<Vec<Option<Match>>, PhotoStatus> {
-        let views: Vec<&Patch> = patches.iter().collect();
-        let near = face
-            .sought(template, &views, reach)
+        let found = face
+            .matches_together(template, patches, reach)
             .ok_or(PhotoStatus::NotFound)?;
-        let found: Vec<Option<Match>> = patches
-            .iter()
-            .map(|patch| face.matched(template, patch, near))
-            .collect();
         if found.iter().flatten().count() < self.params.min_photos {
             return Err(PhotoStatus::NotFound);
         }
@@ -242,12 +238,4 @@ impl Tracker<'_> {
             correlation: found.correlation,
         })
     }
-}
-
-/// Median of the matches' shifts, cells, each coordinate by itself.
-fn median_shift(matches: &[Option<Match>]) -> Vector2<f64> {
-    Vector2::from_fn(|a, _| {
-        let mut shifts: Vec<f64> = matches.iter().flatten().map(|m| m.warp.shift[a]).collect();
-        crate::statistics::median(&mut shifts).unwrap_or(0.0)
-    })
 }

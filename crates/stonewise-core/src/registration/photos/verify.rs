@@ -5,7 +5,7 @@
 
 use super::matching::{Match, Template};
 use super::patch::Patch;
-use super::template::Face;
+use super::template::{Face, median_shift};
 use nalgebra::Vector2;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
@@ -42,12 +42,7 @@ impl Verification<'_> {
         let [first, second] = self.patches;
         let [ones, twos] = self.matches;
         let template = self.face.mean(second, twos)?;
-        let views: Vec<&Patch> = first.iter().collect();
-        let near = self.face.sought(&template, &views, reach)?;
-        let back: Vec<Option<Match>> = first
-            .iter()
-            .map(|patch| self.face.matched(&template, patch, near))
-            .collect();
+        let back = self.face.matches_together(&template, first, reach)?;
         apart(&back, ones)
     }
 
@@ -113,16 +108,8 @@ fn grain_cells(face: &Face, patch: &Patch) -> f64 {
 
 /// Median difference of the shifts of photos that both lists match, cells, each coordinate by itself.
 fn apart(matches: &[Option<Match>], from: &[Option<Match>]) -> Option<Vector2<f64>> {
-    let differences: Vec<Vector2<f64>> = matches
-        .iter()
-        .zip(from)
-        .filter_map(|(a, b)| Some(a.as_ref()?.warp.shift - b.as_ref()?.warp.shift))
-        .collect();
-    let median = |axis: usize| {
-        let mut values: Vec<f64> = differences.iter().map(|d| d[axis]).collect();
-        crate::statistics::median(&mut values)
-    };
-    Some(Vector2::new(median(0)?, median(1)?))
+    let both = matches.iter().zip(from);
+    median_shift(both.filter_map(|(a, b)| Some(a.as_ref()?.warp.shift - b.as_ref()?.warp.shift)))
 }
 
 #[cfg(test)]
@@ -136,20 +123,7 @@ mod tests {
     const SIDE: usize = 48;
 
     fn face() -> Face {
-        let inside = |k: usize| {
-            let (c, r) = (k % SIDE, k / SIDE);
-            (12..SIDE - 12).contains(&c) && (12..SIDE - 12).contains(&r)
-        };
-        let surface = Surface {
-            cell_m: 0.003,
-            columns: SIDE,
-            rows: SIDE,
-            first: [0.0; 2],
-            heights: vec![0.0; SIDE * SIDE],
-            inside: (0..SIDE * SIDE).map(inside).collect(),
-            middle: [0.0015 * (SIDE - 1) as f64; 2],
-        };
-        Face::new(surface, 0.0)
+        Face::new(Surface::flat(SIDE, 12), 0.0)
     }
 
     /// Noise of grains of about `grain` cells; `shift`: columns by which it is moved.

@@ -1,6 +1,6 @@
 //! The probability of each stone to move with the field.
 
-use super::posterior::posterior;
+use super::posterior::{Prediction, posterior};
 use super::problem::FieldProblem;
 use super::solve::Field;
 use crate::registration::adjustment::observation::NormalEquations;
@@ -16,21 +16,31 @@ pub(crate) fn probabilities_with_field(
     field: &Field,
     shared: &[f64; 9],
 ) -> Vec<f64> {
-    let [with_field, loose]: [[f64; 9]; 2] = problem
+    let own: [[f64; 9]; 2] = problem
         .own_variances()
         .map(|own| std::array::from_fn(|k| own[k] + shared[k]));
     let share = problem.loose.share;
     (0..problem.stones.len())
         .into_par_iter()
         .map(|i| {
-            let prediction = &field.from_others[i];
             let equations = problem.stones[i].equations;
-            let tied = posterior(equations, prediction, &with_field).log_evidence + (1.0 - share).ln();
-            let at_optimum = on_own[i].unwrap_or(equations);
-            let free = posterior(at_optimum, prediction, &loose).log_evidence + share.ln();
-            1.0 / (1.0 + (free - tied).exp())
+            let both = [equations, on_own[i].unwrap_or(equations)];
+            1.0 / (1.0 + log_odds_of_loose(both, &field.from_others[i], &own, share).exp())
         })
         .collect()
+}
+
+/// Log odds of a stone being loose against moving with the field, from its equations at the field's motion and at its own.
+///
+/// `own`: variances of what it does beside `prediction` in either case; `share`: expected share of loose stones.
+pub(crate) fn log_odds_of_loose(
+    equations: [&NormalEquations; 2],
+    prediction: &Prediction,
+    own: &[[f64; 9]; 2],
+    share: f64,
+) -> f64 {
+    let [tied, loose] = [0, 1].map(|k| posterior(equations[k], prediction, &own[k]).log_evidence);
+    (loose + share.ln()) - (tied + (1.0 - share).ln())
 }
 
 #[cfg(test)]

@@ -23,7 +23,7 @@ pub(crate) use cracks::{Crack, find_crack};
 pub(crate) use field_vector::FieldVector;
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::LoosePrior;
-pub(crate) use mixture::probabilities_with_field;
+pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
 pub(crate) use prior::Tie;
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};

@@ -346,10 +346,7 @@ mod tests {
                 sights: sights.collect(),
                 place: [0.0; 2],
                 apart_m: [0.0; 2],
-                start: FaceMotion {
-                    translation: Vector3::zeros(),
-                    rotation: Vector3::zeros(),
-                },
+                start: FaceMotion::none(),
             }
         };
         places.iter().map(&mut track).collect()
