@@ -75,6 +75,9 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
 /// # Errors
 /// The limit is too low; a cloud cannot be read.
 pub(crate) fn require_address_space(project: &Project) -> Result<()> {
+    if address_space::room().is_none() {
+        return Ok(());
+    }
     let mut points = 0;
     for cloud in project.epochs.iter().flat_map(|e| &e.clouds) {
         points += claimed_records(cloud)?.unwrap_or(0);
