@@ -107,11 +107,9 @@ impl PairPlaces {
             found.of_stone.insert(stone.0, k);
             let extent = extents.get(&pair.first.id.0);
             let extent = extent.map(|e| e.grown(BOX_MARGIN_M).moved(&shift));
-            let corners = extent.map(|e| (cell_of(&e.min, BOX_CELL_M), cell_of(&e.max, BOX_CELL_M)));
-            for cell in corners
-                .into_iter()
-                .flat_map(|(low, high)| cells_between(low, high))
-            {
+            let cells =
+                extent.map(|e| cells_between(cell_of(&e.min, BOX_CELL_M), cell_of(&e.max, BOX_CELL_M)));
+            for cell in cells.into_iter().flatten() {
                 found.cells.entry(cell).or_default().push(k);
             }
             found.places.push(Place {
