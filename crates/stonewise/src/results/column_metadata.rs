@@ -17,6 +17,22 @@ pub(crate) struct ColumnNote {
     pub meaning: &'static str,
 }
 
+impl ColumnNote {
+    pub(crate) const fn new(
+        name: &'static str,
+        datatype: &'static str,
+        unit: &'static str,
+        meaning: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            datatype,
+            unit,
+            meaning,
+        }
+    }
+}
+
 /// Name of a cell's type that stands for any number of integers with spaces between them.
 pub(crate) const INTEGERS: &str = "integers";
 

@@ -209,12 +209,7 @@ impl StoneColumn {
 
     /// What the column of the text table holds.
     pub(super) fn note(&self) -> ColumnNote {
-        ColumnNote {
-            name: self.name,
-            datatype: self.datatype(),
-            unit: self.unit,
-            meaning: self.meaning,
-        }
+        ColumnNote::new(self.name, self.datatype(), self.unit, self.meaning)
     }
 
     /// Type of the cells in the words of XML Schema.

@@ -17,14 +17,14 @@ const DESCRIPTION: &str = "What the majority of the photos decided about merged,
 
 /// The columns of the table: name, type, meaning.
 #[rustfmt::skip]
-const COLUMNS: [(&str, &str, &str); 6] = [
-    ("event", "string", "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
+const COLUMNS: [ColumnNote; 6] = [
+    ColumnNote::new("event", "string", "", "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
         outvoted_instance (most photos show something else there), dropped_islands (parts cut off from their stone), dropped_stone (too few points)"),
-    ("photo", "string", "photo of the mask, as the cameras name it"),
-    ("instance", "integer", "number of the mask in the photo"),
-    ("stones", INTEGERS, "stones that the decision is about"),
-    ("share", "number", "share of the mask that the stone won, 0 to 1"),
-    ("points", "integer", "points that lost their label"),
+    ColumnNote::new("photo", "string", "", "photo of the mask, as the cameras name it"),
+    ColumnNote::new("instance", "integer", "", "number of the mask in the photo"),
+    ColumnNote::new("stones", INTEGERS, "", "stones that the decision is about"),
+    ColumnNote::new("share", "number", "", "share of the mask that the stone won, 0 to 1"),
+    ColumnNote::new("points", "integer", "", "points that lost their label"),
 ];
 
 /// Writes `audit_epochN.csv`, what the majority of the photos decided about merged, split and dropped
@@ -55,13 +55,7 @@ fn write_rows(csv: &Path, rows: &[AuditRow]) -> Result<()> {
     table.push("share", rows.iter().map(|r| r.share).collect::<Vec<_>>())?;
     table.push("points", rows.iter().map(|r| r.points).collect::<Vec<_>>())?;
     write_csv(csv, &table)?;
-    let notes = COLUMNS.map(|(name, datatype, meaning)| ColumnNote {
-        name,
-        datatype,
-        unit: "",
-        meaning,
-    });
-    write_csv_metadata(csv, DESCRIPTION, None, notes)
+    write_csv_metadata(csv, DESCRIPTION, None, COLUMNS)
 }
 
 struct AuditRow {

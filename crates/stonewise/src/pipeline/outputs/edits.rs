@@ -13,25 +13,32 @@ use stonewise_io::table::{Table, write_csv};
 const DESCRIPTION: &str = "Edits by hand and what each did in each epoch, one row per edit and epoch.";
 
 /// The columns of the table: name, type, meaning.
-const COLUMNS: [(&str, &str, &str); 12] = [
-    ("edit", "integer", "number of the edit in the file, from 1"),
-    ("do", "string", "merge, split, delete, add or ignore"),
-    ("who", "string", "who made the edit"),
-    ("when", "string", "when"),
-    ("why", "string", "why"),
-    ("place", "string", "the file of edits and the place in it"),
-    ("drawn_in", "string", "the photo in which it was drawn, or facade"),
-    ("epoch", "string", "name of the epoch"),
-    ("stones_before", INTEGERS, "stones that it changed"),
-    ("stones_after", INTEGERS, "stones that it left"),
-    (
+const COLUMNS: [ColumnNote; 12] = [
+    ColumnNote::new("edit", "integer", "", "number of the edit in the file, from 1"),
+    ColumnNote::new("do", "string", "", "merge, split, delete, add or ignore"),
+    ColumnNote::new("who", "string", "", "who made the edit"),
+    ColumnNote::new("when", "string", "", "when"),
+    ColumnNote::new("why", "string", "", "why"),
+    ColumnNote::new("place", "string", "", "the file of edits and the place in it"),
+    ColumnNote::new(
+        "drawn_in",
+        "string",
+        "",
+        "the photo in which it was drawn, or facade",
+    ),
+    ColumnNote::new("epoch", "string", "", "name of the epoch"),
+    ColumnNote::new("stones_before", INTEGERS, "", "stones that it changed"),
+    ColumnNote::new("stones_after", INTEGERS, "", "stones that it left"),
+    ColumnNote::new(
         "points",
         "integer",
+        "",
         "points whose label changed; empty without effect",
     ),
-    (
+    ColumnNote::new(
         "no_effect",
         "string",
+        "",
         "why it did nothing in this epoch; empty where it did something",
     ),
 ];
@@ -99,13 +106,7 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     )?;
     let csv = context.out.join(EDITS_AUDIT);
     write_csv(&csv, &table)?;
-    let notes = COLUMNS.map(|(name, datatype, meaning)| ColumnNote {
-        name,
-        datatype,
-        unit: "",
-        meaning,
-    });
-    write_csv_metadata(&csv, DESCRIPTION, None, notes)
+    write_csv_metadata(&csv, DESCRIPTION, None, COLUMNS)
 }
 
 /// Edit, epoch, and what it did there.

@@ -16,20 +16,20 @@ const DESCRIPTION: &str = "M3C2 (Lague, Brodu & Leroux 2013), one row per core p
 
 /// The columns of the table.
 #[rustfmt::skip]
-const COLUMNS: [(&str, &str, &str, &str); 13] = [
-    ("x", "number", "m", "core point, world x"),
-    ("y", "number", "m", "core point, world y"),
-    ("z", "number", "m", "core point, world z"),
-    ("NormalX", "number", "", "unit normal out of the wall, world x"),
-    ("NormalY", "number", "", "unit normal out of the wall, world y"),
-    ("NormalZ", "number", "", "unit normal out of the wall, world z"),
-    ("m3c2_distance", "number", "m", "distance along the normal, positive out of the wall"),
-    ("m3c2_uncertainty", "number", "m", "95 % detection limit of the distance"),
-    ("m3c2_std_dev1", "number", "m", "spread of the first epoch's points along the normal"),
-    ("m3c2_std_dev2", "number", "m", "spread of the later epoch's points along the normal"),
-    ("m3c2_significant", "integer", "", "1 where the distance exceeds its detection limit, else 0"),
-    ("m3c2_count1", "integer", "", "points of the first epoch in the cylinder"),
-    ("m3c2_count2", "integer", "", "points of the later epoch in the cylinder"),
+const COLUMNS: [ColumnNote; 13] = [
+    ColumnNote::new("x", "number", "m", "core point, world x"),
+    ColumnNote::new("y", "number", "m", "core point, world y"),
+    ColumnNote::new("z", "number", "m", "core point, world z"),
+    ColumnNote::new("NormalX", "number", "", "unit normal out of the wall, world x"),
+    ColumnNote::new("NormalY", "number", "", "unit normal out of the wall, world y"),
+    ColumnNote::new("NormalZ", "number", "", "unit normal out of the wall, world z"),
+    ColumnNote::new("m3c2_distance", "number", "m", "distance along the normal, positive out of the wall"),
+    ColumnNote::new("m3c2_uncertainty", "number", "m", "95 % detection limit of the distance"),
+    ColumnNote::new("m3c2_std_dev1", "number", "m", "spread of the first epoch's points along the normal"),
+    ColumnNote::new("m3c2_std_dev2", "number", "m", "spread of the later epoch's points along the normal"),
+    ColumnNote::new("m3c2_significant", "integer", "", "1 where the distance exceeds its detection limit, else 0"),
+    ColumnNote::new("m3c2_count1", "integer", "", "points of the first epoch in the cylinder"),
+    ColumnNote::new("m3c2_count2", "integer", "", "points of the later epoch in the cylinder"),
 ];
 
 /// Writes `m3c2.laz`, `m3c2.csv` and the metadata of its columns (of the third epoch `m3c2_2.laz`, and so on)
@@ -66,13 +66,7 @@ pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeFiel
     table.push("m3c2_count2", counts[1].clone())?;
     let csv = dir.join(PairFile::M3c2Csv.name(pair));
     write_csv(&csv, &table)?;
-    let notes = COLUMNS.map(|(name, datatype, unit, meaning)| ColumnNote {
-        name,
-        datatype,
-        unit,
-        meaning,
-    });
-    write_csv_metadata(&csv, DESCRIPTION, None, notes)?;
+    write_csv_metadata(&csv, DESCRIPTION, None, COLUMNS)?;
 
     let positions: Vec<Point3<f64>> = points.iter().map(|p| p.position).collect();
     let dense: Vec<(&str, Vec<f64>)> = columns
