@@ -1,5 +1,5 @@
-//! The limit on a program's address space (`ulimit -v`). A program that meets it ends in the middle of its work
-//! and names neither the reason nor the fix, so it is compared with the need before the work.
+//! The limit on a program's address space (`ulimit -v`). A program that meets it ends in the middle of its
+//! work and names neither the reason nor the fix, so it is compared with the need before the work.
 
 use crate::error::{Error, Result};
 use std::fs;
@@ -18,7 +18,8 @@ pub(crate) fn room() -> Option<u64> {
     Some(limit.saturating_sub(reserved()))
 }
 
-/// Compares the limit with the memory that some work takes, bytes; `what`: the work, as subject of the message.
+/// Compares the limit with the memory that some work takes, bytes; `what`: the work, as subject of the
+/// message.
 ///
 /// # Errors
 /// The limit is too low.

@@ -4,11 +4,13 @@ use crate::statistics::discoveries;
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// For each stone whether it moved, with the false discovery rate at most `rate`. `None`: not measured, and not tested.
+/// For each stone whether it moved, with the false discovery rate at most `rate`. `None`: not measured, and
+/// not tested.
 ///
-/// Each motion has its whole covariance, the epochs' error included. Stone by stone, a wall of 200 that stands still has ten stones called
-/// moved at 5 %, or all of them where the epochs' error is large by chance; with the rate controlled at most `rate` of such walls has any.
-/// Errors that stones share do no harm: the tests are positively dependent (Benjamini & Yekutieli 2001). Source: Benjamini & Hochberg 1995.
+/// Each motion has its whole covariance, the epochs' error included. Stone by stone, a wall of 200 that
+/// stands still has ten stones called moved at 5 %, or all of them where the epochs' error is large by
+/// chance; with the rate controlled at most `rate` of such walls has any. Errors that stones share do no
+/// harm: the tests are positively dependent (Benjamini & Yekutieli 2001). Source: Benjamini & Hochberg 1995.
 pub fn moved_stones(motions: &[Option<(Vector3<f64>, Matrix3<f64>)>], rate: f64) -> Vec<bool> {
     let p_still = |(motion, covariance): &(Vector3<f64>, Matrix3<f64>)| {
         let chi_square = motion.dot(&covariance.cholesky()?.solve(motion));

@@ -123,7 +123,8 @@ impl SplatDepth {
 /// Depth maps of the photos and the local surface of all tiles, from two passes over the cloud: what spacing
 /// is usual is known after the first.
 ///
-/// Cost: one projection a point and photo whose cone touches the surface cell, and one write a pixel of each splat.
+/// Cost: one projection a point and photo whose cone touches the surface cell, and one write a pixel of each
+/// splat.
 pub(super) fn splat_all<T: TileSource>(
     tiles: &T,
     views: &[&View],

@@ -66,7 +66,8 @@ pub struct Transfer {
 /// photos; merged and fragmented instances by the majority; each point by a vote weighted with ground
 /// sampling distance and incidence.
 ///
-/// Cost: three passes over the tiles; each point is projected into the photos whose cone touches its surface cell.
+/// Cost: three passes over the tiles; each point is projected into the photos whose cone touches its surface
+/// cell.
 ///
 /// # Errors
 /// A tile, mask or label store that fails, a mask of the wrong size, no mask at all, interruption.

@@ -23,7 +23,8 @@ pub(super) struct Sighting {
     pub weight: f32,
 }
 
-/// Radians by which a whole cell must be too oblique before its points are not looked at: rounding must not decide.
+/// Radians by which a whole cell must be too oblique before its points are not looked at: rounding must not
+/// decide.
 const ANGLE_MARGIN: f64 = 1e-6;
 
 /// Everything needed to look up any point in all photos.
@@ -108,8 +109,8 @@ impl<'a> Observer<'a> {
     /// What `judge` makes of the sightings of each chosen point of a tile by the candidate photos, in the
     /// order of `chosen`.
     ///
-    /// Points come cell by cell: their surface is looked up once, photos that cannot vote in the cell are left out, and
-    /// the others show its points side by side.
+    /// Points come cell by cell: their surface is looked up once, photos that cannot vote in the cell are
+    /// left out, and the others show its points side by side.
     pub(super) fn sight_all<R: Clone + Default + Send>(
         &self,
         tile: usize,
@@ -208,8 +209,8 @@ mod tests {
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
     use rand::{RngExt, SeedableRng};
 
-    /// Cells of a rough wall and photos that look anywhere: photos left out for a cell say nothing about any of its
-    /// points, and enough are left out.
+    /// Cells of a rough wall and photos that look anywhere: photos left out for a cell say nothing about any
+    /// of its points, and enough are left out.
     #[test]
     fn photos_left_out_for_a_cell_see_none_of_its_points() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(4);

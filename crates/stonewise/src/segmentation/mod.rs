@@ -8,8 +8,8 @@ use crate::error::Result;
 pub use folder::{FolderJob, FolderSummary, MaskEvaluation, PhotoScore, segment_folder};
 pub use overlay::outlined;
 
-/// Memory of the search for stones with one tile at a time is 0.25 GB, with two 0.41 GB (docs/src/performance.md):
-/// the part that does not depend on the threads.
+/// Memory of the search for stones with one tile at a time is 0.25 GB, with two 0.41 GB
+/// (docs/src/performance.md): the part that does not depend on the threads.
 const DETECTOR_BASE: u64 = 90 << 20;
 const DETECTOR_PER_THREAD: u64 = 165 << 20;
 

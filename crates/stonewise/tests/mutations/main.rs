@@ -3,8 +3,8 @@
 //!
 //! The test is short and the same every time. For any number of inputs, from any seed:
 //! `STONEWISE_MUTATIONS=1000000 STONEWISE_SEED=7 cargo test -p stonewise --test mutations -- --ignored
-//! --nocapture`. Most of an input's time is spent on files, so a folder for temporary files that lies in memory
-//! (`TMPDIR=/dev/shm`) makes it faster, and so does a single thread (`RAYON_NUM_THREADS=1`).
+//! --nocapture`. Most of an input's time is spent on files, so a folder for temporary files that lies in
+//! memory (`TMPDIR=/dev/shm`) makes it faster, and so does a single thread (`RAYON_NUM_THREADS=1`).
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -33,8 +33,8 @@ use targets::{Target, targets};
 const MOST_TIME: Duration = Duration::from_secs(2);
 /// Memory that one input may take beyond what is there, bytes.
 const MOST_MEMORY: u64 = 512 << 20;
-/// Inputs between two looks at the memory, each of which costs as much as a small input. Where a batch took too
-/// much, its inputs are read once more, one by one.
+/// Inputs between two looks at the memory, each of which costs as much as a small input. Where a batch took
+/// too much, its inputs are read once more, one by one.
 const BATCH: u64 = 64;
 /// Time after which a campaign says how far it is.
 const REPORT_EVERY: Duration = Duration::from_secs(60);

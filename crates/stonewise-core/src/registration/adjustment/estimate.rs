@@ -22,10 +22,12 @@ pub(crate) struct Estimate {
 impl Adjustment {
     /// A stone's motion about the common translation.
     ///
-    /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is widened for the
-    /// chance that it does not ([`widening`]). Otherwise mean and covariance are those of the mixture of both motions.
+    /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
+    /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the
+    /// mixture of both motions.
     ///
-    /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the relative covariance.
+    /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
+    /// relative covariance.
     pub fn estimate(&self, i: usize, solution: &Solution, shared: &[f64; 9]) -> Estimate {
         let (stone, equations) = (&self.stones[i], &solution.equations[i]);
         let prediction = &solution.field.from_others[i];
@@ -63,7 +65,8 @@ impl Adjustment {
         }
     }
 
-    /// Probability that a stone is loose; what is expected of any stone where its own observations cannot tell.
+    /// Probability that a stone is loose; what is expected of any stone where its own observations cannot
+    /// tell.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
         match stone.is_undecided {
             true => self.loose.share,
@@ -72,11 +75,12 @@ impl Adjustment {
     }
 }
 
-/// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose` that it
-/// does not: 1.96 standard deviations then hold the motion in 95 of 100 cases even if they miss every loose one.
+/// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose`
+/// that it does not: 1.96 standard deviations then hold the motion in 95 of 100 cases even if they miss every
+/// loose one.
 ///
-/// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own; the factor grows no
-/// further there.
+/// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own;
+/// the factor grows no further there.
 fn widening(p_loose: f64) -> f64 {
     let missed = p_loose.clamp(0.0, 0.9 * OUTSIDE);
     let outside = (OUTSIDE - missed) / (1.0 - missed);

@@ -63,9 +63,10 @@ pub(crate) fn report(
     }
 }
 
-/// Covariance of the mean motion: of the field's mean, of the mean of what stones do and err on their own, and of errors that
-/// points share over whole octaves of length. Of these the longest is one error of the whole wall, the next has four patches, and so
-/// on: 1 + 1/4 + 1/16 + ... of an octave's variance is left in the mean.
+/// Covariance of the mean motion: of the field's mean, of the mean of what stones do and err on their own,
+/// and of errors that points share over whole octaves of length. Of these the longest is one error of the
+/// whole wall, the next has four patches, and so on: 1 + 1/4 + 1/16 + ... of an octave's variance is left in
+/// the mean.
 fn common_covariance(adjustment: &Adjustment, solution: &Solution) -> Matrix3<f64> {
     let (own, shared) = (
         adjustment.components.own_variances(),
@@ -144,7 +145,8 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
-/// `shared`: variances of errors that all points of a stone share, against its neighbours and against the other epoch.
+/// `shared`: variances of errors that all points of a stone share, against its neighbours and against the
+/// other epoch.
 fn motion(
     adjustment: &Adjustment,
     i: usize,

@@ -20,8 +20,9 @@ pub(crate) struct Tested {
 
 /// Finds the stones that moved unlike their neighbours, with the false discovery rate controlled.
 ///
-/// The test is the probability that a stone moved with its neighbours, against that of a motion as loose stones make. A p-value
-/// alone is no test: scans show departures of tenths of a millimetre that come from how stations overlap.
+/// The test is the probability that a stone moved with its neighbours, against that of a motion as loose
+/// stones make. A p-value alone is no test: scans show departures of tenths of a millimetre that come from
+/// how stations overlap.
 pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<Tested> {
     let p_with_field: Vec<Option<f64>> = adjustment
         .stones

@@ -123,7 +123,8 @@ impl Adjustment {
     }
 
     /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
-    /// (few noisy points have optima far away), and those of which one half contradicts it, unless photos show it.
+    /// (few noisy points have optima far away), and those of which one half contradicts it, unless photos
+    /// show it.
     fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
         let own = self.loose.own_variances(&self.components);
         for (i, (equations, prediction)) in equations.iter().zip(&field.from_others).enumerate() {

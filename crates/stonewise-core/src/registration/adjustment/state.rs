@@ -46,8 +46,8 @@ pub(crate) struct StoneState {
     pub ratio: LikelihoodRatio,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
-    /// Whether its observations are too weak, or contradict each other too much, to tell a loose stone from one that moves with the
-    /// field.
+    /// Whether its observations are too weak, or contradict each other too much, to tell a loose stone from
+    /// one that moves with the field.
     pub is_undecided: bool,
     /// Whether its last step exceeded the uncertainty of its motion.
     pub swings: bool,

@@ -12,7 +12,8 @@ const RESTLESS: usize = 50;
 /// A stone's own optimum is followed once its points make it so many times more probably loose than it was
 /// without them.
 const SUSPECT: f64 = 1.5;
-/// A stone whose last step exceeds so many standard deviations of its motion swings between two optima: neither is its motion.
+/// A stone whose last step exceeds so many standard deviations of its motion swings between two optima:
+/// neither is its motion.
 const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
@@ -88,8 +89,8 @@ impl StepLimits {
         }
     }
 
-    /// Moves a candidate to its posterior mean. A candidate of little probability `p` moves the stone's estimate
-    /// by that share only.
+    /// Moves a candidate to its posterior mean. A candidate of little probability `p` moves the stone's
+    /// estimate by that share only.
     fn follow(
         self,
         candidate: &mut CandidateMotion,

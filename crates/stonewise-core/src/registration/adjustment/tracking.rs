@@ -12,7 +12,8 @@ use crate::registration::points::PairSource;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Rotation and bending of a stone before its points are looked at, radians and 1/m: ten times what loose stones do.
+/// Rotation and bending of a stone before its points are looked at, radians and 1/m: ten times what loose
+/// stones do.
 const OPEN: [f64; 2] = [0.2, 1.0];
 /// Standard deviations of the clouds' place within which a stone is sought.
 const SEARCH_SDS: f64 = 3.0;
@@ -80,8 +81,9 @@ impl Adjustment {
             .collect()
     }
 
-    /// How far a stone that moves with the field may have slid in the face without being found out, metres: what passes for an error
-    /// of the clouds may be a slide, and so may what passes for an appearance bias; it is both where both are there.
+    /// How far a stone that moves with the field may have slid in the face without being found out, metres:
+    /// what passes for an error of the clouds may be a slide, and so may what passes for an appearance bias;
+    /// it is both where both are there.
     pub fn undetected_slide_m(&self, i: usize) -> f64 {
         let error_m = self.components.error_m;
         match self.photos.as_ref().and_then(|p| p.stone(i)) {
@@ -90,8 +92,9 @@ impl Adjustment {
         }
     }
 
-    /// Covariance of a stone's displacement that errors of the poses cause, in its frame. The stones share these errors, so no number
-    /// of stones averages them away; they count by the share that the photos have in a stone's motion.
+    /// Covariance of a stone's displacement that errors of the poses cause, in its frame. The stones share
+    /// these errors, so no number of stones averages them away; they count by the share that the photos have
+    /// in a stone's motion.
     pub fn pose_covariance(&self, i: usize) -> Matrix3<f64> {
         let Some(stone) = self.photos.as_ref().and_then(|p| p.stone(i)) else {
             return Matrix3::zeros();
@@ -108,7 +111,8 @@ impl Adjustment {
         share * stone.common * share.transpose()
     }
 
-    /// Whether a stone's photos alone make it more probable that it is loose than that it moves as `prediction` says.
+    /// Whether a stone's photos alone make it more probable that it is loose than that it moves as
+    /// `prediction` says.
     pub fn photos_show_own_motion(&self, i: usize, prediction: &Prediction) -> bool {
         let own = [
             self.components.own_variances(),

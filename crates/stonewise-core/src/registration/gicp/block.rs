@@ -75,11 +75,12 @@ impl GicpBlock {
     }
 }
 
-/// One point of each voxel of a world-aligned grid, in the order of the voxels' first points, and which of them stands for
-/// each point.
+/// One point of each voxel of a world-aligned grid, in the order of the voxels' first points, and which of
+/// them stands for each point.
 ///
-/// Which point stays is drawn by a hash of its position. Means of voxels, or the points nearest to their middles, would lie
-/// on the same lattice in both epochs and hold the motion back, by 0.15 of 4 mm at voxels of 1 cm.
+/// Which point stays is drawn by a hash of its position. Means of voxels, or the points nearest to their
+/// middles, would lie on the same lattice in both epochs and hold the motion back, by 0.15 of 4 mm at voxels
+/// of 1 cm.
 fn thinned(cloud: &Cloud, voxel_m: f64) -> (Vec<Point3<f64>>, Vec<u32>) {
     let mut numbers: CellMap<[i64; 3], u32> = CellMap::default();
     let mut kept: Vec<(u64, usize)> = Vec::new();

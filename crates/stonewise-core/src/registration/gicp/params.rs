@@ -25,8 +25,8 @@ pub struct GicpParams {
     /// Points further apart do not correspond, metres. 0.1 is twice the largest motion of the paper's
     /// experiment.
     pub max_distance_m: f64,
-    /// Edge of the voxels of which both clouds keep one point each, metres. 0: all points, as in the paper. 0.01 takes
-    /// a quarter of the time on clouds of 4 mm.
+    /// Edge of the voxels of which both clouds keep one point each, metres. 0: all points, as in the paper.
+    /// 0.01 takes a quarter of the time on clouds of 4 mm.
     pub voxel_m: f64,
     /// Neighbours to which the plane of a point is fitted, itself included. 20 as in Segal, Haehnel & Thrun
     /// (2009).

@@ -87,7 +87,8 @@ pub(super) fn for_each_pair(
 
 /// Points within the buffer around the stone's points.
 ///
-/// `centroid`: of the stone, world; `stone`: its points, as indices into the cloud that the block was made from.
+/// `centroid`: of the stone, world; `stone`: its points, as indices into the cloud that the block was made
+/// from.
 pub(super) fn window_points(
     first: &GicpBlock,
     centroid: &Point3<f64>,

@@ -4,8 +4,8 @@ use super::components::{ObserverComponents, SensorClass};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
 
-/// Factor on the error of the whole epoch where areas are to speak for themselves. With it left open, directions that no area sees would
-/// seem to show anything.
+/// Factor on the error of the whole epoch where areas are to speak for themselves. With it left open,
+/// directions that no area sees would seem to show anything.
 pub(super) const WIDE: f64 = 5.0;
 /// An error of the whole epoch this many times as large as assumed shows that the assumption does not hold.
 const SURPRISING: f64 = 2.0;
@@ -42,8 +42,8 @@ impl Model {
         (prior, self.components)
     }
 
-    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is assumed: an assumption that does
-    /// not hold would pull the error towards none.
+    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is
+    /// assumed: an assumption that does not hold would pull the error towards none.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
         let (prior, components) = self.opened();
         let solution = Problem::new(unknowns, observations).solve(&prior, &components);
@@ -59,11 +59,13 @@ impl Model {
     }
 }
 
-/// Standard deviation per axis of what all sources of the epochs share, later epoch against reference, metres.
+/// Standard deviation per axis of what all sources of the epochs share, later epoch against reference,
+/// metres.
 ///
-/// `stated_m`: of one epoch, as the project states it, which then holds. Otherwise what is assumed for the class of the sensor and, where
-/// `components` say that sources agree better than they could by themselves, the rest, which an adjustment of the sources to each other
-/// hides in their mean. `counts`: sources of each epoch.
+/// `stated_m`: of one epoch, as the project states it, which then holds. Otherwise what is assumed for the
+/// class of the sensor and, where `components` say that sources agree better than they could by themselves,
+/// the rest, which an adjustment of the sources to each other hides in their mean. `counts`: sources of each
+/// epoch.
 pub(super) fn whole_m(
     stated_m: Option<f64>,
     class: SensorClass,

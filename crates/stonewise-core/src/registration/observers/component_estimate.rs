@@ -1,5 +1,5 @@
-//! Estimation of the variances of the sources' errors, by restricted maximum likelihood from differences within the
-//! epochs.
+//! Estimation of the variances of the sources' errors, by restricted maximum likelihood from differences
+//! within the epochs.
 
 use super::components::{BOUNDS, COUNT, ObserverComponents, SensorClass};
 use super::model::{Prior, Problem};

@@ -7,13 +7,15 @@ use serde::{Deserialize, Serialize};
 pub struct ObserverComponents {
     /// Of a source's translation, per axis, metres.
     pub translation_m: f64,
-    /// Of its rotation, per axis, as a displacement at the root mean square distance of what it sees from its middle, metres.
+    /// Of its rotation, per axis, as a displacement at the root mean square distance of what it sees from its
+    /// middle, metres.
     pub rotation_m: f64,
     /// Of its drift, per axis, metres.
     pub drift_m: f64,
     /// Correlation length of the drift, as a share of the source's duration.
     pub drift_length: f64,
-    /// Of an independent error of each source at each stone (incidence, footprint), in the face and across it, metres.
+    /// Of an independent error of each source at each stone (incidence, footprint), in the face and across
+    /// it, metres.
     pub nugget_m: [f64; 2],
     /// Factor on the variances that the points' noise gives differences of sources.
     pub noise_scale: f64,
@@ -29,7 +31,8 @@ pub enum SensorClass {
     Airborne,
 }
 
-/// Points noisier than this, metres, come from a moving platform: tripod scanners range to 1 to 3 mm, lidars for drones to 5 to 30 mm.
+/// Points noisier than this, metres, come from a moving platform: tripod scanners range to 1 to 3 mm, lidars
+/// for drones to 5 to 30 mm.
 const AIRBORNE_NOISE_M: f64 = 0.005;
 
 impl SensorClass {
@@ -44,8 +47,9 @@ impl SensorClass {
 
     /// Error that all sources of an epoch share, per axis, metres: nothing in the epoch shows it.
     ///
-    /// Terrestrial: points of a control network measured by total station, 0.3 mm in the mean of the targets of a scan. Airborne: the base station
-    /// that all strips share; its short static baselines repeat to 2 to 3 mm.
+    /// Terrestrial: points of a control network measured by total station, 0.3 mm in the mean of the targets
+    /// of a scan. Airborne: the base station that all strips share; its short static baselines repeat to 2 to
+    /// 3 mm.
     pub fn shared_error_m(self) -> f64 {
         match self {
             Self::Terrestrial => 0.3e-3,
@@ -53,13 +57,15 @@ impl SensorClass {
         }
     }
 
-    /// Error that a source has at least, per axis, metres, where it was registered by itself: sources that agree better were fitted to each
-    /// other, by strip adjustment or cloud to cloud, and hide the rest in their mean.
+    /// Error that a source has at least, per axis, metres, where it was registered by itself: sources that
+    /// agree better were fitted to each other, by strip adjustment or cloud to cloud, and hide the rest in
+    /// their mean.
     pub(super) fn least_m(self) -> f64 {
         0.6 * self.typical_m()
     }
 
-    /// Median of the prior of a source's translation, metres: registration by targets; direct georeferencing after strip adjustment.
+    /// Median of the prior of a source's translation, metres: registration by targets; direct georeferencing
+    /// after strip adjustment.
     fn typical_m(self) -> f64 {
         match self {
             Self::Terrestrial => 0.5e-3,

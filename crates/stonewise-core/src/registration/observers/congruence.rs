@@ -8,20 +8,21 @@ use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::collections::BTreeSet;
 
-/// Probability at which something is left out that stood still, divided by the number of things tested: the first step of Benjamini &
-/// Hochberg (1995).
+/// Probability at which something is left out that stood still, divided by the number of things tested: the
+/// first step of Benjamini & Hochberg (1995).
 const RATE: f64 = 0.01;
-/// A motion is told from the errors of the sources where it is larger than these; of how large they are at most, in units of what
-/// sources of the class differ by at least.
+/// A motion is told from the errors of the sources where it is larger than these; of how large they are at
+/// most, in units of what sources of the class differ by at least.
 const MOST: f64 = 5.0;
 /// A direction is seen where the motion along it is known to this, metres.
 const SEEN_M: f64 = 0.05;
 
 /// The observations of what stood still, and the areas that moved.
 ///
-/// One after the other, the area that moved most significantly against all others is left out (data snooping, Baarda 1968); the last one
-/// stays, because nothing is there to doubt it. Areas are judged by each other, not by what the epochs may be off. Then the same with single planes, among which are edges, plants and things that somebody
-/// put there.
+/// One after the other, the area that moved most significantly against all others is left out (data snooping,
+/// Baarda 1968); the last one stays, because nothing is there to doubt it. Areas are judged by each other,
+/// not by what the epochs may be off. Then the same with single planes, among which are edges, plants and
+/// things that somebody put there.
 pub(super) fn standing(
     unknowns: &Unknowns,
     within: &[Vec<Observation>; 2],
@@ -80,7 +81,8 @@ fn most_moved<G: Ord + Copy>(
     let (prior, components) = model.opened();
     let problem = Problem::new(unknowns, &all.iter().collect::<Vec<_>>());
     let solution: Solution = problem.solve(&prior, &components)?;
-    // Where epochs were compared on few stones, one still area in ten differs from the others by what its sources are off.
+    // Where epochs were compared on few stones, one still area in ten differs from the others by what its
+    // sources are off.
     let least_m = model.class.least_m();
     let least_m = model.components.translation_m.clamp(least_m, MOST * least_m);
     let tests = groups.len() as f64;
@@ -125,7 +127,8 @@ mod tests {
 
     #[test]
     fn directions_that_nobody_sees_count_for_nothing() {
-        // One direction seen with a standard deviation of 1 mm, a motion of 2 mm along it: 4.6 % (two-sided normal law).
+        // One direction seen with a standard deviation of 1 mm, a motion of 2 mm along it: 4.6 % (two-sided
+        // normal law).
         let information = Matrix3::from_diagonal(&Vector3::new(1e6, 1e-3, 0.0));
         let motion = Motion::of(&information, &Vector3::new(2e3, 5.0, 0.0));
         assert!((motion.p_still - 0.0455).abs() < 1e-4, "{}", motion.p_still);

@@ -24,7 +24,8 @@ pub struct EpochErrorParams {
     pub contrasts: ContrastParams,
     /// Planes in stable areas.
     pub stable: StableParams,
-    /// Error that all sources of an epoch share, 1 sigma per axis, metres; absent: by the class of the sensor.
+    /// Error that all sources of an epoch share, 1 sigma per axis, metres; absent: by the class of the
+    /// sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shared_error_m: Option<f64>,
 }
@@ -111,7 +112,8 @@ pub struct EpochErrors {
 pub struct EpochPair<'a> {
     /// Sources of both epochs.
     pub sources: &'a [Source],
-    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the other half.
+    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the
+    /// other half.
     pub same_as: &'a [usize],
     /// The stones.
     pub stones: &'a [SeenStone],
@@ -121,14 +123,15 @@ pub struct EpochPair<'a> {
     pub sigma_m: f64,
 }
 
-/// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one degree of freedom,
-/// half of whose weight is at zero (Self & Liang 1987).
+/// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one
+/// degree of freedom, half of whose weight is at zero (Self & Liang 1987).
 const SIGNIFICANT: f64 = 2.71;
 /// Factors on the sources' errors over which their uncertainty is averaged, logarithms.
 const FACTORS: [f64; 9] = [-1.2, -0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9, 1.2];
 /// Factors whose posterior weight is a smaller share of the best one's are left out.
 const LEAST_WEIGHT: f64 = 1e-3;
-/// Error of a source on a plane as a whole, as a share of that of a single cell: most of it differs with incidence and surface.
+/// Error of a source on a plane as a whole, as a share of that of a single cell: most of it differs with
+/// incidence and surface.
 const PLANE_SHARE: f64 = 0.5;
 /// Most stones by which the rigid part of the error is found.
 const RIGID_STONES: usize = 500;
@@ -137,7 +140,8 @@ const OPEN_M: f64 = 0.03;
 
 /// The error of the later epoch against the reference at every stone.
 ///
-/// Cost: three evaluations of the compared stones' points; then dense algebra over the unknowns of the sources.
+/// Cost: three evaluations of the compared stones' points; then dense algebra over the unknowns of the
+/// sources.
 pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     let class = SensorClass::of_noise(pair.sigma_m);
     let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());
@@ -236,7 +240,8 @@ fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
         .collect()
 }
 
-/// The components, and twice what they gain in log likelihood over sources without errors; disturbed stones lose weight on the way.
+/// The components, and twice what they gain in log likelihood over sources without errors; disturbed stones
+/// lose weight on the way.
 fn estimated(
     unknowns: &Unknowns,
     within: &mut [Vec<Observation>; 2],
@@ -313,7 +318,8 @@ impl Averaged {
         }
     }
 
-    /// A linear function of the unknowns: mean, and covariance that holds 95 % within 1.96 standard deviations.
+    /// A linear function of the unknowns: mean, and covariance that holds 95 % within 1.96 standard
+    /// deviations.
     fn function(&self, row: &Row) -> ErrorAt {
         let parts: Vec<(f64, Vector3<f64>, Matrix3<f64>)> = self
             .solutions
@@ -406,8 +412,8 @@ impl Averaged {
     }
 }
 
-/// How much each sight of a stone counts in its motion: each source by its share of its epoch's points, the reference with the other
-/// sign.
+/// How much each sight of a stone counts in its motion: each source by its share of its epoch's points, the
+/// reference with the other sign.
 fn shares(stone: &SeenStone, sources: &[Source]) -> Vec<f64> {
     let total = [0, 1].map(|e| {
         let own = stone.sights.iter().filter(|s| sources[s.source].epoch == e);
@@ -447,7 +453,8 @@ fn applied(row: &Row, solution: &Solution) -> (Vector3<f64>, Matrix3<f64>) {
     (mean, 0.5 * (covariance + covariance.transpose()))
 }
 
-/// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96 standard deviations hold 95 %.
+/// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96
+/// standard deviations hold 95 %.
 fn tail_factor(parts: &[(f64, f64)]) -> f64 {
     let mean: f64 = parts.iter().map(|(w, v)| w * v).sum();
     let Ok(law) = Normal::new(0.0, 1.0) else {

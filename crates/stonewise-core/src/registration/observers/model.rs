@@ -9,10 +9,11 @@ use std::collections::BTreeMap;
 /// Sights for each knot of a source's drift, and the least and most knots.
 const SIGHTS_PER_KNOT: usize = 8;
 const KNOTS: [usize; 2] = [4, 20];
-/// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix invertible.
+/// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix
+/// invertible.
 const KNOT_NUGGET: f64 = 1e-6;
-/// An observation whose squared residual per difference exceeds this loses weight; cells of stable areas lose it earlier, because an edge of a
-/// building is worth less than a stone.
+/// An observation whose squared residual per difference exceeds this loses weight; cells of stable areas lose
+/// it earlier, because an edge of a building is worth less than a stone.
 const MISFIT: f64 = 9.0;
 const CELL_MISFIT: f64 = 4.0;
 /// Standard deviation that stands for none, metres.
@@ -20,8 +21,8 @@ const LEAST_M: f64 = 1e-7;
 
 /// Where the unknowns of a source stand, and how its sights depend on them.
 ///
-/// Per source: translation (3), rotation about the middle of its sights (3, in metres at `radius_m` from it), and its drift at each
-/// knot (3 each).
+/// Per source: translation (3), rotation about the middle of its sights (3, in metres at `radius_m` from it),
+/// and its drift at each knot (3 each).
 #[derive(Clone, Debug)]
 struct Block {
     first: usize,
@@ -32,8 +33,8 @@ struct Block {
     knots: Vec<f64>,
 }
 
-/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3), then what each source gets wrong on each
-/// plane of the stable areas (3 each).
+/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3), then what each
+/// source gets wrong on each plane of the stable areas (3 each).
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
     /// Block of each source; sources of one survey share theirs.
@@ -263,7 +264,8 @@ impl Block {
     }
 }
 
-/// Information of a drift at its knots and the logarithm of its determinant, for one axis; length in units of the source's duration.
+/// Information of a drift at its knots and the logarithm of its determinant, for one axis; length in units of
+/// the source's duration.
 fn knot_information(knots: &[f64], prior: &Prior) -> (DMatrix<f64>, f64) {
     let n = knots.len();
     let duration = knots[n - 1] - knots[0];
@@ -320,7 +322,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Normal equations: information and vector with the prior's, and the deviance of what does not depend on the unknowns.
+    /// Normal equations: information and vector with the prior's, and the deviance of what does not depend on
+    /// the unknowns.
     fn normal(
         &self,
         prior: &Prior,
@@ -364,8 +367,8 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Information and vector of a motion, between the epochs, of the places of some observations, all else as in `solution` (data
-    /// snooping; Baarda 1968).
+    /// Information and vector of a motion, between the epochs, of the places of some observations, all else
+    /// as in `solution` (data snooping; Baarda 1968).
     pub fn motion_of(
         &self,
         solution: &Solution,

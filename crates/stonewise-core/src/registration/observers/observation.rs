@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// What a small part of the wall, or of a stable area, says about the errors of the sources that see it.
 ///
-/// Sight 0 is the reference: `values` holds, for each further sight, its apparent displacement against the first along each
-/// of the directions. The place itself is unknown and has dropped out.
+/// Sight 0 is the reference: `values` holds, for each further sight, its apparent displacement against the
+/// first along each of the directions. The place itself is unknown and has dropped out.
 #[derive(Clone, Debug)]
 pub(super) struct Observation {
     pub sights: Vec<Sight>,
@@ -34,8 +34,8 @@ impl Observation {
         self.values.len()
     }
 
-    /// Covariance of the differences with the noise of the points times `scale` and an independent error of each sight,
-    /// standard deviations `nugget_m` in the face and across it.
+    /// Covariance of the differences with the noise of the points times `scale` and an independent error of
+    /// each sight, standard deviations `nugget_m` in the face and across it.
     pub fn covariance(&self, scale: f64, nugget_m: [f64; 2]) -> DMatrix<f64> {
         let [inside, across] = nugget_m.map(|s| s * s);
         let variances = Matrix3::from_diagonal(&Vector3::new(inside, inside, across));
@@ -56,7 +56,8 @@ impl Observation {
     }
 }
 
-/// Covariance in the world of independent errors with these standard deviations in the face and across it, metres.
+/// Covariance in the world of independent errors with these standard deviations in the face and across it,
+/// metres.
 pub(super) fn in_face(normal: &Vector3<f64>, sd_m: [f64; 2]) -> Matrix3<f64> {
     let face_from_world = FaceFrame::from_normal(normal).face_from_world();
     let [inside, across] = sd_m.map(|s| s * s);

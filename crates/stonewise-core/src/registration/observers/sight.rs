@@ -10,7 +10,8 @@ pub struct Source {
     pub name: String,
     /// 0 for the reference epoch, 1 for the later one.
     pub epoch: usize,
-    /// Whether its points carry times that can order its errors; otherwise their place along the source stands in.
+    /// Whether its points carry times that can order its errors; otherwise their place along the source
+    /// stands in.
     pub has_times: bool,
 }
 

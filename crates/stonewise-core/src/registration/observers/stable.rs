@@ -18,12 +18,13 @@ pub struct StableParams {
     pub cell_m: f64,
     /// Points that a source needs in a cell.
     pub min_points: usize,
-    /// A cell whose points scatter more about their plane is no plane, metres; nor is one whose points scatter much more than their
-    /// noise.
+    /// A cell whose points scatter more about their plane is no plane, metres; nor is one whose points
+    /// scatter much more than their noise.
     pub max_scatter_m: f64,
     /// Cells that the areas must have in all.
     pub min_cells: usize,
-    /// Share of a point's noise that no number of points in a cell averages away (incidence, reflectance, footprint).
+    /// Share of a point's noise that no number of points in a cell averages away (incidence, reflectance,
+    /// footprint).
     pub systematic_share: f64,
 }
 
@@ -52,15 +53,16 @@ pub struct StablePoints {
     pub times_s: Vec<f64>,
 }
 
-/// Factor by which noise along the normal may exceed that of the wall's points, and roughness of a plane, metres. What scatters more is a
-/// shrub or an edge, and its mean plane depends on who looks at it.
+/// Factor by which noise along the normal may exceed that of the wall's points, and roughness of a plane,
+/// metres. What scatters more is a shrub or an edge, and its mean plane depends on who looks at it.
 const NOISE_SLACK: f64 = 1.5;
 const ROUGHNESS_M: f64 = 0.01;
 /// Points farther from their plane than this many median absolute deviations are left out.
 const OUTLIER_MADS: f64 = 4.5;
 /// Least extent of a cell's points in its plane, as a standard deviation and a share of the cell's edge.
 const LEAST_EXTENT: f64 = 0.12;
-/// Cells within this many edges of each other, whose normals agree within [`SAME_PLANE_COSINE`], share their mean normal.
+/// Cells within this many edges of each other, whose normals agree within [`SAME_PLANE_COSINE`], share their
+/// mean normal.
 const NORMAL_REACH: f64 = 4.0;
 const SAME_PLANE_COSINE: f64 = 0.97;
 /// Surfaces farther apart than this share of a cell's edge are two.
@@ -93,7 +95,8 @@ pub(super) fn stable_observations(
         .collect()
 }
 
-/// For each cell the number of the plane that it is part of: the first in its area that has its direction and holds its centre.
+/// For each cell the number of the plane that it is part of: the first in its area that has its direction and
+/// holds its centre.
 fn plane_numbers(cells: &[(usize, CellPlane)], params: &StableParams) -> Vec<usize> {
     let mut heads: Vec<usize> = Vec::new();
     let is_part = |head: usize, k: usize| {
@@ -113,8 +116,8 @@ fn plane_numbers(cells: &[(usize, CellPlane)], params: &StableParams) -> Vec<usi
 
 /// Cuts the areas into pieces of surface, with the area of each.
 ///
-/// Cells are cut only across the two axes along which their surface lies: a boundary along it would cut off the noise of its points on
-/// one side, and so pull their mean.
+/// Cells are cut only across the two axes along which their surface lies: a boundary along it would cut off
+/// the noise of its points on one side, and so pull their mean.
 fn columns(list: &[StablePoints], cell_m: f64) -> Vec<(usize, Vec<CellPoint>)> {
     let key = |p: &Point3<f64>| [0, 1, 2].map(|a| (p[a] / cell_m).floor() as i64);
     let mut cubes: BTreeMap<(usize, [i64; 3]), Vec<CellPoint>> = BTreeMap::new();
@@ -223,7 +226,8 @@ impl CellPlane {
         })
     }
 
-    /// Offsets of the further sources against the first along the normal, with the plane's height and tilt eliminated.
+    /// Offsets of the further sources against the first along the normal, with the plane's height and tilt
+    /// eliminated.
     fn observe(&self, normal: &Vector3<f64>, systematic_m: f64, of: StablePlane) -> Option<Observation> {
         let frame = FaceFrame::from_normal(normal);
         let mut sources: Vec<usize> = self.points.iter().map(|p| p.source).collect();
@@ -306,7 +310,8 @@ fn scatter(points: &[CellPoint], normal: &Vector3<f64>) -> f64 {
     (squares.max(0.0) / points.len().max(1) as f64).sqrt()
 }
 
-/// Whether the points of a source extend over a plane of that normal by themselves: those at an edge, or on another thing, show another.
+/// Whether the points of a source extend over a plane of that normal by themselves: those at an edge, or on
+/// another thing, show another.
 fn shows_plane(points: &[CellPoint], source: usize, normal: &Vector3<f64>, params: &StableParams) -> bool {
     let own: Vec<CellPoint> = points.iter().copied().filter(|p| p.source == source).collect();
     plane_of(&own).is_some_and(|(_, direction, spread)| {
@@ -314,8 +319,8 @@ fn shows_plane(points: &[CellPoint], source: usize, normal: &Vector3<f64>, param
     })
 }
 
-/// Mean normal of the cells around that lie in the same plane: a single cell's tilts with the noise of its points, and would then show
-/// displacements along the plane that nobody can see.
+/// Mean normal of the cells around that lie in the same plane: a single cell's tilts with the noise of its
+/// points, and would then show displacements along the plane that nobody can see.
 fn mean_normal(plane: &CellPlane, planes: &[(usize, CellPlane)], params: &StableParams) -> Vector3<f64> {
     let reach = NORMAL_REACH * params.cell_m;
     let sum: Vector3<f64> = planes

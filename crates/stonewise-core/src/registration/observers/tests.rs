@@ -183,7 +183,8 @@ fn stable_area(
 
 #[test]
 fn cells_of_a_plane_on_a_cell_boundary_show_its_whole_offset() {
-    // The ground lies on z = 0, where cubes meet: cut there, the noise of 10 mm would halve what is seen of 5 mm.
+    // The ground lies on z = 0, where cubes meet: cut there, the noise of 10 mm would halve what is seen of 5
+    // mm.
     let errors = [Vector3::zeros(), Vector3::new(0.0, 0.0, 0.005)];
     let cells = stable_observations(&stable_points(&errors, 0.01), 0.01, &StableParams::default());
     let ground: Vec<f64> = cells
@@ -379,7 +380,8 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
 #[test]
 fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     let mut stones = wall(&ERRORS, 0.002, 1);
-    // A stone that only the first source of each epoch shows has all of its own error, the others half of the variance.
+    // A stone that only the first source of each epoch shows has all of its own error, the others half of the
+    // variance.
     let mut alone = stones[7].clone();
     alone.sights.retain(|s| s.source % 2 == 0);
     stones.push(alone);

@@ -1,8 +1,9 @@
 //! Least-squares matching of a photo's patch with a stone's template (Gruen 1985, Ackermann 1984).
 //!
-//! The photo's values g at W(x) = x0 + A (x - x0) + t are those of the template T times a gain plus an offset. Each step solves the
-//! linearised equations about the template, g(W(x)) = a T(x) + b + a grad T . d(x), and composes W with the inverse of that step
-//! (Baker and Matthews 2004): gradients are those of the template, which has the least noise.
+//! The photo's values g at W(x) = x0 + A (x - x0) + t are those of the template T times a gain plus an
+//! offset. Each step solves the linearised equations about the template, g(W(x)) = a T(x) + b + a grad T .
+//! d(x), and composes W with the inverse of that step (Baker and Matthews 2004): gradients are those of the
+//! template, which has the least noise.
 
 use super::patch::Patch;
 use super::surface::Surface;
@@ -141,8 +142,9 @@ impl FaceCells {
             .collect()
     }
 
-    /// Matches a photo from a start: a shift first, then, where there are cells enough and it settles, an affine warp from there.
-    /// `None` where the shift does not settle, leaves `reach` cells, or where the photo does not show the face.
+    /// Matches a photo from a start: a shift first, then, where there are cells enough and it settles, an
+    /// affine warp from there. `None` where the shift does not settle, leaves `reach` cells, or where the
+    /// photo does not show the face.
     pub fn matched(
         &self,
         template: &Template,
@@ -192,7 +194,8 @@ impl FaceCells {
         None
     }
 
-    /// Correlation of a photo with the template at a shift of whole cells; `None` where it does not show the face.
+    /// Correlation of a photo with the template at a shift of whole cells; `None` where it does not show the
+    /// face.
     pub fn correlation_at(
         &self,
         template: &Template,
@@ -221,7 +224,8 @@ impl FaceCells {
         (shows && tt > 0.0 && pp > 0.0).then(|| f64::from(tp) / (f64::from(tt) * f64::from(pp)).sqrt())
     }
 
-    /// The shift of whole cells, within `reach`, at which photos that share a motion agree best with the template.
+    /// The shift of whole cells, within `reach`, at which photos that share a motion agree best with the
+    /// template.
     pub fn best_shift(
         &self,
         template: &Template,
@@ -283,8 +287,8 @@ fn correlation(pairs: &[Pair]) -> f64 {
 type Normal = SMatrix<f64, 8, 8>;
 type Row = SVector<f64, 8>;
 
-/// The step of the warp, and the covariance of its shift. Unknowns: offset, gain, shift, then the matrix row by row; the last six
-/// times the gain.
+/// The step of the warp, and the covariance of its shift. Unknowns: offset, gain, shift, then the matrix row
+/// by row; the last six times the gain.
 fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
     let row = |p: &Pair| {
         let [x, y] = p.gradient;

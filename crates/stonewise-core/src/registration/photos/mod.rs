@@ -1,7 +1,8 @@
 //! Stones tracked from photo to photo.
 //!
-//! Each photo's part that shows a stone is brought onto the stone's face, its contrast normalised, and matched with one template per
-//! stone. What comes out are shifts in the face, one for each photo; the adjustment makes motions of them.
+//! Each photo's part that shows a stone is brought onto the stone's face, its contrast normalised, and
+//! matched with one template per stone. What comes out are shifts in the face, one for each photo; the
+//! adjustment makes motions of them.
 
 mod blur;
 mod matching;

@@ -8,26 +8,28 @@ use serde::{Deserialize, Serialize};
 pub struct PhotoParams {
     /// Whether stones are tracked in the photos. Where it is off, the clouds alone measure.
     pub enabled: bool,
-    /// Error of a photo's pose, pixels on the wall: standard deviation of what its position and of what its attitude shift. 0.5:
-    /// that of a bundle adjustment with some dozens of tie points a photo.
+    /// Error of a photo's pose, pixels on the wall: standard deviation of what its position and of what its
+    /// attitude shift. 0.5: that of a bundle adjustment with some dozens of tie points a photo.
     pub pose_error_px: f64,
-    /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing, as the appearance of a
-    /// stone is wrong alike in all photos of an epoch.
+    /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
+    /// as the appearance of a stone is wrong alike in all photos of an epoch.
     pub max_photos: usize,
     /// Photos that must show a stone in each epoch. 2: four pairs, of different parallax.
     pub min_photos: usize,
-    /// Width of a stone's rim that is left out, metres. 0.02: shadows in the joints and the neighbours' edges move with the sun.
+    /// Width of a stone's rim that is left out, metres. 0.02: shadows in the joints and the neighbours' edges
+    /// move with the sun.
     pub rim_m: f64,
-    /// Standard deviation of the window in which contrast is normalised, metres. 0.009: shorter than shadows, damp patches and the relief
-    /// that the sun's direction changes, longer than the grain of stone.
+    /// Standard deviation of the window in which contrast is normalised, metres. 0.009: shorter than shadows,
+    /// damp patches and the relief that the sun's direction changes, longer than the grain of stone.
     pub normalise_m: f64,
-    /// Correlation of a photo with the stone's template below which the photo is left out for this stone. 0.4: that of equal parts of
-    /// signal and of something else.
+    /// Correlation of a photo with the stone's template below which the photo is left out for this stone.
+    /// 0.4: that of equal parts of signal and of something else.
     pub min_correlation: f64,
-    /// A stone is sought this far from where the clouds put it, metres, and farther by three standard deviations of that place. 0.01:
-    /// what poses and epochs may be apart.
+    /// A stone is sought this far from where the clouds put it, metres, and farther by three standard
+    /// deviations of that place. 0.01: what poses and epochs may be apart.
     pub search_m: f64,
-    /// It is never sought farther, metres. 0.04: half a course of small bricks, so that a stone is not taken for its neighbour.
+    /// It is never sought farther, metres. 0.04: half a course of small bricks, so that a stone is not taken
+    /// for its neighbour.
     pub max_search_m: f64,
 }
 
@@ -48,7 +50,8 @@ impl Default for PhotoParams {
 }
 
 impl PhotoParams {
-    /// How far beyond a stone's face photos are looked at, metres: the search, and the window in which contrast is normalised.
+    /// How far beyond a stone's face photos are looked at, metres: the search, and the window in which
+    /// contrast is normalised.
     pub fn margin_m(&self) -> f64 {
         self.margin_around_m(self.max_search_m)
     }
@@ -59,8 +62,9 @@ impl PhotoParams {
     }
 }
 
-/// Reach of the window in which contrast is normalised, standard deviations: beyond three its weights are below one percent.
+/// Reach of the window in which contrast is normalised, standard deviations: beyond three its weights are
+/// below one percent.
 pub(super) const WINDOW_SDS: f64 = 3.0;
-/// Width of the window of the other normalisation, which must agree, over that of the first: different enough to weigh other parts of
-/// the picture, and still narrower than a stone.
+/// Width of the window of the other normalisation, which must agree, over that of the first: different enough
+/// to weigh other parts of the picture, and still narrower than a stone.
 pub(super) const OTHER_WINDOW: f64 = 5.0 / 3.0;

@@ -66,7 +66,8 @@ impl Placed<'_> {
     }
 }
 
-/// Differences from the local mean over the local standard deviation, in a Gaussian window of this standard deviation.
+/// Differences from the local mean over the local standard deviation, in a Gaussian window of this standard
+/// deviation.
 pub(super) fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64) -> Patch {
     let (columns, rows) = (surface.columns, surface.rows);
     let valid: Vec<bool> = grey.iter().map(Option::is_some).collect();
@@ -97,7 +98,8 @@ pub(super) fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64)
 }
 
 impl Patch {
-    /// Value at a place in cells, by cubic convolution; `None` outside, and where a cell around it is not shown.
+    /// Value at a place in cells, by cubic convolution; `None` outside, and where a cell around it is not
+    /// shown.
     pub fn sample(&self, surface: &Surface, x: f64, y: f64) -> Option<f32> {
         let inside = |v: f64, size: usize| v >= 1.0 && v < size as f64 - 2.0;
         if !(inside(x, surface.columns) && inside(y, surface.rows)) {

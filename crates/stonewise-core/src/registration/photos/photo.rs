@@ -33,11 +33,13 @@ pub struct Photo {
     pub camera: Box<dyn PhotoCamera>,
 }
 
-/// Distance over which a camera's scale is measured, metres: far below a pixel on the wall, far above rounding.
+/// Distance over which a camera's scale is measured, metres: far below a pixel on the wall, far above
+/// rounding.
 const STEP_M: f64 = 1e-4;
 
 impl Photo {
-    /// Size of a pixel on a face at this point, metres: square root of its area there. `None` where the photo does not see the point.
+    /// Size of a pixel on a face at this point, metres: square root of its area there. `None` where the photo
+    /// does not see the point.
     pub fn pixel_m(&self, at: &Point3<f64>, along: &Vector3<f64>, up: &Vector3<f64>) -> Option<f64> {
         let here = self.camera.project(at)?;
         let step = |axis: &Vector3<f64>| {
@@ -49,7 +51,8 @@ impl Photo {
         (area > 0.0).then(|| area.sqrt().recip())
     }
 
-    /// Shift in the face of what stands a metre out of it, in a frame (along, up, out): the photo's parallax at this point.
+    /// Shift in the face of what stands a metre out of it, in a frame (along, up, out): the photo's parallax
+    /// at this point.
     pub(crate) fn parallax(
         &self,
         at: &Point3<f64>,
@@ -76,7 +79,8 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// Grey value at a pixel coordinate of the photo, by cubic convolution (Keys 1981); `None` within two pixels of the chip's edge.
+    /// Grey value at a pixel coordinate of the photo, by cubic convolution (Keys 1981); `None` within two
+    /// pixels of the chip's edge.
     pub(crate) fn sample(&self, pixel: [f64; 2]) -> Option<f32> {
         let x = pixel[0] - f64::from(self.corner[0]) - 0.5;
         let y = pixel[1] - f64::from(self.corner[1]) - 0.5;

@@ -36,7 +36,8 @@ pub(crate) struct Surface {
 }
 
 impl Surface {
-    /// Of the points of the first epoch; `face_from_world`: the stone's frame. `None` where nothing of the face is left within the rim.
+    /// Of the points of the first epoch; `face_from_world`: the stone's frame. `None` where nothing of the
+    /// face is left within the rim.
     pub fn new(
         pair: &PairPoints,
         face_from_world: &Matrix3<f64>,
@@ -220,7 +221,8 @@ impl HeightMap {
     }
 }
 
-/// z = a + b x + c y by least squares, twice: points beyond three root mean squares of the first fit do not count in the second.
+/// z = a + b x + c y by least squares, twice: points beyond three root mean squares of the first fit do not
+/// count in the second.
 fn fit_plane(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     if points.len() < LEAST_POINTS {
         return None;

@@ -7,9 +7,11 @@ use nalgebra::Vector2;
 
 /// Rounds in which the template follows the photos.
 const ROUNDS: usize = 3;
-/// Error of a pose for which photos of one epoch are searched, cells of a pixel: several times what bundle adjustments leave.
+/// Error of a pose for which photos of one epoch are searched, cells of a pixel: several times what bundle
+/// adjustments leave.
 const POSE_REACH: isize = 4;
-/// Distance in which a least-squares match may end from its start, cells: within the grain that smoothing leaves.
+/// Distance in which a least-squares match may end from its start, cells: within the grain that smoothing
+/// leaves.
 pub(super) const PULL_IN: f64 = 4.0;
 
 /// The face on which photos are matched.
@@ -42,7 +44,8 @@ impl Face {
         Some((template, matches))
     }
 
-    /// The photos matched with the one of them that most others agree with; among equals that which shows most of the face.
+    /// The photos matched with the one of them that most others agree with; among equals that which shows
+    /// most of the face.
     fn first_matches(&self, patches: &[Patch]) -> Option<Vec<Option<Match>>> {
         let inside = &self.surface.inside;
         let shown = |i: usize| -> usize {
@@ -68,7 +71,8 @@ impl Face {
         best
     }
 
-    /// Photos matched with a template one by one, each from where it lay on it before, or from where it is found.
+    /// Photos matched with a template one by one, each from where it lay on it before, or from where it is
+    /// found.
     fn matches(
         &self,
         template: &Template,
@@ -85,7 +89,8 @@ impl Face {
         patches.iter().enumerate().map(one).collect()
     }
 
-    /// Photos that share a motion matched with a template, from where they agree best with it within `reach` cells.
+    /// Photos that share a motion matched with a template, from where they agree best with it within `reach`
+    /// cells.
     pub fn matches_together(
         &self,
         template: &Template,
@@ -104,7 +109,8 @@ impl Face {
         Some(Warp::shift(shift))
     }
 
-    /// A photo's match with a template near a start; `None` where it does not settle or correlates too little.
+    /// A photo's match with a template near a start; `None` where it does not settle or correlates too
+    /// little.
     pub fn matched(&self, template: &Template, patch: &Patch, start: Warp) -> Option<Match> {
         let found = self
             .cells

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 
 /// Rounds in which the second epoch's patches follow the stone.
 const ROUNDS: usize = 3;
-/// A stone that is found within this of where its patches were taken needs no other patches, metres: relief and parallax of that
-/// distance make less than a tenth of a millimetre.
+/// A stone that is found within this of where its patches were taken needs no other patches, metres: relief
+/// and parallax of that distance make less than a tenth of a millimetre.
 const NEAR_M: f64 = 0.002;
 
 /// Where a photo shows a stone.

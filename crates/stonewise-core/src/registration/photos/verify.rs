@@ -1,7 +1,9 @@
-//! What a match must pass: more correlation than chance gives, the way back, and another normalisation of contrast.
+//! What a match must pass: more correlation than chance gives, the way back, and another normalisation of
+//! contrast.
 //!
-//! Photos of one epoch resemble each other, so a wrong match, on a shadow's edge or on a neighbour's, can be the same in all of them
-//! and correlate well. It is rarely the same from the second epoch to the first, or in another window.
+//! Photos of one epoch resemble each other, so a wrong match, on a shadow's edge or on a neighbour's, can be
+//! the same in all of them and correlate well. It is rarely the same from the second epoch to the first, or
+//! in another window.
 
 use super::matching::{Match, Template};
 use super::patch::Patch;
@@ -17,8 +19,9 @@ const LEAST_GRAIN: f64 = 0.05;
 /// Reach over which grain is summed, cells: beyond, contrast normalisation leaves none.
 const LONGEST_GRAIN: usize = 12;
 
-/// Cells by which the way back and the other normalisation may lead elsewhere. Half a pixel: of 1,457 tracked stones on ten simulated
-/// walls that leaves out 12 of 19 that were wrong by more than 4 mm, and 3 of 1,347 that were right to 1.5 mm.
+/// Cells by which the way back and the other normalisation may lead elsewhere. Half a pixel: of 1,457 tracked
+/// stones on ten simulated walls that leaves out 12 of 19 that were wrong by more than 4 mm, and 3 of 1,347
+/// that were right to 1.5 mm.
 const MOST_APART: f64 = 0.5;
 
 /// The photos of both epochs and how they lie on the template.
@@ -29,15 +32,17 @@ pub(super) struct Verification<'a> {
 }
 
 impl Verification<'_> {
-    /// What the match differs by under the other normalisation `others`, cells; `None` where the match fails: the way back or the other
-    /// normalisation lead elsewhere or nowhere. The way back is sought within `reach` cells.
+    /// What the match differs by under the other normalisation `others`, cells; `None` where the match fails:
+    /// the way back or the other normalisation lead elsewhere or nowhere. The way back is sought within
+    /// `reach` cells.
     pub fn verified(&self, others: [&[Patch]; 2], reach: isize) -> Option<Vector2<f64>> {
         let way_back = self.way_back(reach)?;
         let other = self.under(others)?;
         (way_back.norm() <= MOST_APART && other.norm() <= MOST_APART).then_some(other)
     }
 
-    /// How far the first epoch's photos lie from their place when they are sought by the mean of the second epoch's.
+    /// How far the first epoch's photos lie from their place when they are sought by the mean of the second
+    /// epoch's.
     fn way_back(&self, reach: isize) -> Option<Vector2<f64>> {
         let [first, second] = self.patches;
         let [ones, twos] = self.matches;
@@ -63,8 +68,8 @@ impl Verification<'_> {
 
 /// Whether matches found within `reach` cells correlate better with a template than the best of chance.
 ///
-/// A face of n independent grains has Fisher's z with a standard deviation of 1 / sqrt(n) (Fisher 1921); the search tries as many
-/// independent places as grains fit into its circle.
+/// A face of n independent grains has Fisher's z with a standard deviation of 1 / sqrt(n) (Fisher 1921); the
+/// search tries as many independent places as grains fit into its circle.
 pub(super) fn is_beyond_chance(
     face: &Face,
     template: &Template,
@@ -83,7 +88,8 @@ pub(super) fn is_beyond_chance(
 /// Keeps Fisher's z finite.
 const MOST_CORRELATION: f64 = 0.999;
 
-/// Integral of a patch's autocorrelation along a line, cells: the side of what counts as one independent value.
+/// Integral of a patch's autocorrelation along a line, cells: the side of what counts as one independent
+/// value.
 fn grain_cells(face: &Face, patch: &Patch) -> f64 {
     let (inside, columns) = (&face.surface.inside, face.surface.columns);
     let shows = |k: usize| inside.get(k) == Some(&true) && patch.valid[k];

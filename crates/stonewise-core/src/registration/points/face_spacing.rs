@@ -11,8 +11,8 @@ const AREA_CELL_M: f64 = 0.02;
 
 /// Mean distance of neighbouring points, seen along the normal, metres; 0 without points.
 ///
-/// The root of the area that each point has for itself; the area is that of all cells with points, so that it is
-/// too large where a cell has less than one point on average.
+/// The root of the area that each point has for itself; the area is that of all cells with points, so that it
+/// is too large where a cell has less than one point on average.
 pub fn face_spacing(cloud: &Cloud, normal: &Vector3<f64>) -> f64 {
     let frame = FaceFrame::from_normal(normal);
     let cell = |i: usize| {

@@ -206,7 +206,8 @@ mod tests {
     #[test]
     fn the_deviance_with_photos_is_that_of_both_observations() {
         let mut wall = SmallWall::new(3, 2, 4);
-        // Without correlation between the face and what is across it an error in the face is plainly an error there.
+        // Without correlation between the face and what is across it an error in the face is plainly an error
+        // there.
         for equations in &mut wall.equations {
             for (r, c) in (0..9).flat_map(|r| (0..9).map(move |c| (r, c))) {
                 if [0, 1, 5].contains(&r) != [0, 1, 5].contains(&c) {

@@ -30,9 +30,11 @@ pub(crate) fn probabilities_with_field(
         .collect()
 }
 
-/// Log odds of a stone being loose against moving with the field, from its equations at the field's motion and at its own.
+/// Log odds of a stone being loose against moving with the field, from its equations at the field's motion
+/// and at its own.
 ///
-/// `own`: variances of what it does beside `prediction` in either case; `share`: expected share of loose stones.
+/// `own`: variances of what it does beside `prediction` in either case; `share`: expected share of loose
+/// stones.
 pub(crate) fn log_odds_of_loose(
     equations: [&NormalEquations; 2],
     prediction: &Prediction,

@@ -67,13 +67,13 @@ pub(crate) fn posterior(equations: &NormalEquations, prediction: &Prediction, ow
     }
 }
 
-/// Covariance of the stone's translation against the prediction (posterior mean less predicted mean), as an estimate of what the
-/// stone did beside the field.
+/// Covariance of the stone's translation against the prediction (posterior mean less predicted mean), as an
+/// estimate of what the stone did beside the field.
 ///
-/// Prediction and posterior are correlated: with C the covariance of the posterior, P that of the motion before the stone's own
-/// observations and S that of the prediction, the error of their difference has C + S - C P^-1 S - S P^-1 C. `shared`: variances of
-/// errors of the observations that their equations leave out; of these the difference takes up I - C P^-1. `posterior`: of the same
-/// `prediction` and `own`.
+/// Prediction and posterior are correlated: with C the covariance of the posterior, P that of the motion
+/// before the stone's own observations and S that of the prediction, the error of their difference has
+/// C + S - C P^-1 S - S P^-1 C. `shared`: variances of errors of the observations that their equations leave
+/// out; of these the difference takes up I - C P^-1. `posterior`: of the same `prediction` and `own`.
 pub(crate) fn covariance_against(
     posterior: &Posterior,
     prediction: &Prediction,
@@ -143,8 +143,8 @@ mod tests {
                 constant: 0.0,
             };
             let posterior = posterior(&equations, &prediction, &own);
-            // The difference takes up the share G = C H of the prediction's error, of the own motion and of the observations' error;
-            // the own motion is what it should show.
+            // The difference takes up the share G = C H of the prediction's error, of the own motion and of
+            // the observations' error; the own motion is what it should show.
             let gain = posterior.covariance * information;
             let missed = gain - Matrix9::identity();
             let mut of_prediction = Matrix9::zeros();

@@ -19,8 +19,8 @@ pub(crate) struct FieldProblem<'a> {
     pub ties: Vec<Tie>,
     pub components: VarianceComponents,
     pub loose: LoosePrior,
-    /// What photos say, where the variance components are to be estimated from them too; the stones' equations are then those of
-    /// the clouds alone.
+    /// What photos say, where the variance components are to be estimated from them too; the stones'
+    /// equations are then those of the clouds alone.
     pub photos: Option<PhotoTerms<'a>>,
 }
 
@@ -32,7 +32,8 @@ pub(crate) struct PhotoTerms<'a> {
 }
 
 impl PhotoTerms<'_> {
-    /// Clouds and photos joined, each with its error in the face. Constants hold what depends on these errors.
+    /// Clouds and photos joined, each with its error in the face. Constants hold what depends on these
+    /// errors.
     pub fn join(&self, problem: &FieldProblem, components: &VarianceComponents) -> Vec<NormalEquations> {
         let of_stone = |(stone, (photos, origin)): (&FieldStone, &(Option<&StonePhotos>, StoneVector))| {
             let mut sum = NormalEquations {

@@ -11,8 +11,8 @@ use std::collections::{BTreeSet, VecDeque};
 const WHOLE: usize = 600;
 /// Connected parts at fixed places. They lie apart, so that one odd corner of the wall does not decide.
 const SPREAD_PARTS: usize = 3;
-/// Parts where neighbours move most unlike each other: components from places at rest alone would make ties so stiff that a bulge
-/// elsewhere ends as loose stones.
+/// Parts where neighbours move most unlike each other: components from places at rest alone would make ties
+/// so stiff that a bulge elsewhere ends as loose stones.
 const STRAINED_PARTS: usize = 2;
 /// Stones in each part: 600 in all determine the components to a tenth.
 const PART_STONES: usize = 120;
@@ -32,7 +32,8 @@ impl Subgraph {
         graph.nodes.len() > WHOLE
     }
 
-    /// `displacements`: of the stones as they are known so far, world, metres. `None` where the graph is small enough to be used whole.
+    /// `displacements`: of the stones as they are known so far, world, metres. `None` where the graph is
+    /// small enough to be used whole.
     pub fn new(graph: &Graph, displacements: &[Vector3<f64>]) -> Option<Self> {
         if !Self::is_needed(graph) {
             return None;
@@ -101,8 +102,8 @@ fn grown(next: &[Vec<usize>], seed: usize) -> BTreeSet<usize> {
     reached
 }
 
-/// By how much stones depart from the mean of their neighbours, metres: the median over each stone and its neighbours, so that a
-/// single stone that is loose or wrong does not count.
+/// By how much stones depart from the mean of their neighbours, metres: the median over each stone and its
+/// neighbours, so that a single stone that is loose or wrong does not count.
 fn departures(next: &[Vec<usize>], displacements: &[Vector3<f64>]) -> Vec<f64> {
     let own: Vec<f64> = next
         .iter()

@@ -21,8 +21,9 @@ pub struct VarianceComponents {
     pub own_rad: f64,
     /// Bending of a stone's face, 1/m.
     pub bending_per_m: f64,
-    /// Appearance bias of a stone between the epochs in the photos, metres, along each axis of the face: light, moisture and moss move
-    /// what all photos of an epoch show alike. Absent where photos take no part.
+    /// Appearance bias of a stone between the epochs in the photos, metres, along each axis of the face:
+    /// light, moisture and moss move what all photos of an epoch show alike. Absent where photos take no
+    /// part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub appearance_m: Option<f64>,
 }

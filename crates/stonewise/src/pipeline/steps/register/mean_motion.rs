@@ -3,11 +3,11 @@
 use crate::results::records::{AdjustmentRecord, Datum};
 use crate::texts::notices::{MEAN_MOTION, MEAN_MOTION_OF_UNKNOWN_DATUM};
 
-/// The mean motion as measured, with its standard deviations: these hold the error of the registration where it is
-/// known, and else the sentence says that they do not.
+/// The mean motion as measured, with its standard deviations: these hold the error of the registration where
+/// it is known, and else the sentence says that they do not.
 ///
-/// Its name differs from that of the common rigid motion, against which stones are tested: that one turns, and
-/// weights stones by their own covariances.
+/// Its name differs from that of the common rigid motion, against which stones are tested: that one turns,
+/// and weights stones by their own covariances.
 pub(super) fn mean_motion(adjustment: &AdjustmentRecord, datum: &Datum) -> String {
     let of_datum = datum.covariance_at(&datum.centre.into());
     let part = |axis: usize| {

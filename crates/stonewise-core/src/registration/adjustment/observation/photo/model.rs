@@ -8,13 +8,15 @@ use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Disagreements of two normalisations that stand for as many more before those of a stone count by themselves.
+/// Disagreements of two normalisations that stand for as many more before those of a stone count by
+/// themselves.
 const PRIOR_DISAGREEMENTS: f64 = 8.0;
 /// Components of a disagreement.
 const DISAGREEMENTS: f64 = 2.0;
 /// Median of the sum of two squared standard normal variables, 2 ln 2.
 const MEDIAN_SQUARE: f64 = 2.0 * std::f64::consts::LN_2;
-/// Least median of squared disagreements over formal variances, so that a survey without any keeps factors of one.
+/// Least median of squared disagreements over formal variances, so that a survey without any keeps factors of
+/// one.
 const LEAST_RATIO: f64 = 1e-6;
 /// Distance from the wall where no stone shows one, metres; nothing depends on it then.
 const USUAL_DISTANCE_M: f64 = 10.0;
@@ -88,7 +90,8 @@ impl PhotoModel {
         }
     }
 
-    /// Adjusts the poses to where the clouds put the stones, and takes from the photos what they say with these poses.
+    /// Adjusts the poses to where the clouds put the stones, and takes from the photos what they say with
+    /// these poses.
     pub fn update(&mut self, stones: &[StoneInPhotos], bias_m: f64) {
         let factors = self.bias_factors();
         let used: Vec<usize> = (0..stones.len())
@@ -153,8 +156,9 @@ impl PhotoModel {
 
     /// Factors on the variance of the stones' appearance bias, about one for the median stone.
     ///
-    /// What changed on a stone leaves residuals in its matches and shifts them: the bias follows their formal variance. Where two
-    /// normalisations of contrast disagree by more than is usual for that variance, it is larger.
+    /// What changed on a stone leaves residuals in its matches and shifts them: the bias follows their formal
+    /// variance. Where two normalisations of contrast disagree by more than is usual for that variance, it is
+    /// larger.
     fn bias_factors(&self) -> Vec<f64> {
         let known: Vec<Option<[f64; 2]>> = self.tracks.iter().map(|t| self.change_of(t)).collect();
         let usual = |pick: &dyn Fn(&[f64; 2]) -> f64| {
@@ -170,7 +174,8 @@ impl PhotoModel {
         known.into_iter().map(|k| k.map_or(1.0, of_stone)).collect()
     }
 
-    /// Mean formal variance of the second epoch's matches, and squared disagreement of two normalisations, m^2.
+    /// Mean formal variance of the second epoch's matches, and squared disagreement of two normalisations,
+    /// m^2.
     fn change_of(&self, track: &Track) -> Option<[f64; 2]> {
         let variances: Vec<f64> = track
             .sights

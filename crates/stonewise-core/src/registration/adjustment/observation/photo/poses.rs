@@ -4,9 +4,10 @@
 //!
 //! s_ki = o_k + q_i h_k + [second epoch] F_i d_k + F_i E (w_i x r - c_i) + e,   F_i = (1, q_i)
 //!
-//! o_k: place of the stone's template, h_k: error of the height of its face, d_k: its displacement, E: world to face, r: from the
-//! camera to the stone, c_i and w_i: corrections of the camera's position and attitude. All photos of the second epoch share a
-//! similarity transformation beside that, of any size: photos show motions relative to each other.
+//! o_k: place of the stone's template, h_k: error of the height of its face, d_k: its displacement, E: world
+//! to face, r: from the camera to the stone, c_i and w_i: corrections of the camera's position and attitude.
+//! All photos of the second epoch share a similarity transformation beside that, of any size: photos show
+//! motions relative to each other.
 
 use crate::registration::photos::{Sight, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Point3, SMatrix, Vector2, Vector3};
@@ -19,13 +20,15 @@ const WHOLE: usize = 7;
 const STONE: usize = 6;
 /// Standard deviation of the second epoch as a whole at the wall's end, metres: as good as free.
 const WHOLE_M: f64 = 0.1;
-/// Error of the height of a stone's face, metres: that of a noisy drone cloud and of relief between its points.
+/// Error of the height of a stone's face, metres: that of a noisy drone cloud and of relief between its
+/// points.
 const HEIGHT_M: f64 = 0.01;
 /// Share of a pixel below which no match is trusted, whatever its formal error: interpolation and lens model.
 const LEAST_PX: f64 = 0.02;
 /// Rounds in which the weights of outlying photos and stones follow.
 const ROUNDS: usize = 6;
-/// Degrees of freedom of the law of errors: photos with leaves or shadows on a stone lose weight (Lange et al. 1989).
+/// Degrees of freedom of the law of errors: photos with leaves or shadows on a stone lose weight (Lange et
+/// al. 1989).
 const FREEDOM: f64 = 4.0;
 /// Start of the factor on the formal variances of matches: pixels of one patch are correlated.
 const START_FACTOR: f64 = 4.0;
@@ -87,7 +90,8 @@ impl PoseProblem<'_> {
         POSE * self.centres.len() + WHOLE
     }
 
-    /// What a sight's shift changes by: with the stone's unknowns, with its pose, with the second epoch as a whole.
+    /// What a sight's shift changes by: with the stone's unknowns, with its pose, with the second epoch as a
+    /// whole.
     fn rows(
         &self,
         stone: &PoseStone,
@@ -171,7 +175,8 @@ impl PoseProblem<'_> {
         system
     }
 
-    /// Adjusts the poses; `bias_m`: appearance bias, `None` where the equations cannot be solved. `weights`: start.
+    /// Adjusts the poses; `bias_m`: appearance bias, `None` where the equations cannot be solved. `weights`:
+    /// start.
     pub fn solve(&self, bias_m: f64, factors: &[f64]) -> Option<Poses> {
         let mut weights: Vec<Vec<f64>> = self
             .stones
@@ -295,8 +300,8 @@ impl StoneSystem {
         DVector::from_iterator(self.columns.len(), self.columns.iter().map(|&c| corrections[c]))
     }
 
-    /// What the photos alone say of the displacement, template and height eliminated: information, information times displacement,
-    /// and the covariance that the poses' errors give it.
+    /// What the photos alone say of the displacement, template and height eliminated: information,
+    /// information times displacement, and the covariance that the poses' errors give it.
     pub fn displacement(&self, poses: &Poses) -> Option<(Matrix3<f64>, Vector3<f64>, Matrix3<f64>)> {
         let right = self.right - &self.cross * self.of(&poses.corrections);
         let inner = self.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;

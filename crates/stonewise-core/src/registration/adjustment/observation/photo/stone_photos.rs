@@ -16,7 +16,8 @@ pub(crate) struct StonePhotos {
     pub vector: Vector3<f64>,
     /// Place on the face, metres from the centroid: along, up.
     pub place: [f64; 2],
-    /// Factor on the variance of the stone's appearance bias: faces that seem strained, which stones cannot be, have more.
+    /// Factor on the variance of the stone's appearance bias: faces that seem strained, which stones cannot
+    /// be, have more.
     pub bias_factor: f64,
     /// Covariance of the displacement that errors of the poses cause; other stones share it.
     pub common: Matrix3<f64>,
@@ -35,8 +36,8 @@ impl StonePhotos {
         lever
     }
 
-    /// What is known with an appearance bias of this standard deviation, metres, along each axis of the face: information, and
-    /// information times displacement.
+    /// What is known with an appearance bias of this standard deviation, metres, along each axis of the face:
+    /// information, and information times displacement.
     pub fn with_bias(&self, bias_m: f64) -> (Matrix3<f64>, Vector3<f64>, f64) {
         let sd = bias_m * self.bias_factor.sqrt();
         let root = Matrix3::from_diagonal(&Vector3::new(sd, sd, 0.0));

@@ -21,7 +21,8 @@ pub(crate) fn steepness([u, v]: [f64; 2]) -> f64 {
 
 /// Fits the surface; points on its steep parts and points far off it lose weight and it is fitted again.
 ///
-/// The weights are those of the fit that is returned: with others, what the surface absorbs of the information could exceed it.
+/// The weights are those of the fit that is returned: with others, what the surface absorbs of the
+/// information could exceed it.
 pub(crate) fn robust_fit(
     grid: PatchGrid,
     epochs: &mut [Vec<WeightedPoint>; 2],
