@@ -20,7 +20,7 @@ const AFFINE_CELLS: usize = 250;
 /// Cells that determine a shift.
 const LEAST_CELLS: usize = 80;
 /// Share of the face that a photo must show.
-const LEAST_SHARE: f64 = 0.6;
+pub(super) const LEAST_SHARE: f64 = 0.6;
 /// Strain of an affine match that is no longer that of the same face.
 const LARGEST_STRAIN: f64 = 0.2;
 
@@ -193,68 +193,6 @@ impl FaceCells {
         }
         None
     }
-
-    /// Correlation of a photo with the template at a shift of whole cells; `None` where it does not show the
-    /// face.
-    pub fn correlation_at(
-        &self,
-        template: &Template,
-        patch: &Patch,
-        surface: &Surface,
-        shift: [isize; 2],
-    ) -> Option<f64> {
-        let offset = shift[1] * surface.columns as isize + shift[0];
-        let (mut tt, mut tp, mut pp, mut count) = (0.0, 0.0, 0.0, 0);
-        for (k, _) in self.cells.iter().filter(|(k, _)| template.patch.valid[*k]) {
-            let column = (k % surface.columns) as isize + shift[0];
-            let to = *k as isize + offset;
-            if column < 0 || column >= surface.columns as isize || to < 0 {
-                continue;
-            }
-            let to = to as usize;
-            if patch.valid.get(to).copied().unwrap_or(false) {
-                let (t, p) = (template.patch.values[*k], patch.values[to]);
-                tt += t * t;
-                tp += t * p;
-                pp += p * p;
-                count += 1;
-            }
-        }
-        let shows = count as f64 >= LEAST_SHARE * self.count() as f64;
-        (shows && tt > 0.0 && pp > 0.0).then(|| f64::from(tp) / (f64::from(tt) * f64::from(pp)).sqrt())
-    }
-
-    /// The shift of whole cells, within `reach`, at which photos that share a motion agree best with the
-    /// template.
-    pub fn best_shift(
-        &self,
-        template: &Template,
-        patches: &[&Patch],
-        surface: &Surface,
-        reach: isize,
-    ) -> Option<Vector2<f64>> {
-        let score = |shift: [isize; 2]| {
-            let of_photos = patches
-                .iter()
-                .filter_map(|p| self.correlation_at(template, p, surface, shift));
-            let (sum, count) = of_photos.fold((0.0, 0usize), |(s, n), c| (s + c, n + 1));
-            (count > 0).then(|| sum / count as f64)
-        };
-        let mut best: Option<(f64, [isize; 2])> = None;
-        for y in -reach..=reach {
-            for x in -reach..=reach {
-                if x * x + y * y > reach * reach {
-                    continue;
-                }
-                if let Some(score) = score([x, y])
-                    && best.is_none_or(|(b, _)| score > b)
-                {
-                    best = Some((score, [x, y]));
-                }
-            }
-        }
-        best.map(|(_, [x, y])| Vector2::new(x as f64, y as f64))
-    }
 }
 
 struct Pair {
@@ -284,63 +222,84 @@ fn correlation(pairs: &[Pair]) -> f64 {
     }
 }
 
-type Normal = SMatrix<f64, 8, 8>;
-type Row = SVector<f64, 8>;
-
-/// The step of the warp, and the covariance of its shift. Unknowns: offset, gain, shift, then the matrix row
-/// by row; the last six times the gain.
+/// The step of the warp, and the covariance of its shift.
 fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
-    let row = |p: &Pair| {
-        let [x, y] = p.gradient;
-        let (u, v) = if is_affine {
-            (p.place.x, p.place.y)
-        } else {
-            (0.0, 0.0)
-        };
-        Row::from([1.0, p.template, x, y, x * u, x * v, y * u, y * v])
+    match is_affine {
+        true => {
+            let (x, covariance) = least_squares(pairs, |p| {
+                let ([x, y], u, v) = (p.gradient, p.place.x, p.place.y);
+                [1.0, p.template, x, y, x * u, x * v, y * u, y * v]
+            })?;
+            let strain = Matrix2::new(x[4], x[5], x[6], x[7]);
+            step([x[1], x[2], x[3]], strain, covariance)
+        }
+        false => {
+            let row = |p: &Pair| [1.0, p.template, p.gradient[0], p.gradient[1]];
+            let (x, covariance) = least_squares(pairs, row)?;
+            step([x[1], x[2], x[3]], Matrix2::zeros(), covariance)
+        }
+    }
+}
+
+/// The step that a gain, and a shift and a strain times this gain make.
+fn step(
+    [gain, x, y]: [f64; 3],
+    strain: Matrix2<f64>,
+    covariance: Matrix2<f64>,
+) -> Option<(Warp, Matrix2<f64>)> {
+    let warp = Warp {
+        shift: Vector2::new(x, y) / gain,
+        matrix: Matrix2::identity() + strain / gain,
     };
+    (gain > 0.0).then(|| (warp, covariance / (gain * gain)))
+}
+
+/// Robust least squares of the photo's values on rows of offset, gain, shift and what else there is; the
+/// unknowns, and the covariance of the shift.
+fn least_squares<const N: usize>(
+    pairs: &[Pair],
+    row: impl Fn(&Pair) -> [f64; N],
+) -> Option<(SVector<f64, N>, Matrix2<f64>)> {
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
     for _ in 0..2 {
-        let (mut normal, mut right) = (Normal::zeros(), Row::zeros());
+        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
         for (p, w) in pairs.iter().zip(&weights) {
             let row = row(p);
-            normal.syger(*w, &row, &row, 1.0);
-            right += row * (w * p.photo);
+            for i in 0..N {
+                let weighted = w * row[i];
+                right[i] += weighted * p.photo;
+                for j in i..N {
+                    normal[(j, i)] += weighted * row[j];
+                }
+            }
         }
         normal.fill_upper_triangle_with_lower_triangle();
-        if !is_affine {
-            (4..8).for_each(|k| normal[(k, k)] = 1.0);
-        }
         let inverse = normal.cholesky()?.inverse();
         let solution = inverse * right;
-        let residuals: Vec<f64> = pairs.iter().map(|p| p.photo - row(p).dot(&solution)).collect();
+        let fitted = |p: &Pair| {
+            row(p)
+                .iter()
+                .zip(solution.iter())
+                .map(|(a, x)| a * x)
+                .sum::<f64>()
+        };
+        let residuals: Vec<f64> = pairs.iter().map(|p| p.photo - fitted(p)).collect();
         let total: f64 = weights.iter().sum();
         let square: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
-        let sigma = (square / (total - 8.0).max(1.0)).sqrt();
+        let sigma = (square / (total - N as f64).max(1.0)).sqrt();
         for (w, r) in weights.iter_mut().zip(&residuals) {
             *w = (HUBER * sigma / r.abs().max(f64::MIN_POSITIVE)).min(1.0);
         }
-        found = Some((solution, inverse * (sigma * sigma)));
+        let shift = inverse.fixed_view::<2, 2>(2, 2).into_owned();
+        found = Some((solution, shift * (sigma * sigma)));
     }
-    let (x, covariance) = found?;
-    let gain = x[1];
-    if gain <= 0.0 {
-        return None;
-    }
-    let matrix = Matrix2::new(x[4], x[5], x[6], x[7]) / gain;
-    let step = Warp {
-        shift: Vector2::new(x[2], x[3]) / gain,
-        matrix: Matrix2::identity() + if is_affine { matrix } else { Matrix2::zeros() },
-    };
-    Some((
-        step,
-        covariance.fixed_view::<2, 2>(2, 2).into_owned() / (gain * gain),
-    ))
+    found
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::Search;
     use super::*;
 
     /// Grain of two to six cells, everywhere.
@@ -375,7 +334,7 @@ mod tests {
             0.3 + 1.4 * texture(from.x, from.y) + dirt(x, y)
         });
         let reach = 6;
-        let start = face.best_shift(&template, &[&patch], &surface, reach)?;
+        let (start, _) = Search::new(&template, &surface).best_shift(&[&patch], reach)?;
         face.matched(&template, &patch, &surface, Warp::shift(start), 4.0)
     }
 

@@ -9,6 +9,7 @@ mod matching;
 mod params;
 mod patch;
 mod photo;
+mod search;
 mod surface;
 mod template;
 mod track;

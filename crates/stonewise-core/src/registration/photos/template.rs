@@ -2,6 +2,7 @@
 
 use super::matching::{FaceCells, Match, Template, Warp};
 use super::patch::Patch;
+use super::search::Search;
 use super::surface::Surface;
 use nalgebra::Vector2;
 
@@ -105,7 +106,7 @@ impl Face {
 
     /// Where photos that share a motion agree best with a template, within `reach` cells.
     pub fn sought(&self, template: &Template, patches: &[&Patch], reach: isize) -> Option<Warp> {
-        let shift = self.cells.best_shift(template, patches, &self.surface, reach)?;
+        let (shift, _) = Search::new(template, &self.surface).best_shift(patches, reach)?;
         Some(Warp::shift(shift))
     }
 

@@ -120,6 +120,7 @@ fn apart(matches: &[Option<Match>], from: &[Option<Match>]) -> Option<Vector2<f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::Search;
     use super::super::surface::Surface;
     use super::*;
     use crate::registration::photos::matching::Warp;
@@ -169,14 +170,8 @@ mod tests {
         for seed in 0..120 {
             let template = Template::new(drawn(2 * seed, 3.0, 0.0), &face.surface);
             let other = drawn(2 * seed + 1, 3.0, 0.0);
-            let best = face
-                .sought(&template, &[&other], reach)
-                .and_then(|near| {
-                    let cells = &face.cells;
-                    let shift = [near.shift.x as isize, near.shift.y as isize];
-                    cells.correlation_at(&template, &other, &face.surface, shift)
-                })
-                .unwrap();
+            let search = Search::new(&template, &face.surface);
+            let (_, best) = search.best_shift(&[&other], reach).unwrap();
             passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)], reach));
         }
         // 5 % of 120 are 6, standard deviation 2.4.
