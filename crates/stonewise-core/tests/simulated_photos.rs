@@ -3,8 +3,8 @@
 use stonewise_core::geometry::View;
 use stonewise_core::raster::LabelImage;
 use stonewise_core::simulate::{
-    FacePoint, PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views, plan_views,
-    shown_part, true_labels,
+    Day, FacePoint, PhotoParams, SceneParams, Studio, WallMotion, WallParams, World, disturb_views,
+    plan_views, shown_part, true_labels,
 };
 
 fn params() -> (SceneParams, PhotoParams) {
@@ -49,7 +49,7 @@ fn labels_under_projected_points_are_their_stones() {
     for epoch in [0, 1] {
         let scene = world.scene(epoch);
         let scan = world.scan(&params, epoch).tls.unwrap();
-        let studio = Studio::new(&scene, 3);
+        let studio = Studio::new(&scene, &Day::new(3));
         for view in plan_views(&world.wall, &photos, epoch, 5) {
             let photo = studio.photograph(&view, &photos.sensor);
             let (mut right, mut all) = (0, 0);
@@ -94,7 +94,7 @@ fn a_part_of_the_wall_is_enough_for_a_photo_that_shows_no_more() {
         .filter(|(a, b)| a == b)
         .count();
     assert!(same * 1000 >= labels.data().len() * 999, "{same}");
-    let photo = Studio::new(&world.scene(0), 3).photograph(view, &photos.sensor);
+    let photo = Studio::new(&world.scene(0), &Day::new(3)).photograph(view, &photos.sensor);
     assert_eq!(photo.labels, whole);
 }
 
@@ -144,7 +144,7 @@ fn photos_are_exposed_and_do_not_depend_on_threads() {
             .unwrap();
         pool.install(|| {
             let views = plan_views(&world.wall, &photos, 0, 5);
-            Studio::new(&scene, 3).photograph(&views[0], &photos.sensor)
+            Studio::new(&scene, &Day::new(3)).photograph(&views[0], &photos.sensor)
         })
     };
     let (one, two) = (take(1), take(2));

@@ -38,6 +38,15 @@ impl Light {
         }
     }
 
+    /// The same day without sun, under a sky that is brighter for its clouds.
+    pub fn overcast(&self) -> Self {
+        Self {
+            sun_rgb: [0.0; 3],
+            sky_rgb: [1.1, 1.15, 1.2],
+            ..self.clone()
+        }
+    }
+
     /// Light on a matt surface with this normal, as red, green, blue. `lit`: share of the sun that reaches
     /// it; `open`: share of its sky that nothing hides.
     pub fn on(&self, normal: &Vector3<f64>, lit: f64, open: f64) -> [f64; 3] {

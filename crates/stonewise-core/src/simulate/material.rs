@@ -4,12 +4,13 @@
 //! Colours are linear reflectances. Everything on a stone is a function of a place in the stone's own frame,
 //! so that the texture moves with it.
 
+use crate::simulate::day::Day;
 use crate::simulate::noise::Noise;
 use crate::simulate::props::Material;
 use crate::simulate::scene::{Hit, Target};
 use crate::simulate::wall::Wall;
 
-/// Paints a wall; `moss` and `wet` may differ between epochs.
+/// Paints a wall on a day.
 pub struct Painter {
     rock: Noise,
     grain: Noise,
@@ -37,10 +38,9 @@ const LICHEN: Rgb = [0.42, 0.42, 0.34];
 const DIRT: Rgb = [0.105, 0.095, 0.080];
 
 impl Painter {
-    /// Colours of a wall by its seed; `day`: what differs from epoch to epoch.
-    pub fn new(wall_seed: u64, day: u64) -> Self {
+    /// Colours of a wall by its seed, with the moss and the moisture of a day.
+    pub fn new(wall_seed: u64, day: &Day) -> Self {
         let noise = |purpose: u64| Noise::new(wall_seed, 200 + purpose);
-        let today = Noise::new(day, 60);
         Self {
             rock: noise(0),
             grain: noise(1),
@@ -48,8 +48,8 @@ impl Painter {
             moss: noise(3),
             grass: noise(4),
             stone: noise(5),
-            moss_share: 0.7 + 0.6 * today.uniform(0),
-            wet_share: 0.5 * today.uniform(1),
+            moss_share: day.moss,
+            wet_share: day.wet,
         }
     }
 

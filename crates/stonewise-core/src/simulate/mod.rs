@@ -1,5 +1,6 @@
 //! Surveys made up from scratch, with truth: walls, motions, scanners and cameras.
 
+mod day;
 mod deform;
 mod drift;
 mod face;
@@ -23,6 +24,7 @@ mod wall;
 mod wall_params;
 mod window;
 
+pub use day::{Day, LaterDays, LaterLight};
 pub use deform::{TrueMotion, WallMotion, move_stones, shared_displacement};
 pub use face::{Face, FacePoint};
 pub use lens::SensorParams;

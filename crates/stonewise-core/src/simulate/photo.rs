@@ -3,6 +3,7 @@
 use crate::geometry::{Camera, Distortion, Rigid3, View};
 use crate::id::ImageId;
 use crate::raster::{LabelImage, Raster};
+use crate::simulate::day::{Day, LaterDays};
 use crate::simulate::face::FacePoint;
 use crate::simulate::lens::{SensorParams, develop};
 use crate::simulate::light::{Light, LightMap};
@@ -49,6 +50,8 @@ pub struct PhotoParams {
     /// Whether photos are rendered; if not they are plain grey, which is quicker and enough where masks are
     /// given.
     pub rendered: bool,
+    /// How light, moss and moisture of the later epochs differ from those of the first.
+    pub later: LaterDays,
     /// Lens and sensor.
     pub sensor: SensorParams,
 }
@@ -70,6 +73,7 @@ impl Default for PhotoParams {
             pose_noise_px: 0.4,
             last_unaligned: false,
             rendered: true,
+            later: LaterDays::default(),
             sensor: SensorParams::default(),
         }
     }
@@ -213,17 +217,16 @@ pub struct Studio<'a> {
 }
 
 impl<'a> Studio<'a> {
-    /// Sets up the light. `seed`: of the day. Cost: about a microsecond for every 25 mm^2 of wall.
-    pub fn new(scene: &'a Scene<'a>, seed: u64) -> Self {
-        let light = Light::of_day(seed);
+    /// Sets up the light of a day. Cost: about a microsecond for every 25 mm^2 of wall.
+    pub fn new(scene: &'a Scene<'a>, day: &Day) -> Self {
         let wall_seed = scene.wall().params().seed;
         Self {
-            map: LightMap::new(scene, &light),
-            light,
+            map: LightMap::new(scene, &day.light),
+            light: day.light.clone(),
             scene,
-            painter: Painter::new(wall_seed, seed),
+            painter: Painter::new(wall_seed, day),
             bump: Noise::new(wall_seed, 300),
-            seed,
+            seed: day.seed,
         }
     }
 

@@ -1,6 +1,7 @@
 //! What every simulated scanner shares: beams, footprints, noise, and the cloud that comes out.
 
 use crate::cloud::Cloud;
+use crate::simulate::day::Day;
 use crate::simulate::material::Painter;
 use crate::simulate::noise::normals;
 use crate::simulate::scene::{Hit, Scene};
@@ -123,7 +124,7 @@ impl<'a> Instrument<'a> {
         Self {
             beam,
             scale,
-            painter: (beam.darkness_m != 0.0).then(|| Painter::new(wall_seed, day)),
+            painter: (beam.darkness_m != 0.0).then(|| Painter::new(wall_seed, &Day::new(day))),
         }
     }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use stonewise_core::geometry::View;
 use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_core::simulate::{
-    Photo, SampledFaces, Scene, SensorParams, Studio, Wall, disturb_views, plan_views, shown_part,
+    Day, Photo, SampledFaces, Scene, SensorParams, Studio, Wall, disturb_views, plan_views, shown_part,
     shown_stones, true_labels,
 };
 use stonewise_io::cameras::{write_colmap, write_metashape};
@@ -22,11 +22,7 @@ const ONE_SURFACE_M2: f64 = 100.0;
 /// each stone.
 pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
     let (params, number) = (survey.params, survey.number());
-    let seed = params
-        .scene
-        .seed
-        .wrapping_mul(1000)
-        .wrapping_add(10 + survey.epoch as u64);
+    let seed = seed_of(params, survey.epoch);
     let images = survey.folder.join(format!("epoch{number}/images"));
     create_folder(&images)?;
     let wall = &survey.world.wall;
@@ -40,7 +36,8 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
     let is_small = (extent[1] - extent[0]) * (extent[3] - extent[2]) <= ONE_SURFACE_M2;
     let whole = is_small.then(|| survey.world.surface(extent));
     let scene = whole.as_ref().map(|s| survey.world.scene_of(s, survey.epoch));
-    let darkroom = scene.as_ref().map(|s| Darkroom::new(s, params, seed + 2));
+    let day = day_of(params, survey.epoch);
+    let darkroom = scene.as_ref().map(|s| Darkroom::new(s, params, &day));
     let mut sampled = SampledFaces::default();
     for (view, shown_part) in along_the_wall(wall, &exact) {
         survey.progress.check()?;
@@ -55,7 +52,7 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
             (None, Some(part)) => {
                 let surface = survey.world.next_surface(part, &mut sampled);
                 let scene = survey.world.scene_of(&surface, survey.epoch);
-                Darkroom::new(&scene, params, seed + 2).photo(view)
+                Darkroom::new(&scene, params, &day).photo(view)
             }
             (None, None) => blank(view),
         };
@@ -75,6 +72,24 @@ pub(super) fn write_photos(survey: &Survey) -> Result<Vec<u32>, SimulateError> {
     Ok(shown)
 }
 
+/// Seed of what is by chance in an epoch's photos.
+fn seed_of(params: &SurveyParams, epoch: usize) -> u64 {
+    params
+        .scene
+        .seed
+        .wrapping_mul(1000)
+        .wrapping_add(10 + epoch as u64)
+}
+
+/// Light, moss and moisture of an epoch.
+fn day_of(params: &SurveyParams, epoch: usize) -> Day {
+    let [first, own] = [0, epoch].map(|e| seed_of(params, e) + 2);
+    match epoch {
+        0 => Day::new(own),
+        _ => Day::later(own, first, &params.photos.later),
+    }
+}
+
 /// Views with the part of the wall that each shows, in such an order that most of one part is in the next.
 fn along_the_wall<'a>(wall: &Wall, views: &'a [View]) -> Vec<(&'a View, Option<[f64; 4]>)> {
     let mut parts: Vec<_> = views.iter().map(|view| (view, shown_part(wall, view))).collect();
@@ -91,7 +106,7 @@ struct Darkroom<'a> {
 }
 
 impl<'a> Darkroom<'a> {
-    fn new(scene: &'a Scene<'a>, params: &'a SurveyParams, day: u64) -> Self {
+    fn new(scene: &'a Scene<'a>, params: &'a SurveyParams, day: &Day) -> Self {
         Self {
             scene,
             studio: params.photos.rendered.then(|| Studio::new(scene, day)),
