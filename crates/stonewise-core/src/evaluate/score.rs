@@ -16,6 +16,9 @@ pub struct MotionScore {
     pub estimated: usize,
     /// Errors per direction.
     pub errors: Directions,
+    /// The same with the common rigid motions of estimates and of truths taken off.
+    #[serde(default)]
+    pub errors_without_datum: Directions,
     /// Share of estimates whose 3D error is beyond the outlier limit.
     pub outlier_rate: Option<f64>,
     /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have
@@ -59,6 +62,7 @@ pub fn score_motions(samples: &[MotionSample], expected: usize, params: &Evaluat
         estimated: samples.len(),
         outlier_rate: errors.norm_3d.as_ref().map(|s| s.outlier_rate),
         errors,
+        errors_without_datum: directions(&relative, params.outlier_m),
         calibration: is_absolute.then(|| Calibration::of(samples)),
         calibration_without_datum: (!relative.is_empty()).then(|| Calibration::of(&relative)),
         significance: Detection::of(tested, params.still_m),
@@ -197,6 +201,9 @@ mod tests {
         // The estimates tilt by a millimetre per metre and shift; the wall truly stood still.
         let score = score_stones(&outcomes, |_| Vector3::zeros(), &EvaluationParams::default());
         assert!(score.calibration.is_none());
+        let left = score.errors_without_datum;
+        assert!(left.up.unwrap().rmse_m < 1e-12 && left.along.unwrap().rmse_m < 1e-12);
+        assert!((left.out_of_plane.unwrap().p95_m - 0.004 * 0.2).abs() < 1e-12);
         let calibration = score.calibration_without_datum.unwrap();
         assert_eq!(calibration.coverage_95.along, Some(1.0));
         assert_eq!(calibration.coverage_95.out, Some(16.0 / 17.0));
