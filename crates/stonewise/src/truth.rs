@@ -22,8 +22,8 @@ const NEEDED: [&str; 11] = [
 /// results.
 ///
 /// `truth`: CSV with the columns `stone_id, cx, cy, cz` (centroid in epoch 1), `dx, dy, dz`, `rx, ry, rz`,
-/// `loose`, and, where known, `nx, ny, nz` (face normal), `edge` and `vis_tls` or `vis_uav` or `visible`
-/// (share of the face that both epochs measured). A row of the results belongs to the true stone whose
+/// `loose`, and, where known, `nx, ny, nz` (face normal), `edge` and `visible` (share of the face that both
+/// epochs measured) or `vis_tls` and `vis_uav` (the same of two scanners, of which the better one counts). A row of the results belongs to the true stone whose
 /// centroid is nearest.
 ///
 /// # Errors
@@ -80,7 +80,10 @@ fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
     if let Some(missing) = NEEDED.iter().find(|n| find(n).is_none()) {
         return Err(bad(format!("no column {missing:?} in the table of true stones")));
     }
-    let visible = ["visible", "vis_tls", "vis_uav"].iter().find_map(|n| find(n));
+    let visible: Vec<usize> = match find("visible") {
+        Some(column) => vec![column],
+        None => ["vis_tls", "vis_uav"].iter().filter_map(|n| find(n)).collect(),
+    };
     lines
         .map(|(number, line)| {
             let cells: Vec<&str> = line.split(',').map(str::trim).collect();
@@ -106,8 +109,38 @@ fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
                 rotation: vector("rx", "ry", "rz", 0.0)?,
                 loose: value("loose", 0.0)? != 0.0,
                 edge: value("edge", 0.0)? != 0.0,
-                visible_share: visible.map_or(Ok(1.0), at)?,
+                visible_share: visible
+                    .iter()
+                    .map(|&column| at(column))
+                    .reduce(|a, b| Ok(a?.max(b?)))
+                    .unwrap_or(Ok(1.0))?,
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(columns: &str, row: &str) -> Vec<f64> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stones.csv");
+        fs::write(
+            &path,
+            format!("{},{columns}\n{}{row}\n", NEEDED.join(","), "0,".repeat(11)),
+        )
+        .unwrap();
+        let stones = read_truth(&path).unwrap();
+        stones.iter().map(|s| s.visible_share).collect()
+    }
+
+    #[test]
+    fn a_stone_is_as_visible_as_to_the_scanner_that_saw_it_best() {
+        assert_eq!(read("vis_tls,vis_uav", "0,0.8"), vec![0.8]);
+        assert_eq!(read("vis_tls,vis_uav", "0.9,0"), vec![0.9]);
+        assert_eq!(read("vis_uav", "0.7"), vec![0.7]);
+        assert_eq!(read("vis_tls,visible", "0.9,0.4"), vec![0.4]);
+        assert_eq!(read("edge", "0"), vec![1.0]);
+    }
 }
