@@ -83,8 +83,16 @@ impl Adjustment {
     }
 
     /// Parts the wall along its most significant crack; whether there is one.
+    ///
+    /// The points alone decide: all stones of a side share the errors of their photos' poses, so that no number
+    /// of them proves a jump.
     pub fn add_crack(&mut self, solution: &Solution) -> bool {
-        let problem = self.problem(solution.equations.iter().map(|e| &e.with_field));
+        let of_clouds = self.photos.is_some();
+        let of_clouds = of_clouds.then(|| self.cloud_equations(self.components.error_m));
+        let problem = match &of_clouds {
+            Some(equations) => self.problem(equations.iter()),
+            None => self.problem(solution.equations.iter().map(|e| &e.with_field)),
+        };
         let Some(crack) = find_crack(&problem, &solution.field) else {
             return false;
         };
@@ -141,5 +149,59 @@ impl Adjustment {
                 stone.p_with_field = 1.0;
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::observation::photo::{PhotoModel, StonePhotos};
+    use super::super::params::AdjustmentParams;
+    use super::super::survey::survey;
+    use super::super::testing::{COLUMNS, wall};
+    use super::*;
+    use crate::progress::Silent;
+    use crate::registration::points::MemoryPairs;
+    use nalgebra::Matrix3;
+
+    fn is_right(stone: usize) -> bool {
+        stone as u32 % COLUMNS >= COLUMNS / 2
+    }
+
+    /// Whether a wall is parted whose right half moved by these by its points and by its photos.
+    fn is_parted(by_points: Vector3<f64>, by_photos: Vector3<f64>) -> bool {
+        let params = AdjustmentParams::default();
+        let moved = |k: u32| by_points * f64::from(u8::from(is_right(k as usize)));
+        let source = MemoryPairs::new(wall(10, [0.001; 2], moved));
+        let mut adjustment = Adjustment::new(survey(&source, &params).unwrap(), &params).unwrap();
+        adjustment.estimate_noise();
+        for _ in 0..3 {
+            adjustment.evaluate(&source, &Silent).unwrap();
+            let equations = adjustment.equations();
+            let field = adjustment.solve_and_reweight(&equations).unwrap();
+            adjustment.step(&Solution { equations, field });
+        }
+        // Two tenths of a millimetre in the face, nothing across it.
+        let information = Matrix3::from_diagonal(&Vector3::new(2.5e7, 2.5e7, 1.0));
+        let shown = |i: usize| StonePhotos {
+            information,
+            vector: information
+                * (adjustment.graph.nodes[i].face_from_world * by_photos * f64::from(u8::from(is_right(i)))),
+            place: [0.0; 2],
+            bias_factor: 1.0,
+            common: Matrix3::zeros(),
+        };
+        let photos = (0..adjustment.stones.len()).map(shown).collect();
+        adjustment.photos = Some(PhotoModel::showing(photos));
+        adjustment.components.appearance_m = Some(1e-4);
+        let equations = adjustment.equations();
+        let field = adjustment.solve(&equations).unwrap();
+        adjustment.add_crack(&Solution { equations, field })
+    }
+
+    #[test]
+    fn points_part_a_wall_and_photos_do_not() {
+        let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
+        assert!(is_parted(moved, moved));
+        assert!(!is_parted(still, moved));
     }
 }

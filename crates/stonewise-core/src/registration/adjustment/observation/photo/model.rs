@@ -90,6 +90,15 @@ impl PhotoModel {
         }
     }
 
+    /// Photos that show this of all stones.
+    #[cfg(test)]
+    pub fn showing(stones: Vec<StonePhotos>) -> Self {
+        Self {
+            stones: stones.into_iter().map(Some).collect(),
+            ..Self::new(PhotoParams::default(), &[], &[], Vec::new())
+        }
+    }
+
     /// Adjusts the poses to where the clouds put the stones, and takes from the photos what they say with
     /// these poses.
     pub fn update(&mut self, stones: &[StoneInPhotos], bias_m: f64) {
