@@ -248,20 +248,41 @@ fn wrong_projects_are_wrong_usage() {
     assert_eq!(code, 2, "{log}");
 }
 
+/// A command with two threads and a limit on its address space, KiB.
+#[cfg(target_os = "linux")]
+fn limited(kib: u32, command: &str) -> assert_cmd::Command {
+    let mut shell = assert_cmd::Command::new("sh");
+    shell
+        .arg("-c")
+        .arg(format!("ulimit -v {kib}; exec \"$0\" \"$@\""))
+        .arg(support::program())
+        .args([command, "--threads", "2"]);
+    shell
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_demo_says_that_no_limit_leaves_it_enough() {
+    let out = tempfile::tempdir().unwrap();
+    // From where the program itself can just be loaded to where everything but the detector would work.
+    for kib in [200_000, 300_000, 500_000, 700_000] {
+        let mut demo = limited(kib, "demo");
+        let (code, log) = outcome(demo.arg("--out").arg(out.path().join("demo")));
+        assert_eq!(code, 1, "{kib}: {log}");
+        assert!(
+            log.contains("of address space, and only") && log.contains("(`ulimit -v`)"),
+            "{kib}: {log}"
+        );
+        assert!(!out.path().join("demo").exists(), "{kib}: something was written");
+    }
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn too_little_address_space_is_said_before_the_work() {
     let out = tempfile::tempdir().unwrap();
     // 200 MB for a small survey and 64 MB for each thread are more than 400,000 KiB.
-    let limited = |command: &str| {
-        let mut shell = assert_cmd::Command::new("sh");
-        shell
-            .args(["-c", "ulimit -v 400000; exec \"$0\" \"$@\""])
-            .arg(support::program())
-            .args([command, "--threads", "2"]);
-        shell
-    };
-    let mut run = limited("run");
+    let mut run = limited(400_000, "run");
     run.arg(tiny_survey().join("stonewise.toml"))
         .arg("--out")
         .arg(out.path().join("results"));
@@ -272,7 +293,7 @@ fn too_little_address_space_is_said_before_the_work() {
         "{log}"
     );
     assert!(log.contains("only 0.4 GB are allowed (`ulimit -v`)"), "{log}");
-    let mut segment = limited("segment");
+    let mut segment = limited(400_000, "segment");
     segment
         .arg(tiny_survey().join("epoch1/images"))
         .arg("--out")
@@ -280,7 +301,7 @@ fn too_little_address_space_is_said_before_the_work() {
     let (code, log) = outcome(&mut segment);
     assert_eq!(code, 1, "{log}");
     assert!(
-        log.contains("the search for stones in photos takes about 0.7 GB"),
+        log.contains("the search for stones in photos takes about 0.9 GB"),
         "{log}"
     );
 }

@@ -14,8 +14,24 @@ const GIB: f64 = (1u64 << 30) as f64;
 
 /// Memory that can be used under the limit, bytes; `None` without a limit, or where it is not known.
 pub(crate) fn room() -> Option<u64> {
-    let limit = limit_in(&fs::read_to_string("/proc/self/limits").ok()?)?;
-    Some(limit.saturating_sub(reserved()))
+    Some(limit()?.saturating_sub(reserved(rayon::current_num_threads())))
+}
+
+/// Compares the limit with what the program takes before it holds any data. To be called before the threads
+/// are started: a thread that cannot be started is an error of its own, but memory that runs out at that time
+/// aborts the program. `threads`: how many are to be started.
+///
+/// # Errors
+/// The limit is too low.
+pub fn require_start(threads: usize) -> Result<()> {
+    match limit() {
+        Some(limit) => compare(
+            limit,
+            reserved(threads),
+            &format!("stonewise with --threads {threads}"),
+        ),
+        None => Ok(()),
+    }
 }
 
 /// Compares the limit with the memory that some work takes, bytes; `what`: the work, as subject of the
@@ -24,24 +40,37 @@ pub(crate) fn room() -> Option<u64> {
 /// # Errors
 /// The limit is too low.
 pub(crate) fn require(memory: u64, what: &str) -> Result<()> {
-    match room() {
-        Some(room) if room < memory => {
-            let total = |memory: u64| (memory + reserved()) as f64 / GIB;
-            Err(Error::AddressSpace {
-                what: what.to_owned(),
-                needed_gb: total(memory),
-                limit_gb: total(room),
-            })
-        }
-        _ => Ok(()),
+    match limit() {
+        Some(limit) => compare(
+            limit,
+            memory.saturating_add(reserved(rayon::current_num_threads())),
+            what,
+        ),
+        None => Ok(()),
     }
 }
 
-fn reserved() -> u64 {
-    PROGRAM + PER_THREAD * (rayon::current_num_threads() as u64 + OTHER_THREADS)
+fn compare(limit: u64, needed: u64, what: &str) -> Result<()> {
+    if needed <= limit {
+        return Ok(());
+    }
+    Err(Error::AddressSpace {
+        what: what.to_owned(),
+        needed_gb: needed as f64 / GIB,
+        limit_gb: limit as f64 / GIB,
+    })
 }
 
-/// The limit in force, in the text of `/proc/self/limits`: the first number of its line.
+fn reserved(threads: usize) -> u64 {
+    PROGRAM + PER_THREAD * (threads as u64 + OTHER_THREADS)
+}
+
+/// The limit in force, bytes; `None` without one, or where it is not known.
+fn limit() -> Option<u64> {
+    limit_in(&fs::read_to_string("/proc/self/limits").ok()?)
+}
+
+/// The limit in the text of `/proc/self/limits`: the first number of its line.
 fn limit_in(limits: &str) -> Option<u64> {
     let line = limits.lines().find_map(|l| l.strip_prefix("Max address space"))?;
     line.split_whitespace().next()?.parse().ok()

@@ -33,6 +33,7 @@ mod truth;
 mod verdict;
 mod warnings;
 
+pub use address_space::require_start;
 pub use error::{Error, Result};
 pub use init::{Initialised, init};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};

@@ -5,6 +5,7 @@ use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
+use stonewise::check::require_memory_of_clouds;
 use stonewise::{Comparison, OutputFolder, Owner, Project, compare_clouds};
 use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 
@@ -18,12 +19,7 @@ pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcom
     if let Some(params) = params {
         project.settings.m3c2 = params;
     }
-    compare(
-        &project,
-        Comparison::M3c2,
-        &claim(&project, args, force)?,
-        printer,
-    )
+    compare(&project, Comparison::M3c2, args, force, printer)
 }
 
 /// C2C of a project or of two clouds.
@@ -32,7 +28,7 @@ pub fn c2c(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome
         max_m: args.max_distance,
     };
     let project = project(args, M3c2Params::default())?;
-    compare(&project, what, &claim(&project, args, force)?, printer)
+    compare(&project, what, args, force, printer)
 }
 
 /// C2M of a mesh and a cloud.
@@ -41,19 +37,25 @@ pub fn c2m(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome
         bail!("c2m needs a mesh and a cloud: stonewise c2m mesh.ply cloud.laz --out DIR");
     };
     let project = Project::of_clouds(mesh, cloud, M3c2Params::default());
-    compare(
-        &project,
-        Comparison::C2m {
-            mesh,
-            max_m: args.max_distance,
-        },
-        &claim(&project, args, force)?,
-        printer,
-    )
+    let what = Comparison::C2m {
+        mesh,
+        max_m: args.max_distance,
+    };
+    compare(&project, what, args, force, printer)
 }
 
-fn compare(project: &Project, what: Comparison, folder: &OutputFolder, printer: &Printer) -> Result<Outcome> {
-    compare_clouds(project, what, folder, printer)?;
+fn compare(
+    project: &Project,
+    what: Comparison,
+    args: &CompareArgs,
+    force: bool,
+    printer: &Printer,
+) -> Result<Outcome> {
+    if !force {
+        require_memory_of_clouds(project)?;
+    }
+    let folder = claim(project, args, force)?;
+    compare_clouds(project, what, &folder, printer)?;
     printer.finish();
     printer.log(&format!("results: {}", folder.path().display()));
     Ok(Outcome::Done)

@@ -20,19 +20,20 @@ mod units;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
-use anyhow::Result;
+use anyhow::{Context, Result};
 pub use outcome::Outcome;
 pub use run::measure;
-use stonewise::Until;
+use std::error::Error;
+use std::num::NonZero;
+use stonewise::{Until, require_start};
 
 /// Runs the command that the arguments name.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
-    if let Some(threads) = args.threads {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build_global()?;
-    }
     let force = args.force;
+    if !force {
+        require_start(threads(args.threads))?;
+    }
+    start_threads(args.threads)?;
     match args.command {
         Command::Run(args) => run::run_all(&args, force, printer),
         Command::Plan(args) => units::plan(&args, force, printer),
@@ -56,5 +57,26 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Edits(which) => edits::edits(&which, printer),
         Command::Init(args) => init::init(&args),
         Command::Info(args) => info::info(&args),
+    }
+}
+
+/// How many threads compute: those that the arguments name, else the number that rayon takes, of
+/// `RAYON_NUM_THREADS` or of the processor's cores.
+fn threads(given: Option<usize>) -> usize {
+    let from_environment = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok();
+    given
+        .filter(|&n| n > 0)
+        .or_else(|| from_environment().filter(|&n| n > 0))
+        .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, NonZero::get))
+}
+
+/// Starts the threads that compute. Those that a library starts at its first use would panic where the system
+/// refuses them.
+fn start_threads(given: Option<usize>) -> Result<()> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(given.unwrap_or(0));
+    match pool.build_global() {
+        // The Python module runs many commands, with the threads of the first one.
+        Err(error) if given.is_none() && error.source().is_none() => Ok(()),
+        outcome => outcome.context("the threads cannot be started (fewer: --threads)"),
     }
 }

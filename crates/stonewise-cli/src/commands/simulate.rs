@@ -5,7 +5,8 @@ use crate::commands::{Outcome, run};
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
-use stonewise::simulate::{SurveyParams, write_survey};
+use stonewise::segmentation;
+use stonewise::simulate::{SurveyParams, require_memory, write_survey};
 use stonewise::{OutputFolder, Owner, Project, Until};
 
 /// Makes a small survey, runs it and scores it against its truth.
@@ -13,6 +14,10 @@ pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     let mut params = SurveyParams::demo();
     params.scene.seed = args.seed;
     params.scene.wall.seed = args.seed;
+    if !force {
+        require_memory(&params)?;
+        segmentation::require_memory()?;
+    }
     let survey = args.out.join("survey");
     let path = survey.join("stonewise.toml");
     let owner = Owner::project(&path, &params.name);
@@ -62,6 +67,9 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
     };
     if let Some(seed) = args.seed {
         params = params.seeded(seed);
+    }
+    if !force {
+        require_memory(&params)?;
     }
     let folder = claim(&args.out, &params, force)?;
     let summary = write_survey(folder.path(), &params, printer)?;

@@ -13,7 +13,8 @@ mod sample;
 
 pub use depth::Depth;
 pub use finding::{Finding, Report, Verdict};
-pub(crate) use resources::{is_about_this_machine, require_address_space};
+pub use resources::require_memory_of_clouds;
+pub(crate) use resources::{is_about_this_machine, require_memory_of_run};
 
 use crate::error::Result;
 use crate::project::Project;

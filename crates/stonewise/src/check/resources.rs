@@ -70,19 +70,34 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
     ]
 }
 
-/// Refuses to begin a run that the limit on the address space would end; from the heads of the clouds.
+/// Compares the limit on the address space with what a run of a project takes, from the points that the
+/// clouds claim.
 ///
 /// # Errors
 /// The limit is too low; a cloud cannot be read.
-pub(crate) fn require_address_space(project: &Project) -> Result<()> {
+pub(crate) fn require_memory_of_run(project: &Project) -> Result<()> {
+    require(project, |points| memory(project, points), "a run of this survey")
+}
+
+/// Compares the limit on the address space with what a comparison of the clouds of a project takes, without
+/// the photos.
+///
+/// # Errors
+/// The limit is too low; a cloud cannot be read.
+pub fn require_memory_of_clouds(project: &Project) -> Result<()> {
+    require(project, memory_of_points, "the comparison of these clouds")
+}
+
+/// Heads of clouds are only read where there is a limit.
+fn require(project: &Project, memory: impl Fn(u64) -> u64, what: &str) -> Result<()> {
     if address_space::room().is_none() {
         return Ok(());
     }
-    let mut points = 0;
+    let mut points: u64 = 0;
     for cloud in project.epochs.iter().flat_map(|e| &e.clouds) {
-        points += claimed_records(cloud)?.unwrap_or(0);
+        points = points.saturating_add(claimed_records(cloud)?.unwrap_or(0));
     }
-    address_space::require(memory(project, points), "a run of this survey")
+    address_space::require(memory(points), what)
 }
 
 fn memory(project: &Project, points: u64) -> u64 {
@@ -91,7 +106,11 @@ fn memory(project: &Project, points: u64) -> u64 {
         false => 0,
     };
     // The photos are looked at before most points are in memory.
-    (MEMORY_BASE + MEMORY_PER_POINT.saturating_mul(points)).max(detector)
+    memory_of_points(points).max(detector)
+}
+
+fn memory_of_points(points: u64) -> u64 {
+    MEMORY_BASE.saturating_add(MEMORY_PER_POINT.saturating_mul(points))
 }
 
 /// Whether a finding concerns free disk or memory, and not the survey.

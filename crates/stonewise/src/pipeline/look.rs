@@ -1,6 +1,6 @@
 //! The look at a survey with which every run begins.
 
-use crate::check::{Depth, Report, Verdict, check, is_about_this_machine, require_address_space};
+use crate::check::{Depth, Report, Verdict, check, is_about_this_machine, require_memory_of_run};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -18,7 +18,7 @@ const STEP: &str = "check";
 pub fn look(context: &Context, forced: bool) -> Result<()> {
     let project = context.project;
     if !forced {
-        require_address_space(project)?;
+        require_memory_of_run(project)?;
     }
     let mut inputs = Vec::new();
     for epoch in &project.epochs {

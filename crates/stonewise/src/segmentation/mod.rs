@@ -8,10 +8,11 @@ use crate::error::Result;
 pub use folder::{FolderJob, FolderSummary, MaskEvaluation, PhotoScore, segment_folder};
 pub use overlay::outlined;
 
-/// Memory of the search for stones with one tile at a time is 0.25 GB, with two 0.41 GB
-/// (docs/src/performance.md): the part that does not depend on the threads.
-const DETECTOR_BASE: u64 = 90 << 20;
-const DETECTOR_PER_THREAD: u64 = 165 << 20;
+/// Address space that the search for stones takes beyond the program and its threads, which is more than the
+/// memory it uses: 0.40 GB with one thread, 0.51 with two, 0.97 with four (docs/src/performance.md), rounded
+/// up.
+const DETECTOR_BASE: u64 = 240 << 20;
+const DETECTOR_PER_THREAD: u64 = 190 << 20;
 
 /// Memory that the search for stones takes with the threads of now, bytes.
 pub(crate) fn detector_memory() -> u64 {
