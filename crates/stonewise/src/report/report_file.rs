@@ -256,6 +256,36 @@ mod tests {
         assert!(header.contains("<p class=\"datum\">Registration error between the surveys is unknown"));
     }
 
+    #[test]
+    fn a_run_in_doubt_gives_no_limits_and_no_intervals() {
+        let page = |converged: bool| {
+            let folder = folder(&rows());
+            let mut registration = registration_record();
+            if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+                adjustment.converged = converged;
+            }
+            write_json(&folder.path().join("registration.json"), &registration).unwrap();
+            let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+            // The terms are explained in either case.
+            let body = html.split("<body>").nth(1).unwrap();
+            body.split("<section id=\"method\">").next().unwrap().to_owned()
+        };
+        let [sound, doubtful] = [true, false].map(page);
+        for claim in [
+            "LoD95",
+            "95 % limit",
+            "class=\"faded\"",
+            "elow their limit",
+            "(95 %: ",
+        ] {
+            assert!(sound.contains(claim) && !doubtful.contains(claim), "{claim}");
+        }
+        assert!(
+            doubtful.contains("Detection limit: cannot be stated")
+                && doubtful.contains("motions as computed")
+        );
+    }
+
     /// The report of a wall that settled, of which nothing moved but the stones of these ids.
     fn settled(moving: &[u32], params: &crate::ReportParams) -> String {
         let mut stones = rows();
