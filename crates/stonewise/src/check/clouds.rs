@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn units_are_told_from_walls_of_other_sizes() {
         let metres = wall(1.0, 0.0);
-        for (name, unit) in UNITS {
+        for (name, unit) in UNIT_NAMES.map(|(message, metres)| (message.english, metres)) {
             let other = wall(1.0 / unit, 0.0);
             assert!(
                 unit_ratio(&metres, &other)

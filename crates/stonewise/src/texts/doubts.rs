@@ -1,6 +1,6 @@
 //! Doubts about a run as a whole.
 
-use super::message::messages;
+use super::message::{Message, messages};
 
 messages! {
     DOUBTS {

@@ -1,6 +1,6 @@
 //! What a look at a survey finds against it.
 
-use super::message::messages;
+use super::message::{Message, messages};
 
 messages! {
     FINDINGS {

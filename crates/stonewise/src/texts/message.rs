@@ -22,9 +22,9 @@ impl Message {
 /// fit the same words the more particular one comes first.
 macro_rules! messages {
     ($all:ident { $($name:ident: $english:expr, $german:expr;)* }) => {
-        $(pub(crate) static $name: $crate::texts::Message = $crate::texts::Message { english: $english, german: $german };)*
+        $(pub(crate) static $name: Message = Message { english: $english, german: $german };)*
 
-        pub(super) static $all: &[&$crate::texts::Message] = &[$(&$name),*];
+        pub(super) static $all: &[&Message] = &[$(&$name),*];
     };
 }
 pub(super) use messages;

@@ -1,6 +1,6 @@
 //! What a run notes beside its results, and inputs that it left out.
 
-use super::message::messages;
+use super::message::{Message, messages};
 
 messages! {
     NOTICES {

@@ -71,11 +71,12 @@ fn values_of<'a>(text: &'static str, said: &'a str) -> Option<Vec<(&'static str,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn what_a_run_said_is_said_in_german_with_its_values() {
         for message in all() {
-            let names: Vec<&str> = message
+            let names: BTreeSet<&str> = message
                 .english
                 .split('{')
                 .skip(1)
