@@ -23,16 +23,16 @@ fn all() -> impl Iterator<Item = &'static Message> {
 pub(crate) fn message_in(language: Language, said: &str) -> Option<String> {
     match language {
         Language::English => Some(said.to_owned()),
-        Language::German => all().find_map(|message| in_german(message, said)).or_else(|| {
-            // A finding with what was looked at before it.
-            let (topic, finding) = said.split_once(": ")?;
-            Some(format!(
-                "{}: {}",
-                message_in(language, topic)?,
-                message_in(language, finding)?
-            ))
-        }),
+        Language::German => finding(said).or_else(|| all().find_map(|message| in_german(message, said))),
     }
+}
+
+/// A finding with what was looked at before it, in German.
+fn finding(said: &str) -> Option<String> {
+    let (topic, finding) = said.split_once(": ")?;
+    let topic = FINDINGS.iter().find(|message| message.english == topic)?;
+    let finding = message_in(Language::German, finding)?;
+    Some(format!("{}: {finding}", topic.german))
 }
 
 /// The sentence in German, if it is this message.
