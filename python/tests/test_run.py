@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -136,7 +137,9 @@ def test_control_c(survey, results, tmp_path, program):
         "module": [sys.executable, "-c", script],
         "command": [sys.executable, "-m", "stonewise", "run", project, "--out", out],
     }[program]
-    stopped = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    # Programs that a shell starts in the background ignore Ctrl-C, and so would those that they start.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    stopped = subprocess.Popen(args, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=heed)
     lines = []
     for line in stopped.stdout:
         lines.append(line)

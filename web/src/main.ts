@@ -25,7 +25,7 @@ async function start(): Promise<void> {
   // The stone of the largest motion is shown first.
   const largest = byMotion(report.stones)[0] ?? -1;
   const store = new Store({
-    quantity: "out", fade: true, arrows: false, behind: "none", view: "map", tool: "move", hover: -1,
+    quantity: "out", fade: report.document.sound, arrows: false, behind: "none", view: "map", tool: "move", hover: -1,
     chosen: largest >= 0 && isMeasured(report.stones, largest) ? largest : -1, follow: 0, profile: null,
   });
   const shown = quantities(report);

@@ -34,7 +34,7 @@ export const OUTCOME_COLOURS = [
 
 /** All quantities of a report, in the order of the menu. */
 export function quantities(report: Report): readonly Quantity[] {
-  const { stones, document: { limits } } = report;
+  const { stones, document: { limits, sound } } = report;
   const measured = (i: number, value: number) => (isMeasured(stones, i) ? value : NaN);
   const component = (key: "along" | "up" | "out", axis: 0 | 1 | 2, label: string, note: string): Quantity => ({
     key, label, note, unit: "mm", scale: "diverging", limit: limits.component, fades: true, decimals: 1,
@@ -62,7 +62,7 @@ export function quantities(report: Report): readonly Quantity[] {
     },
     {
       key: "opening", label: t("quantityOpening"), unit: "mm", scale: "diverging", limit: limits.opening, fades: true, decimals: 2,
-      value: () => NaN, note: t("quantityOpeningNote"),
+      value: () => NaN, note: t("quantityOpeningNote") + (sound ? t("quantityOpeningPale") : ""),
     },
     {
       key: "m3c2", label: t("quantityM3c2"), unit: "mm", scale: "diverging", limit: limits.component, fades: true, decimals: 1,
@@ -83,7 +83,7 @@ export function quantities(report: Report): readonly Quantity[] {
     },
   ];
   const hasChange = report.change.a.length > 0;
-  return all.filter((q) => hasChange || (q.key !== "m3c2" && q.key !== "difference"));
+  return all.filter((q) => (hasChange || (q.key !== "m3c2" && q.key !== "difference")) && (sound || q.key !== "limit"));
 }
 
 /** Colours of values of a quantity. */

@@ -5,8 +5,11 @@ export function reachable(elements: Iterable<HTMLElement>): void {
   const observer = new ResizeObserver((entries) => {
     for (const { target } of entries) adapt(target as HTMLElement);
   });
+  const narrow = matchMedia("(max-width: 700px)").matches;
   for (const element of elements) {
     if (element.closest("#explore")) continue;
+    // Maps of a wide wall scroll on every phone; they are measured no earlier than they are drawn.
+    if (narrow && element.closest(".maps.wide")) reach(element);
     observer.observe(element);
     if (element.firstElementChild) observer.observe(element.firstElementChild);
   }
@@ -19,6 +22,10 @@ function adapt(target: HTMLElement): void {
     for (const name of ["tabindex", "role", "aria-label"]) element.removeAttribute(name);
     return;
   }
+  reach(element);
+}
+
+function reach(element: HTMLElement): void {
   element.tabIndex = 0;
   element.setAttribute("role", "group");
   element.setAttribute("aria-label", headingOf(element));

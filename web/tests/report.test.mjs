@@ -9,7 +9,7 @@ import { fileURLToPath } from "node:url";
 import { launch, open } from "./browser.mjs";
 
 const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
-/** Folder of made reports (`200`, `10000` and `german`), to test without cargo. */
+/** Folder of made reports (`200`, `10000`, `german` and `doubt`), to test without cargo. */
 const given = process.env["REPORTS"];
 let browser, folder = given;
 
@@ -23,6 +23,7 @@ before(async () => {
     execFileSync(join(target, "debug/examples/sample_report"), [String(stones), join(folder, String(stones))]);
   }
   execFileSync(join(target, "debug/examples/sample_report"), ["200", join(folder, "german"), "moved", "de"]);
+  execFileSync(join(target, "debug/examples/sample_report"), ["200", join(folder, "doubt"), "unconverged"]);
 });
 
 after(async () => {
@@ -158,6 +159,20 @@ test("a German report speaks German", async () => {
   const english = seen.filter((text) => /\b(the|wall|stone|stones|show|motion|along|moved|above|below|measured|all|page|outline|points|limit)\b/i.test(text));
   assert.deepEqual(english, []);
   assert.match(await page.textContent(".stone-panel .numbers"), /\d,\d/);
+  assert.deepEqual(trouble, []);
+  await close();
+});
+
+test("of a run in doubt neither limits nor intervals are given", async () => {
+  const { page, trouble, close } = await open(browser, report("doubt"));
+  assert.equal(await page.locator("#fade").count(), 0);
+  assert.equal(await page.locator("#quantity option[value=limit]").count(), 0);
+  await page.click(".stone-panel button:text-is('level')");
+  await page.waitForSelector(".profile .line");
+  await page.click(".stone-list summary");
+  await page.waitForSelector(".stone-list tbody tr");
+  const text = await page.textContent("#explore");
+  for (const claim of ["\u00b1", "LoD", "95 %", "limit"]) assert.ok(!text.includes(claim), claim);
   assert.deepEqual(trouble, []);
   await close();
 });

@@ -169,10 +169,10 @@ impl Shown {
                 self.wait = (2.0 * self.wait).min(LONGEST_WAIT_S);
                 self.next = now + self.wait;
                 let count = match self.part.total {
-                    0 => String::new(),
-                    total => format!("{} of {total}", self.part.done),
+                    0 => self.part.what.clone(),
+                    total => format!("{}: {} of {total}", self.part.what, self.part.done),
                 };
-                let words = [self.part.what.as_str(), self.part.detail.as_str(), count.as_str()];
+                let words = [count.as_str(), self.part.detail.as_str()];
                 self.say(&joined(Some(place.trim_start()), &words), now);
             }
             (None, Some(_)) => {}

@@ -125,7 +125,9 @@ impl Screen {
         let below: Vec<String> = [words, then].into_iter().filter(|l| !l.is_empty()).collect();
         let below = below.join("\n");
         let bar = if self.width() < 120 { 14 } else { 30 };
-        let counted = format!("{{spinner}} {{wide_msg}} {{bar:{bar}}} {{count:>8}} {{to_go:14}}");
+        // Beside the name and the bar: sign, count, time to go, four spaces, and one column that stays free.
+        let name = NAMES.min(self.width().saturating_sub(bar + 1 + 8 + 14 + 4 + 1));
+        let counted = format!("{{spinner}} {{msg:{name}!}} {{bar:{bar}}} {{count:>8}} {{to_go:14}}");
         let first = if is_counted {
             &counted
         } else {

@@ -326,7 +326,9 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
             DatumState::Stable,
             &Point3::origin(),
             &Matrix6::from_diagonal_element(1e-10),
-            "the stable areas show a registration error of 0.2 mm".to_owned(),
+            "the stable areas show a registration error of 0.20 mm at the middle of the wall: it is taken off the \
+             motions, and what stays uncertain of it is in limits and intervals"
+                .to_owned(),
         ),
     };
     let run = RunRecord {

@@ -2,6 +2,7 @@
 
 mod braces;
 mod doubts;
+pub(crate) mod findings;
 mod message;
 pub(crate) mod notices;
 mod report;
@@ -127,9 +128,10 @@ pub(crate) struct PageTexts {
     pub tile_no_motion: &'static str,
     pub tile_cannot_tell: &'static str,
     pub limit_unknown: &'static str,
-    pub above_as_computed: &'static str,
     pub registration_included: &'static str,
+    pub registration_in_doubt: &'static str,
     pub registration_unknown: &'static str,
+    pub registration_unknown_in_doubt: &'static str,
     pub chance: &'static str,
     pub doubts: &'static str,
     pub in_numbers: &'static str,
@@ -137,7 +139,9 @@ pub(crate) struct PageTexts {
     pub summary: &'static str,
     pub finished: &'static str,
     pub map_title: &'static str,
+    pub map_colours: &'static str,
     pub map_note: &'static str,
+    pub map_note_in_doubt: &'static str,
     pub map_as_measured: &'static str,
     pub no_registration: &'static str,
 }
@@ -266,11 +270,13 @@ static ENGLISH: Texts = Texts {
         tile_no_motion: "no motion is shown",
         tile_cannot_tell: "which stones moved or are loose cannot be told",
         limit_unknown: "Detection limit: cannot be stated for results in doubt",
-        above_as_computed: "As computed, {above} stones are above their own 95 % limit. Which stones moved or are loose cannot be told.",
         registration_included: "Registration error between the surveys is included in the limits: {note}.",
+        registration_in_doubt: "Registration error between the surveys: {note}.",
         registration_unknown: "Registration error between the surveys is unknown and is <b>not</b> included in the limits below: limits, \
             intervals and significance hold for motions against the common rigid motion of the measured stones. A motion of the wall \
             as a whole cannot be told from an error of the registration; stable areas outside the wall would show it.",
+        registration_unknown_in_doubt: "Registration error between the surveys is unknown, too: a motion of the wall as a whole cannot be told \
+            from it; stable areas outside the wall would show it.",
         chance: "{above} stones are above their own 95 % limit; on a still wall chance alone gives about {chance}. Moved is said only of stones \
             that remain when the false discovery rate over all stones is held at 5 %: {n}.",
         doubts: "These results must not be relied on as they stand.",
@@ -279,8 +285,10 @@ static ENGLISH: Texts = Texts {
         summary: "Summary",
         finished: "finished",
         map_title: "Length of the motion, with in-plane arrows",
+        map_colours: "Colours: 0 to {end} mm. ",
         map_note: "Arrows: in-plane part of motions above the stone's own limit, thinned where they would touch. Pale: below its limit; hatched: \
             not measured.",
+        map_note_in_doubt: "Arrows: in-plane part of the motions as computed, thinned where they would touch. Hatched: not measured.",
         map_as_measured: " Motions are drawn as measured: with the common motion of the wall, which may be an error of the registration.",
         no_registration: "Nothing is recorded about the registration of the epochs.",
     },
@@ -294,7 +302,7 @@ static ENGLISH: Texts = Texts {
     statuses: [
         "measured",
         "the later epoch has no points, or no photo of them, at this place",
-        "the later epoch shows the place but no stone there",
+        "the later epoch shows the place, but no stone was found there",
         "several stones of the later epoch fit equally well",
         "the best candidate's face is much larger or smaller: masks merged or split",
         "too few points for an estimate",
@@ -428,11 +436,13 @@ static GERMAN: Texts = Texts {
         tile_no_motion: "keine Bewegung ist nachweisbar",
         tile_cannot_tell: "welche Steine sich bewegt haben oder lose sind, ist nicht zu sagen",
         limit_unknown: "Nachweisgrenze: bei zweifelhaften Ergebnissen nicht anzugeben",
-        above_as_computed: "Wie berechnet liegen {above} Steine \u{fc}ber ihrer eigenen 95-%-Grenze. Welche Steine sich bewegt haben oder lose sind, ist nicht zu sagen.",
         registration_included: "Der Registrierungsfehler zwischen den Aufnahmen ist in den Grenzen enthalten: {note}.",
+        registration_in_doubt: "Registrierungsfehler zwischen den Aufnahmen: {note}.",
         registration_unknown: "Der Registrierungsfehler zwischen den Aufnahmen ist unbekannt und in den Grenzen unten <b>nicht</b> enthalten: \
             Grenzen, Intervalle und Signifikanz gelten f\u{fc}r Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine. Eine Bewegung \
             der Mauer als Ganzes ist von einem Registrierungsfehler nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
+        registration_unknown_in_doubt: "Auch der Registrierungsfehler zwischen den Aufnahmen ist unbekannt: eine Bewegung der Mauer als Ganzes ist \
+            von ihm nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
         chance: "{above} Steine liegen \u{fc}ber ihrer eigenen 95-%-Grenze; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Als bewegt \
             gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
@@ -441,6 +451,9 @@ static GERMAN: Texts = Texts {
         summary: "Zusammenfassung",
         finished: "berechnet",
         map_title: "Betrag der Bewegung, mit Pfeilen in der Ebene der Mauer",
+        map_colours: "Farben: 0 bis {end} mm. ",
+        map_note_in_doubt: "Pfeile: Anteil der berechneten Bewegungen in der Ebene, ausged\u{fc}nnt, wo sie sich ber\u{fc}hren w\u{fc}rden. \
+            Schraffiert: nicht gemessen.",
         map_note: "Pfeile: Anteil in der Ebene von Bewegungen \u{fc}ber der eigenen Grenze des Steins, ausged\u{fc}nnt, wo sie sich ber\u{fc}hren \
             w\u{fc}rden. Blass: unter der Grenze; schraffiert: nicht gemessen.",
         map_as_measured: " Die Bewegungen sind gezeichnet wie gemessen: mit der gemeinsamen Bewegung der Mauer, die ein Registrierungsfehler sein kann.",
@@ -456,7 +469,7 @@ static GERMAN: Texts = Texts {
     statuses: [
         "gemessen",
         "die sp\u{e4}tere Epoche hat an dieser Stelle keine Punkte oder kein Foto von ihnen",
-        "die sp\u{e4}tere Epoche zeigt die Stelle, aber keinen Stein",
+        "die sp\u{e4}tere Epoche zeigt die Stelle, aber dort wurde kein Stein gefunden",
         "mehrere Steine der sp\u{e4}teren Epoche passen gleich gut",
         "die Fl\u{e4}che des besten Kandidaten ist viel gr\u{f6}\u{df}er oder kleiner: Masken verschmolzen oder geteilt",
         "zu wenige Punkte f\u{fc}r eine Sch\u{e4}tzung",

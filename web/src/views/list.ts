@@ -16,6 +16,8 @@ interface Column {
 }
 
 const FILTERS = ["filterAll", "filterMoved", "filterAbove", "loose", "filterBelow", "unmeasured"] as const;
+/** Those that a run in doubt can answer. */
+const FILTERS_IN_DOUBT = ["filterAll", "unmeasured"] as const;
 
 /** The folded list under the map. */
 export function stoneList(report: Report, store: Store): HTMLElement {
@@ -24,13 +26,14 @@ export function stoneList(report: Report, store: Store): HTMLElement {
   const move = (title: string, axis: 0 | 1 | 2): Column => ({
     title, value: (i) => stones.move[axis][i]!, text: (i) => signed(stones.move[axis][i]! * 1e3, decimals),
   });
+  const limit: Column = { title: t("columnLimit"), value: (i) => stones.limit[i]!, text: (i) => mm(stones.limit[i]!) };
   const columns: readonly Column[] = [
     { title: t("columnStone"), value: (i) => stones.id[i]!, text: (i) => String(stones.id[i]) },
     { title: t("columnAlong"), value: (i) => stones.a[i]!, text: (i) => fixed(stones.a[i]!, 2) },
     { title: t("columnUp"), value: (i) => stones.u[i]!, text: (i) => fixed(stones.u[i]!, 2) },
     move(t("columnMoveAlong"), 0), move(t("columnMoveUp"), 1), move(t("columnMoveOut"), 2),
     { title: t("columnLength"), value: (i) => norm(stones.move, i), text: (i) => mm(norm(stones.move, i)) },
-    { title: t("columnLimit"), value: (i) => stones.limit[i]!, text: (i) => mm(stones.limit[i]!) },
+    ...(sound ? [limit] : []),
     { title: t("columnRelative"), value: (i) => norm(stones.relative, i), text: (i) => mm(norm(stones.relative, i)) },
     { title: t("columnRotation"), value: (i) => norm(stones.rotation, i), text: (i) => fixed(norm(stones.rotation, i) * 1e3, 2) },
     { title: t("columnConfidence"), value: (i) => stones.confidence[i]!, text: (i) => percent(stones.confidence[i]!) },
@@ -45,7 +48,7 @@ export function stoneList(report: Report, store: Store): HTMLElement {
     unmeasured: (i) => !isMeasured(stones, i),
   };
   let sortBy = columns[6]!, descending = true, page = 0;
-  const filter = el("select", {}, ...FILTERS.filter((f) => sound || (f !== "filterMoved" && f !== "loose")).map((f) => el("option", { value: f }, t(f))));
+  const filter = el("select", {}, ...(sound ? FILTERS : FILTERS_IN_DOUBT).map((f) => el("option", { value: f }, t(f))));
   const body = el("div", { class: "scroll", tabindex: 0, role: "group", "aria-label": t("tableOfAll") }), pager = el("p", { class: "choices" });
   const rows = () => {
     const kept = Array.from({ length: stones.count }, (_, i) => i).filter(passes[filter.value as (typeof FILTERS)[number]]);

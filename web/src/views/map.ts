@@ -2,13 +2,14 @@
 
 import { type Report, ringOf } from "../data.ts";
 import { css, el } from "../dom.ts";
-import { fixed, signedMm } from "../format.ts";
+import { fixed } from "../format.ts";
 import { Squares, contains } from "../geometry.ts";
 import { Palette, type Quantity, isFaded, opens, stoneColour } from "../quantities.ts";
 import type { Line, Store } from "../store.ts";
 import { t } from "../texts.ts";
 import { Backdrop } from "./backdrop.ts";
 import type { Photos } from "./photos.ts";
+import { stoneFacts } from "./stone.ts";
 
 /** Length of the longest arrow, least distance between arrows, pixels. */
 const ARROW_PX = 46;
@@ -461,12 +462,7 @@ export class WallMap {
   #showTip(stone: number, px: number, py: number): void {
     this.#tip.hidden = stone < 0;
     if (stone < 0) return;
-    const { stones, document: { statuses } } = this.#report;
-    const [along, up, out] = stones.move.map((d) => signedMm(d[stone]!));
-    const facts = Number.isNaN(stones.move[2][stone]!)
-      ? statuses[stones.state[stone]!]!.meaning
-      : t("tipFacts", { along: along!, up: up!, out: out!, limit: signedMm(stones.limit[stone]!).replace("+", "") });
-    this.#tip.textContent = t("stoneFacts", { id: stones.id[stone]!, facts });
+    this.#tip.textContent = stoneFacts(this.#report, stone);
     this.#tip.style.left = `${Math.max(0, Math.min(px + 14, this.#width - this.#tip.offsetWidth - 4))}px`;
     this.#tip.style.top = `${Math.max(0, py - 34)}px`;
   }

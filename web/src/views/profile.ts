@@ -83,6 +83,7 @@ function charts(report: Report, store: Store, line: Line, width: number): Node[]
   const head = el("p", { class: "profile-head" },
     el("b", {}, t("profileHead", { length: fixed(length, 2), n: new Set(measured.map((s) => s.stone)).size })),
     t("profileLines"),
+    report.document.sound ? t("profileBands") : "",
     report.change.a.length ? t("profileDots") : "",
     button(t("closeProfile"), "", () => store.set({ profile: null })));
   return [head, ...([2, 0, 1] as const).map((axis) => chart(report, store, line, width, length, steps, axis))];
@@ -92,8 +93,10 @@ function chart(report: Report, store: Store, line: Line, width: number, length: 
   const { stones } = report;
   const height = axis === 2 ? 190 : 130, left = 58, right = 12, top = 8, bottom = axis === 1 ? 30 : 18;
   const change = axis === 2 ? changeAlong(report, line) : [];
+  // Half the height of a stone's band, millimetres: a run in doubt has none.
+  const half = (stone: number) => (report.document.sound ? QUANTILE * stones.sigma[axis][stone]! * 1e3 : 0);
   const bounds = steps.filter((s) => isMeasured(stones, s.stone)).flatMap(({ stone }) => {
-    const [v, s] = [stones.move[axis][stone]! * 1e3, QUANTILE * stones.sigma[axis][stone]! * 1e3];
+    const [v, s] = [stones.move[axis][stone]! * 1e3, half(stone)];
     return [v - s, v + s];
   });
   const place = (m: number): [number, number] => {
@@ -124,7 +127,7 @@ function chart(report: Report, store: Store, line: Line, width: number, length: 
     if (v >= low && v <= high) add(svg("circle", { class: "change-dot", cx: x(place), cy: y(v), r: 1.6 }));
   }
   for (const { stone, from, to } of steps) {
-    const [v, s] = [stones.move[axis][stone]! * 1e3, QUANTILE * stones.sigma[axis][stone]! * 1e3];
+    const [v, s] = [stones.move[axis][stone]! * 1e3, half(stone)];
     const [x0, x1] = [x(from), x(to)];
     const [v0, v1] = [from, to].map((m) => motionAt(report, stone, axis, ...place(m)) * 1e3) as [number, number];
     const mark = Number.isNaN(v)
@@ -133,7 +136,8 @@ function chart(report: Report, store: Store, line: Line, width: number, length: 
         svg("path", { class: "band", d: `M${x0} ${y(v0 + s)}L${x1} ${y(v1 + s)}V${y(v1 - s)}L${x0} ${y(v0 - s)}z` }),
         svg("path", { class: "line", d: `M${x0} ${y(v0)}L${x1} ${y(v1)}` }),
         svg("rect", { class: "catch", x: x0, y: top, width: x1 - x0, height: height - top - bottom }));
-    mark.append(svg("title", {}, t("stoneFacts", { id: stones.id[stone]!, facts: Number.isNaN(v) ? t("unmeasured") : `${signedMm(v / 1e3)} \u00b1 ${fixed(s, 2)} mm` })));
+    const interval = report.document.sound ? ` \u00b1 ${fixed(s, 2)}` : "";
+    mark.append(svg("title", {}, t("stoneFacts", { id: stones.id[stone]!, facts: Number.isNaN(v) ? t("unmeasured") : `${signedMm(v / 1e3)}${interval} mm` })));
     mark.addEventListener("pointerenter", () => store.set({ hover: stone }));
     mark.addEventListener("click", () => store.set({ chosen: stone }));
     add(mark);

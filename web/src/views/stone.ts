@@ -60,19 +60,13 @@ export class StonePanel {
     const parts: (Node | null)[] = [this.#head(stone)];
     const measured = isMeasured(stones, stone);
     parts.push(measured ? this.#numbers(stone) : this.#failure(stone), this.#photos.of(stone), this.#sections.of(stone));
-    if (measured) parts.push(this.#ellipsoid(stone));
+    if (measured && this.#report.document.sound) parts.push(this.#ellipsoid(stone));
     parts.push(this.#neighbours(stone), this.#quality(stone));
     this.element.replaceChildren(...parts.filter((part) => part !== null));
   }
 
   #sentence(stone: number): string {
-    if (stone < 0) return "";
-    const { stones, document: { statuses } } = this.#report;
-    const [along, up, out] = stones.move.map((d) => signedMm(d[stone]!));
-    const facts = isMeasured(stones, stone)
-      ? t("tipFacts", { along: along!, up: up!, out: out!, limit: mm(stones.limit[stone]!) })
-      : statuses[stones.state[stone]!]!.meaning;
-    return t("stoneFacts", { id: stones.id[stone]!, facts });
+    return stone < 0 ? "" : stoneFacts(this.#report, stone);
   }
 
   #nothing(): Node {
@@ -115,21 +109,23 @@ export class StonePanel {
   }
 
   #numbers(stone: number): Node {
-    const { stones, document: { decimals, registrationKnown } } = this.#report;
+    const { stones, document: { decimals, registrationKnown, sound } } = this.#report;
     const mm = (metres: number) => fixed(metres * 1e3, decimals), signedMm = (metres: number) => signed(metres * 1e3, decimals);
     const cell = (text: string) => el("td", { class: "n" }, text);
+    // Of a run in doubt neither intervals nor limits are given.
+    const sure = (text: string) => (sound ? cell(text) : null);
     const row = (k: 0 | 1 | 2) =>
       el("tr", {}, el("th", { scope: "row" }, AXES[k]),
-        cell(signedMm(stones.move[k][stone]!)), cell(`\u00b1 ${mm(QUANTILE * stones.sigma[k][stone]!)}`),
+        cell(signedMm(stones.move[k][stone]!)), sure(`\u00b1 ${mm(QUANTILE * stones.sigma[k][stone]!)}`),
         cell(signedMm(stones.relative[k][stone]!)), cell(signedMrad(stones.rotation[k][stone]!)));
     const table = el("table", { class: "numbers" },
-      el("thead", {}, el("tr", {}, ...[t("direction"), t("columnMotion"), t("column95"), t("columnRelative"), t("columnRotation")].map((text, i) =>
+      el("thead", {}, el("tr", {}, ...[t("direction"), t("columnMotion"), ...(sound ? [t("column95")] : []), t("columnRelative"), t("columnRotation")].map((text, i) =>
         el("th", { scope: "col", ...(i ? { class: "n" } : {}) }, text)))),
       el("tbody", {}, row(0), row(1), row(2),
         el("tr", { class: "sum" }, el("th", { scope: "row" }, t("length")), cell(mm(norm(stones.move, stone))),
-          cell(`LoD ${mm(stones.limit[stone]!)}`), cell(mm(norm(stones.relative, stone))),
+          sure(`LoD ${mm(stones.limit[stone]!)}`), cell(mm(norm(stones.relative, stone))),
           cell(fixed(norm(stones.rotation, stone) * 1e3, 2)))));
-    return registrationKnown ? table : el("div", {}, table,
+    return registrationKnown || !sound ? table : el("div", {}, table,
       el("p", { class: "note" }, t("unknownDatum")));
   }
 
@@ -188,6 +184,17 @@ export class StonePanel {
     return el("div", { class: "card" }, el("h4", {}, t("quality")),
       el("dl", {}, ...facts.flatMap(([term, text]) => [el("dt", {}, term), el("dd", {}, text)])));
   }
+}
+
+/** What is known of a stone in one sentence. */
+export function stoneFacts(report: Report, stone: number): string {
+  const { stones, document: { statuses, sound } } = report;
+  const [along, up, out] = stones.move.map((d) => signedMm(d[stone]!));
+  const limit = sound ? t("tipLimit", { limit: mm(stones.limit[stone]!) }) : "";
+  const facts = isMeasured(stones, stone)
+    ? t("tipFacts", { along: along!, up: up!, out: out! }) + limit
+    : statuses[stones.state[stone]!]!.meaning;
+  return t("stoneFacts", { id: stones.id[stone]!, facts });
 }
 
 /** Indices of all stones: those that moved by size of motion, then those above their limit by size, then the others as they come. */

@@ -43,7 +43,7 @@ export function toolbar(report: Report, store: Store, quantities: readonly Quant
     button("\u2212", t("zoomOut"), () => current().zoom(1 / 1.6)),
     button(t("wholeWall"), "", () => current().whole()));
   return el("div", { class: "controls" }, el("span", { class: "group", role: "group", "aria-label": t("viewGroup") }, ...tabs),
-    el("label", {}, t("show"), select), check(t("fade"), "fade"), check(t("arrows"), "arrows"),
+    el("label", {}, t("show"), select), report.document.sound ? check(t("fade"), "fade") : null, check(t("arrows"), "arrows"),
     behind(report, store), search(report, store), draw, zoom);
 }
 

@@ -31,7 +31,7 @@ pub fn score(results: &Path, truth: &Path, printer: &Printer) -> Result<()> {
                 .map_or("-".to_owned(), |s| format!("{:.2} mm", 1e3 * s.rmse_m))
         };
         printer.log(&format!(
-            "against the truth: {} of {} stones measured, RMSE in-plane (2D) {}, out-of-plane {}",
+            "against the truth: {} of {} countable stones measured, RMSE in-plane (2D) {}, out-of-plane {}",
             score.found,
             score.countable,
             rmse(&score.motions.errors.in_plane_2d),

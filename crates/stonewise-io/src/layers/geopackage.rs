@@ -5,6 +5,8 @@ use super::schema::{APPLICATION_ID, TABLES, USER_VERSION, rtree, rtree_triggers}
 use super::{Layer, LayerStyle};
 use crate::atomic::write_atomically;
 use crate::table::Column;
+#[cfg(doc)]
+use crate::table::Table;
 use rusqlite::types::Value;
 use rusqlite::{Connection, params, params_from_iter};
 use std::path::{Path, PathBuf};
@@ -52,7 +54,8 @@ pub enum LayerError {
 
 /// Writes layers into a new GeoPackage; replaces the file at `path` when all is written.
 ///
-/// Columns are `fid`, `geom` and those of each layer's table. A feature with too few or infinite vertices has
+/// Columns are `fid`, `geom` and those of each layer's table; what [`Table::describe`] said of them is in
+/// `gpkg_data_columns`. A feature with too few or infinite vertices has
 /// no geometry. `last_change`: time stamp of the content, as `2026-04-30T12:00:00.000Z`; given, not taken
 /// from the clock, so that the same results give the same bytes.
 ///
@@ -148,6 +151,19 @@ fn add_layer(file: &Connection, layer: &Layer, last_change: &str) -> rusqlite::R
         "INSERT INTO gpkg_geometry_columns VALUES (?1, 'geom', ?2, ?3, ?4, 0)",
         params![name, kind, srs, i32::from(layer.geometry.has_z())],
     )?;
+    for column in layer.attributes.names() {
+        if let Some((unit, meaning)) = layer.attributes.description(column) {
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" ({unit})")
+            };
+            file.execute(
+                "INSERT INTO gpkg_data_columns (table_name, column_name, description) VALUES (?1, ?2, ?3)",
+                params![name, column, format!("{meaning}{unit}")],
+            )?;
+        }
+    }
     file.execute_batch(&rtree(name))?;
     let extent = add_features(file, layer, srs)?;
     if let Some([min_x, max_x, min_y, max_y]) = extent {
@@ -275,6 +291,7 @@ mod tests {
             .push("status", ["ok", "<script>'\"", ""].map(str::to_owned).to_vec())
             .unwrap();
         attributes.push("loose", vec![Some(1u8), Some(0), None]).unwrap();
+        attributes.describe("d_out", "m", "displacement out of the wall");
         let p = Point3::new;
         let triangle = vec![p(1.0, 2.0, 3.0), p(4.0, 2.0, 3.0), p(4.0, 6.0, 5.0)];
         let style = LayerStyle {
@@ -328,6 +345,10 @@ mod tests {
             Value::Integer(1)
         );
         assert_eq!(one("SELECT count(*) FROM rtree_stones_geom"), Value::Integer(2));
+        assert_eq!(
+            one("SELECT group_concat(column_name || ': ' || description) FROM gpkg_data_columns"),
+            Value::Text("d_out: displacement out of the wall (m)".into())
+        );
         assert_eq!(
             one("SELECT styleQML FROM layer_styles WHERE useAsDefault"),
             Value::Text("<qgis/>".into())

@@ -104,6 +104,19 @@ impl Table {
         self.metadata.push((key.to_owned(), value.into()));
     }
 
+    /// Says what a column holds: metadata entries `NAME.unit` (empty for counts, names and flags) and
+    /// `NAME.meaning`.
+    pub fn describe(&mut self, name: &str, unit: &str, meaning: &str) {
+        self.set_metadata(&format!("{name}.unit"), unit);
+        self.set_metadata(&format!("{name}.meaning"), meaning);
+    }
+
+    /// What [`describe`](Self::describe) said of a column: unit and meaning.
+    pub fn description(&self, name: &str) -> Option<(&str, &str)> {
+        let entry = |what: &str| self.metadata(&format!("{name}.{what}"));
+        entry("unit").zip(entry("meaning"))
+    }
+
     /// A metadata entry.
     pub fn metadata(&self, key: &str) -> Option<&str> {
         let found = self.metadata.iter().find(|(k, _)| k == key);

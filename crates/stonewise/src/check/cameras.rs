@@ -6,6 +6,7 @@ use super::finding::{Finding, Picture, Verdict};
 use super::sample::Sample;
 use crate::error::Result;
 use crate::project::Epoch;
+use crate::texts::findings::{CAMERAS, NOT_SEEN};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::Point3;
@@ -38,18 +39,16 @@ struct Compared {
 
 /// Checks that photos see the cloud; at full depth, compares some photos of an epoch with its cloud, too.
 pub(super) fn look(epoch: &Epoch, survey: &Sample, depth: Depth) -> Result<(Vec<Finding>, Option<Picture>)> {
-    let topic = "cameras against cloud";
-    let finding = |verdict, text: String| vec![Finding::new(&epoch.name, topic, verdict, text)];
+    let finding = |verdict, text: String| vec![Finding::new(&epoch.name, CAMERAS.english, verdict, text)];
     let candidates = candidates(epoch, survey)?;
     if candidates.is_empty() {
-        let text = "no photo sees the cloud: are cameras and clouds in one frame, and in metres?";
         // Points that were not read may be seen.
         let verdict = match (survey.is_whole(), depth) {
             (true, _) => Verdict::Wrong,
             (false, Depth::Full) => Verdict::Doubt,
             (false, Depth::Quick) => Verdict::Note,
         };
-        return Ok((finding(verdict, text.to_owned()), None));
+        return Ok((finding(verdict, NOT_SEEN.say(&[])), None));
     }
     if depth == Depth::Quick {
         let text = format!("{} photos see the cloud", candidates.len());

@@ -3,16 +3,22 @@
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::project::Project;
+use crate::texts::Message;
+use crate::texts::findings::{
+    CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
+    NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS,
+    THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
+};
 use nalgebra::Vector3;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::crs::Crs;
 
 /// Metres in a unit that somebody may have exported, by its name.
-const UNITS: [(&str, f64); 4] = [
-    ("feet", 0.3048),
-    ("inches", 0.0254),
-    ("centimetres", 0.01),
-    ("millimetres", 0.001),
+static UNIT_NAMES: [(&Message, f64); 4] = [
+    (&FEET, 0.3048),
+    (&INCHES, 0.0254),
+    (&CENTIMETRES, 0.01),
+    (&MILLIMETRES, 0.001),
 ];
 /// Ratios of the longer extents that differ from that of two units by less than this share are taken for it.
 const UNIT_TOLERANCE: f64 = 0.04;
@@ -41,7 +47,7 @@ pub(super) fn look(project: &Project, surveys: &[Sample]) -> Vec<Finding> {
         let Some(bounds) = bounds else { continue };
         let names = [project.epochs[0].name.as_str(), epoch.name.as_str()];
         match unit_ratio(&first, bounds) {
-            Some(why) => found.push(Finding::new(names[1], "units", Verdict::Wrong, why)),
+            Some(why) => found.push(Finding::new(names[1], UNITS.english, Verdict::Wrong, why)),
             None => found.push(overlap(names, &first, bounds)),
         }
     }
@@ -55,41 +61,33 @@ fn size(bounds: &Bounds) -> Vector3<f64> {
 
 fn extent(name: &str, survey: &Sample) -> Finding {
     let Some(bounds) = &survey.bounds else {
-        return Finding::new(name, "extent", Verdict::Wrong, "the clouds hold no points");
+        return Finding::new(name, EXTENT.english, Verdict::Wrong, NO_POINTS.say(&[]));
     };
     let size = size(bounds);
-    let text = format!(
-        "{:.1} x {:.1} x {:.1} m, {} points",
-        size.x, size.y, size.z, survey.records
-    );
-    let (longest, verdict, advice) = (size.max(), Verdict::Wrong, ": are the coordinates in metres?");
-    if longest > LONGEST_M {
-        return Finding::new(
-            name,
-            "extent",
-            verdict,
-            format!("{text}{advice} Cut the cloud to the structure"),
-        );
-    }
-    if longest < SMALLEST_M {
-        return Finding::new(name, "extent", Verdict::Doubt, format!("{text}{advice}"));
-    }
-    Finding::new(name, "extent", Verdict::Fine, text)
+    let [x, y, z] = [size.x, size.y, size.z].map(|m| format!("{m:.1}"));
+    let points = survey.records.to_string();
+    let values = [("x", &*x), ("y", &*y), ("z", &*z), ("points", &*points)];
+    let longest = size.max();
+    let (verdict, text) = if longest > LONGEST_M {
+        (Verdict::Wrong, TOO_LONG.say(&values))
+    } else if longest < SMALLEST_M {
+        (Verdict::Doubt, TOO_SMALL.say(&values))
+    } else {
+        (Verdict::Fine, format!("{x} x {y} x {z} m, {points} points"))
+    };
+    Finding::new(name, EXTENT.english, verdict, text)
 }
 
 fn spacing(name: &str, survey: &Sample) -> Finding {
-    match survey.spacing_m {
-        Some(m) if m <= WIDEST_SPACING_M => {
-            Finding::new(name, "point spacing", Verdict::Fine, format!("{:.1} mm", 1e3 * m))
+    let (verdict, text) = match survey.spacing_m {
+        Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m)),
+        Some(m) => {
+            let spacing = format!("{:.0}", 1e3 * m);
+            (Verdict::Doubt, SPACING_WIDE.say(&[("spacing", &*spacing)]))
         }
-        Some(m) => Finding::new(
-            name,
-            "point spacing",
-            Verdict::Doubt,
-            format!("{:.0} mm: too wide to show the relief of single stones", 1e3 * m),
-        ),
-        None => Finding::new(name, "point spacing", Verdict::Doubt, "too few points to tell"),
-    }
+        None => (Verdict::Doubt, SPACING_UNKNOWN.say(&[])),
+    };
+    Finding::new(name, SPACING.english, verdict, text)
 }
 
 /// A coordinate system whose unit is not the metre.
@@ -105,14 +103,14 @@ fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
             "unit[\"international foot",
         ];
         match () {
-            () if is_geographic => Some("degrees"),
-            () if feet.iter().any(|f| text.contains(f)) => Some("feet"),
+            () if is_geographic => Some(&DEGREES),
+            () if feet.iter().any(|f| text.contains(f)) => Some(&FEET),
             () => None,
         }
     };
-    let unit = crs.filter_map(unit).next()?;
-    let text = format!("the clouds' coordinate system is in {unit}: transform them to a system in metres");
-    Some(Finding::new(name, "units", Verdict::Wrong, text))
+    let unit: &Message = crs.filter_map(unit).next()?;
+    let text = SYSTEM_UNIT.say(&[("unit", unit.english)]);
+    Some(Finding::new(name, UNITS.english, Verdict::Wrong, text))
 }
 
 /// One system for all clouds.
@@ -130,7 +128,7 @@ fn systems(project: &Project, surveys: &[Sample]) -> Finding {
             }
         }
     }
-    let topic = "coordinate system";
+    let topic = SYSTEM.english;
     match codes.as_slice() {
         [] => Finding::new("", topic, Verdict::Fine, "none named: a local frame"),
         [(code, _)] if named == all => Finding::new("", topic, Verdict::Fine, format!("EPSG:{code}")),
@@ -144,10 +142,7 @@ fn systems(project: &Project, surveys: &[Sample]) -> Finding {
                 .iter()
                 .map(|(code, epoch)| format!("EPSG:{code} ({epoch})"))
                 .collect();
-            let text = format!(
-                "the clouds are in different systems, {}: transform them to one",
-                list.join(", ")
-            );
+            let text = SYSTEMS.say(&[("systems", &*list.join(", "))]);
             Finding::new("", topic, Verdict::Wrong, text)
         }
     }
@@ -163,17 +158,19 @@ fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<String> {
     axes.sort_by(|a, b| b.0.total_cmp(&a.0));
     let ratios: Vec<f64> = axes.iter().take(2).map(|(a, b)| b / a.max(1e-9)).collect();
     let near = |ratio: f64| ratios.iter().all(|r| (r / ratio - 1.0).abs() < UNIT_TOLERANCE);
-    UNITS.iter().find_map(|(name, metres)| {
+    UNIT_NAMES.iter().find_map(|(unit, metres)| {
         let (which, ratio) = match () {
-            () if near(1.0 / metres) => ("this epoch", 1.0 / metres),
-            () if near(*metres) => ("the first epoch", *metres),
+            () if near(1.0 / metres) => (&THIS_EPOCH, 1.0 / metres),
+            () if near(*metres) => (&FIRST_EPOCH, *metres),
             () => return None,
         };
-        Some(format!(
-            "the clouds are {:.3} times as large as those of the first epoch; {ratio:.3} would mean that {which} is in {name}: \
-             export its coordinates in metres",
-            ratios[0]
-        ))
+        let [found, ratio] = [ratios[0], ratio].map(|r| format!("{r:.3}"));
+        Some(UNIT_RATIO.say(&[
+            ("found", &*found),
+            ("ratio", &*ratio),
+            ("which", which.english),
+            ("unit", unit.english),
+        ]))
     })
 }
 
@@ -183,14 +180,16 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
         max: first.max.inf(&second.max),
     });
     if shared.min() < 0.0 {
-        let text = format!(
-            "the clouds do not overlap those of {one}: they reach from {:.1?} to {:.1?} m, {one} from {:.1?} to {:.1?} m; bring both into one frame",
-            second.min.coords.as_slice(),
-            second.max.coords.as_slice(),
-            first.min.coords.as_slice(),
-            first.max.coords.as_slice()
-        );
-        return Finding::new(other, "overlap", Verdict::Wrong, text);
+        let corners = [second.min, second.max, first.min, first.max];
+        let [low, high, first_low, first_high] = corners.map(|p| format!("{:.1?}", p.coords.as_slice()));
+        let text = NO_OVERLAP.say(&[
+            ("first", one),
+            ("low", &*low),
+            ("high", &*high),
+            ("first_low", &*first_low),
+            ("first_high", &*first_high),
+        ]);
+        return Finding::new(other, OVERLAP.english, Verdict::Wrong, text);
     }
     // A wall is thin in one direction: the two longer ones count.
     let face = |v: Vector3<f64>| v.x * v.y + v.y * v.z + v.z * v.x;
@@ -200,16 +199,18 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
     } else {
         1.0
     };
-    let text = format!("{:.0} % of the smaller epoch with {one}", 100.0 * share);
-    match share < LEAST_OVERLAP {
-        true => Finding::new(
-            other,
-            "overlap",
+    let percent = format!("{:.0}", 100.0 * share);
+    let (verdict, text) = match share < LEAST_OVERLAP {
+        true => (
             Verdict::Doubt,
-            format!("{text}: are both in one frame?"),
+            LITTLE_OVERLAP.say(&[("share", &*percent), ("first", one)]),
         ),
-        false => Finding::new(other, "overlap", Verdict::Fine, text),
-    }
+        false => (
+            Verdict::Fine,
+            format!("{percent} % of the smaller epoch with {one}"),
+        ),
+    };
+    Finding::new(other, OVERLAP.english, verdict, text)
 }
 
 /// Two epochs that read the same cloud show no motion.
@@ -223,8 +224,9 @@ fn same_file(project: &Project) -> Option<Finding> {
         for earlier in &epochs[..number] {
             let files: Vec<_> = earlier.clouds.iter().map(canonical).collect();
             if let Some(twice) = epoch.clouds.iter().find(|c| files.contains(&canonical(c))) {
-                let text = format!("reads {} like epoch {:?}", twice.display(), earlier.name);
-                return Some(Finding::new(&epoch.name, "clouds", Verdict::Doubt, text));
+                let (file, name) = (twice.display().to_string(), format!("{:?}", earlier.name));
+                let text = SAME_FILE.say(&[("file", &*file), ("first", &*name)]);
+                return Some(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
             }
         }
     }
@@ -246,7 +248,7 @@ mod tests {
     #[test]
     fn units_are_told_from_walls_of_other_sizes() {
         let metres = wall(1.0, 0.0);
-        for (name, unit) in UNITS {
+        for (name, unit) in UNIT_NAMES.map(|(message, metres)| (message.english, metres)) {
             let other = wall(1.0 / unit, 0.0);
             assert!(
                 unit_ratio(&metres, &other)

@@ -3,6 +3,7 @@
 use super::finding::{Finding, Verdict};
 use crate::error::{Error, Result};
 use crate::project::Epoch;
+use crate::texts::findings::{BROKEN_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
@@ -32,7 +33,7 @@ pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
             Ok(_) if is_cut_off(path)? => broken.push(name),
             Ok((width, height)) if (width, height) != (view.camera.width, view.camera.height) => {
                 sizes.push(format!(
-                    "{name} is {width}x{height} px, its camera {}x{} px",
+                    "{name} {width}x{height} px (camera {}x{} px)",
                     view.camera.width, view.camera.height
                 ));
             }
@@ -41,16 +42,16 @@ pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
     }
     let mut out = Vec::new();
     let mut add =
-        |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, "photos", verdict, text));
+        |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, PHOTOS.english, verdict, text));
     let total = cameras.views.len();
     match found {
         0 => add(
             Verdict::Wrong,
-            format!(
-                "none of the {total} photos that {} names is in {}",
-                epoch.cameras.display(),
-                epoch.images.display()
-            ),
+            NO_PHOTOS.say(&[
+                ("total", &*total.to_string()),
+                ("file", &*epoch.cameras.to_string_lossy()),
+                ("folder", &*epoch.images.to_string_lossy()),
+            ]),
         ),
         n if n < total => add(
             Verdict::Note,
@@ -69,19 +70,10 @@ pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
         );
     }
     if !broken.is_empty() {
-        add(
-            Verdict::Doubt,
-            format!(
-                "cannot be read or are cut off: {}; copy them again",
-                some(&broken)
-            ),
-        );
+        add(Verdict::Doubt, BROKEN_PHOTOS.say(&[("photos", &*some(&broken))]));
     }
     if !sizes.is_empty() {
-        add(
-            Verdict::Doubt,
-            format!("{}: give the photos as they were posed", some(&sizes)),
-        );
+        add(Verdict::Doubt, PHOTO_SIZES.say(&[("photos", &*some(&sizes))]));
     }
     Ok(out)
 }
@@ -91,7 +83,7 @@ fn some(all: &[String]) -> String {
     let first = all.iter().take(NAMES).cloned().collect::<Vec<_>>().join(", ");
     match all.len().saturating_sub(NAMES) {
         0 => first,
-        more => format!("{first} and {more} more"),
+        more => format!("{first} (+ {more})"),
     }
 }
 

@@ -34,6 +34,30 @@ pub(super) fn joint_layer(
         .iter()
         .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
     table.push("significant", significant.collect::<Vec<Option<u8>>>())?;
+    table.describe("stone_1", "", "number of one stone beside the joint");
+    table.describe("stone_2", "", "number of the other stone");
+    table.describe("width", "m", "distance between the outlines of the stones");
+    table.describe("opening", "m", "motion of the stones apart, across the joint");
+    table.describe(
+        "sliding",
+        "m",
+        "motion of the second stone along the joint against the first",
+    );
+    table.describe(
+        "step_out",
+        "m",
+        "motion of the second stone out of the face against the first",
+    );
+    table.describe(
+        "sigma_opening",
+        "m",
+        "standard deviation of the opening, an upper bound",
+    );
+    table.describe(
+        "significant",
+        "",
+        "1 where the opening differs from zero at 95 %, else 0; empty where a stone was not measured",
+    );
     let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
     Ok(Layer {
         name: name.to_owned(),

@@ -5,8 +5,8 @@ use super::layer_style::{arrow_style, stone_style};
 use crate::figure::Scale;
 use crate::results::names::numbered;
 use crate::results::{
-    ResultSet, RowMotion, Sorted, StoneOutline, StoneRow, component_limit_m, joints, nice_scale_m,
-    stone_table,
+    ResultSet, RowMotion, STONE_COLUMNS, Sorted, StoneOutline, StoneRow, component_limit_m, joints,
+    nice_scale_m, stone_table,
 };
 use nalgebra::{Point2, Point3};
 use stonewise_io::crs::Crs;
@@ -154,6 +154,16 @@ fn motion_table(moved: &[(&StoneRow, &RowMotion)], factor: f64) -> Result<Table,
             .collect::<Vec<u8>>(),
     )?;
     table.push("exaggeration", vec![factor; moved.len()])?;
+    let same = |name: &str| ["stone_id", "d_along", "d_up", "d_out", "lod95", "significant"].contains(&name);
+    for column in STONE_COLUMNS.iter().filter(|c| same(c.name)) {
+        table.describe(column.name, column.unit, column.meaning);
+    }
+    table.describe("norm", "m", "length of the displacement");
+    table.describe(
+        "exaggeration",
+        "",
+        "how many times longer than the displacement the line is",
+    );
     Ok(table)
 }
 

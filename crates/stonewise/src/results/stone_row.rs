@@ -91,7 +91,7 @@ pub enum Status {
     Ok,
     /// The later epoch does not see the place.
     UnmatchedUnseen,
-    /// The later epoch sees the place but no stone there.
+    /// The later epoch sees the place, but no stone was found there.
     UnmatchedLost,
     /// Candidates too alike.
     UnmatchedAmbiguous,
@@ -141,7 +141,7 @@ impl Status {
         match self {
             Self::Ok => "measured",
             Self::UnmatchedUnseen => "the later epoch has no points, or no photo of them, at this place",
-            Self::UnmatchedLost => "the later epoch shows the place but no stone there",
+            Self::UnmatchedLost => "the later epoch shows the place, but no stone was found there",
             Self::UnmatchedAmbiguous => "several stones of the later epoch fit equally well",
             Self::UnmatchedArea => {
                 "the best candidate's face is much larger or smaller: masks merged or split"

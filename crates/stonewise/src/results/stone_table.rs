@@ -59,8 +59,7 @@ pub fn stone_table(rows: &[StoneRow]) -> std::result::Result<Table, TableError> 
     let mut table = Table::new();
     for column in columns_of(rows) {
         table.push(column.name, column.of(rows))?;
-        table.set_metadata(&format!("{}.unit", column.name), column.unit);
-        table.set_metadata(&format!("{}.meaning", column.name), column.meaning);
+        table.describe(column.name, column.unit, column.meaning);
     }
     Ok(table)
 }

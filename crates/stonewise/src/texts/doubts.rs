@@ -1,51 +1,47 @@
 //! Doubts about a run as a whole.
 
-use super::message::Message;
+use super::message::{Message, messages};
 
-pub(crate) static NOT_CONVERGED: Message = Message {
-    english: "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
-              on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
-              pictures",
-    german: "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert, auf ihre Bewegungen und deren Intervalle ist kein \
-             Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
-             die Bilder ansehen",
-};
+messages! {
+    DOUBTS {
+        NOT_CONVERGED:
+            "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
+            on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
+            pictures",
+            "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert, auf ihre Bewegungen und deren Intervalle ist kein \
+            Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
+            die Bilder ansehen";
 
-pub(crate) static BESIDE: Message = Message {
-    english: "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
-              cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
-              `stonewise check` shows the edges of the cloud over a photo",
-    german: "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen; Steine sind also \
-             neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
-             System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto",
-};
+        BESIDE_COMPARED:
+            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
+            so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
+            clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
+            "die Punktwolke liegt, verglichen mit der Epoche {first}, {length} mm ({along} längs, {up} hoch) neben den Steinen, die \
+            die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
+            Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-pub(crate) static BESIDE_COMPARED: Message = Message {
-    english: "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
-              so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
-              clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
-    german: "die Punktwolke liegt, verglichen mit der Epoche {first}, {length} mm ({along} längs, {up} hoch) neben den Steinen, die \
-             die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
-             Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto",
-};
+        BESIDE:
+            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
+            cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
+            `stonewise check` shows the edges of the cloud over a photo",
+            "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen; Steine sind also \
+            neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
+            System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-pub(crate) static FEW_MEASURED: Message = Message {
-    english: "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
-              the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
-              `stonewise check` on the project and look at its pictures",
-    german: "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
-             anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. Meist passen die Punktwolken einer \
-             Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen",
-};
+        FEW_MEASURED:
+            "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
+            the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
+            `stonewise check` on the project and look at its pictures",
+            "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
+            anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. Meist passen die Punktwolken einer \
+            Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen";
 
-pub(crate) static BLIND: Message = Message {
-    english: "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
-              of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
-              `stonewise check` on the project",
-    german: "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
-             Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
-             wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden",
-};
-
-/// All of them; of two that begin alike the longer one first.
-pub(super) static DOUBTS: [&Message; 5] = [&NOT_CONVERGED, &BESIDE_COMPARED, &BESIDE, &FEW_MEASURED, &BLIND];
+        BLIND:
+            "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
+            of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
+            `stonewise check` on the project",
+            "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
+            Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
+            wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden";
+    }
+}

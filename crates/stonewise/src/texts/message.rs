@@ -17,3 +17,14 @@ impl Message {
         fill(self.english, values)
     }
 }
+
+/// Declares messages and the list of all of them: a name, the English and the German text of each. Of two that
+/// fit the same words the more particular one comes first.
+macro_rules! messages {
+    ($all:ident { $($name:ident: $english:expr, $german:expr;)* }) => {
+        $(pub(crate) static $name: Message = Message { english: $english, german: $german };)*
+
+        pub(super) static $all: &[&Message] = &[$(&$name),*];
+    };
+}
+pub(super) use messages;

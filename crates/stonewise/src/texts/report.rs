@@ -101,8 +101,9 @@ in_both! {
         m3c2_note: "Core points, along the normal; same scale. Faded: below its LoD95.",
             "Kernpunkte, entlang der Normalen; gleiche Skala. Blass: unter der LoD95.";
         opening: "Joint opening", "Fugenöffnung";
-        opening_note: "Motion of neighbouring stones apart, across their joint: red opens, blue closes; a scale of its own. Faded: less than its 95 % uncertainty.",
-            "Bewegung benachbarter Steine auseinander, quer zu ihrer Fuge: rot öffnet, blau schließt; eigene Skala. Blass: weniger als die 95-%-Unsicherheit.";
+        opening_note: "Motion of neighbouring stones apart, across their joint: red opens, blue closes; a scale of its own.",
+            "Bewegung benachbarter Steine auseinander, quer zu ihrer Fuge: rot öffnet, blau schließt; eigene Skala.";
+        opening_faded: " Faded: less than its 95 % uncertainty.", " Blass: weniger als die 95-%-Unsicherheit.";
         relative: "Motion against the neighbours", "Bewegung gegen die Nachbarn";
         relative_note: "Length of the difference to what the neighbours predict.", "Betrag des Unterschieds zu dem, was die Nachbarn erwarten lassen.";
         limit: "Detection limit (LoD95)", "Nachweisgrenze (LoD95)";
@@ -140,11 +141,13 @@ in_both! {
         below_median: "below their limit: median mm", "unter ihrer Grenze: Median mm";
         below_nmad: "below their limit: NMAD mm", "unter ihrer Grenze: NMAD mm";
         datum: "Displacements refer to the registration of the epochs. A motion that all stones share can be a motion of the wall or an \
-            error of that registration; only stable points outside the wall can tell. Stones below their own limit should scatter around zero.",
+            error of that registration; only stable points outside the wall can tell.",
             "Verschiebungen beziehen sich auf die Registrierung der Epochen. Eine Bewegung, die alle Steine teilen, kann eine Bewegung der Mauer sein \
-            oder ein Fehler dieser Registrierung; nur stabile Punkte neben der Mauer können das zeigen. Steine unter ihrer eigenen Grenze sollten um null streuen.";
-        nmad: "NMAD: 1.4826 times the median distance from the median, the standard deviation of normally distributed values. {n} stones in all, {below} below their limit.",
-            "NMAD: das 1,4826-Fache des mittleren Abstands (Median) vom Median, bei normalverteilten Werten die Standardabweichung. {n} Steine insgesamt, {below} unter ihrer Grenze.";
+            oder ein Fehler dieser Registrierung; nur stabile Punkte neben der Mauer können das zeigen.";
+        datum_below: " Stones below their own limit should scatter around zero.", " Steine unter ihrer eigenen Grenze sollten um null streuen.";
+        nmad: "NMAD: 1.4826 times the median distance from the median, the standard deviation of normally distributed values. {n} stones in all.",
+            "NMAD: das 1,4826-Fache des mittleren Abstands (Median) vom Median, bei normalverteilten Werten die Standardabweichung. {n} Steine insgesamt.";
+        nmad_below: " Below their limit: {below}.", " Unter ihrer Grenze: {below}.";
         estimated: "Datum: {note}. Error of the later epoch in the middle of the wall: {parts} (one standard deviation, world axes; {cells} plane cells in stable \
             areas, sources compared on {compared} stones).",
             "Datum: {note}. Fehler der späteren Epoche in der Mitte der Mauer: {parts} (eine Standardabweichung, Achsen des Weltsystems; {cells} ebene Zellen in \
@@ -157,9 +160,6 @@ in_both! {
             "<b>Der Registrierungsfehler der Epochen ist unbekannt.</b> Das Projekt nennt keine stabilen Flächen \
             (<code>[[registration.stable]]</code>), die ihn zeigen, und gibt keinen Fehler an (<code>epoch_error_m</code>): Intervalle, Grenzen und \
             Signifikanz gelten für Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine, nicht gegen den Boden.";
-        note_stable: "{note}", "stabile Flächen zeigen ihn, auf {sd} mm genau (eine Standardabweichung je Achse)";
-        note_stated: "{note}", "das Projekt gibt ihn an, {sd} mm (eine Standardabweichung je Achse)";
-        note_sources: "{note}", "er folgt daraus, wie Standpunkte und Streifen jeder Epoche sich unterscheiden, auf {sd} mm genau (eine Standardabweichung je Achse)";
     }
 }
 
@@ -225,8 +225,8 @@ in_both! {
         false discoveries are controlled over all stones.</dd>\
         <dt>M3C2</dt><dd>Distance between the clouds along the local normal (Lague, Brodu &amp; Leroux 2013). It cannot see motion within \
         the face.</dd></dl>\
-        <h3>Limitations</h3><p>Displacements refer to the registration of the epochs, so a motion common to many stones - \
-        a shift, a tilt, a slow drift along the wall - may be an error of it, however small the limits of single stones are. A \
+        <h3>Limitations</h3><p>Displacements refer to the registration of the epochs, so a motion common to many stones \u{2013} \
+        a shift, a tilt, a slow drift along the wall \u{2013} may be an error of it, however small the limits of single stones are. A \
         stone is taken as rigid. Masks that merge or split stones spoil single rows; such pairs are reported as failed where they \
         can be told. Values of stones that were not measured are unknown, not zero.</p>",
         "<p>Steine werden in den Fotos umrissen, ihre Nummern auf die Punkte der Wolke jeder Epoche übertragen, Steine über die Epochen hinweg \
@@ -245,8 +245,8 @@ in_both! {
         erklärt; die Falscherkennungsrate wird über alle Steine gehalten.</dd>\
         <dt>M3C2</dt><dd>Abstand der Wolken entlang der örtlichen Normalen (Lague, Brodu &amp; Leroux 2013). Bewegungen in der Mauerfläche sieht er \
         nicht.</dd></dl>\
-        <h3>Grenzen der Aussage</h3><p>Verschiebungen beziehen sich auf die Registrierung der Epochen; eine Bewegung, die viele Steine teilen - ein Versatz, \
-        eine Kippung, eine langsame Drift längs der Mauer -, kann daher ein Fehler von ihr sein, so klein die Grenzen einzelner Steine auch sind. Ein Stein gilt als \
+        <h3>Grenzen der Aussage</h3><p>Verschiebungen beziehen sich auf die Registrierung der Epochen; eine Bewegung, die viele Steine teilen \u{2013} ein Versatz, \
+        eine Kippung, eine langsame Drift längs der Mauer \u{2013}, kann daher ein Fehler von ihr sein, so klein die Grenzen einzelner Steine auch sind. Ein Stein gilt als \
         starr. Masken, die Steine verschmelzen oder teilen, verderben einzelne Zeilen; solche Paare sind als misslungen gemeldet, wo sie zu erkennen \
         sind. Werte nicht gemessener Steine sind unbekannt, nicht null.</p>";
     }

@@ -2,31 +2,53 @@
 
 use super::braces::fill;
 use super::doubts::DOUBTS;
+use super::findings::FINDINGS;
 use super::message::Message;
 use super::notices::NOTICES;
 use crate::report_params::Language;
 
+/// Values that hold numbers as a run writes them, with a decimal point.
+const NUMBERS: [&str; 11] = [
+    "error_mm", "excess", "found", "limit", "mean", "ratio", "share", "spacing", "x", "y", "z",
+];
+/// Values that are messages of their own.
+const NESTED: [&str; 3] = ["reason", "unit", "which"];
+
 fn all() -> impl Iterator<Item = &'static Message> {
-    DOUBTS.into_iter().chain(NOTICES)
+    DOUBTS.iter().chain(NOTICES).chain(FINDINGS).copied()
 }
 
 /// A sentence as a run said it, in the language of a report; `None` where it has no words of that language. A
 /// value that is a sentence of its own (`reason`) is given in that language, too.
 pub(crate) fn message_in(language: Language, said: &str) -> Option<String> {
-    let translated = |message: &Message| {
-        let values = values_of(message.english, said)?;
-        let reason = |(name, value): &(&'static str, &str)| {
-            let known = (*name == "reason").then(|| message_in(language, value)).flatten();
-            (*name, known.unwrap_or_else(|| (*value).to_owned()))
-        };
-        let values: Vec<(&str, String)> = values.iter().map(reason).collect();
-        let values: Vec<(&str, &str)> = values.iter().map(|(name, value)| (*name, &**value)).collect();
-        Some(fill(message.german, &values))
-    };
     match language {
         Language::English => Some(said.to_owned()),
-        Language::German => all().find_map(translated),
+        Language::German => finding(said).or_else(|| all().find_map(|message| in_german(message, said))),
     }
+}
+
+/// A finding with what was looked at before it, in German.
+fn finding(said: &str) -> Option<String> {
+    let (topic, finding) = said.split_once(": ")?;
+    let topic = FINDINGS.iter().find(|message| message.english == topic)?;
+    let finding = message_in(Language::German, finding)?;
+    Some(format!("{}: {finding}", topic.german))
+}
+
+/// The sentence in German, if it is this message.
+fn in_german(message: &Message, said: &str) -> Option<String> {
+    let value = |(name, value): &(&'static str, &str)| {
+        let value = match *name {
+            name if NESTED.contains(&name) => message_in(Language::German, value),
+            name if NUMBERS.contains(&name) => Some(value.replace('.', ",")),
+            _ => None,
+        }
+        .unwrap_or_else(|| (*value).to_owned());
+        (*name, value)
+    };
+    let values: Vec<(&str, String)> = values_of(message.english, said)?.iter().map(value).collect();
+    let values: Vec<(&str, &str)> = values.iter().map(|(name, value)| (*name, &**value)).collect();
+    Some(fill(message.german, &values))
 }
 
 /// What the braces of `text` were filled with in `said`.
@@ -49,11 +71,12 @@ fn values_of<'a>(text: &'static str, said: &'a str) -> Option<Vec<(&'static str,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
 
     #[test]
     fn what_a_run_said_is_said_in_german_with_its_values() {
         for message in all() {
-            let names: Vec<&str> = message
+            let names: BTreeSet<&str> = message
                 .english
                 .split('{')
                 .skip(1)
@@ -80,5 +103,19 @@ mod tests {
             reason.as_deref(),
             Some("Kamera nicht verwendet: nicht ausgerichtet")
         );
+        let german = |said| message_in(Language::German, said);
+        assert_eq!(
+            german("units: the clouds' coordinate system is in feet: transform them to a system in metres")
+                .as_deref(),
+            Some(
+                "Einheiten: das Koordinatensystem der Punktwolken ist in Fuß: sie in ein System in Metern umrechnen"
+            )
+        );
+        assert_eq!(
+            german("extent: 0.1 x 0.2 x 0.3 m, 500 points: are the coordinates in metres?").as_deref(),
+            Some("Ausdehnung: 0,1 x 0,2 x 0,3 m, 500 Punkte: sind die Koordinaten in Metern?")
+        );
+        // Half a translation would be worse than none.
+        assert_eq!(german("units: something else"), None);
     }
 }

@@ -23,8 +23,7 @@ pub fn write_series(context: &Context, pairs: &[&[StoneRow]]) -> Result<()> {
     for (name, column) in stones.columns() {
         series.push(name, column.clone())?;
     }
-    series.set_metadata("epoch.unit", "");
-    series.set_metadata("epoch.meaning", "name of the later epoch");
+    series.describe("epoch", "", "name of the later epoch");
     for (key, value) in stones.metadata_entries() {
         series.set_metadata(key, value);
     }

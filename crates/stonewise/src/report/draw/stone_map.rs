@@ -1,7 +1,7 @@
 //! The unrolled wall with its stones coloured by a quantity.
 
 use crate::figure::{Axes, Axis, Scale, escape, mm, nice_above};
-use crate::results::{ResultSet, Sorted, StoneRow};
+use crate::results::{ResultSet, RowMotion, Sorted, StoneRow};
 use crate::texts::{Texts, fill};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -44,7 +44,7 @@ pub(crate) struct MapPicture<'a> {
     pub scale: Scale,
     /// Fade stones whose motion is not significant.
     pub fade: bool,
-    /// Draw in-plane arrows of significant motions.
+    /// Draw in-plane arrows: of significant motions where the others are faded, else of all.
     pub arrows: bool,
     /// Draw a heavy outline around loose stones.
     pub loose: bool,
@@ -242,7 +242,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     }
     out.push_str("</g>");
     if picture.arrows {
-        draw_arrows(layout, &mut out);
+        draw_arrows(layout, picture.fade, &mut out);
     }
     layout.draw_bar(&mut out, picture.scale, picture.unit);
     out.push_str("</svg>");
@@ -286,14 +286,15 @@ fn path(ring: &[Point2<f64>], axes: &Axes) -> String {
     out
 }
 
-/// In-plane arrows of significant motions, one to a square of the picture, and the reference arrow.
-fn draw_arrows(layout: &MapLayout, out: &mut String) {
+/// In-plane arrows of all or of significant motions, one to a square of the picture, and the reference arrow.
+fn draw_arrows(layout: &MapLayout, only_significant: bool, out: &mut String) {
     let arrows: Vec<([f64; 2], [f64; 2])> = layout
         .results
         .stones
         .iter()
         .filter_map(|s| {
-            let face = s.motion.as_ref().filter(|m| m.significant)?.face;
+            let shown = |m: &&RowMotion| m.significant || !only_significant;
+            let face = s.motion.as_ref().filter(shown)?.face;
             let at = layout.results.facade.place(&s.centroid);
             let arrow = ([layout.axes.px(at.x), layout.axes.py(at.y)], [face.x, face.y]);
             arrow

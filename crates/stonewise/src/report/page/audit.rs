@@ -1,10 +1,11 @@
 //! Where the numbers come from: warnings, parameters, digests, times.
 
+use super::first_page::said;
 use super::html::{details, section, table};
 use crate::figure::{count, escape, number};
 use crate::results::ResultSet;
 use crate::results::records::StepTime;
-use crate::texts::{AuditTexts, Texts, fill, message_in};
+use crate::texts::{AuditTexts, Texts, fill};
 use crate::warnings::Warning;
 use serde::Serialize;
 use serde_json::Value;
@@ -177,10 +178,7 @@ fn warnings(warnings: &[Warning], texts: &Texts) -> String {
         vec![
             escape(&w.step),
             escape(&w.subject),
-            match message_in(texts.language(), &w.message) {
-                Some(message) => escape(&message),
-                None => format!("<span lang=\"en\">{}</span>", escape(&w.message)),
-            },
+            said(&w.message, texts),
             match w.skipped_input {
                 true => format!("<b>{}</b>", names.left_out),
                 false => String::new(),

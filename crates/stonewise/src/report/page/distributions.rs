@@ -1,6 +1,6 @@
 //! Histograms, in-plane scatter, stones against M3C2, and the datum check.
 
-use super::first_page::datum_note;
+use super::first_page::said;
 use super::html::{figure, section, table};
 use crate::figure::count;
 use crate::report::draw::{Guide, Series, histogram, scatter};
@@ -9,6 +9,7 @@ use crate::results::Comparison;
 use crate::results::records::DatumState;
 use crate::results::{ResultSet, Sorted};
 use crate::texts::{ChartTexts, Texts, fill};
+use std::iter;
 
 /// The three directions in words.
 fn directions(names: &ChartTexts) -> [&'static str; 3] {
@@ -131,23 +132,21 @@ fn shared_limits(series: &[&[[f64; 2]]]) -> [[f64; 2]; 2] {
     ranges.map(|r| [(r[0] + r[1]) / 2.0 - half, (r[0] + r[1]) / 2.0 + half])
 }
 
-/// What all stones have in common, and what stands still.
+/// What all stones have in common, and what stands still; the latter cannot be told where a run is in doubt.
 pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
     let texts = facts.texts();
     let names = &texts.charts;
+    let is_sound = facts.verdict.is_sound();
+    let columns = if is_sound { 4 } else { 2 };
     let still: Vec<_> = facts.measured.iter().filter(|(_, m)| !m.significant).collect();
     let rows: Vec<Vec<String>> = (0..3)
         .map(|k| {
             let all = &facts.components[k];
             let rest = Sorted::new(still.iter().map(|(_, m)| m.face[k]));
             let cell = |v: Option<f64>| facts.mm(v.unwrap_or(f64::NAN));
-            vec![
-                directions(names)[k].into(),
-                cell(all.median()),
-                cell(all.nmad()),
-                cell(rest.median()),
-                cell(rest.nmad()),
-            ]
+            let row = [all.median(), all.nmad(), rest.median(), rest.nmad()];
+            let cells = row.into_iter().take(columns).map(cell);
+            iter::once(directions(names)[k].to_owned()).chain(cells).collect()
         })
         .collect();
     let head = [
@@ -161,11 +160,15 @@ pub(super) fn datum(results: &ResultSet, facts: &Summary) -> String {
         ("n", &*count(facts.measured.len())),
         ("below", &*count(still.len())),
     ];
+    let [below, nmad_below] = match is_sound {
+        true => [names.datum_below.to_owned(), fill(names.nmad_below, &values)],
+        false => [String::new(), String::new()],
+    };
     let body = format!(
-        "<p>{}</p><p>{}</p>{}<p class=\"note\">{}</p>",
+        "<p>{}{below}</p><p>{}</p>{}<p class=\"note\">{}{nmad_below}</p>",
         names.datum,
         registration(results, texts),
-        table(&head, &rows, 1),
+        table(&head[..=columns], &rows, 1),
         fill(names.nmad, &values)
     );
     section("datum", texts.sections.datum_title, &body)
@@ -187,7 +190,7 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
             )
         };
         let values = [
-            ("note", &*datum_note(datum, texts)),
+            ("note", &*said(&datum.note, texts)),
             ("parts", &*axes.map(part).collect::<Vec<_>>().join(", ")),
             ("cells", &*count(observers.stable_cells)),
             ("compared", &*observers.compared_stones.map(count).join(names.and)),
@@ -196,7 +199,7 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
     }
     match results.datum() {
         Some(datum) if datum.state != DatumState::Unknown => {
-            fill(names.known, &[("note", &*datum_note(datum, texts))])
+            fill(names.known, &[("note", &*said(&datum.note, texts))])
         }
         _ => names.unknown.to_owned(),
     }

@@ -1,7 +1,8 @@
 //! What must be read before anything else.
 
+use super::first_page::said;
 use crate::figure::escape;
-use crate::texts::{Texts, message_in};
+use crate::texts::Texts;
 use crate::warnings::Warning;
 use std::fmt::Write;
 
@@ -16,16 +17,8 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
-        let (lang, message) = match message_in(texts.language(), &warning.message) {
-            Some(message) => ("", message),
-            None => (" lang=\"en\"", warning.message.clone()),
-        };
-        let _ = write!(
-            out,
-            "<li{lang}>{}: {}</li>",
-            escape(&warning.subject),
-            escape(&message)
-        );
+        let message = said(&warning.message, texts);
+        let _ = write!(out, "<li>{}: {message}</li>", escape(&warning.subject));
     }
     out.push_str("</ul></div>");
     out
@@ -48,7 +41,7 @@ mod tests {
         assert!(html.contains("<li>&lt;2026&gt;: did not converge</li>") && !html.contains("cut off"));
         let german = Language::German.texts();
         let html = doubts(&warnings.sorted(), german);
-        assert!(html.contains("<li lang=\"en\">&lt;2026&gt;: did not converge</li>"));
+        assert!(html.contains("<li>&lt;2026&gt;: <span lang=\"en\">did not converge</span></li>"));
         warnings.doubt(
             "register",
             "2027",

@@ -200,9 +200,14 @@ fn motions(results: &ResultSet, facts: &Summary, block: &mut Block) {
         rows.iter()
             .map(move |s| u8::from(s.motion.as_ref().is_some_and(of)))
     };
-    block.u8("significant", flag(|m| m.significant));
-    // Which stones moved or are loose, a run in doubt cannot tell.
+    // Which stones are above their limit, moved or are loose, a run in doubt cannot tell: it sets none apart.
     let sound = facts.verdict.is_sound();
+    let significant = move |m: &RowMotion| m.significant || !sound;
+    block.u8(
+        "significant",
+        rows.iter()
+            .map(|s| u8::from(s.motion.as_ref().is_some_and(significant))),
+    );
     let moved: BTreeSet<u32> = facts.moved.iter().map(|(s, _)| s.stone_id).collect();
     block.u8(
         "moved",

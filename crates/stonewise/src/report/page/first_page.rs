@@ -7,7 +7,7 @@ use crate::figure::{count, escape};
 use crate::report::summary::Summary;
 use crate::results::records::{Datum, DatumState, EpochRecord, State, StoneVerdict};
 use crate::results::{ResultSet, Status, StoneRow};
-use crate::texts::{Texts, counted, fill};
+use crate::texts::{Texts, counted, fill, message_in};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::collections::BTreeMap;
@@ -303,37 +303,37 @@ fn zones(facts: &Summary) -> String {
     format!("<h3>{}</h3>{}", page.zones, table(&head, &rows, 2))
 }
 
-/// What is known about the registration of the epochs.
-pub(super) fn registration(datum: Option<&Datum>, texts: &Texts) -> String {
+/// What is known about the registration of the epochs; a run in doubt has no limits that could hold it.
+pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
+    let (texts, page) = (facts.texts(), &facts.texts().page);
+    let is_sound = facts.verdict.is_sound();
     match datum {
-        Some(datum) if datum.state != DatumState::Unknown => fill(
-            texts.page.registration_included,
-            &[("note", &*datum_note(datum, texts))],
-        ),
-        Some(_) => texts.page.registration_unknown.to_owned(),
-        None => texts.page.no_registration.to_owned(),
+        Some(datum) if datum.state != DatumState::Unknown => {
+            let text = match is_sound {
+                true => page.registration_included,
+                false => page.registration_in_doubt,
+            };
+            fill(text, &[("note", &*said(&datum.note, texts))])
+        }
+        Some(_) if is_sound => page.registration_unknown.to_owned(),
+        Some(_) => page.registration_unknown_in_doubt.to_owned(),
+        None => page.no_registration.to_owned(),
     }
 }
 
-/// Where the registration error is known from; the run's own sentence, where the language is the one it
-/// speaks.
-pub(super) fn datum_note(datum: &Datum, texts: &Texts) -> String {
-    let shift = |k: usize| datum.covariance_6x6.map_or(f64::NAN, |c| c[k][k]);
-    let size = ((shift(0) + shift(1) + shift(2)) / 3.0).max(0.0).sqrt();
-    let text = match datum.state {
-        DatumState::Stable => texts.charts.note_stable,
-        DatumState::Stated => texts.charts.note_stated,
-        DatumState::Sources => texts.charts.note_sources,
-        DatumState::Unknown => "{note}",
-    };
-    fill(text, &[("sd", &*texts.mm(size)), ("note", &*escape(&datum.note))])
+/// What a run said, as HTML in the language of the report, or marked as English.
+pub(super) fn said(message: &str, texts: &Texts) -> String {
+    match message_in(texts.language(), message) {
+        Some(message) => escape(&message),
+        None => format!("<span lang=\"en\">{}</span>", escape(message)),
+    }
 }
 
 /// The warning that limits do not hold the registration error, where it is unknown.
-pub(super) fn datum_warning(datum: Option<&Datum>, texts: &Texts) -> String {
+pub(super) fn datum_warning(datum: Option<&Datum>, facts: &Summary) -> String {
     match datum {
         Some(datum) if datum.state == DatumState::Unknown => {
-            format!("<p class=\"datum\">{}</p>", registration(Some(datum), texts))
+            format!("<p class=\"datum\">{}</p>", registration(Some(datum), facts))
         }
         _ => String::new(),
     }

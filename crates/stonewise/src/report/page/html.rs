@@ -22,7 +22,7 @@ pub(super) fn table(head: &[&str], rows: &[Vec<String>], numbers_from: usize) ->
     out
 }
 
-/// A figure; the picture is SVG or HTML already, the note HTML.
+/// A figure; the picture is SVG or HTML already, the note HTML. A picture that is wider than a phone is scrolled.
 pub(super) fn figure(title: &str, picture: &str, note: &str) -> String {
     let note = if note.is_empty() {
         String::new()
@@ -30,7 +30,7 @@ pub(super) fn figure(title: &str, picture: &str, note: &str) -> String {
         format!("<p class=\"note\">{note}</p>")
     };
     format!(
-        "<figure><figcaption>{}</figcaption>{picture}{note}</figure>\n",
+        "<figure><figcaption>{}</figcaption><div class=\"scroll\">{picture}</div>{note}</figure>\n",
         escape(title)
     )
 }

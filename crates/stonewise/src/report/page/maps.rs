@@ -8,17 +8,21 @@ use crate::report::summary::Summary;
 use crate::results::{Joint, ResultSet, StoneRow, nice_scale_m};
 use crate::texts::{MapTexts, fill};
 
-/// What the marks in the maps mean; loose stones are marked where they can be told.
-fn legend(names: &MapTexts, tells_loose: bool) -> String {
+/// What the marks in the maps mean. A run in doubt has no limits, and cannot tell which stones are loose.
+fn legend(names: &MapTexts, is_sound: bool) -> String {
     let key = |class: &str, words: &str| format!("<span><i class=\"key {class}\"></i>{words}</span>");
-    let keys = [
-        key("solid", names.above),
-        key("pale", names.below),
-        key("hatched", names.unmeasured),
-        key("ring", names.loose),
-    ];
-    let shown = if tells_loose { &keys[..] } else { &keys[..3] };
-    format!("<p class=\"legend\">{}</p>", shown.concat())
+    let unmeasured = key("hatched", names.unmeasured);
+    let keys = match is_sound {
+        true => [
+            key("solid", names.above),
+            key("pale", names.below),
+            unmeasured,
+            key("ring", names.loose),
+        ]
+        .concat(),
+        false => unmeasured,
+    };
+    format!("<p class=\"legend\">{keys}</p>")
 }
 
 /// All maps of a run; one diverging scale is shared by the components and M3C2.
@@ -40,7 +44,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
             value: &value,
             unit: "mm",
             scale: shared,
-            fade: true,
+            fade: facts.verdict.is_sound(),
             arrows: false,
             loose: facts.verdict.is_sound(),
         };
@@ -53,7 +57,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
     if let Some(picture) = distance_map(&layout, results, shared) {
         grid.push_str(&figure(names.m3c2, &picture, names.m3c2_note));
     }
-    grid.push_str(&opening_map(&layout, joints, names));
+    grid.push_str(&opening_map(&layout, joints, facts));
     grid.push_str(&magnitude_maps(&layout, facts));
     let wide = if layout.is_wide() { " wide" } else { "" };
     let note = if beyond > 0 {
@@ -70,20 +74,26 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
 }
 
 /// How joints open and close; empty where no joint has both its stones measured.
-fn opening_map(layout: &MapLayout, joints: &[Joint], names: &MapTexts) -> String {
+fn opening_map(layout: &MapLayout, joints: &[Joint], facts: &Summary) -> String {
+    let names = &facts.texts().maps;
+    let is_sound = facts.verdict.is_sound();
     let moved: Vec<_> = joints
         .iter()
-        .filter_map(|j| j.motion.map(|m| (j.line, m.opening_m, m.is_significant())))
+        .filter_map(|j| {
+            j.motion
+                .map(|m| (j.line, m.opening_m, !is_sound || m.is_significant()))
+        })
         .collect();
     if moved.is_empty() {
         return String::new();
     }
     let scale = Scale::Diverging(nice_scale_m(moved.iter().map(|(_, opening, _)| opening.abs())));
     let title = names.opening;
+    let faded = if is_sound { names.opening_faded } else { "" };
     figure(
         title,
         &joint_map(layout, title, &moved, scale),
-        names.opening_note,
+        &format!("{}{faded}", names.opening_note),
     )
 }
 
@@ -94,12 +104,14 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
     let page = &facts.texts().page;
     let title = page.map_title;
+    let is_sound = facts.verdict.is_sound();
+    let end_m = nice_scale_m(norms);
     let picture = MapPicture {
         title,
         value: &norm,
         unit: "mm",
-        scale: Scale::Sequential(nice_scale_m(norms)),
-        fade: true,
+        scale: Scale::Sequential(end_m),
+        fade: is_sound,
         arrows: true,
         loose: false,
     };
@@ -108,7 +120,16 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         true => "",
         false => page.map_as_measured,
     };
-    let note = format!("{}{as_measured}", page.map_note);
+    let marks = if is_sound {
+        page.map_note
+    } else {
+        page.map_note_in_doubt
+    };
+    let colours = fill(
+        page.map_colours,
+        &[("end", &*facts.texts().threshold(end_m * 1e3))],
+    );
+    let note = format!("{colours}{marks}{as_measured}");
     format!(
         "<div class=\"{class}\">{}</div>",
         figure(title, &stone_map(&layout, &picture), &note)
@@ -145,16 +166,18 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
         nice_scale_m(relatives),
         true,
     ));
-    let median = texts.mm_or_dash(facts.limits.median());
-    let note = fill(names.limit_note, &[("median", &*median)]);
-    out.push_str(&draw(
-        names.limit,
-        &note,
-        &limit,
-        "mm",
-        nice_scale_m(limits),
-        false,
-    ));
+    if facts.verdict.is_sound() {
+        let median = texts.mm_or_dash(facts.limits.median());
+        let note = fill(names.limit_note, &[("median", &*median)]);
+        out.push_str(&draw(
+            names.limit,
+            &note,
+            &limit,
+            "mm",
+            nice_scale_m(limits),
+            false,
+        ));
+    }
     out.push_str(&draw(
         names.rotation,
         names.rotation_note,

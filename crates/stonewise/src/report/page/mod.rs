@@ -163,7 +163,7 @@ fn header(results: &ResultSet, facts: &Summary) -> String {
         title(results, texts),
         first_page::verdict(facts),
         doubts::doubts(warnings, texts),
-        first_page::datum_warning(results.datum(), texts),
+        first_page::datum_warning(results.datum(), facts),
         first_page::cover(results, facts),
         cover(results, texts)
     )

@@ -82,7 +82,10 @@ fn sentences(results: &ResultSet, facts: &Summary) -> Vec<String> {
             capital(texts.clauses.nothing_measured)
         )];
     }
-    let mut out = vec![first_page::registration(results.datum(), texts), chance(facts)];
+    let mut out = vec![first_page::registration(results.datum(), facts)];
+    if facts.verdict.is_sound() {
+        out.push(chance(facts));
+    }
     let [along, up, outward] = facts.components.each_ref().map(|c| texts.mm_or_dash(c.median()));
     let values = [("along", &*along), ("up", &*up), ("out", &*outward)];
     out.push(fill(texts.stones.median, &values));
@@ -121,13 +124,8 @@ fn places(facts: &Summary) -> Vec<String> {
     out
 }
 
-/// How many stones are above their limit, how many chance alone would bring there, and how many moved; of a
-/// run that is in doubt the first alone.
+/// How many stones are above their limit, how many chance alone would bring there, and how many moved.
 fn chance(facts: &Summary) -> String {
-    if !facts.verdict.is_sound() {
-        let above = count(facts.above_limit);
-        return fill(facts.texts().page.above_as_computed, &[("above", &*above)]);
-    }
     let expected = (FALSE_ALARMS * facts.measured.len() as f64).round() as usize;
     let values = [
         ("above", &*count(facts.above_limit)),
@@ -157,7 +155,7 @@ pub(super) fn tables(results: &ResultSet, facts: &Summary) -> String {
         .iter()
         .map(|(status, stones)| {
             vec![
-                format!("<code>{status}</code>"),
+                format!("<code>{}</code>", status.word().replace('_', "_<wbr>")),
                 escape(texts.status(*status)),
                 count(stones.len()),
                 texts.percent(stones.len(), facts.stones),
@@ -232,7 +230,7 @@ fn stone_rows(results: &ResultSet, facts: &Summary, stones: &[(&StoneRow, &RowMo
     out
 }
 
-/// Medians by stretch of the wall.
+/// Medians by stretch of the wall; without limits where a run is in doubt.
 fn stretches(results: &ResultSet, facts: &Summary) -> String {
     let places = Sorted::new(
         facts
@@ -261,30 +259,34 @@ fn stretches(results: &ResultSet, facts: &Summary) -> String {
                 .median()
                 .unwrap_or(f64::NAN))
         };
-        vec![
+        let mut row = vec![
             format!("{} – {}", texts.number(edge(i), 1), texts.number(edge(i + 1), 1)),
             count(part.len()),
-            texts.percent(above, part.len()),
             median(|m| m.face.x),
             median(|m| m.face.y),
             median(|m| m.face.z),
-            median(|m| m.detection_limit_m),
-        ]
+        ];
+        if facts.verdict.is_sound() {
+            row.push(median(|m| m.detection_limit_m));
+            row.push(texts.percent(above, part.len()));
+        }
+        row
     };
     let names = &texts.stones;
     let head = [
         names.stretch,
         names.measured,
-        names.above,
         names.d_along,
         names.d_up,
         names.d_out,
         names.limit,
+        names.above,
     ];
+    let columns = if facts.verdict.is_sound() { 7 } else { 5 };
     format!(
         "<h3>{}</h3>{}",
         names.stretches,
-        table(&head, &(0..n).map(row).collect::<Vec<_>>(), 1)
+        table(&head[..columns], &(0..n).map(row).collect::<Vec<_>>(), 1)
     )
 }
 

@@ -48,18 +48,28 @@ pub fn write_cameras(dir: &Path, epoch: usize, photos: &[PosedPhoto]) -> Result<
     make_dir(dir)?;
     let mut table = Table::new();
     table.push("name", photos.iter().map(|p| p.name.clone()).collect::<Vec<_>>())?;
-    let vectors: [(&str, VectorOf); 4] = [
-        ("centre", |p| p.centre.coords),
-        ("axis", |p| p.axis),
-        ("right", |p| p.right),
-        ("down", |p| p.down),
+    table.describe("name", "", "name of the photo");
+    let vectors: [(&str, &str, &str, VectorOf); 4] = [
+        ("centre", "m", "projection centre", |p| p.centre.coords),
+        ("axis", "", "unit vector of the view", |p| p.axis),
+        (
+            "right",
+            "m",
+            "from the view axis to the right edge of the picture, at a depth of one metre",
+            |p| p.right,
+        ),
+        (
+            "down",
+            "m",
+            "from the view axis to the lower edge of the picture, at a depth of one metre",
+            |p| p.down,
+        ),
     ];
-    for (stem, of) in vectors {
+    for (stem, unit, meaning, of) in vectors {
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            table.push(
-                &format!("{stem}_{axis}"),
-                photos.iter().map(|p| of(p)[k]).collect::<Vec<f64>>(),
-            )?;
+            let name = format!("{stem}_{axis}");
+            table.push(&name, photos.iter().map(|p| of(p)[k]).collect::<Vec<f64>>())?;
+            table.describe(&name, unit, &format!("{meaning}, world {axis}"));
         }
     }
     Ok(write_parquet(&path(dir, "cameras", epoch, "parquet"), &table)?)

@@ -31,6 +31,17 @@ pub fn write_thin_cloud(dir: &Path, epoch: usize, points: &[ThinPoint]) -> Resul
         table.push(name, points.iter().map(|p| p.colour[k]).collect::<Vec<u8>>())?;
     }
     table.push("stone_id", points.iter().map(|p| p.stone).collect::<Vec<u32>>())?;
+    for axis in ["x", "y", "z"] {
+        table.describe(axis, "m", &format!("point, world {axis}"));
+    }
+    for channel in ["red", "green", "blue"] {
+        table.describe(
+            channel,
+            "",
+            &format!("{channel} of the photos at the point, 0 to 255"),
+        );
+    }
+    table.describe("stone_id", "", "number of the stone, 0 for none");
     Ok(write_parquet(&path(dir, "cloud", epoch, "parquet"), &table)?)
 }
 

@@ -75,6 +75,13 @@ pub fn write_crops(
         crops.iter().map(|c| c.photo.clone()).collect::<Vec<String>>(),
     )?;
     table.push("half_m", crops.iter().map(|c| c.half_m).collect::<Vec<f64>>())?;
+    table.describe("stone_id", "", "number of the stone");
+    table.describe("photo", "", "name of the photo");
+    table.describe(
+        "half_m",
+        "m",
+        "half the edge of the crop on the plane of the stone's face",
+    );
     table.set_metadata(SIDE, side_px.to_string());
     table.set_metadata(PER_ROW, per_row.to_string());
     write_outlines(&path(dir, "crop_outlines", epoch, "parquet"), crops)?;
@@ -101,6 +108,10 @@ fn write_outlines(path: &Path, crops: &[Crop]) -> Result<(), Error> {
     table.push("ring", ring)?;
     table.push("x_px", x)?;
     table.push("y_px", y)?;
+    table.describe("stone_id", "", "number of the stone");
+    table.describe("ring", "", "number of the ring, from 0");
+    table.describe("x_px", "px", "vertex, to the right from the crop's left edge");
+    table.describe("y_px", "px", "vertex, down from the crop's upper edge");
     Ok(write_parquet(path, &table)?)
 }
 

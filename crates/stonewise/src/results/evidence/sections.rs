@@ -45,6 +45,19 @@ pub fn write_sections(dir: &Path, later: usize, points: &[SectionPoint]) -> Resu
     table.push("upright", upright.collect::<Vec<bool>>())?;
     table.push("place", points.iter().map(|p| p.place_m).collect::<Vec<f32>>())?;
     table.push("out", points.iter().map(|p| p.out_m).collect::<Vec<f32>>())?;
+    table.describe("stone_id", "", "number of the stone");
+    table.describe("later", "", "whether the point is of the later epoch");
+    table.describe("upright", "", "whether the section is upright, else level");
+    table.describe(
+        "place",
+        "m",
+        "along the section, from the stone's centroid in the first epoch",
+    );
+    table.describe(
+        "out",
+        "m",
+        "out of the face, from the stone's centroid in the first epoch",
+    );
     Ok(write_parquet(&path(dir, "sections", later, "parquet"), &table)?)
 }
 

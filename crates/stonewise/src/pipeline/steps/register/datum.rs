@@ -3,7 +3,9 @@
 use super::Registered;
 use crate::project::Project;
 use crate::results::records::{Datum, DatumState, SourceError};
-use crate::texts::notices::REGISTRATION_UNKNOWN;
+use crate::texts::notices::{
+    DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
+};
 use nalgebra::{Matrix6, Point3};
 use stonewise_core::registration::observers::{self, EpochErrors};
 use stonewise_core::stone::Stone;
@@ -37,11 +39,7 @@ fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, sto
     };
     let shift_mm = |errors: &EpochErrors| 1e3 * errors.rigid.error.fixed_rows::<3>(0).norm();
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Stable) {
-        let note = format!(
-            "the stable areas show a registration error of {:.2} mm at the middle of the wall: it is taken off the motions, and what \
-             stays uncertain of it is in limits and intervals",
-            shift_mm(errors)
-        );
+        let note = DATUM_STABLE.say(&[("error_mm", &*format!("{:.2}", shift_mm(errors)))]);
         return known(DatumState::Stable, errors, note);
     }
     let centre = middle(stones);
@@ -49,25 +47,16 @@ fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, sto
         // Both epochs carry the error of their registration.
         let variance = 2.0 * error_m * error_m;
         let covariance = Matrix6::from_diagonal(&[variance, variance, variance, 0.0, 0.0, 0.0].into());
-        let note = format!(
-            "the project states a registration error of {:.1} mm per axis and epoch; limits and intervals hold it",
-            1e3 * error_m
-        );
+        let note = DATUM_STATED.say(&[("error_mm", &*format!("{:.1}", 1e3 * error_m))]);
         return Datum::known(DatumState::Stated, &centre, &covariance, note);
     }
     if project.epochs[number - 1].same_survey_as == Some(0)
         && let Some(errors) = errors
     {
-        let note =
-            "both epochs are parts of one survey: there is no registration error between them".to_owned();
-        return known(DatumState::Stated, errors, note);
+        return known(DatumState::Stated, errors, DATUM_ONE_SURVEY.say(&[]));
     }
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Sources) {
-        let note = format!(
-            "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {:.1} mm \
-             per axis that all sources of an epoch share; limits and intervals hold both",
-            1e3 * errors.shared_error_m
-        );
+        let note = DATUM_SOURCES.say(&[("error_mm", &*format!("{:.1}", 1e3 * errors.shared_error_m))]);
         return known(DatumState::Sources, errors, note);
     }
     Datum::unknown(&centre, REGISTRATION_UNKNOWN.say(&[]))

@@ -7,6 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
+use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
@@ -175,10 +176,14 @@ impl<'a> Detection<'a> {
         );
         if found != expected {
             progress.advance(self.tiles(view));
-            return Ok(Outcome::left_out(format!(
-                "the photo is {}x{} px, its camera {}x{} px: give the photo as it was posed",
-                found[0], found[1], expected[0], expected[1]
-            )));
+            let [[width, height], [camera_width, camera_height]] =
+                [found, expected].map(|size| size.map(|px| px.to_string()));
+            return Ok(Outcome::left_out(PHOTO_SIZE.say(&[
+                ("width", &*width),
+                ("height", &*height),
+                ("camera_width", &*camera_width),
+                ("camera_height", &*camera_height),
+            ])));
         }
         let tiling = &self.context.project.settings.segment.tiling;
         let relief = match &self.ingested {

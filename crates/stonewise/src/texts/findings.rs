@@ -1,0 +1,53 @@
+//! What a look at a survey finds against it.
+
+use super::message::{Message, messages};
+
+messages! {
+    FINDINGS {
+        NOT_SEEN: "no photo sees the cloud: are cameras and clouds in one frame, and in metres?",
+            "kein Foto sieht die Punktwolke: sind Kameras und Punktwolken in einem System, und in Metern?";
+        NO_POINTS: "the clouds hold no points", "die Punktwolken enthalten keine Punkte";
+        TOO_LONG: "{x} x {y} x {z} m, {points} points: are the coordinates in metres? Cut the cloud to the structure",
+            "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern? Die Punktwolke auf das Bauwerk zuschneiden";
+        TOO_SMALL: "{x} x {y} x {z} m, {points} points: are the coordinates in metres?",
+            "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern?";
+        SPACING_WIDE: "{spacing} mm: too wide to show the relief of single stones",
+            "{spacing} mm: zu weit, um das Relief einzelner Steine zu zeigen";
+        SPACING_UNKNOWN: "too few points to tell", "zu wenige Punkte für eine Aussage";
+        SYSTEM_UNIT: "the clouds' coordinate system is in {unit}: transform them to a system in metres",
+            "das Koordinatensystem der Punktwolken ist in {unit}: sie in ein System in Metern umrechnen";
+        UNIT_RATIO: "the clouds are {found} times as large as those of the first epoch; {ratio} would mean that {which} is in {unit}: \
+                     export its coordinates in metres",
+            "die Punktwolken sind {found}-mal so groß wie die der ersten Epoche; {ratio} hieße, dass {which} in {unit} vorliegt: ihre \
+             Koordinaten in Metern ausgeben";
+        SYSTEMS: "the clouds are in different systems, {systems}: transform them to one",
+            "die Punktwolken liegen in verschiedenen Systemen, {systems}: sie in eines umrechnen";
+        NO_OVERLAP: "the clouds do not overlap those of {first}: they reach from {low} to {high} m, {first} from {first_low} to {first_high} m; \
+                     bring both into one frame",
+            "die Punktwolken überlappen die von {first} nicht: sie reichen von {low} bis {high} m, {first} von {first_low} bis {first_high} m; \
+             beide in ein System bringen";
+        LITTLE_OVERLAP: "{share} % of the smaller epoch with {first}: are both in one frame?",
+            "{share} % der kleineren Epoche mit {first}: sind beide in einem System?";
+        SAME_FILE: "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
+        NO_PHOTOS: "none of the {total} photos that {file} names is in {folder}", "keines der {total} Fotos, die {file} nennt, liegt in {folder}";
+        BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",
+            "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
+        PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
+            "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
+        CAMERAS: "cameras against cloud", "Kameras gegen Punktwolke";
+        EXTENT: "extent", "Ausdehnung";
+        SPACING: "point spacing", "Punktabstand";
+        UNITS: "units", "Einheiten";
+        SYSTEM: "coordinate system", "Koordinatensystem";
+        OVERLAP: "overlap", "Überlappung";
+        CLOUDS: "clouds", "Punktwolken";
+        PHOTOS: "photos", "Fotos";
+        DEGREES: "degrees", "Grad";
+        FEET: "feet", "Fuß";
+        INCHES: "inches", "Zoll";
+        CENTIMETRES: "centimetres", "Zentimetern";
+        MILLIMETRES: "millimetres", "Millimetern";
+        THIS_EPOCH: "this epoch", "diese Epoche";
+        FIRST_EPOCH: "the first epoch", "die erste Epoche";
+    }
+}
