@@ -152,7 +152,7 @@ const CASES: [Case; 9] = [
             fs::remove_file(&photo).unwrap();
             write_jpeg(&photo, &half.unwrap(), 90).unwrap();
         },
-        "its camera 1200x900 px",
+        "camera 1200x900 px",
         false,
     ),
 ];
