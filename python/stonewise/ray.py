@@ -88,7 +88,10 @@ def run_many(
     """
     pairs = [(os.path.abspath(project), os.path.abspath(out)) for project, out in jobs]
     is_ours = not ray.is_initialized()
-    if is_ours:
+    if is_ours and address is None:
+        # Ray left to itself joins whatever cluster it finds on this machine.
+        ray.init(address="local", include_dashboard=False, log_to_driver=False)
+    elif is_ours:
         ray.init(address=address, log_to_driver=False)
     try:
         with listener(progress) as told:
