@@ -87,8 +87,8 @@ impl Adjustment {
     /// The points alone decide: all stones of a side share the errors of their photos' poses, so that no number
     /// of them proves a jump.
     pub fn add_crack(&mut self, solution: &Solution) -> bool {
-        let of_clouds = self.photos.is_some();
-        let of_clouds = of_clouds.then(|| self.cloud_equations(self.components.error_m));
+        let photos = self.photos.as_ref();
+        let of_clouds = photos.map(|_| self.cloud_equations(self.components.error_m));
         let problem = match &of_clouds {
             Some(equations) => self.problem(equations.iter()),
             None => self.problem(solution.equations.iter().map(|e| &e.with_field)),

@@ -69,6 +69,9 @@ impl<'a> Search<'a> {
         let width = self.surface.columns;
         let columns = shifted(&self.columns, shift[0], width);
         let rows = shifted(&self.rows, shift[1], self.surface.rows);
+        if columns.is_empty() {
+            return None;
+        }
         let mut sums = [[0.0; LANES]; 4];
         for row in rows {
             let from = row * width + columns.start;
@@ -186,7 +189,16 @@ mod tests {
         let template = Template::new(drawn(3), &surface);
         let search = Search::new(&template, &surface);
         let shown = Shown::new(&photo, |_| true);
-        for shift in [[0, 0], [3, -2], [-11, 5], [14, 14], [-25, 0], [60, -60]] {
+        for shift in [
+            [0, 0],
+            [3, -2],
+            [-11, 5],
+            [14, 14],
+            [-25, 0],
+            [60, -60],
+            [60, 5],
+            [-60, 5],
+        ] {
             let found = search.correlation(&shown, shift);
             let expected = correlation(&surface, &first, &photo, shift);
             match (found, expected) {
