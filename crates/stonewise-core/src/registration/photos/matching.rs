@@ -69,6 +69,14 @@ impl Warp {
         self.matrix * d + self.shift
     }
 
+    /// This warp after another.
+    pub fn after(&self, first: &Self) -> Self {
+        Self {
+            matrix: self.matrix * first.matrix,
+            shift: self.at(first.shift),
+        }
+    }
+
     /// This warp after the inverse of another.
     fn after_inverse_of(&self, step: &Self) -> Option<Self> {
         let inverse = step.matrix.try_inverse()?;
@@ -334,7 +342,7 @@ mod tests {
             0.3 + 1.4 * texture(from.x, from.y) + dirt(x, y)
         });
         let reach = 6;
-        let (start, _) = Search::new(&template, &surface).best_shift(&[&patch], reach)?;
+        let (start, _) = Search::new(&template, &surface).best_shift(&patch, reach)?;
         face.matched(&template, &patch, &surface, Warp::shift(start), 4.0)
     }
 

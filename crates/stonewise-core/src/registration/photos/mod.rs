@@ -12,6 +12,8 @@ mod photo;
 mod search;
 mod surface;
 mod template;
+#[cfg(test)]
+mod testing;
 mod track;
 mod verify;
 

@@ -1,4 +1,4 @@
-//! Search for the shift of whole cells at which photos agree best with a template.
+//! Search for the shift of whole cells at which a photo agrees best with a template.
 
 use super::matching::{LEAST_SHARE, Template};
 use super::patch::Patch;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Cells that are summed side by side.
 const LANES: usize = 16;
 
-/// A template to be sought in photos.
+/// A template to be sought in a photo.
 pub(super) struct Search<'a> {
     surface: &'a Surface,
     template: Shown,
@@ -94,22 +94,17 @@ impl<'a> Search<'a> {
         (shows && tt > 0.0 && pp > 0.0).then(|| tp / (tt * pp).sqrt())
     }
 
-    /// The shift, within `reach` cells, at which photos that share a motion agree best with the template, and
-    /// their mean correlation there.
-    pub fn best_shift(&self, photos: &[&Patch], reach: isize) -> Option<(Vector2<f64>, f64)> {
-        let photos: Vec<Shown> = photos.iter().map(|p| Shown::new(p, |_| true)).collect();
-        let score = |shift: [isize; 2]| {
-            let of_photos = photos.iter().filter_map(|p| self.correlation(p, shift));
-            let (sum, count) = of_photos.fold((0.0, 0usize), |(s, n), c| (s + c, n + 1));
-            (count > 0).then(|| sum / count as f64)
-        };
+    /// The shift, within `reach` cells, at which a photo agrees best with the template, and their correlation
+    /// there.
+    pub fn best_shift(&self, photo: &Patch, reach: isize) -> Option<(Vector2<f64>, f64)> {
+        let photo = Shown::new(photo, |_| true);
         let mut best: Option<(f64, [isize; 2])> = None;
         for y in -reach..=reach {
             for x in -reach..=reach {
                 if x * x + y * y > reach * reach {
                     continue;
                 }
-                if let Some(score) = score([x, y])
+                if let Some(score) = self.correlation(&photo, [x, y])
                     && best.is_none_or(|(b, _)| score > b)
                 {
                     best = Some((score, [x, y]));

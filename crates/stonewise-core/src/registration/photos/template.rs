@@ -1,6 +1,7 @@
 //! The template of a stone: the mean of the first epoch's photos, brought onto each other.
 
 use super::matching::{FaceCells, Match, Template, Warp};
+use super::params::PhotoParams;
 use super::patch::Patch;
 use super::search::Search;
 use super::surface::Surface;
@@ -8,41 +9,59 @@ use nalgebra::Vector2;
 
 /// Rounds in which the template follows the photos.
 const ROUNDS: usize = 3;
-/// Error of a pose for which photos of one epoch are searched, cells of a pixel: several times what bundle
-/// adjustments leave.
-const POSE_REACH: isize = 4;
+/// Distance within which photos of one epoch are sought on each other, standard deviations of their poses'
+/// difference.
+const POSE_SDS: f64 = 4.0;
 /// Distance in which a least-squares match may end from its start, cells: within the grain that smoothing
 /// leaves.
-pub(super) const PULL_IN: f64 = 4.0;
+const PULL_IN: f64 = 4.0;
 
 /// The face on which photos are matched.
 pub(super) struct Face {
     pub surface: Surface,
     pub cells: FaceCells,
     /// Correlation below which a photo is left out.
-    pub min_correlation: f64,
+    min_correlation: f64,
+    /// Distance within which photos of one epoch are sought on each other, cells.
+    pose_reach: isize,
+}
+
+/// The mean of one epoch's photos, and how each lies on it.
+pub(super) struct Mean {
+    pub template: Template,
+    pub matches: Vec<Option<Match>>,
 }
 
 impl Face {
-    pub fn new(surface: Surface, min_correlation: f64) -> Self {
+    /// `pixel_m`: size of a pixel on the face, metres.
+    pub fn new(surface: Surface, pixel_m: f64, params: &PhotoParams) -> Self {
+        // Position and attitude each shift two photos by the error of a pose.
+        let apart_px = 2.0 * params.pose_error_px;
         Self {
             cells: FaceCells::new(&surface),
+            pose_reach: (POSE_SDS * apart_px * pixel_m / surface.cell_m).ceil() as isize,
+            min_correlation: params.min_correlation,
             surface,
-            min_correlation,
         }
     }
 
-    /// The mean of photos brought onto each other, and how each lies on it; `None` where none matches.
-    pub fn template(&self, patches: &[Patch]) -> Option<(Template, Vec<Option<Match>>)> {
-        let mut matches = self.first_matches(patches)?;
-        let mut template = self.mean(patches, &matches)?;
+    /// The mean of photos of one epoch brought onto each other, refined in rounds; `None` where none matches.
+    pub fn template(&self, patches: &[Patch]) -> Option<Mean> {
+        let mut mean = self.first_mean(patches)?;
         for round in 1..ROUNDS {
-            matches = self.matches(&template, patches, &matches);
+            mean.matches = self.matches(&mean.template, patches, &mean.matches);
             if round + 1 < ROUNDS {
-                template = self.mean(patches, &matches)?;
+                mean.template = self.mean(patches, &mean.matches)?;
             }
         }
-        Some((template, matches))
+        Some(mean)
+    }
+
+    /// The mean of photos of one epoch brought onto one of them: enough to search with.
+    pub fn first_mean(&self, patches: &[Patch]) -> Option<Mean> {
+        let matches = self.first_matches(patches)?;
+        let template = self.mean(patches, &matches)?;
+        Some(Mean { template, matches })
     }
 
     /// The photos matched with the one of them that most others agree with; among equals that which shows
@@ -83,30 +102,46 @@ impl Face {
         let one = |(i, patch): (usize, &Patch)| {
             let start = match before.get(i).copied().flatten() {
                 Some(found) => found.warp,
-                None => self.sought(template, &[patch], POSE_REACH)?,
+                None => self.sought(template, patch, self.pose_reach)?,
             };
             self.matched(template, patch, start)
         };
         patches.iter().enumerate().map(one).collect()
     }
 
-    /// Photos that share a motion matched with a template, from where they agree best with it within `reach`
-    /// cells.
-    pub fn matches_together(
+    /// Photos of an epoch matched with the template of the other epoch.
+    ///
+    /// Their own template is sought within `reach` cells, so that errors of single poses do not blur the
+    /// search; each photo starts from where it lies on that.
+    pub fn matches_across(
         &self,
         template: &Template,
         patches: &[Patch],
+        own: &Mean,
         reach: isize,
     ) -> Option<Vec<Option<Match>>> {
-        let views: Vec<&Patch> = patches.iter().collect();
-        let start = self.sought(template, &views, reach)?;
-        let one = |patch| self.matched(template, patch, start);
-        Some(patches.iter().map(one).collect())
+        let between = self.sought(template, &own.template.patch, reach)?;
+        let start = |found: &Option<Match>| found.map_or(between, |m| m.warp.after(&between));
+        let starts: Vec<Warp> = own.matches.iter().map(start).collect();
+        Some(self.matches_from(template, patches, &starts))
     }
 
-    /// Where photos that share a motion agree best with a template, within `reach` cells.
-    pub fn sought(&self, template: &Template, patches: &[&Patch], reach: isize) -> Option<Warp> {
-        let (shift, _) = Search::new(template, &self.surface).best_shift(patches, reach)?;
+    /// Photos matched with a template, each from its start.
+    pub fn matches_from(
+        &self,
+        template: &Template,
+        patches: &[Patch],
+        starts: &[Warp],
+    ) -> Vec<Option<Match>> {
+        let photos = patches.iter().zip(starts);
+        photos
+            .map(|(p, start)| self.matched(template, p, *start))
+            .collect()
+    }
+
+    /// Where a photo agrees best with a template, within `reach` cells.
+    fn sought(&self, template: &Template, photo: &Patch, reach: isize) -> Option<Warp> {
+        let (shift, _) = Search::new(template, &self.surface).best_shift(photo, reach)?;
         Some(Warp::shift(shift))
     }
 
@@ -158,4 +193,61 @@ pub(super) fn median_shift(shifts: impl Iterator<Item = Vector2<f64>>) -> Option
         crate::statistics::median(&mut values)
     };
     Some(Vector2::new(median(0)?, median(1)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{face, grained};
+    use super::*;
+
+    const GRAIN: f64 = 3.0;
+    /// Cells by which poses shift the photos of an epoch.
+    const POSES: [[f64; 2]; 5] = [[0.0, 0.0], [2.5, -1.5], [-3.0, 2.0], [1.0, 3.5], [-1.5, -3.0]];
+
+    fn photos(moved: [f64; 2]) -> Vec<Patch> {
+        let photo = |[x, y]: &[f64; 2]| grained(7, GRAIN, [x + moved[0], y + moved[1]]);
+        POSES.iter().map(photo).collect()
+    }
+
+    /// The largest distance of matches from the shifts of the photos' poses and of `moved`, cells, with the
+    /// shift that all have in common left out.
+    fn largest_error(matches: &[Option<Match>], moved: [f64; 2]) -> Option<f64> {
+        let errors: Option<Vec<Vector2<f64>>> = matches
+            .iter()
+            .zip(POSES)
+            .map(|(found, [x, y])| {
+                Some(found.as_ref()?.warp.shift - Vector2::new(x + moved[0], y + moved[1]))
+            })
+            .collect();
+        let errors = errors?;
+        let mean = errors.iter().sum::<Vector2<f64>>() / errors.len() as f64;
+        errors.iter().map(|e| (e - mean).norm()).reduce(f64::max)
+    }
+
+    #[test]
+    fn photos_with_wrong_poses_are_found_across_epochs() {
+        let face = face(1.0);
+        let moved = [6.0, -4.0];
+        let second = photos(moved);
+        let mean = face.template(&photos([0.0; 2])).unwrap();
+        let own = face.first_mean(&second).unwrap();
+        let found = face.matches_across(&mean.template, &second, &own, 11).unwrap();
+        let error = largest_error(&found, moved);
+        assert!(error.is_some_and(|e| e < 0.1), "{error:?}");
+        let shift = |matches: &[Option<Match>]| median_shift(matches.iter().flatten().map(|m| m.warp.shift));
+        let between = shift(&found).unwrap() - shift(&mean.matches).unwrap();
+        assert!((between - Vector2::from(moved)).norm() < 0.1, "{between}");
+    }
+
+    #[test]
+    fn photos_are_brought_together_as_far_as_their_poses_are_stated_to_err() {
+        let far = [grained(7, GRAIN, [0.0; 2]), grained(7, GRAIN, [9.0, 0.0])];
+        let difference = |pose_error_px: f64| {
+            let mean = face(pose_error_px).template(&far).unwrap();
+            let [first, second] = [0, 1].map(|i| mean.matches[i].map(|m| m.warp.shift.x));
+            Some(second? - first?)
+        };
+        assert!(difference(1.5).is_some_and(|d| (d - 9.0).abs() < 0.1));
+        assert!(difference(0.5).is_none_or(|d| d < 8.0));
+    }
 }

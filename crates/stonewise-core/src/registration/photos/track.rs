@@ -1,11 +1,11 @@
 //! One stone from photo to photo.
 
-use super::matching::{Match, Template};
+use super::matching::{Match, Template, Warp};
 use super::params::{OTHER_WINDOW, PhotoParams};
 use super::patch::{FaceMotion, Patch, Placed, normalised};
 use super::photo::{Chip, Photo};
 use super::surface::Surface;
-use super::template::{Face, PULL_IN, median_shift};
+use super::template::{Face, Mean, median_shift};
 use super::verify::{Verification, is_beyond_chance};
 use crate::registration::points::PairPoints;
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -74,6 +74,16 @@ pub(crate) struct Tracker<'a> {
     pub params: &'a PhotoParams,
 }
 
+/// The second epoch's photos of a stone.
+struct Second {
+    /// Their grey values on the moved face.
+    grey: Vec<Vec<Option<f32>>>,
+    /// The same with normalised contrast.
+    patches: Vec<Patch>,
+    /// How they lie on the template.
+    matches: Vec<Option<Match>>,
+}
+
 impl Tracker<'_> {
     pub fn track(&self) -> Track {
         let mut track = Track {
@@ -96,45 +106,28 @@ impl Tracker<'_> {
         let margin_m = self.params.margin_around_m(self.search_m);
         let surface = Surface::new(self.pair, self.face_from_world, pixel_m, margin_m, self.params)
             .ok_or(PhotoStatus::SmallFace)?;
-        let face = Face::new(surface, self.params.min_correlation);
+        let face = Face::new(surface, pixel_m, self.params);
         track.place = face.surface.middle;
-        let grey = |epoch: usize, motion: &FaceMotion| self.grey(&face.surface, &chips[epoch], motion);
-        let first = grey(0, &FaceMotion::none());
+        let first = self.grey(&face.surface, &chips[0], &FaceMotion::none());
         let before = self.normalised(&first, &face.surface, 1.0);
-        let (template, ones) = face.template(&before).ok_or(PhotoStatus::NoTemplate)?;
-        if ones.iter().flatten().count() < self.params.min_photos {
-            return Err(PhotoStatus::NoTemplate);
-        }
-        let furthest = (self.search_m / face.surface.cell_m).ceil() as isize;
-        let mut reach = furthest;
-        let (mut second, mut after, mut twos) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..ROUNDS {
-            second = grey(1, &track.start);
-            after = self.normalised(&second, &face.surface, 1.0);
-            twos = self.found_again(&face, &template, &after, reach)?;
-            let shifts = twos.iter().flatten().map(|m| m.warp.shift);
-            let shift = median_shift(shifts).unwrap_or_else(Vector2::zeros) * face.surface.cell_m;
-            if shift.norm() < NEAR_M {
-                break;
-            }
-            track.start.translation.x += shift.x;
-            track.start.translation.y += shift.y;
-            reach = PULL_IN as isize;
-        }
-        if !is_beyond_chance(&face, &template, &twos, furthest) {
+        let mean = self.agreeing(face.template(&before))?;
+        let reach = (self.search_m / face.surface.cell_m).ceil() as isize;
+        let second = self.followed(&face, &mean.template, &chips[1], &mut track.start, reach)?;
+        if !is_beyond_chance(&face, &mean.template, &second.matches, reach) {
             return Err(PhotoStatus::NotFound);
         }
-        let others = [&first, &second].map(|grey| self.normalised(grey, &face.surface, OTHER_WINDOW));
+        let others = [&first, &second.grey].map(|grey| self.normalised(grey, &face.surface, OTHER_WINDOW));
         let verification = Verification {
             face: &face,
-            patches: [&before, &after],
-            matches: [&ones, &twos],
+            patches: [&before, &second.patches],
+            first: &mean,
+            second: &second.matches,
         };
         let apart = verification
-            .verified([&others[0], &others[1]], furthest)
+            .verified([&others[0], &others[1]], reach)
             .ok_or(PhotoStatus::Ambiguous)?;
         track.apart_m = (apart * face.surface.cell_m).into();
-        for (epoch, matches) in [ones, twos].iter().enumerate() {
+        for (epoch, matches) in [&mean.matches, &second.matches].into_iter().enumerate() {
             for (chip, found) in chips[epoch].iter().zip(matches) {
                 track.sights.extend(
                     found.and_then(|m| {
@@ -180,21 +173,58 @@ impl Tracker<'_> {
         grey.iter().map(|g| normalised(g, surface, window_m)).collect()
     }
 
-    /// The second epoch's photos on the template.
-    fn found_again(
+    /// The second epoch's photos on the template, taken about where the stone is found from `start` on.
+    fn followed(
         &self,
         face: &Face,
         template: &Template,
-        patches: &[Patch],
+        chips: &[&Chip],
+        start: &mut FaceMotion,
         reach: isize,
-    ) -> Result<Vec<Option<Match>>, PhotoStatus> {
-        let found = face
-            .matches_together(template, patches, reach)
-            .ok_or(PhotoStatus::NotFound)?;
-        if found.iter().flatten().count() < self.params.min_photos {
-            return Err(PhotoStatus::NotFound);
+    ) -> Result<Second, PhotoStatus> {
+        let take = |motion: &FaceMotion| {
+            let grey = self.grey(&face.surface, chips, motion);
+            let patches = self.normalised(&grey, &face.surface, 1.0);
+            (grey, patches)
+        };
+        let (mut grey, mut patches) = take(start);
+        let own = self.agreeing(face.first_mean(&patches))?;
+        let mut matches = self.found(face.matches_across(template, &patches, &own, reach))?;
+        for _ in 1..ROUNDS {
+            let shifts = matches.iter().flatten().map(|m| m.warp.shift);
+            let shift = median_shift(shifts).unwrap_or_else(Vector2::zeros);
+            let shift_m = shift * face.surface.cell_m;
+            if shift_m.norm() < NEAR_M {
+                break;
+            }
+            start.translation.x += shift_m.x;
+            start.translation.y += shift_m.y;
+            (grey, patches) = take(start);
+            let starts: Vec<Warp> = matches.iter().map(|m| start_after(m, shift)).collect();
+            matches = self.found(Some(face.matches_from(template, &patches, &starts)))?;
         }
-        Ok(found)
+        Ok(Second {
+            grey,
+            patches,
+            matches,
+        })
+    }
+
+    /// The mean of an epoch's photos, where enough of them agree.
+    fn agreeing(&self, mean: Option<Mean>) -> Result<Mean, PhotoStatus> {
+        mean.filter(|m| self.are_enough(&m.matches))
+            .ok_or(PhotoStatus::NoTemplate)
+    }
+
+    /// Matches of the second epoch with the template, where they are enough.
+    fn found(&self, matches: Option<Vec<Option<Match>>>) -> Result<Vec<Option<Match>>, PhotoStatus> {
+        matches
+            .filter(|m| self.are_enough(m))
+            .ok_or(PhotoStatus::NotFound)
+    }
+
+    fn are_enough(&self, matches: &[Option<Match>]) -> bool {
+        matches.iter().flatten().count() >= self.params.min_photos
     }
 
     /// Median size of a pixel on the face, metres.
@@ -237,5 +267,16 @@ impl Tracker<'_> {
             parallax,
             correlation: found.correlation,
         })
+    }
+}
+
+/// Where a match starts after its patch was taken again with the face moved by `shift`, cells.
+fn start_after(found: &Option<Match>, shift: Vector2<f64>) -> Warp {
+    match found {
+        Some(found) => Warp {
+            shift: found.warp.shift - shift,
+            ..found.warp
+        },
+        None => Warp::shift(Vector2::zeros()),
     }
 }

@@ -7,7 +7,7 @@
 
 use super::matching::{Match, Template};
 use super::patch::Patch;
-use super::template::{Face, median_shift};
+use super::template::{Face, Mean, median_shift};
 use nalgebra::Vector2;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::f64::consts::PI;
@@ -28,7 +28,10 @@ const MOST_APART: f64 = 0.5;
 pub(super) struct Verification<'a> {
     pub face: &'a Face,
     pub patches: [&'a [Patch]; 2],
-    pub matches: [&'a [Option<Match>]; 2],
+    /// The first epoch's photos on their template.
+    pub first: &'a Mean,
+    /// The second epoch's photos on that template.
+    pub second: &'a [Option<Match>],
 }
 
 impl Verification<'_> {
@@ -45,22 +48,22 @@ impl Verification<'_> {
     /// epoch's.
     fn way_back(&self, reach: isize) -> Option<Vector2<f64>> {
         let [first, second] = self.patches;
-        let [ones, twos] = self.matches;
-        let template = self.face.mean(second, twos)?;
-        let back = self.face.matches_together(&template, first, reach)?;
-        apart(&back, ones)
+        let template = self.face.mean(second, self.second)?;
+        let back = self.face.matches_across(&template, first, self.first, reach)?;
+        apart(&back, &self.first.matches)
     }
 
     /// The second epoch's shift against the first's in photos of another normalisation, less that in these.
     fn under(&self, others: [&[Patch]; 2]) -> Option<Vector2<f64>> {
-        let template = self.face.mean(others[0], self.matches[0])?;
+        let matches = [&self.first.matches, self.second];
+        let template = self.face.mean(others[0], matches[0])?;
         let [first, second] = [0, 1].map(|epoch| {
             let again: Vec<Option<Match>> = others[epoch]
                 .iter()
-                .zip(self.matches[epoch])
+                .zip(matches[epoch])
                 .map(|(patch, found)| self.face.matched(&template, patch, found.as_ref()?.warp))
                 .collect();
-            apart(&again, self.matches[epoch])
+            apart(&again, matches[epoch])
         });
         Some(second? - first?)
     }
@@ -120,40 +123,11 @@ fn apart(matches: &[Option<Match>], from: &[Option<Match>]) -> Option<Vector2<f6
 
 #[cfg(test)]
 mod tests {
+    use super::super::matching::Warp;
     use super::super::search::Search;
-    use super::super::surface::Surface;
+    use super::super::testing::{face, grained};
     use super::*;
-    use crate::registration::photos::matching::Warp;
-    use crate::statistics::split_mix;
     use nalgebra::Matrix2;
-
-    const SIDE: usize = 48;
-
-    fn face() -> Face {
-        Face::new(Surface::flat(SIDE, 12), 0.0)
-    }
-
-    /// Noise of grains of about `grain` cells; `shift`: columns by which it is moved.
-    fn drawn(seed: u64, grain: f64, shift: f64) -> Patch {
-        let node = |i: i64, j: i64| {
-            let number = split_mix(seed ^ split_mix((i as u64) << 32 ^ (j as u64 & 0xffff_ffff)));
-            number as f64 / u64::MAX as f64 - 0.5
-        };
-        let value = |x: f64, y: f64| {
-            let (x, y) = (x / grain, y / grain);
-            let (i, j) = (x.floor(), y.floor());
-            let (u, v) = (x - i, y - j);
-            let (i, j) = (i as i64, j as i64);
-            let line = |j: i64| node(i, j) * (1.0 - u) + node(i + 1, j) * u;
-            line(j) * (1.0 - v) + line(j + 1) * v
-        };
-        Patch {
-            values: (0..SIDE * SIDE)
-                .map(|k| value((k % SIDE) as f64 - shift + 200.0, (k / SIDE) as f64 + 200.0) as f32)
-                .collect(),
-            valid: vec![true; SIDE * SIDE],
-        }
-    }
 
     fn matched(correlation: f64) -> Option<Match> {
         Some(Match {
@@ -165,25 +139,26 @@ mod tests {
 
     #[test]
     fn the_best_of_chance_passes_as_rarely_as_stated() {
-        let face = face();
+        let face = face(0.5);
         let (mut passed, reach) = (0, 8);
         for seed in 0..120 {
-            let template = Template::new(drawn(2 * seed, 3.0, 0.0), &face.surface);
-            let other = drawn(2 * seed + 1, 3.0, 0.0);
+            let template = Template::new(grained(2 * seed, 3.0, [0.0; 2]), &face.surface);
+            let other = grained(2 * seed + 1, 3.0, [0.0; 2]);
             let search = Search::new(&template, &face.surface);
-            let (_, best) = search.best_shift(&[&other], reach).unwrap();
+            let (_, best) = search.best_shift(&other, reach).unwrap();
             passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)], reach));
         }
         // 5 % of 120 are 6, standard deviation 2.4.
         assert!(passed <= 14, "{passed}");
-        let template = Template::new(drawn(1, 3.0, 0.0), &face.surface);
+        let template = Template::new(grained(1, 3.0, [0.0; 2]), &face.surface);
         assert!(is_beyond_chance(&face, &template, &[matched(0.8)], reach));
     }
 
     #[test]
     fn a_coarse_picture_needs_more_correlation_than_a_fine_one() {
-        let face = face();
-        let [fine, coarse] = [2.0, 9.0].map(|grain| Template::new(drawn(3, grain, 0.0), &face.surface));
+        let face = face(0.5);
+        let [fine, coarse] =
+            [2.0, 9.0].map(|grain| Template::new(grained(3, grain, [0.0; 2]), &face.surface));
         let found = [matched(0.5)];
         assert!(is_beyond_chance(&face, &fine, &found, 8));
         assert!(!is_beyond_chance(&face, &coarse, &found, 8));
@@ -191,16 +166,17 @@ mod tests {
 
     #[test]
     fn a_match_that_leads_elsewhere_on_the_way_back_is_refused() {
-        let face = face();
-        let [first, second] = [0.0, 3.0].map(|shift| vec![drawn(5, 3.0, shift)]);
-        let (_, ones) = face.template(&first).unwrap();
+        let face = face(0.5);
+        let [first, second] = [0.0, 3.0].map(|shift| vec![grained(5, 3.0, [shift, 0.0])]);
+        let mean = face.template(&first).unwrap();
         let at = |shift: f64| {
             let warp = Warp::shift(Vector2::new(shift, 0.0));
             let twos = [matched(0.9).map(|m| Match { warp, ..m })];
             let verification = Verification {
                 face: &face,
                 patches: [&first, &second],
-                matches: [&ones, &twos],
+                first: &mean,
+                second: &twos,
             };
             let apart = verification.way_back(10).map(|w| w.norm());
             (apart, verification.verified([&first, &second], 10).is_some())
