@@ -162,6 +162,7 @@ fn main() {
         sources: &sources,
         same_as: &same,
         stones: &stones,
+        neighbours: &[],
         stable: &stable,
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
     };

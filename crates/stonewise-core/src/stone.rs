@@ -117,6 +117,16 @@ pub struct PairResult {
     pub motion: Result<StoneMotion, MotionFailure>,
 }
 
+/// How certain the displacements of two neighbours are against each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Contrast {
+    /// Two stones of the first epoch.
+    pub stones: [StoneId; 2],
+    /// Covariance of the second one's displacement less the first one's, world, m^2; what both have in common
+    /// drops out.
+    pub covariance: Matrix3<f64>,
+}
+
 /// The common rigid motion of the measured stones that are not loose; `None` where three stones or fewer show
 /// none.
 ///

@@ -10,8 +10,10 @@ use std::fs;
 use std::path::Path;
 use stonewise_core::evaluate::{
     Evaluation, EvaluationParams, StoneOutcome, TrueStone, owners_by_centroid, score_against_truth,
+    score_neighbours,
 };
 use stonewise_core::id::StoneId;
+use stonewise_core::stone::Contrast;
 
 /// Columns that a table of true stones must have.
 const NEEDED: [&str; 11] = [
@@ -41,8 +43,18 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     let owners = owners_by_centroid(&centroids, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
+    evaluation.neighbours = score_neighbours(&outcomes, &owners, &stones, &contrasts(&set), params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
+}
+
+/// The covariances of neighbours as the evaluation takes them.
+fn contrasts(set: &ResultSet) -> Vec<Contrast> {
+    let contrast = |(ids, covariance): (&[u32; 2], &Matrix3<f64>)| Contrast {
+        stones: ids.map(StoneId),
+        covariance: *covariance,
+    };
+    set.neighbours.iter().map(contrast).collect()
 }
 
 /// A row as the evaluation takes it; `datum`: what is known about the registration of its epoch.

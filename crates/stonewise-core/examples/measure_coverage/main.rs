@@ -81,6 +81,7 @@ fn measure(case: &Case, seed: u64, is_full: bool) -> Wall {
         sources: &survey.sources,
         same_as: &same,
         stones: &survey.stones,
+        neighbours: &[],
         stable: &survey.stable,
         sigma_m: survey.sigma_m,
     };

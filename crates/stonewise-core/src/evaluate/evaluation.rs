@@ -1,7 +1,8 @@
 //! The whole evaluation of one pair of epochs, as written to evaluation.json.
 
 use crate::evaluate::{
-    EvaluationParams, InstanceScore, LabelScore, MatchScore, MotionScore, TruthScore, definitions,
+    EvaluationParams, InstanceScore, LabelScore, MatchScore, MotionScore, NeighbourScore, TruthScore,
+    definitions,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -24,6 +25,9 @@ pub struct Evaluation {
     /// Stone motions against an external truth, missing stones included.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub external: Option<TruthScore>,
+    /// Motions of neighbours against each other, against an external truth.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub neighbours: Option<NeighbourScore>,
     /// Matches across epochs.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub matches: Option<MatchScore>,
@@ -45,6 +49,7 @@ impl Evaluation {
             stones: None,
             m3c2: None,
             external: None,
+            neighbours: None,
             matches: None,
             labels: None,
             instances: None,

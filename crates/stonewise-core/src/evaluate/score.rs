@@ -105,7 +105,7 @@ pub fn score_change(
     score_motions(&samples, field.points.len(), params)
 }
 
-fn directions(samples: &[MotionSample], outlier_m: f64) -> Directions {
+pub(super) fn directions(samples: &[MotionSample], outlier_m: f64) -> Directions {
     let errors: Vec<Vector3<f64>> = samples.iter().map(MotionSample::error).collect();
     let truths: Vec<Vector3<f64>> = samples.iter().map(MotionSample::local_truth).collect();
     let statistics = |pick: &dyn Fn(&Vector3<f64>) -> Vec<f64>| {

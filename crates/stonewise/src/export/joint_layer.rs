@@ -48,11 +48,7 @@ pub(super) fn joint_layer(
         "m",
         "motion of the second stone out of the face against the first",
     );
-    table.describe(
-        "sigma_opening",
-        "m",
-        "standard deviation of the opening, an upper bound",
-    );
+    table.describe("sigma_opening", "m", "standard deviation of the opening");
     table.describe(
         "significant",
         "",

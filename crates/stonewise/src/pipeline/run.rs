@@ -35,7 +35,9 @@ use crate::project::Project;
 use crate::report::write_report;
 use crate::results::names::PairFile;
 use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRecord, Verdict};
-use crate::results::{Facade, StoneOutline, StoneRow, facade_of, read_outlines, write_stones};
+use crate::results::{
+    Facade, StoneOutline, StoneRow, facade_of, read_outlines, write_neighbours, write_stones,
+};
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
@@ -340,6 +342,9 @@ fn measure(
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
     };
     write_readable_json(&file(PairFile::Registration), &record)?;
+    if !registered.contrasts.is_empty() {
+        write_neighbours(&context.out, pair, &registered.contrasts)?;
+    }
     let change = if until > Until::Registered {
         let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();
         let outward = OutwardReference::Towards(&centres);

@@ -44,9 +44,9 @@ pub struct JointMotion {
     pub sliding_m: f64,
     /// Out of the face, metres; positive: the second stone stands out.
     pub step_m: f64,
-    /// Standard deviation of the opening, metres. The registration error of the epochs drops out; the rest of
-    /// both covariances is added as if it were independent. Neighbours share a part of it, so this is an
-    /// upper bound.
+    /// Standard deviation of the opening, metres: of [`ResultSet::neighbours`]. Where that has no covariance of
+    /// the two, the registration error of the epochs drops out and the rest of both stones' covariances is
+    /// added as if it were independent, which is an upper bound.
     pub opening_sigma_m: f64,
 }
 
@@ -135,14 +135,27 @@ fn motion(results: &ResultSet, stones: [usize; 2], across: &Vector2<f64>) -> Opt
     let (first, second) = (a.motion.as_ref()?, b.motion.as_ref()?);
     let difference = second.face - first.face;
     let direction = Vector3::new(across.x, across.y, 0.0);
-    let variance =
-        variance_apart(results, a, first, &direction) + variance_apart(results, b, second, &direction);
+    let variance = match between_neighbours(results, [a, b], &direction) {
+        Some(variance) => variance,
+        None => {
+            variance_apart(results, a, first, &direction) + variance_apart(results, b, second, &direction)
+        }
+    };
     Some(JointMotion {
         opening_m: difference.xy().dot(across),
         sliding_m: difference.xy().dot(&Vector2::new(-across.y, across.x)),
         step_m: difference.z,
         opening_sigma_m: variance.sqrt(),
     })
+}
+
+/// Variance of the motion of two stones against each other in a direction (along, up, out) of the first;
+/// `None` where their joint covariance is not known.
+fn between_neighbours(results: &ResultSet, [a, b]: [&StoneRow; 2], direction: &Vector3<f64>) -> Option<f64> {
+    let ids = [a.stone_id.min(b.stone_id), a.stone_id.max(b.stone_id)];
+    let world = results.world_from_face(a) * direction;
+    let covariance = results.neighbours.get(&ids)?;
+    Some(world.dot(&(covariance * world)).max(0.0))
 }
 
 /// Variance of a stone's motion in a direction (along, up, out), without the registration error of the
@@ -286,6 +299,23 @@ mod tests {
                 .filter(|j| j.stones.contains(&2))
                 .all(|j| j.motion.is_none())
         );
+    }
+
+    #[test]
+    fn the_joint_covariance_of_neighbours_is_that_of_the_opening() {
+        let folder = folder(&rows());
+        let mut results = ResultSet::read(folder.path()).unwrap();
+        let ids = [6, 7].map(|i: usize| results.stones[i].stone_id);
+        // The wall looks along x; the joint opens along y.
+        let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 9e-8, 1e-4));
+        results.neighbours.insert(ids, covariance);
+        let all = joints(&results);
+        let sigma = |stones: [usize; 2]| {
+            let joint = all.iter().find(|j| j.stones == stones).unwrap();
+            joint.motion.unwrap().opening_sigma_m
+        };
+        assert!((sigma([6, 7]) - 3e-4).abs() < 1e-7, "{}", sigma([6, 7]));
+        assert!((sigma([7, 8]) - 0.0005 * (2.0 + 2f64).sqrt()).abs() < 1e-9);
     }
 
     #[test]

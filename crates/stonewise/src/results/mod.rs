@@ -9,6 +9,7 @@ mod evidence;
 mod facade;
 mod joints;
 pub mod names;
+mod neighbours;
 mod outlines;
 pub mod records;
 mod result_set;
@@ -32,6 +33,8 @@ pub use evidence::{
 };
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};
+pub use neighbours::NeighbourCovariances;
+pub(crate) use neighbours::{read_neighbours, write_neighbours};
 pub use outlines::{StoneOutline, read_outlines, write_outlines};
 pub use result_set::ResultSet;
 pub(crate) use result_set::facade_of;

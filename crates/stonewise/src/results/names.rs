@@ -51,6 +51,8 @@ pub enum PairFile {
     Matches,
     /// What the estimator says about itself.
     Registration,
+    /// How certain the motions of neighbours are against each other.
+    Neighbours,
     /// Scores against the motion in the project file.
     Evaluation,
     /// The report, in its folder.
@@ -67,6 +69,7 @@ impl PairFile {
             Self::M3c2Laz => ("m3c2", "laz"),
             Self::Matches => ("matches", "json"),
             Self::Registration => ("registration", "json"),
+            Self::Neighbours => ("neighbours", "parquet"),
             Self::Evaluation => ("evaluation", "json"),
             Self::ReportPage => ("index", "html"),
         };

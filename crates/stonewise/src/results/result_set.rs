@@ -5,7 +5,7 @@ use super::names::{EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
 use super::stone_table::read_stones;
-use super::{Evidence, Facade, RowMotion, StoneRow};
+use super::{Evidence, Facade, NeighbourCovariances, RowMotion, StoneRow, read_neighbours};
 use crate::error::Error;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use serde::de::DeserializeOwned;
@@ -33,6 +33,8 @@ pub struct ResultSet {
     pub run: Option<RunRecord>,
     /// `registration.json`, where there is one.
     pub registration: Option<RegistrationRecord>,
+    /// `neighbours.parquet`; empty where the file is missing.
+    pub neighbours: NeighbourCovariances,
     /// `verdict.json`, where there is one.
     pub verdict: Option<Verdict>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
@@ -96,6 +98,7 @@ impl ResultSet {
             evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
+            neighbours: read_neighbours(dir, pair)?,
             verdict: None,
             decisions: Vec::new(),
             edits: Vec::new(),

@@ -1,9 +1,10 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
 use super::field::{covariance_against, posterior};
+use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
-use super::stone_vector::{Matrix9, StoneVector};
+use super::stone_vector::{Matrix9, StoneVector, Vector9};
 use nalgebra::Matrix3;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -17,6 +18,10 @@ pub(crate) struct Estimate {
     pub covariance: Matrix9,
     /// Covariance of the translation against what the neighbours predict, m^2.
     pub relative_covariance: Matrix3<f64>,
+    /// Probability that the stone is loose, where `covariance` is widened for it ([`widening`]).
+    pub missed: f64,
+    /// Change of the motion with that of the field at the stone.
+    pub by_field: Matrix9,
 }
 
 impl Adjustment {
@@ -42,12 +47,15 @@ impl Adjustment {
             relative_covariance[(k, k)] += slide_m * slide_m;
         }
         let p_loose = self.p_loose(stone);
+        let tied_by_field = by_field(&equations.with_field, &own);
         let Some(at_own) = &equations.on_own else {
             let factor = widening(p_loose);
             return Estimate {
                 mean: tied.mean,
                 covariance: covariance * factor,
                 relative_covariance: relative_covariance * factor,
+                missed: p_loose,
+                by_field: tied_by_field,
             };
         };
         let wide = self.loose.own_variances(&self.components);
@@ -62,6 +70,8 @@ impl Adjustment {
             relative_covariance: relative_covariance * p
                 + loose_relative * p_loose
                 + between.fixed_view::<3, 3>(0, 0),
+            missed: 0.0,
+            by_field: tied_by_field * p + by_field(at_own, &wide) * p_loose,
         }
     }
 
@@ -75,13 +85,23 @@ impl Adjustment {
     }
 }
 
+/// Change of a stone's motion with that of the field: with the own motion's variances W and the observations'
+/// information H the stone departs from the field by (H + W^-1)^-1 H of what its observations ask for, and
+/// follows it by (I + W H)^-1.
+pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 9]) -> Matrix9 {
+    let own = Matrix9::from_diagonal(&Vector9::from(*own));
+    (Matrix9::identity() + own * equations.information)
+        .try_inverse()
+        .unwrap_or_else(Matrix9::identity)
+}
+
 /// Factor on the covariance of a stone that moves with its neighbours, for the small probability `p_loose`
 /// that it does not: 1.96 standard deviations then hold the motion in 95 of 100 cases even if they miss every
 /// loose one.
 ///
 /// Stones of a larger probability than nine tenths of what intervals leave outside are followed on their own;
 /// the factor grows no further there.
-fn widening(p_loose: f64) -> f64 {
+pub(crate) fn widening(p_loose: f64) -> f64 {
     let missed = p_loose.clamp(0.0, 0.9 * OUTSIDE);
     let outside = (OUTSIDE - missed) / (1.0 - missed);
     let quantile = |outside: f64| Normal::standard().inverse_cdf(1.0 - 0.5 * outside);

@@ -7,6 +7,7 @@
 mod adjust;
 mod breaks;
 mod candidate;
+mod contrast;
 mod equations;
 mod error;
 mod estimate;

@@ -1,6 +1,7 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
 use super::breaks::find_breaks;
+use super::contrast::contrasts;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
 use super::params::AdjustmentReport;
@@ -45,6 +46,7 @@ pub(crate) fn report(
         .filter_map(|r| r.motion.as_ref().ok().filter(|m| !m.loose))
         .map(|m| m.displacement)
         .collect();
+    let contrasts = last.map_or_else(Vec::new, |solution| contrasts(adjustment, solution, &results));
     let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
     AdjustmentReport {
         loose: results.iter().filter(is_loose).count(),
@@ -59,6 +61,7 @@ pub(crate) fn report(
         iterations,
         converged,
         breaks,
+        contrasts,
         photos: adjustment.photo_report(),
     }
 }
@@ -167,7 +170,7 @@ fn motion(
         local[(k, k)] += variance;
     }
     let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
-    of_poses += adjustment.pose_covariance(i);
+    of_poses += adjustment.pose_covariance(i, i);
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];
     let common = adjustment.common_in(i).translation();

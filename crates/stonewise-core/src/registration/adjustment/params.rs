@@ -3,7 +3,7 @@
 use super::field::VarianceComponents;
 use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
-use crate::stone::PairResult;
+use crate::stone::{Contrast, PairResult};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -110,6 +110,8 @@ pub struct AdjustmentReport {
     pub loose: usize,
     /// Neighbours between which the field broke.
     pub breaks: Vec<Break>,
+    /// How certain the motions of neighbours are against each other.
+    pub contrasts: Vec<Contrast>,
     /// What photos contributed, where they took part.
     pub photos: Option<PhotoReport>,
 }

@@ -1,7 +1,7 @@
 //! Stones tracked in the photos from where the clouds put them.
 
 use super::error::AdjustError;
-use super::field::{Prediction, START_APPEARANCE_M, log_odds_of_loose};
+use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, log_odds_of_loose};
 use super::observation::NormalEquations;
 use super::observation::photo::{CloudMotion, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos};
 use super::state::Adjustment;
@@ -92,23 +92,42 @@ impl Adjustment {
         }
     }
 
-    /// Covariance of a stone's displacement that errors of the poses cause, in its frame. The stones share
-    /// these errors, so no number of stones averages them away; they count by the share that the photos have
-    /// in a stone's motion.
-    pub fn pose_covariance(&self, i: usize) -> Matrix3<f64> {
-        let Some(stone) = self.photos.as_ref().and_then(|p| p.stone(i)) else {
+    /// Covariance, caused by errors of the poses, of two stones' displacements, each in its frame; of a
+    /// stone's own where both are the same. The stones share these errors, so no number of stones averages
+    /// them away; they count by the share that the photos have in a stone's motion.
+    pub fn pose_covariance(&self, i: usize, j: usize) -> Matrix3<f64> {
+        let Some(photos) = &self.photos else {
             return Matrix3::zeros();
         };
-        let clouds = self.cloud_motion(i, [0.0; 2]);
-        let (information, _, _) = stone.with_bias(self.components.appearance_m());
-        let by_clouds = clouds
+        let covariance = || {
+            let [first, second] = [photos.stone(i)?, photos.stone(j)?];
+            let [by_first, by_second] = [self.share_of(i, first)?, self.share_of(j, second)?];
+            Some(by_first * photos.pose_covariance(first, second) * by_second.transpose())
+        };
+        covariance().unwrap_or_else(Matrix3::zeros)
+    }
+
+    /// Covariance of a stone's displacement, in its frame, that the least appearance bias causes by the share of
+    /// the photos.
+    pub fn least_photo_error(&self, i: usize) -> Matrix3<f64> {
+        let covariance = || {
+            let photos = self.photos.as_ref()?.stone(i)?;
+            let share = self.share_of(i, photos)?;
+            let variance = LEAST_APPEARANCE_M.powi(2) * photos.bias_factor;
+            let bias = Matrix3::from_diagonal(&Vector3::new(variance, variance, 0.0));
+            Some(share * bias * share.transpose())
+        };
+        covariance().unwrap_or_else(Matrix3::zeros)
+    }
+
+    /// Share of the photos in a stone's displacement; `None` where neither photos nor points determine it.
+    fn share_of(&self, i: usize, photos: &StonePhotos) -> Option<Matrix3<f64>> {
+        let (information, _, _) = photos.with_bias(self.components.appearance_m());
+        let by_clouds = self
+            .cloud_motion(i, [0.0; 2])
             .and_then(|c| c.covariance.try_inverse())
             .unwrap_or_else(Matrix3::zeros);
-        let Some(inverse) = (by_clouds + information).try_inverse() else {
-            return Matrix3::zeros();
-        };
-        let share = inverse * information;
-        share * stone.common * share.transpose()
+        Some((by_clouds + information).try_inverse()? * information)
     }
 
     /// Whether a stone's photos alone make it more probable that it is loose than that it moves as

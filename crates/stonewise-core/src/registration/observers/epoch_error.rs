@@ -106,6 +106,10 @@ pub struct EpochErrors {
     pub rigid: RigidError,
     /// Error at each stone, in their order.
     pub at: Vec<ErrorAt>,
+    /// Covariance of the error at the second of two neighbours less that at the first, world, m^2, in their
+    /// order.
+    #[serde(skip)]
+    pub between: Vec<Matrix3<f64>>,
 }
 
 /// What is measured and stated about two epochs.
@@ -117,6 +121,8 @@ pub struct EpochPair<'a> {
     pub same_as: &'a [usize],
     /// The stones.
     pub stones: &'a [SeenStone],
+    /// Neighbours among them, as indices.
+    pub neighbours: &'a [[usize; 2]],
     /// Points in stable areas.
     pub stable: &'a [StablePoints],
     /// Noise of single points along the normal, metres.
@@ -206,6 +212,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         sources: found.sources(pair, &unknowns),
         rigid: found.rigid(pair, &unknowns),
         at: found.at_stones(pair, &unknowns, model.components.nugget_m),
+        between: found.between(pair, &unknowns),
     }
 }
 
@@ -350,6 +357,17 @@ impl Averaged {
             error
         };
         pair.stones.par_iter().map(at).collect()
+    }
+
+    /// Of neighbours, without the independent error of each source at each stone.
+    fn between(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<Matrix3<f64>> {
+        let difference = |stones: &[usize; 2]| {
+            let [first, second] = stones.map(|i| difference_row(&pair.stones[i], pair.sources, unknowns));
+            let mut row = second;
+            row.extend(first.into_iter().map(|(k, m)| (k, -m)));
+            self.function(&row).covariance
+        };
+        pair.neighbours.par_iter().map(difference).collect()
     }
 
     /// The rigid motion closest to the error at the stones, which is linear in the unknowns.

@@ -248,6 +248,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
             sources: &sources,
             same_as: &[0, 1, 2, 3],
             stones: &stones,
+            neighbours: &[[0, 1], [0, 4], [3, 3]],
             stable,
             sigma_m: 0.002,
         };
@@ -272,6 +273,10 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     let sd = without.at[0].covariance[(0, 0)].sqrt();
     assert!((6e-4..4e-3).contains(&sd), "{sd}");
     assert!(without.at[0].mean.norm() < 5e-4, "{}", without.at[0].mean);
+    // Stones share what is uncertain, the more the nearer they are.
+    let between = [0, 1, 2].map(|k| without.between[k].trace().sqrt());
+    assert!(0.0 < between[0] && between[0] < 0.5 * between[1], "{between:?}");
+    assert!(between[1] < 0.5 * sd && between[2] < 1e-9, "{between:?} {sd}");
 }
 
 #[test]
@@ -337,6 +342,7 @@ fn an_area_that_moved_is_named_and_left_out() {
             sources: &sources,
             same_as: &[0, 1, 2, 3],
             stones: &stones,
+            neighbours: &[],
             stable: &stable,
             sigma_m: 0.002,
         };
@@ -366,6 +372,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         sources: &sources,
         same_as: &[0, 1, 2, 3],
         stones: &stones,
+        neighbours: &[],
         stable: &stable_points(&errors, 0.002),
         sigma_m: 0.002,
     };
@@ -398,6 +405,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
         sources: &sources,
         same_as: &[0, 1, 0, 1],
         stones: &stones,
+        neighbours: &[],
         stable: &[],
         sigma_m: 0.002,
     };
@@ -423,6 +431,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
         sources: &sources,
         same_as: &[0, 1, 2, 3],
         stones: &stones,
+        neighbours: &[],
         stable: &[],
         sigma_m: 0.002,
     };

@@ -20,7 +20,7 @@ mod variance_components;
 
 pub(crate) use component_estimate::estimate_components;
 pub(crate) use cracks::{Crack, find_crack};
-pub(crate) use field_vector::FieldVector;
+pub(crate) use field_vector::{FieldVector, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::LoosePrior;
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
@@ -30,5 +30,5 @@ pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
 pub(crate) use solve::{Field, solve};
 pub(crate) use subgraph::Subgraph;
 pub(crate) use ties::reweight_ties;
-pub(crate) use variance_components::START_APPEARANCE_M;
 pub use variance_components::VarianceComponents;
+pub(crate) use variance_components::{LEAST_APPEARANCE_M, START_APPEARANCE_M};

@@ -38,6 +38,8 @@ const RARE_RAD: f64 = 5e-3;
 
 /// Number of components; the last one counts where photos take part.
 pub(crate) const COUNT: usize = 9;
+/// Least appearance bias, metres: a thirtieth of a pixel, as far as interpolation and lens model are trusted.
+pub(crate) const LEAST_APPEARANCE_M: f64 = 1e-4;
 /// Appearance bias before it is estimated, metres: a fifth of a pixel.
 pub(crate) const START_APPEARANCE_M: f64 = 7e-4;
 
@@ -129,7 +131,7 @@ pub(crate) const BOUNDS: [[f64; 2]; COUNT] = [
     [NONE_M, 6e-3],
     [1e-5, 1.5e-2],
     [1e-4, 0.5],
-    [1e-4, 6e-3],
+    [LEAST_APPEARANCE_M, 6e-3],
 ];
 
 #[cfg(test)]

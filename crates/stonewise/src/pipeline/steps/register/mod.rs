@@ -110,10 +110,12 @@ pub fn register(
             params.auto_stable.then_some(&off_wall),
             context.progress,
         )?;
+        let neighbours = registered.neighbours_among(&sights.stones);
         let pair = EpochPair {
             sources: &sights.sources,
             same_as: &sights.same_as,
             stones: &sights.seen,
+            neighbours: &neighbours,
             stable: &sights.stable,
             sigma_m: registered.noise_m(),
         };
@@ -121,7 +123,11 @@ pub fn register(
             shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),
             ..params.observers.clone()
         };
-        registered.epoch_errors = Some(epoch_errors(&pair, &observers));
+        let errors = epoch_errors(&pair, &observers);
+        if errors.datum != observers::Datum::Unknown {
+            registered.add_registration(&errors.between);
+        }
+        registered.epoch_errors = Some(errors);
         registered.error_stones = sights.stones;
         write_json(&step.file("motions.json"), &registered)
     })?;
@@ -225,6 +231,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
     };
     Registered {
         results: report.results,
+        contrasts: report.contrasts,
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
         epoch_errors: None,
         error_stones: Vec::new(),
@@ -241,6 +248,7 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
     };
     Registered {
         results,
+        contrasts: Vec::new(),
         estimator: EstimatorRecord::Gicp(gicp),
         epoch_errors: None,
         error_stones: Vec::new(),

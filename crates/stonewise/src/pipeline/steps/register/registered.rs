@@ -1,12 +1,12 @@
 //! Motions of a pair of epochs.
 
 use crate::results::records::EstimatorRecord;
-use nalgebra::Point3;
+use nalgebra::{Matrix3, Point3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
-use stonewise_core::stone::PairResult;
+use stonewise_core::stone::{Contrast, PairResult};
 
 /// Name of the step.
 pub(super) const STEP: &str = "register";
@@ -16,6 +16,8 @@ pub(super) const STEP: &str = "register";
 pub struct Registered {
     /// One result per matched stone, ascending by stone of the first epoch.
     pub results: Vec<PairResult>,
+    /// How certain the motions of neighbours are against each other; empty where the estimator gives none.
+    pub contrasts: Vec<Contrast>,
     /// What the estimator says about itself.
     pub estimator: EstimatorRecord,
     /// Error of the later epoch against the reference, as sources and stable areas show it.
@@ -33,6 +35,25 @@ impl Registered {
     pub fn errors(&self) -> BTreeMap<StoneId, &ErrorAt> {
         let errors = self.epoch_errors.iter().flat_map(|e| &e.at);
         self.error_stones.iter().copied().zip(errors).collect()
+    }
+
+    /// The two stones of each contrast as indices into `stones`; contrasts of others are left out here and in
+    /// the results.
+    pub(super) fn neighbours_among(&mut self, stones: &[StoneId]) -> Vec<[usize; 2]> {
+        let index: BTreeMap<StoneId, usize> = stones.iter().copied().zip(0..).collect();
+        self.contrasts
+            .retain(|c| c.stones.iter().all(|s| index.contains_key(s)));
+        self.contrasts
+            .iter()
+            .map(|c| c.stones.map(|s| index[&s]))
+            .collect()
+    }
+
+    /// Adds to each contrast the covariance of what the error of the epochs differs by between its stones.
+    pub(super) fn add_registration(&mut self, between: &[Matrix3<f64>]) {
+        for (contrast, covariance) in self.contrasts.iter_mut().zip(between) {
+            contrast.covariance += covariance;
+        }
     }
 
     /// Noise of single points along the normal, metres: the larger of the epochs'.

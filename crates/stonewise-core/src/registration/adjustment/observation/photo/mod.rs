@@ -7,4 +7,6 @@ mod stone_photos;
 pub(crate) use model::{PhotoModel, StoneInPhotos};
 pub use model::{PhotoReport, StonePhotoReport};
 pub(crate) use poses::CloudMotion;
+#[cfg(test)]
+pub(crate) use poses::PoseInfluence;
 pub(crate) use stone_photos::StonePhotos;

@@ -5,7 +5,7 @@ use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
 use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
 use crate::statistics::upper_median;
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Disagreements of two normalisations that stand for as many more before those of a stone count by
@@ -32,6 +32,8 @@ pub(crate) struct PhotoModel {
     stones: Vec<Option<StonePhotos>>,
     factor: f64,
     poses_px: Vec<f64>,
+    /// Covariance of the poses' errors.
+    of_poses: DMatrix<f64>,
 }
 
 /// A stone as the model needs it.
@@ -87,6 +89,7 @@ impl PhotoModel {
             tracks,
             factor: 1.0,
             poses_px: vec![0.0; photos.len()],
+            of_poses: DMatrix::zeros(0, 0),
         }
     }
 
@@ -136,12 +139,12 @@ impl PhotoModel {
             let system = problem.system(stone, &poses.weights[k], poses.factor);
             found[i] = system
                 .displacement(&poses)
-                .map(|(information, vector, common)| StonePhotos {
+                .map(|(information, vector, by_poses)| StonePhotos {
                     information,
                     vector,
                     place: self.tracks[i].place,
                     bias_factor: factors[i],
-                    common,
+                    by_poses,
                 });
         }
         let px = |i: usize| {
@@ -150,12 +153,19 @@ impl PhotoModel {
         };
         self.poses_px = (0..self.centres.len()).map(px).collect();
         self.factor = poses.factor.sqrt();
+        self.of_poses = poses.covariance;
         self.stones = found;
     }
 
     /// What the photos say of a stone.
     pub fn stone(&self, i: usize) -> Option<&StonePhotos> {
         self.stones[i].as_ref()
+    }
+
+    /// Covariance, caused by errors of the poses, of two stones' displacements by their photos, each in its
+    /// frame.
+    pub fn pose_covariance(&self, first: &StonePhotos, second: &StonePhotos) -> Matrix3<f64> {
+        first.by_poses.covariance_with(&second.by_poses, &self.of_poses)
     }
 
     /// Place on a stone's face whose displacement its photos show.
@@ -287,6 +297,7 @@ mod tests {
             stones: vec![None; stones.len()],
             factor: 1.0,
             poses_px: vec![0.0; 2],
+            of_poses: DMatrix::zeros(0, 0),
         }
     }
 

@@ -10,7 +10,7 @@
 //! motions relative to each other.
 
 use crate::registration::photos::{Sight, Track};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Point3, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Point3, SMatrix, Vector2, Vector3};
 
 /// Unknowns of a pose.
 const POSE: usize = 6;
@@ -83,6 +83,34 @@ pub(super) struct StoneSystem {
     poses: DMatrix<f64>,
     poses_right: DVector<f64>,
     columns: Vec<usize>,
+}
+
+/// What errors of the poses change of a stone's displacement by its photos, in the stone's frame.
+#[derive(Clone, Debug)]
+pub(crate) struct PoseInfluence {
+    /// Which unknowns of the poses.
+    columns: Vec<usize>,
+    /// Displacement by these unknowns, three rows.
+    matrix: Matrix3xX<f64>,
+}
+
+impl PoseInfluence {
+    /// No error of a pose matters.
+    #[cfg(test)]
+    pub fn none() -> Self {
+        Self {
+            columns: Vec::new(),
+            matrix: Matrix3xX::zeros(0),
+        }
+    }
+
+    /// Covariance of this displacement with another stone's, for the covariance of the poses.
+    pub fn covariance_with(&self, other: &Self, poses: &DMatrix<f64>) -> Matrix3<f64> {
+        let between = DMatrix::from_fn(self.columns.len(), other.columns.len(), |r, c| {
+            poses[(self.columns[r], other.columns[c])]
+        });
+        &self.matrix * between * other.matrix.transpose()
+    }
 }
 
 impl PoseProblem<'_> {
@@ -301,26 +329,23 @@ impl StoneSystem {
     }
 
     /// What the photos alone say of the displacement, template and height eliminated: information,
-    /// information times displacement, and the covariance that the poses' errors give it.
-    pub fn displacement(&self, poses: &Poses) -> Option<(Matrix3<f64>, Vector3<f64>, Matrix3<f64>)> {
+    /// information times displacement, and what the poses' errors change of it.
+    pub fn displacement(&self, poses: &Poses) -> Option<(Matrix3<f64>, Vector3<f64>, PoseInfluence)> {
         let right = self.right - &self.cross * self.of(&poses.corrections);
         let inner = self.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;
         let mixed = self.own.fixed_view::<3, 3>(0, 3).into_owned();
         let solved = inner.solve(&mixed);
         let information = self.own.fixed_view::<3, 3>(3, 3) - mixed.transpose() * solved;
         let vector = right.fixed_rows::<3>(3) - solved.transpose() * right.fixed_rows::<3>(0);
-        let sensitivity = self.cross.rows(3, 3) - solved.transpose() * self.cross.rows(0, 3);
-        let count = self.columns.len();
-        let covariance = DMatrix::from_fn(count, count, |r, c| {
-            poses.covariance[(self.columns[r], self.columns[c])]
-        });
-        let spread = &sensitivity * covariance * sensitivity.transpose();
+        let sensitivity = self.cross.fixed_rows::<3>(3) - solved.transpose() * self.cross.fixed_rows::<3>(0);
         let inverse = information.try_inverse()?;
-        let spread = Matrix3::from_fn(|r, c| spread[(r, c)]);
         Some((
             0.5 * (information + information.transpose()),
             vector,
-            inverse * spread * inverse.transpose(),
+            PoseInfluence {
+                columns: self.columns.clone(),
+                matrix: inverse * sensitivity,
+            },
         ))
     }
 }
@@ -432,7 +457,7 @@ mod tests {
             weights: weights.clone(),
         };
         let system = problem.system(&problem.stones[4], &weights[4], factor);
-        let (information, vector, common) = system.displacement(&poses).unwrap();
+        let (information, vector, by_poses) = system.displacement(&poses).unwrap();
         let bias = Matrix3::from_diagonal(&Vector3::new(bias_m * bias_m, bias_m * bias_m, 0.0));
         let prior = (clouds.covariance + bias).try_inverse().unwrap();
         let joined = (information + prior).try_inverse().unwrap() * (vector + prior * clouds.mean);
@@ -441,6 +466,24 @@ mod tests {
             (joined - expected).norm() < 1e-6 * expected.norm(),
             "{joined} {expected}"
         );
-        assert!(common.symmetric_eigenvalues().min() > -1e-12 * common.trace());
+        // Errors of the poses: the displacements change by what each unknown changes them.
+        let other = problem.system(&problem.stones[5], &weights[5], factor);
+        let changes = |system: &StoneSystem| -> DMatrix<f64> {
+            let displacement = |step: Option<usize>| {
+                let mut poses = poses.clone();
+                step.into_iter().for_each(|k| poses.corrections[k] += 1.0);
+                let (information, vector, _) = system.displacement(&poses).unwrap();
+                information.try_inverse().unwrap() * vector
+            };
+            let columns = (0..count).map(|k| displacement(Some(k)) - displacement(None));
+            DMatrix::from_fn(3, count, |r, k| columns.clone().nth(k).unwrap()[r])
+        };
+        let expected = changes(&system) * &poses.covariance * changes(&other).transpose();
+        let (_, _, other) = other.displacement(&poses).unwrap();
+        let found = by_poses.covariance_with(&other, &poses.covariance);
+        assert!(
+            (found - &expected).norm() < 1e-6 * expected.norm(),
+            "{found} {expected}"
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! What photos say of one stone, with the poses as they were adjusted.
 
+use super::poses::PoseInfluence;
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
 use crate::registration::adjustment::stone_vector::{StoneVector, Vector9};
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -19,8 +20,8 @@ pub(crate) struct StonePhotos {
     /// Factor on the variance of the stone's appearance bias: faces that seem strained, which stones cannot
     /// be, have more.
     pub bias_factor: f64,
-    /// Covariance of the displacement that errors of the poses cause; other stones share it.
-    pub common: Matrix3<f64>,
+    /// What errors of the poses change of the displacement; other stones share them.
+    pub by_poses: PoseInfluence,
 }
 
 impl StonePhotos {
@@ -89,7 +90,7 @@ mod tests {
             vector: m * Vector3::new(0.003, -0.001, 0.004),
             place: [0.02, -0.03],
             bias_factor: 1.7,
-            common: Matrix3::zeros(),
+            by_poses: PoseInfluence::none(),
         }
     }
 
