@@ -16,8 +16,8 @@ use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
 /// First of the seeds that are kept; training draws 64-bit numbers, the test of the built-in weights has
-/// 9,000 to 9,011.
-const FIRST_SEED: u64 = 20_000;
+/// 9,000 to 9,011, and 20,000 to 20,059 decided which weights are built in.
+const FIRST_SEED: u64 = 21_000;
 const COUNT: u64 = 60;
 /// Edge of a photo, pixels: several stones of the largest class.
 const SIDE_PX: u32 = 480;
