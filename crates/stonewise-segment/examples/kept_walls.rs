@@ -5,7 +5,12 @@
 //!
 //! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other
 //! seeds then, and say so.
-#![allow(clippy::expect_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+#![allow(
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::print_stderr
+)]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
