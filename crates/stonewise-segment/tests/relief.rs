@@ -7,6 +7,8 @@ mod narrow_model;
 use burn::backend::{Autodiff, Flex};
 use burn::module::AutodiffModule;
 use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
+use safetensors::SafeTensors;
+use std::collections::HashMap;
 use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
 use stonewise_segment::model::{
     MaskRcnn, MaskRcnnConfig, Precision, config_from_bytes, model_from_bytes, weights_to_bytes,
@@ -16,16 +18,33 @@ use stonewise_segment::{Sample, Weights};
 
 const SIDE: u32 = 160;
 
-fn built_in(relief: bool) -> MaskRcnn<Flex> {
+/// The built-in weights as a file of colour alone: without the tensor of relief.
+fn of_colour_alone() -> Vec<u8> {
     let bytes = Weights::BuiltIn.bytes().unwrap();
-    model_from_bytes(&bytes, "built-in", relief, &Default::default()).unwrap()
+    let config = MaskRcnnConfig {
+        relief_channels: 0,
+        ..config_from_bytes(&bytes, "built-in").unwrap()
+    };
+    let metadata = HashMap::from([(
+        "stonewise_model".to_owned(),
+        serde_json::to_string(&config).unwrap(),
+    )]);
+    let file = SafeTensors::deserialize(&bytes).unwrap();
+    let tensors = file.tensors().into_iter();
+    let of_colour = tensors.filter(|(name, _)| name != "backbone.body.relief.weight");
+    safetensors::serialize(of_colour, Some(metadata)).unwrap()
+}
+
+fn opened(bytes: &[u8], relief: bool) -> MaskRcnn<Flex> {
+    model_from_bytes(bytes, "weights", relief, &Default::default()).unwrap()
 }
 
 #[test]
 fn weights_of_colour_alone_see_no_relief_to_the_bit() {
     let photo = surveyed_photo_by(Some(&Survey::random(SurveyKind::Terrestrial, 4)), 4, SIDE, SIDE);
     let relief = photo.relief().unwrap();
-    let (colour, wider) = (built_in(false), built_in(true));
+    let bytes = of_colour_alone();
+    let (colour, wider) = (opened(&bytes, false), opened(&bytes, true));
     let expected = colour.instances(photo.image(), None);
     assert!(!expected.is_empty());
     assert_eq!(colour.instances(photo.image(), Some(relief)), expected);
@@ -35,10 +54,12 @@ fn weights_of_colour_alone_see_no_relief_to_the_bit() {
 
 #[test]
 fn a_file_says_how_many_channels_its_model_takes() {
-    assert!(!Weights::BuiltIn.takes_relief().unwrap());
-    let bytes = weights_to_bytes(&built_in(true), Precision::Half).unwrap();
+    assert!(Weights::BuiltIn.takes_relief().unwrap());
+    let bytes = of_colour_alone();
+    assert_eq!(config_from_bytes(&bytes, "colour").unwrap().relief_channels, 0);
+    let bytes = weights_to_bytes(&opened(&bytes, true), Precision::Half).unwrap();
     assert_eq!(config_from_bytes(&bytes, "wider").unwrap().relief_channels, 4);
-    // Today's files stay as they are.
+    // Files of colour alone do not name it.
     let text = serde_json::to_string(&MaskRcnnConfig::light()).unwrap();
     assert!(!text.contains("relief"), "{text}");
 }

@@ -49,7 +49,22 @@ fn survey(folder: &Path) -> PathBuf {
     project
 }
 
-/// The built-in weights after so many steps of learning relief.
+/// The built-in weights with zeros for relief.
+fn blind(folder: &Path) -> PathBuf {
+    let mut bytes = Weights::BuiltIn.bytes().unwrap();
+    let tensors = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let header: serde_json::Value = serde_json::from_slice(&bytes[8..tensors]).unwrap();
+    let offset = |end: usize| {
+        let offsets = &header["backbone.body.relief.weight"]["data_offsets"];
+        tensors + offsets[end].as_u64().unwrap() as usize
+    };
+    bytes[offset(0)..offset(1)].fill(0);
+    let path = folder.join("blind.safetensors");
+    fs::write(&path, bytes).unwrap();
+    path
+}
+
+/// The same after so many steps of learning relief.
 fn model(folder: &Path, steps: u64) -> PathBuf {
     let out = folder.join(format!("model-{steps}"));
     fs::create_dir_all(&out).unwrap();
@@ -64,7 +79,7 @@ fn model(folder: &Path, steps: u64) -> PathBuf {
         },
         ..TrainParams::fine_tuning()
     };
-    let start = Start::Weights(Weights::BuiltIn);
+    let start = Start::Weights(Weights::File(blind(folder)));
     let mut session = Session::open(&out, &start, Some(params), Some(Total::Steps(steps)), None).unwrap();
     let source = Rendered {
         seed: 1,
@@ -124,4 +139,8 @@ fn a_run_looks_at_clouds_where_its_detector_has_learnt_relief() {
     let plain = alone(&project, &learnt, &out("c"));
     assert!(stones(&plain) > 3, "{}", stones(&plain));
     assert_ne!(in_a_run(&project, &learnt, &out("d")), plain);
+    // So they do with the built-in weights.
+    let built_in = Path::new("built-in");
+    let plain = alone(&project, built_in, &out("e"));
+    assert_ne!(in_a_run(&project, built_in, &out("f")), plain);
 }
