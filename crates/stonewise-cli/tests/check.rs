@@ -71,7 +71,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 9] = [
+const CASES: [Case; 12] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -115,6 +115,32 @@ const CASES: [Case; 9] = [
             fs::write(path, text.replace(CLOUD_2, "epoch1/cloud_tls.laz")).unwrap();
         },
         "like epoch",
+        false,
+    ),
+    (
+        "a copy of the first epoch's cloud",
+        |dir| {
+            fs::copy(dir.join("epoch1/cloud_tls.laz"), dir.join(CLOUD_2)).unwrap();
+        },
+        "100 % of the points are those of epoch",
+        false,
+    ),
+    (
+        "a cloud that is there twice",
+        |dir| {
+            fs::copy(dir.join(CLOUD_2), dir.join("epoch2/again.laz")).unwrap();
+            let path = dir.join("stonewise.toml");
+            let text = fs::read_to_string(&path).unwrap();
+            let both = format!("{CLOUD_2}\", \"epoch2/again.laz");
+            fs::write(path, text.replace(CLOUD_2, &both)).unwrap();
+        },
+        "100 % of the points are there twice",
+        false,
+    ),
+    (
+        "coordinates in steps of 5 cm",
+        |dir| map_cloud(&dir.join(CLOUD_2), |p| p.map(|c| (c * 20.0).round() / 20.0)),
+        "the coordinates are in steps of 50.0 mm",
         false,
     ),
     (

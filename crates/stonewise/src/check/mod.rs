@@ -8,6 +8,7 @@ mod edges;
 mod finding;
 mod page;
 mod photos;
+mod repeats;
 mod resources;
 mod sample;
 
@@ -43,6 +44,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         progress.advance(1);
     }
     report.findings.extend(clouds::look(project, &surveys));
+    report.findings.extend(repeats::look(project, &surveys));
     report.findings.extend(resources::look(project, &surveys, out));
     report.sort(project);
     Ok(report)

@@ -159,6 +159,7 @@ impl Project {
         source.check_settings(&settings)?;
         let map = source.map_frame(&raw.project)?;
         source.check_names(&raw.epochs)?;
+        source.check_dates(&raw.epochs)?;
         let mut epochs = Vec::new();
         for epoch in raw.epochs {
             epochs.push(source.epoch(epoch, &map, &epochs)?);
@@ -407,6 +408,29 @@ impl Source<'_> {
         Ok(())
     }
 
+    /// Epochs stand in time order: the first is the one that motions count from.
+    fn check_dates(&self, epochs: &[RawEpoch]) -> Result<()> {
+        let dated = epochs.iter().filter_map(|epoch| {
+            let date = epoch.date.as_ref()?;
+            Some((epoch, date.span(), date.get_ref().date?))
+        });
+        let dated: Vec<_> = dated.collect();
+        for pair in dated.windows(2) {
+            let [(earlier, _, before), (later, span, after)] = pair else {
+                continue;
+            };
+            if after < before {
+                let [first, second] = [earlier, later].map(|e| e.name.get_ref());
+                let message = format!(
+                    "epochs stand in time order, and {second:?} of {after} stands after {first:?} of {before}: change their \
+                     order, and name the epoch that motions count from in `reference` where it is not the first"
+                );
+                return Err(self.error(span.clone(), message));
+            }
+        }
+        Ok(())
+    }
+
     /// Values that the types do not exclude.
     fn check_settings(&self, settings: &Settings) -> Result<()> {
         let Some((key, message)) = impossible(settings) else {
@@ -453,6 +477,41 @@ mod tests {
         let file = dir.path().join("stonewise.toml");
         fs::write(&file, text).unwrap();
         Project::read(&file)
+    }
+
+    #[test]
+    fn epochs_out_of_time_order_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["cloud.laz", "cameras.xml"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let file = dir.path().join("stonewise.toml");
+        let read = |dates: [&str; 3]| {
+            let mut text = "[project]\nname = \"wall\"\n".to_owned();
+            for (name, date) in ["a", "b", "c"].into_iter().zip(dates) {
+                text += &format!(
+                    "[[epochs]]\nname = \"{name}\"\n{date}\nclouds = [\"cloud.laz\"]\nimages = \".\"\ncameras = \"cameras.xml\"\n"
+                );
+            }
+            fs::write(&file, text).unwrap();
+            Project::read(&file).map_err(|e| e.to_string())
+        };
+        for sound in [
+            [
+                "date = 2024-05-01",
+                "date = 2024-05-01",
+                "date = 2025-01-01T08:00:00",
+            ],
+            ["", "date = 2024-05-01", ""],
+        ] {
+            assert!(read(sound).is_ok(), "{sound:?}");
+        }
+        let message = read(["date = 2025-05-01", "", "date = 2024-11-30"]).unwrap_err();
+        assert!(
+            message.contains("\"c\" of 2024-11-30 stands after \"a\" of 2025-05-01: change their order"),
+            "{message}"
+        );
+        assert!(message.contains("stonewise.toml:17: "), "{message}");
     }
 
     #[test]

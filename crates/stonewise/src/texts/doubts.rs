@@ -28,6 +28,16 @@ messages! {
             neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
             System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
+        TORN:
+            "the photos do not agree where the stones are: the points of a typical stone give it only {share} % of the votes of the \
+            photos that see them, so stones are cut out of the cloud beside their place, and their motions must not be relied on. \
+            Cameras and clouds do not fit each other (frame, direction of an axis, focal length), or the masks are poor; \
+            `stonewise check` shows the edges of the cloud over a photo",
+            "die Fotos sind sich nicht einig, wo die Steine liegen: die Punkte eines typischen Steins geben ihm nur {share} % der \
+            Stimmen der Fotos, die sie sehen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
+            ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
+            die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+
         FEW_MEASURED:
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
             the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \

@@ -7,7 +7,7 @@
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 
-use laz::laszip::ChunkTable;
+use laz::laszip::{ChunkTable, ChunkTableEntry};
 use laz::{LazItemType, LazVlr};
 
 use super::compression::{Compression, Order};
@@ -24,12 +24,28 @@ const MAX_POINTS_PER_BYTE: u64 = 1 << 20;
 const TABLE_PLACE_BYTES: u64 = 8;
 
 /// What the reader needs of the chunks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Chunks {
-    /// There is no table that says where they are.
-    pub lacks_table: bool,
-    /// One of them is too large to be unpacked at once.
-    pub are_large: bool,
+#[derive(Debug)]
+pub enum Chunks {
+    /// They can be unpacked side by side.
+    Known(Vec<Chunk>),
+    /// One of them is too large to be held in memory.
+    Large(Vec<Chunk>),
+    /// Nothing says where they end.
+    Unknown {
+        /// Where the first one begins.
+        start: u64,
+        /// Points of each.
+        points: u64,
+    },
+}
+
+/// Points that are packed together.
+#[derive(Clone, Copy, Debug)]
+pub struct Chunk {
+    /// Where in the file it begins.
+    pub start: u64,
+    pub bytes: u64,
+    pub points: u64,
 }
 
 impl Chunks {
@@ -37,13 +53,9 @@ impl Chunks {
     /// claims.
     pub fn check(file: &Envelope, compression: &Compression) -> Result<Self, CloudError> {
         let (points, path) = (file.points(), &file.path);
-        let lacks_table = Self {
-            lacks_table: true,
-            are_large: false,
-        };
         if points == 0 {
-            // Whatever its table says, the decoder must not read it.
-            return Ok(lacks_table);
+            // Whatever its table says, it must not be read.
+            return Ok(Self::Known(Vec::new()));
         }
         let bytes = file.length - file.start();
         if points / MAX_POINTS_PER_BYTE > bytes {
@@ -51,35 +63,43 @@ impl Chunks {
             return Err(CloudError::truncated(path, reason));
         }
         if compression.order == Order::Stream {
-            return Ok(lacks_table);
+            let start = file.start();
+            return Ok(Self::Unknown { start, points });
         }
         let vlr = &compression.vlr;
         let Some(place) = table_place(file)? else {
             return match compression.order {
-                Order::Layers => walk_layers(file, vlr).map(|()| lacks_table),
+                Order::Layers => walk_layers(file, vlr).map(|chunks| Self::of(file, chunks)),
                 _ if vlr.uses_variable_size_chunks() => Err(CloudError::malformed(
                     path,
                     "the table of its chunks is missing: write the file again",
                 )),
-                _ => Ok(lacks_table),
+                _ => Ok(Self::Unknown {
+                    start: first_chunk(file),
+                    points: u64::from(vlr.chunk_size()),
+                }),
             };
         };
-        let table = read_table(file, vlr, place)?;
-        check_table(file, vlr, &table)?;
+        let chunks = read_table(file, vlr, place)?;
+        check_table(file, vlr, &chunks)?;
         if compression.order == Order::Layers {
-            check_layers(file, vlr, &table)?;
+            check_layers(file, vlr, &chunks)?;
         }
-        let largest = table.as_ref().iter().map(|entry| entry.point_count).max();
-        let are_large = largest.unwrap_or(0).saturating_mul(file.record_bytes()) > LARGE_CHUNK_BYTES;
-        if are_large && compression.order == Order::Layers {
-            // One thread goes by the layers, and not by the table.
-            walk_layers(file, vlr)?;
-        }
-        Ok(Self {
-            lacks_table: false,
-            are_large,
-        })
+        Ok(Self::of(file, chunks))
     }
+
+    fn of(file: &Envelope, chunks: Vec<Chunk>) -> Self {
+        let largest = chunks.iter().map(|chunk| chunk.points).max().unwrap_or(0);
+        if largest.saturating_mul(file.record_bytes()) > LARGE_CHUNK_BYTES {
+            Self::Large(chunks)
+        } else {
+            Self::Known(chunks)
+        }
+    }
+}
+
+fn first_chunk(file: &Envelope) -> u64 {
+    file.start() + TABLE_PLACE_BYTES
 }
 
 /// Where the table of chunks is; `None` where there is none.
@@ -94,11 +114,10 @@ fn table_place(file: &Envelope) -> Result<Option<u64>, CloudError> {
         return Err(CloudError::truncated(&file.path, reason));
     }
     let place = u64::try_from(place).unwrap_or(0);
-    let first_chunk = file.start() + TABLE_PLACE_BYTES;
-    Ok((first_chunk < place && place <= file.length - TABLE_PLACE_BYTES).then_some(place))
+    Ok((first_chunk(file) < place && place <= file.length - TABLE_PLACE_BYTES).then_some(place))
 }
 
-fn read_table(file: &Envelope, vlr: &LazVlr, place: u64) -> Result<ChunkTable, CloudError> {
+fn read_table(file: &Envelope, vlr: &LazVlr, place: u64) -> Result<Vec<Chunk>, CloudError> {
     let mut source = open(file)?;
     let head = number_at(file, &mut source, place)?.cast_unsigned();
     let room = (place - file.start()) / file.record_bytes().max(1);
@@ -111,13 +130,24 @@ fn read_table(file: &Envelope, vlr: &LazVlr, place: u64) -> Result<ChunkTable, C
         return Err(CloudError::malformed(&file.path, reason));
     }
     seek(file, &mut source, file.start())?;
-    ChunkTable::read_from(&mut source, vlr).map_err(|e| las_error(&file.path, las::Error::from(e)))
+    let table = ChunkTable::read_from(&mut source, vlr);
+    let table = table.map_err(|e| las_error(&file.path, las::Error::from(e)))?;
+    let mut next = first_chunk(file);
+    let chunk = |entry: &ChunkTableEntry| {
+        let start = next;
+        next = next.saturating_add(entry.byte_count);
+        Chunk {
+            start,
+            bytes: entry.byte_count,
+            points: entry.point_count,
+        }
+    };
+    Ok(table.as_ref().iter().map(chunk).collect())
 }
 
-fn check_table(file: &Envelope, vlr: &LazVlr, table: &ChunkTable) -> Result<(), CloudError> {
-    let entries = table.as_ref();
-    let held = entries.iter().fold(0u64, |n, e| n.saturating_add(e.point_count));
-    let bytes = entries.iter().fold(0u64, |n, e| n.saturating_add(e.byte_count));
+fn check_table(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<(), CloudError> {
+    let held = chunks.iter().fold(0u64, |n, c| n.saturating_add(c.points));
+    let bytes = chunks.iter().fold(0u64, |n, c| n.saturating_add(c.bytes));
     let points = file.points();
     if held < points || (vlr.uses_variable_size_chunks() && held != points) {
         let reason = format!("its chunks hold {held} of {points} points");
@@ -133,68 +163,60 @@ fn check_table(file: &Envelope, vlr: &LazVlr, table: &ChunkTable) -> Result<(), 
 }
 
 /// Checks that no chunk of the table has layers that are larger than it.
-fn check_layers(file: &Envelope, vlr: &LazVlr, table: &ChunkTable) -> Result<(), CloudError> {
+fn check_layers(file: &Envelope, vlr: &LazVlr, chunks: &[Chunk]) -> Result<(), CloudError> {
     let mut source = open(file)?;
-    let mut place = file.start() + TABLE_PLACE_BYTES;
-    for (number, entry) in (1..).zip(table.as_ref()).filter(|(_, e)| e.byte_count > 0) {
-        let layers = Layers::read(file, vlr, &mut source, place)?;
-        if layers.bytes > entry.byte_count {
+    for (number, chunk) in (1..).zip(chunks).filter(|(_, chunk)| chunk.bytes > 0) {
+        let layers = layered_chunk(file, vlr, &mut source, chunk.start)?;
+        if layers.bytes > chunk.bytes {
             let reason = format!(
                 "the layers of chunk {number} take {} bytes, and the chunk has {}",
-                layers.bytes, entry.byte_count
+                layers.bytes, chunk.bytes
             );
             return Err(CloudError::malformed(&file.path, reason));
         }
-        place += entry.byte_count;
     }
     Ok(())
 }
 
 /// Walks from chunk to chunk by the sizes of their layers, for files without a table.
-fn walk_layers(file: &Envelope, vlr: &LazVlr) -> Result<(), CloudError> {
+fn walk_layers(file: &Envelope, vlr: &LazVlr) -> Result<Vec<Chunk>, CloudError> {
     let mut source = open(file)?;
-    let mut place = file.start() + TABLE_PLACE_BYTES;
+    let mut place = first_chunk(file);
     let mut held = 0;
+    let mut chunks = Vec::new();
     while held < file.points() {
-        let layers = Layers::read(file, vlr, &mut source, place)?;
+        let layers = layered_chunk(file, vlr, &mut source, place)?;
         place += layers.bytes;
         if place > file.length || layers.points == 0 {
             let reason = format!("its whole chunks hold {held} of {} points", file.points());
             return Err(CloudError::truncated(&file.path, reason));
         }
         held += layers.points;
+        chunks.push(layers);
     }
-    Ok(())
+    Ok(chunks)
 }
 
-/// A chunk of layers, as its head describes it.
-struct Layers {
-    points: u64,
-    /// Bytes of the chunk, its head included.
-    bytes: u64,
-}
-
-impl Layers {
-    fn read(
-        file: &Envelope,
-        vlr: &LazVlr,
-        source: &mut BufReader<File>,
-        place: u64,
-    ) -> Result<Self, CloudError> {
-        let mut word = [0; 4];
-        let mut next = |source: &mut BufReader<File>| {
-            let read = source.read_exact(&mut word);
-            read.map_err(|e| CloudError::read(&file.path, e))?;
-            Ok(u64::from(u32::from_le_bytes(word)))
-        };
-        seek(file, source, place + file.record_bytes())?;
-        let points = next(source)?;
-        let mut bytes = file.record_bytes() + 4;
-        for _ in 0..layer_count(vlr) {
-            bytes += 4 + next(source)?;
-        }
-        Ok(Self { points, bytes })
+/// A chunk of layers, as its head describes it, the bytes of the head included.
+fn layered_chunk(
+    file: &Envelope,
+    vlr: &LazVlr,
+    source: &mut BufReader<File>,
+    start: u64,
+) -> Result<Chunk, CloudError> {
+    let mut word = [0; 4];
+    let mut next = |source: &mut BufReader<File>| {
+        let read = source.read_exact(&mut word);
+        read.map_err(|e| CloudError::read(&file.path, e))?;
+        Ok(u64::from(u32::from_le_bytes(word)))
+    };
+    seek(file, source, start + file.record_bytes())?;
+    let points = next(source)?;
+    let mut bytes = file.record_bytes() + 4;
+    for _ in 0..layer_count(vlr) {
+        bytes += 4 + next(source)?;
     }
+    Ok(Chunk { start, bytes, points })
 }
 
 fn layer_count(vlr: &LazVlr) -> usize {

@@ -8,6 +8,7 @@ use super::crs_record::named_crs;
 use super::envelope::Envelope;
 use super::las_error::las_error;
 use super::stream::{Corrections, LasStream};
+use super::unpack::Packing;
 use crate::cloud::CloudError;
 use crate::cloud::guard::guarded;
 
@@ -17,8 +18,8 @@ pub struct Layout {
     /// All extended variable length records, of which the header has only the first.
     pub extended: Vec<las::Vlr>,
     pub corrections: Corrections,
-    /// The chunks of a compressed file are too large, or too little known, for the decoder with many threads.
-    pub one_thread: bool,
+    /// How the points are compressed, where they are.
+    pub packing: Option<Packing>,
 }
 
 impl Layout {
@@ -27,13 +28,17 @@ impl Layout {
     pub fn open(path: &Path) -> Result<Self, CloudError> {
         let envelope = Envelope::open(path)?;
         let records = envelope.records()?;
-        let chunks = match Compression::of(&envelope, &records)? {
-            Some(compression) => guarded(path, || Chunks::check(&envelope, &compression))?,
-            None => Chunks::default(),
-        };
+        let compression = Compression::of(&envelope, &records)?;
+        let packing = compression.map(|compression| {
+            Ok::<_, CloudError>(Packing {
+                record_bytes: envelope.record_bytes(),
+                chunks: guarded(path, || Chunks::check(&envelope, &compression))?,
+                compression,
+            })
+        });
+        let packing = packing.transpose()?;
         let corrections = Corrections {
             record_count: records.count,
-            lacks_chunk_table: chunks.lacks_table,
         };
         let extended = envelope.extended_records()?;
         let header = guarded(path, || {
@@ -44,7 +49,7 @@ impl Layout {
             header,
             extended,
             corrections,
-            one_thread: chunks.lacks_table || chunks.are_large,
+            packing,
         })
     }
 

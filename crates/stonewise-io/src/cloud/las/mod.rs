@@ -10,6 +10,7 @@ mod las_error;
 mod layout;
 mod read;
 mod stream;
+mod unpack;
 mod writer;
 
 pub(super) use copy::copy_labelled;

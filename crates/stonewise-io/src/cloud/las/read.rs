@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use las::{LazParallelism, PointData, PointDataBuilder, Reader, ReaderOptions};
+use las::{PointData, PointDataBuilder, Reader};
 use nalgebra::Point3;
 
 use super::Layout;
 use super::las_error::las_error;
 use super::stream::LasStream;
+use super::unpack::LazReader;
 use crate::cloud::chunk::Visit;
 use crate::cloud::guard::guarded;
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
@@ -19,29 +20,33 @@ const MAX_STEP_BYTES: u64 = 1 << 27;
 pub struct LasSource {
     path: PathBuf,
     pub layout: Layout,
-    reader: Reader,
+    records: Records,
     data: PointData,
     next_index: u64,
 }
 
+/// Where the records come from.
+enum Records {
+    Plain(Reader),
+    Packed(LazReader),
+}
+
 impl LasSource {
     pub fn open(path: &Path) -> Result<Self, CloudError> {
-        let layout = Layout::open(path)?;
-        let parallelism = if layout.one_thread {
-            LazParallelism::No
-        } else {
-            LazParallelism::Yes
+        let mut layout = Layout::open(path)?;
+        let records = match layout.packing.take() {
+            Some(packing) => Records::Packed(LazReader::open(path, packing)?),
+            None => Records::Plain(guarded(path, || {
+                let stream =
+                    LasStream::open(path, layout.corrections).map_err(|e| CloudError::read(path, e))?;
+                Reader::new(stream).map_err(|e| las_error(path, e))
+            })?),
         };
-        let reader = guarded(path, || {
-            let stream = LasStream::open(path, layout.corrections).map_err(|e| CloudError::read(path, e))?;
-            let options = ReaderOptions::default().with_laz_parallelism(parallelism);
-            Reader::with_options(stream, options).map_err(|e| las_error(path, e))
-        })?;
         Ok(Self {
             path: path.to_owned(),
-            data: PointDataBuilder::new().for_header(reader.header()).build(),
+            data: PointDataBuilder::new().for_header(&layout.header).build(),
             layout,
-            reader,
+            records,
             next_index: 0,
         })
     }
@@ -56,10 +61,14 @@ impl LasSource {
             return Ok(None);
         }
         let Self {
-            path, reader, data, ..
+            path, records, data, ..
         } = self;
-        guarded(path, || {
-            reader.fill_points(wanted, data).map_err(|e| las_error(path, e))
+        guarded(path, || match records {
+            Records::Plain(reader) => {
+                let read = reader.fill_points(wanted, data);
+                read.map(|_| ()).map_err(|e| las_error(path, e))
+            }
+            Records::Packed(reader) => reader.fill(data.resize_for(wanted as usize)),
         })?;
         let first = self.next_index;
         self.next_index += wanted;

@@ -12,8 +12,6 @@ const RECORD_COUNT: std::ops::Range<u64> = 100..104;
 pub struct Corrections {
     /// Number of variable length records between the header and the points.
     pub record_count: u32,
-    /// The file has no table of its chunks: the decoder must take them one after the other.
-    pub lacks_chunk_table: bool,
 }
 
 /// A file with corrections.
@@ -52,12 +50,6 @@ impl Read for LasStream {
 
 impl Seek for LasStream {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        // The LAZ decoder queries its position before it looks for the table; without an answer it reads on
-        // from where it is.
-        if self.corrections.lacks_chunk_table && to == SeekFrom::Current(0) {
-            let reason = "a file without a table of its chunks is read from front to back";
-            return Err(io::Error::new(io::ErrorKind::Unsupported, reason));
-        }
         self.position = self.file.seek(to)?;
         Ok(self.position)
     }
