@@ -53,8 +53,9 @@ pub fn mutate(bytes: &mut Vec<u8>, other: &[u8], is_text: bool, random: &mut Ran
         } else {
             change_bytes(bytes, other, random);
         }
+        // After every change: lines that are repeated twice would take gigabytes.
+        bytes.truncate(1 << 20);
     }
-    bytes.truncate(1 << 20);
 }
 
 /// A place: often in the head, where the sizes are.
