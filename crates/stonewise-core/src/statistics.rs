@@ -1,6 +1,13 @@
 //! Order statistics and mixed bits that several modules share.
 
 use nalgebra::Vector3;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
+/// of its size; below, it is sought numerically, which takes longer.
+const EXPANDED_FROM: f64 = 12.0;
+/// Cumulative probability at the upper end of a 95 % interval.
+pub(crate) const UPPER_95: f64 = 0.975;
 
 /// The upper median: of an even number of values the larger of the two in the middle. `None` without values.
 ///
@@ -84,9 +91,44 @@ pub fn discoveries(p_values: &[Option<f64>], rate: f64) -> Vec<usize> {
     found.map(|(i, _)| i).collect()
 }
 
+/// Student's 97.5 % quantile; `z`: the normal one. The expansion is Abramowitz & Stegun (1964), 26.7.5.
+pub(crate) fn student_95(freedom: f64, z: f64) -> f64 {
+    if freedom < EXPANDED_FROM {
+        return StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(UPPER_95));
+    }
+    let terms = [
+        (z.powi(3) + z) / 4.0,
+        (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
+        (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
+    ];
+    terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom) + z
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use statrs::distribution::Normal;
+
+    #[test]
+    fn quantiles_are_those_of_the_tables() {
+        let z = Normal::standard().inverse_cdf(UPPER_95);
+        // Published two-sided 95 % points of Student's law.
+        for (freedom, expected) in [
+            (4.0, 2.776),
+            (10.0, 2.228),
+            (12.0, 2.179),
+            (30.0, 2.042),
+            (120.0, 1.980),
+        ] {
+            let found = student_95(freedom, z);
+            assert!((found - expected).abs() < 6e-4, "{freedom}: {found}");
+        }
+        assert_eq!(student_95(f64::INFINITY, z), z);
+        let exact = StudentsT::new(0.0, 1.0, EXPANDED_FROM)
+            .unwrap()
+            .inverse_cdf(UPPER_95);
+        assert!((student_95(EXPANDED_FROM, z) / exact - 1.0).abs() < 5e-5);
+    }
 
     #[test]
     fn medians_differ_where_the_number_of_values_is_even() {

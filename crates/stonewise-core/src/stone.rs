@@ -117,13 +117,13 @@ pub struct PairResult {
     pub motion: Result<StoneMotion, MotionFailure>,
 }
 
-/// How certain the displacements of two neighbours are against each other.
+/// Covariance of the displacements of two neighbours relative to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Contrast {
     /// Two stones of the first epoch.
     pub stones: [StoneId; 2],
-    /// Covariance of the second one's displacement less the first one's, world, m^2; what both have in common
-    /// drops out.
+    /// Covariance of the second stone's displacement less the first stone's, world, m^2; errors that both
+    /// have in common cancel.
     pub covariance: Matrix3<f64>,
 }
 

@@ -24,7 +24,7 @@ const CHUNK: u32 = 700;
 /// More than are unpacked at once.
 const LARGE_CHUNK: u32 = 3_000_000;
 
-/// Numbers that are the same every time (Knuth 1981, linear congruence modulo 2^64).
+/// Pseudo-random numbers that are the same in every run (Knuth 1981, linear congruence modulo 2^64).
 struct Random(u64);
 
 impl Random {
@@ -212,7 +212,7 @@ fn the_number_of_points_at_a_time_does_not_matter() {
     }
 }
 
-/// What a file with damaged times in its first chunk is refused with.
+/// Message that refuses a file with damaged times in its first chunk.
 fn assert_refused(path: &Path, name: &str) {
     let refused = read_cloud(path, POINTS, |_| Ok::<(), CloudError>(()));
     let expected = format!(
@@ -230,12 +230,12 @@ fn damaged_layers_of_times_are_refused() {
         write(&path, &case, Some(CHUNK), &records(&case));
         let mut bytes = std::fs::read(&path).unwrap();
         let word = |at| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
-        // Behind the place of the table, the first point and the number of the others.
+        // After the place of the table, the first point and the number of the others.
         let sizes = word(96) + 8 + usize::from(format(&case).len()) + 4;
         let others: usize = case.items[1..].iter().map(layers).sum();
         let layers: Vec<usize> = (0..9).map(|i| word(sizes + 4 * i)).collect();
         let end = sizes + 4 * (9 + others) + layers.iter().sum::<usize>();
-        // Ones are the last symbol of every model, a switch to another sequence of times.
+        // Bytes of ones decode to the last symbol of every model: a switch to another sequence of times.
         bytes[end - layers[8]..end].fill(255);
         std::fs::write(&path, &bytes).unwrap();
         assert_refused(&path, case.name);

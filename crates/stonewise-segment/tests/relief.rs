@@ -18,7 +18,7 @@ use stonewise_segment::{Sample, Weights};
 
 const SIDE: u32 = 160;
 
-/// The built-in weights as a file of colour alone: without the tensor of relief.
+/// The built-in weights as a file for colour alone: without the tensor of relief.
 fn of_colour_alone() -> Vec<u8> {
     let bytes = Weights::BuiltIn.bytes().unwrap();
     let config = MaskRcnnConfig {
@@ -59,7 +59,7 @@ fn a_file_says_how_many_channels_its_model_takes() {
     assert_eq!(config_from_bytes(&bytes, "colour").unwrap().relief_channels, 0);
     let bytes = weights_to_bytes(&opened(&bytes, true), Precision::Half).unwrap();
     assert_eq!(config_from_bytes(&bytes, "wider").unwrap().relief_channels, 4);
-    // Files of colour alone do not name it.
+    // The configuration of a model of colour alone does not mention relief.
     let text = serde_json::to_string(&MaskRcnnConfig::light()).unwrap();
     assert!(!text.contains("relief"), "{text}");
 }

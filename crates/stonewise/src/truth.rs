@@ -25,8 +25,8 @@ const NEEDED: [&str; 11] = [
 ///
 /// `truth`: CSV with the columns `stone_id, cx, cy, cz` (centroid in epoch 1), `dx, dy, dz`, `rx, ry, rz`,
 /// `loose`, and, where known, `nx, ny, nz` (face normal), `edge` and `visible` (share of the face that both
-/// epochs measured) or `vis_tls` and `vis_uav` (the same of two scanners, of which the better one counts). A row of the results belongs to the true stone whose
-/// centroid is nearest.
+/// epochs measured) or `vis_tls` and `vis_uav` (the same of two scanners, of which the better one counts). A
+/// row of the results belongs to the true stone whose centroid is nearest.
 ///
 /// # Errors
 /// The results or the truth cannot be read, a column is missing, a value is no number.
@@ -48,7 +48,7 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     Ok(evaluation)
 }
 
-/// The covariances of neighbours as the evaluation takes them.
+/// The covariances of neighbours in the form that the evaluation takes.
 fn contrasts(set: &ResultSet) -> Vec<Contrast> {
     let contrast = |(ids, covariance): (&[u32; 2], &Matrix3<f64>)| Contrast {
         stones: ids.map(StoneId),

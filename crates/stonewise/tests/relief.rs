@@ -64,7 +64,7 @@ fn blind(folder: &Path) -> PathBuf {
     path
 }
 
-/// The same after so many steps of learning relief.
+/// The same weights after so many steps of training with relief.
 fn model(folder: &Path, steps: u64) -> PathBuf {
     let out = folder.join(format!("model-{steps}"));
     fs::create_dir_all(&out).unwrap();
@@ -139,7 +139,7 @@ fn a_run_looks_at_clouds_where_its_detector_has_learnt_relief() {
     let plain = alone(&project, &learnt, &out("c"));
     assert!(stones(&plain) > 3, "{}", stones(&plain));
     assert_ne!(in_a_run(&project, &learnt, &out("d")), plain);
-    // So they do with the built-in weights.
+    // The built-in weights, too, give other stones with clouds than without.
     let built_in = Path::new("built-in");
     let plain = alone(&project, built_in, &out("e"));
     assert_ne!(in_a_run(&project, built_in, &out("f")), plain);

@@ -2,14 +2,9 @@
 
 use super::m3c2::variances_of_means;
 use super::{ChangeField, ChangePoint};
+use crate::statistics::{UPPER_95, student_95};
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
-
-/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
-/// of its size; below, it is sought numerically, which takes longer.
-const EXPANDED_FROM: f64 = 12.0;
-/// Cumulative probability at the upper end of a 95 % interval.
-const UPPER_95: f64 = 0.975;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 impl ChangeField {
     /// The same distances, with limits for a registration error of each core point: LoD95 = t(nu) sqrt(s1^2 /
@@ -43,19 +38,6 @@ fn freedom(of_means: [f64; 2], counts: [f64; 2]) -> f64 {
     }
 }
 
-/// Student's 97.5 % quantile; `z`: the normal one. The expansion is Abramowitz & Stegun (1964), 26.7.5.
-fn student_95(freedom: f64, z: f64) -> f64 {
-    if freedom < EXPANDED_FROM {
-        return StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |law| law.inverse_cdf(UPPER_95));
-    }
-    let terms = [
-        (z.powi(3) + z) / 4.0,
-        (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / 96.0,
-        (3.0 * z.powi(7) + 19.0 * z.powi(5) + 17.0 * z.powi(3) - 15.0 * z) / 384.0,
-    ];
-    terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom) + z
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,27 +54,6 @@ mod tests {
             spread_m: spread_m.map(Some),
             counts,
         }
-    }
-
-    #[test]
-    fn quantiles_are_those_of_the_tables() {
-        let z = Normal::standard().inverse_cdf(UPPER_95);
-        // Published two-sided 95 % points of Student's law.
-        for (freedom, expected) in [
-            (4.0, 2.776),
-            (10.0, 2.228),
-            (12.0, 2.179),
-            (30.0, 2.042),
-            (120.0, 1.980),
-        ] {
-            let found = student_95(freedom, z);
-            assert!((found - expected).abs() < 6e-4, "{freedom}: {found}");
-        }
-        assert_eq!(student_95(f64::INFINITY, z), z);
-        let exact = StudentsT::new(0.0, 1.0, EXPANDED_FROM)
-            .unwrap()
-            .inverse_cdf(UPPER_95);
-        assert!((student_95(EXPANDED_FROM, z) / exact - 1.0).abs() < 5e-5);
     }
 
     #[test]

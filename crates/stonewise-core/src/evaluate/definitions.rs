@@ -54,7 +54,7 @@ const WORDS: [(&str, &str); 24] = [
     ),
     (
         "neighbours",
-        "displacement of a stone less that of a neighbour, against the same of the truth, with the covariance of the difference (neighbours.parquet): how right openings of joints are",
+        "displacement of a stone less that of a neighbour, compared with the same difference of the truth, with the covariance of the difference (neighbours.parquet); shows how accurate openings of joints are",
     ),
     (
         "significance",

@@ -25,7 +25,7 @@ pub struct Evaluation {
     /// Stone motions against an external truth, missing stones included.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub external: Option<TruthScore>,
-    /// Motions of neighbours against each other, against an external truth.
+    /// Motions of neighbours relative to each other, compared with an external truth.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub neighbours: Option<NeighbourScore>,
     /// Matches across epochs.

@@ -1,4 +1,4 @@
-//! Motions of neighbours against each other.
+//! Motions of neighbours relative to each other.
 
 use super::calibration::Calibration;
 use super::external_truth::{Owner, TrueStone};
@@ -9,19 +9,19 @@ use crate::stone::Contrast;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How right differences of the displacements of neighbours are, such as openings of joints.
+/// Errors of the differences between the displacements of neighbours, such as openings of joints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NeighbourScore {
     /// Pairs of neighbours.
     pub pairs: usize,
     /// Errors of the differences per direction of the first stone's face.
     pub errors: Directions,
-    /// Honesty of what is claimed about them.
+    /// Whether the stated covariances of the differences are correct.
     pub calibration: Calibration,
 }
 
-/// Scores the differences of neighbours whose true stones count; `owners` runs parallel to `outcomes`. `None`
-/// without such neighbours.
+/// Scores the differences between neighbours whose true stones are countable; `owners` runs parallel to
+/// `outcomes`. `None` without such neighbours.
 pub fn score_neighbours(
     outcomes: &[StoneOutcome],
     owners: &[Owner],
@@ -105,7 +105,7 @@ mod tests {
         let contrasts = [contrast(0, 1), contrast(1, 2), contrast(2, 7)];
         let params = EvaluationParams::default();
         let score = score_neighbours(&outcomes, &owners, &stones, &contrasts, &params).unwrap();
-        // Errors of 1 and 3 mm at a claim of 1 mm.
+        // Errors of 1 and 3 mm with a stated standard deviation of 1 mm.
         assert_eq!(score.pairs, 2);
         let along = score.errors.along.unwrap();
         assert!((along.rmse_m - 5e-6f64.sqrt()).abs() < 1e-12);

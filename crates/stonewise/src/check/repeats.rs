@@ -1,5 +1,5 @@
-//! Points that are there twice: in one epoch, where they count twice and make intervals too small, or in two
-//! epochs, between which they show that nothing moved.
+//! Points that occur twice: within one epoch, where they count twice and make intervals of motions too small,
+//! or in two epochs, between which they seem to show that nothing moved.
 
 use std::collections::HashMap;
 
@@ -10,19 +10,20 @@ use crate::texts::findings::{CLOUDS, ROUNDED, SAME_POINTS, TWICE};
 use nalgebra::Point3;
 use stonewise_core::geometry::cell_of;
 
-/// Edge of the cells that two points must share to be one, metres: a tenth of what scanners resolve.
+/// Edge of the cells, metres; points in the same cell count as the same point. A tenth of what scanners
+/// resolve.
 const SAME_M: f64 = 1e-4;
-/// Points of an epoch that are compared, about.
+/// About how many points of an epoch are compared.
 const COMPARED: usize = 400_000;
-/// Share of an epoch's points from which on they are no chance. A cloud that is named twice gives 1, one of
-/// three stations that is named twice a half.
+/// Share of repeated points in an epoch above which chance does not explain them. A cloud that is named twice
+/// gives 1; three stations, one of which is named twice, give a half.
 const TOO_MANY: f64 = 0.3;
-/// Coordinates in steps above this share of the points' spacing let points of two surveys fall on each other
+/// Steps of the coordinates, as a share of the point spacing, above which many points of two surveys coincide
 /// by chance; below it, fewer than one in sixteen do.
 const CHANCE_STEP: f64 = 0.25;
-/// Coordinates in steps above this multiple of the points' spacing give motions that are further off than their
-/// intervals say: on a cloud of 7.5 mm spacing, steps of 20 mm gave errors of 1.4 standard deviations, steps
-/// of 10 mm of 0.3.
+/// Steps of the coordinates, as a multiple of the point spacing, above which the errors of motions exceed
+/// their intervals: on a cloud of 7.5 mm spacing, steps of 20 mm gave errors of 1.4 standard deviations, and
+/// steps of 10 mm gave errors of 0.3.
 const COARSE_STEP: f64 = 2.0;
 
 /// Looks for repeated points and for coarse steps of the coordinates.
@@ -90,7 +91,7 @@ impl Cells {
         self.share(thinning, |cell, _| other.counts.contains_key(cell))
     }
 
-    /// Share of the points in cells of which something is true.
+    /// Share of the points that lie in cells for which `is_true` holds.
     fn share(&self, thinning: u64, is_true: impl Fn(&[i64; 3], u32) -> bool) -> f64 {
         let (mut all, mut some) = (0, 0);
         for (cell, &count) in self.counts.iter().filter(|(cell, _)| is_counted(cell, thinning)) {
@@ -106,18 +107,18 @@ fn is_counted(cell: &[i64; 3], thinning: u64) -> bool {
     let primes = [73_856_093, 19_349_663, 83_492_791];
     let parts = cell.iter().zip(primes);
     let hash = parts.fold(0, |hash, (i, prime): (&i64, i64)| hash ^ i.wrapping_mul(prime));
-    // The low bits of a product know the low bits of its factors alone.
+    // The low bits of a product depend only on the low bits of its factors.
     (hash ^ hash >> 17).cast_unsigned() % thinning == 0
 }
 
-/// The step of the coordinates, metres: the largest, of the three axes, of the usual distance between values
-/// that follow each other.
+/// The step of the coordinates, metres: the median difference between successive values of an axis, the
+/// largest of the three axes.
 fn step(points: &[Point3<f64>]) -> f64 {
     let axis = |axis: usize| {
         let mut values: Vec<f64> = points.iter().take(COMPARED).map(|p| p[axis]).collect();
         values.sort_by(f64::total_cmp);
         let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
-        // Differences of large coordinates that are equal but for the last bits are none.
+        // Large coordinates that differ only in their last bits are equal.
         let mut steps: Vec<f64> = steps.filter(|s| *s > SAME_M / 100.0).collect();
         let middle = steps.len() / 2;
         match steps.len() {
@@ -125,14 +126,14 @@ fn step(points: &[Point3<f64>]) -> f64 {
             _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
         }
     };
-    // Few points have no two coordinates alike, whatever the step.
+    // Among few points no two coordinates need be one step apart.
     match points.len() {
         0..LEAST_POINTS => 0.0,
         _ => axis(0).max(axis(1)).max(axis(2)),
     }
 }
 
-/// Points from which on the distance between neighbouring values is that of a step.
+/// Least number of points for which the median difference between successive values is the step.
 const LEAST_POINTS: usize = 10_000;
 
 #[cfg(test)]

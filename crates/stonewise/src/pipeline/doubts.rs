@@ -25,11 +25,11 @@ const UNLIKE: f64 = 0.6;
 /// surface is about 0.9.
 const LIKE: f64 = 0.3;
 
-/// The share of the votes that the points of a median stone give it, below which the photos do not agree
-/// where it is. Cameras in one frame with the cloud gave 0.94 to 0.99 (simulated), 0.87 on the real photos of
-/// `fountain`; a focal length wrong by a tenth gave 0.6, swapped axes 0.7.
+/// Median over the stones of their share of the photos' votes on their points, below which the photos
+/// disagree on where the stones are. Cameras in one frame with the cloud gave 0.94 to 0.99 (simulated) and
+/// 0.87 (the real photos of `fountain`); a focal length wrong by a tenth gave 0.6, swapped axes gave 0.7.
 const AGREED: f64 = 0.8;
-/// Stones of which a median is no chance.
+/// Least number of stones whose median is not left to chance.
 const LEAST_STONES: usize = 8;
 
 /// Warns where the motions of a pair of epochs cannot be relied on.
@@ -94,7 +94,7 @@ fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Strin
     is_off.then(|| doubt.say(&values))
 }
 
-/// The photos of an epoch do not agree about its stones.
+/// The photos of an epoch disagree on where its stones are.
 fn torn(stones: &[Stone]) -> Option<String> {
     // A single photo agrees with itself.
     let seen_twice = stones.iter().filter(|s| s.photos >= 2);

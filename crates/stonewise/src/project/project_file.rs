@@ -408,7 +408,7 @@ impl Source<'_> {
         Ok(())
     }
 
-    /// Epochs stand in time order: the first is the one that motions count from.
+    /// Epochs must be in time order, because motions count from the first one by default.
     fn check_dates(&self, epochs: &[RawEpoch]) -> Result<()> {
         let dated = epochs.iter().filter_map(|epoch| {
             let date = epoch.date.as_ref()?;
@@ -422,8 +422,8 @@ impl Source<'_> {
             if after < before {
                 let [first, second] = [earlier, later].map(|e| e.name.get_ref());
                 let message = format!(
-                    "epochs stand in time order, and {second:?} of {after} stands after {first:?} of {before}: change their \
-                     order, and name the epoch that motions count from in `reference` where it is not the first"
+                    "epochs must be in time order, but {second:?} of {after} stands after {first:?} of {before}: change their \
+                     order; if motions count from an epoch that is not the first, name it in `reference`"
                 );
                 return Err(self.error(span.clone(), message));
             }

@@ -44,9 +44,9 @@ pub struct JointMotion {
     pub sliding_m: f64,
     /// Out of the face, metres; positive: the second stone stands out.
     pub step_m: f64,
-    /// Standard deviation of the opening, metres: of [`ResultSet::neighbours`]. Where that has no covariance of
-    /// the two, the registration error of the epochs drops out and the rest of both stones' covariances is
-    /// added as if it were independent, which is an upper bound.
+    /// Standard deviation of the opening, metres, from [`ResultSet::neighbours`]. If the two stones have no
+    /// covariance there, it is an upper bound: both stones' covariances without the registration error of the
+    /// epochs, added as if they were independent.
     pub opening_sigma_m: f64,
 }
 

@@ -51,7 +51,7 @@ pub enum PairFile {
     Matches,
     /// What the estimator says about itself.
     Registration,
-    /// How certain the motions of neighbours are against each other.
+    /// Covariances of the motions of neighbours relative to each other.
     Neighbours,
     /// Scores against the motion in the project file.
     Evaluation,

@@ -1,4 +1,4 @@
-//! `neighbours.parquet`: how certain the motions of neighbours are against each other.
+//! `neighbours.parquet`: covariances of the motions of neighbours relative to each other.
 
 use super::names::PairFile;
 use crate::error::Error;
@@ -18,11 +18,11 @@ const COVARIANCE: [(&str, [usize; 2]); 6] = [
     ("cov_zz", [2, 2]),
 ];
 
-/// Covariances of the second stone's displacement less the first's, world, m^2, by the ids of both stones, the
-/// lower first.
+/// Covariances of the second stone's displacement less the first's, world, m^2, by the ids of both stones;
+/// the lower id comes first.
 pub type NeighbourCovariances = BTreeMap<[u32; 2], Matrix3<f64>>;
 
-/// Writes the file of a pair of epochs, one row for each two neighbours that were measured.
+/// Writes the file of a pair of epochs, one row for each pair of neighbours that were both measured.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -40,8 +40,8 @@ pub(crate) fn write_neighbours(dir: &Path, pair: usize, contrasts: &[Contrast]) 
         table.describe(
             name,
             "m2",
-            "covariance of the displacement of stone_2 less that of stone_1, world; what both have in common \
-             drops out",
+            "covariance of the displacement of stone_2 less that of stone_1, world; errors that both \
+             share cancel",
         );
     }
     Ok(write_parquet(&dir.join(PairFile::Neighbours.name(pair)), &table)?)
@@ -53,7 +53,7 @@ fn by_ids(contrast: &Contrast) -> ([u32; 2], Matrix3<f64>) {
     (ids, contrast.covariance)
 }
 
-/// Reads it back; empty where there is none.
+/// Reads the file of a pair of epochs; empty if there is none.
 ///
 /// # Errors
 /// The file is damaged.

@@ -29,12 +29,12 @@ messages! {
             System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
         TORN:
-            "the photos do not agree where the stones are: the points of a typical stone give it only {share} % of the votes of the \
-            photos that see them, so stones are cut out of the cloud beside their place, and their motions must not be relied on. \
+            "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, so \
+            stones are cut out of the cloud beside their place, and their motions must not be relied on. \
             Cameras and clouds do not fit each other (frame, direction of an axis, focal length), or the masks are poor; \
             `stonewise check` shows the edges of the cloud over a photo",
-            "die Fotos sind sich nicht einig, wo die Steine liegen: die Punkte eines typischen Steins geben ihm nur {share} % der \
-            Stimmen der Fotos, die sie sehen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
+            "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
+            Fotos zu seinen Punkten; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
             ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
             die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 

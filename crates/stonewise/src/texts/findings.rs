@@ -31,13 +31,14 @@ messages! {
         SAME_FILE: "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
         SAME_POINTS: "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
             "{share} % der Punkte sind die der Epoche {first}: ist die Punktwolke einer Epoche eine Kopie der anderen?";
-        TWICE: "{share} % of the points are there twice and would count twice, so that intervals come out too small: give each \
-                cloud once",
-            "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen, Intervalle also zu klein: jede Punktwolke nur \
-             einmal angeben";
-        ROUNDED: "the coordinates are in steps of {step} mm, and the points lie {spacing} mm apart: export them with more digits",
-            "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: sie mit mehr \
-             Stellen ausgeben";
+        TWICE: "{share} % of the points are there twice and would count twice, so the intervals of motions would be too small: name \
+                each cloud only once",
+            "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
+             jede Punktwolke nur einmal angeben";
+        ROUNDED: "the coordinates are in steps of {step} mm, and the points lie {spacing} mm apart: export the coordinates with \
+                  more digits",
+            "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: die \
+             Koordinaten mit mehr Stellen ausgeben";
         NO_PHOTOS: "none of the {total} photos that {file} names is in {folder}", "keines der {total} Fotos, die {file} nennt, liegt in {folder}";
         BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";

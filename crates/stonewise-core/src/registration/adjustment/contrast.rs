@@ -1,30 +1,32 @@
-//! Motions of neighbours against each other, from the joint covariance.
+//! Covariances of the motions of neighbours relative to each other.
 
 use super::estimate::{Estimate, widening};
 use super::field::stone_from_field;
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Matrix9;
+use crate::statistics::{UPPER_95, student_95};
 use crate::stone::{Contrast, PairResult};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Covariances of the displacements of neighbours against each other, where both were measured.
+/// Covariances of the displacements of neighbours relative to each other, where both were measured.
 ///
-/// A stone's motion is x = B A f + e: f the field at the stone, A what the field moves it by, B the share in
-/// which it follows, e what it does and errs beside that. Neighbours share the error of f; their covariance
-/// is B_i A_i Q_ij A_j' B_j' with the blocks Q_ij of the inverse normal matrix. Errors of the poses are
-/// shared too. Of the errors that points share over octaves of length, the shortest counts for each stone;
-/// neighbours have the longer ones in common.
+/// A stone's motion is x = B A f + e. f is the field at the stone, A turns it into a motion of the stone, B
+/// is the share with which the stone follows it, and e holds the stone's own motion and its error. Neighbours
+/// share the error of f; the covariance between them is B_i A_i Q_ij A_j' B_j' with the blocks Q_ij of the
+/// inverse normal matrix. They also share errors of the poses. Points share errors over octaves of length;
+/// only the shortest octave counts for each stone, because neighbours have the longer ones in common.
 ///
-/// Photos show each stone with the least error that the appearance bias may have (`LEAST_APPEARANCE_M`) beside
-/// that: the field averages biases over neighbours as if they were independent normal errors, while light and
-/// shadow shift single stones by many times the bias of most.
+/// Each stone that photos show also adds the least appearance bias (`LEAST_APPEARANCE_M`). The field averages
+/// biases over neighbours as if they were independent normal errors, but light and shadow shift a few stones
+/// by many times the usual bias.
 ///
-/// Ties between neighbours have a law with heavy tails, and so have errors of single photos, while f is a
-/// normal law about the weights that this gives them. The covariance is scaled so that 1.96 standard
-/// deviations hold 95 % of the law of the ties.
+/// The distributions of the ties between neighbours and of the errors of single photos have heavy tails, but
+/// the covariance of f is that of a normal distribution with the weights that result from them. The
+/// covariance is therefore scaled so that 1.96 standard deviations contain 95 % of the distribution of the
+/// ties.
 pub(crate) fn contrasts(
     adjustment: &Adjustment,
     solution: &Solution,
@@ -66,10 +68,11 @@ pub(crate) fn contrasts(
     edges.filter_map(contrast).collect()
 }
 
-/// Factor on a variance by which 1.96 standard deviations hold 95 % of a t law with these degrees of freedom.
+/// Factor on a variance with which 1.96 standard deviations contain 95 % of a t distribution with these
+/// degrees of freedom.
 fn tail_factor(freedom: f64) -> f64 {
-    let normal = Normal::standard().inverse_cdf(0.975);
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |law| (law.inverse_cdf(0.975) / normal).powi(2))
+    let normal = Normal::standard().inverse_cdf(UPPER_95);
+    (student_95(freedom, normal) / normal).powi(2)
 }
 
 /// Covariance of a stone's translation, not widened for the chance that it is loose.
@@ -77,15 +80,15 @@ fn translation(estimate: &Estimate) -> Matrix3<f64> {
     estimate.covariance.fixed_view::<3, 3>(0, 0) / widening(estimate.missed)
 }
 
-/// Covariance of two stones' translations, world, from that of the field at the first with the field at the
-/// second.
+/// Covariance between two stones' translations, world, from the covariance between the field at the first and
+/// the field at the second.
 fn between(frames: [&Matrix3<f64>; 2], estimates: [&Estimate; 2], field: &Matrix9) -> Matrix3<f64> {
     let [a, b] = [0, 1].map(|k| estimates[k].by_field * stone_from_field(frames[k]));
     let local = a * field * b.transpose();
     frames[0].transpose() * local.fixed_view::<3, 3>(0, 0) * frames[1]
 }
 
-/// What errors of the poses do to the difference of two displacements, world.
+/// Covariance of the difference of two displacements that errors of the poses cause, world.
 fn of_poses(adjustment: &Adjustment, stones: [usize; 2]) -> Matrix3<f64> {
     let block = |a: usize, b: usize| {
         let [from, to] = [a, b].map(|k| &adjustment.graph.nodes[stones[k]].face_from_world);
@@ -170,7 +173,7 @@ mod tests {
 
     #[test]
     fn heavy_tails_widen_to_their_quantile() {
-        // Tables of the t law: 3.1824 at 97.5 % for three degrees of freedom, 1.96 for the normal law.
+        // Tables of quantiles at 97.5 %: 3.1824 for t with three degrees of freedom, 1.96 for the normal law.
         assert!((tail_factor(3.0) - (3.1824f64 / 1.959_96).powi(2)).abs() < 1e-3);
         assert!((tail_factor(1e7) - 1.0).abs() < 1e-5);
     }

@@ -18,9 +18,9 @@ pub(crate) struct Estimate {
     pub covariance: Matrix9,
     /// Covariance of the translation against what the neighbours predict, m^2.
     pub relative_covariance: Matrix3<f64>,
-    /// Probability that the stone is loose, where `covariance` is widened for it ([`widening`]).
+    /// Probability that the stone is loose, if `covariance` is widened for it ([`widening`]); else 0.
     pub missed: f64,
-    /// Change of the motion with that of the field at the stone.
+    /// Derivative of the motion with respect to the motion of the field at the stone.
     pub by_field: Matrix9,
 }
 
@@ -85,9 +85,9 @@ impl Adjustment {
     }
 }
 
-/// Change of a stone's motion with that of the field: with the own motion's variances W and the observations'
-/// information H the stone departs from the field by (H + W^-1)^-1 H of what its observations ask for, and
-/// follows it by (I + W H)^-1.
+/// Derivative of a stone's motion with respect to the field's motion. W are the variances of the stone's own
+/// motion, H is the information of its observations. The stone departs from the field by (H + W^-1)^-1 H
+/// times the difference that its observations show, so it follows the field with the share (I + W H)^-1.
 pub(crate) fn by_field(equations: &NormalEquations, own: &[f64; 9]) -> Matrix9 {
     let own = Matrix9::from_diagonal(&Vector9::from(*own));
     (Matrix9::identity() + own * equations.information)

@@ -110,7 +110,7 @@ pub struct AdjustmentReport {
     pub loose: usize,
     /// Neighbours between which the field broke.
     pub breaks: Vec<Break>,
-    /// How certain the motions of neighbours are against each other.
+    /// Covariances of the motions of neighbours relative to each other.
     pub contrasts: Vec<Contrast>,
     /// What photos contributed, where they took part.
     pub photos: Option<PhotoReport>,

@@ -92,9 +92,9 @@ impl Adjustment {
         }
     }
 
-    /// Covariance, caused by errors of the poses, of two stones' displacements, each in its frame; of a
-    /// stone's own where both are the same. The stones share these errors, so no number of stones averages
-    /// them away; they count by the share that the photos have in a stone's motion.
+    /// Covariance between two stones' displacements that errors of the poses cause, each stone in its own
+    /// frame; for `i == j`, the covariance of one displacement. The stones share these errors, so no number
+    /// of stones averages them away. They are weighted by the share that the photos have in a stone's motion.
     pub fn pose_covariance(&self, i: usize, j: usize) -> Matrix3<f64> {
         let Some(photos) = &self.photos else {
             return Matrix3::zeros();
@@ -107,8 +107,8 @@ impl Adjustment {
         covariance().unwrap_or_else(Matrix3::zeros)
     }
 
-    /// Covariance of a stone's displacement, in its frame, that the least appearance bias causes by the share of
-    /// the photos.
+    /// Covariance of a stone's displacement, in its frame, that the least appearance bias causes, weighted by
+    /// the share of the photos in the displacement.
     pub fn least_photo_error(&self, i: usize) -> Matrix3<f64> {
         let covariance = || {
             let photos = self.photos.as_ref()?.stone(i)?;

@@ -106,8 +106,8 @@ pub struct EpochErrors {
     pub rigid: RigidError,
     /// Error at each stone, in their order.
     pub at: Vec<ErrorAt>,
-    /// Covariance of the error at the second of two neighbours less that at the first, world, m^2, in their
-    /// order.
+    /// Covariance of the error at the second of two neighbours less the error at the first, world, m^2, in
+    /// the order of [`EpochPair::neighbours`].
     #[serde(skip)]
     pub between: Vec<Matrix3<f64>>,
 }
@@ -121,7 +121,7 @@ pub struct EpochPair<'a> {
     pub same_as: &'a [usize],
     /// The stones.
     pub stones: &'a [SeenStone],
-    /// Neighbours among them, as indices.
+    /// Pairs of neighbours among them, as indices.
     pub neighbours: &'a [[usize; 2]],
     /// Points in stable areas.
     pub stable: &'a [StablePoints],
@@ -359,7 +359,7 @@ impl Averaged {
         pair.stones.par_iter().map(at).collect()
     }
 
-    /// Of neighbours, without the independent error of each source at each stone.
+    /// Covariances between neighbours, without the independent error of each source at each stone.
     fn between(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<Matrix3<f64>> {
         let difference = |stones: &[usize; 2]| {
             let [first, second] = stones.map(|i| difference_row(&pair.stones[i], pair.sources, unknowns));

@@ -273,7 +273,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     let sd = without.at[0].covariance[(0, 0)].sqrt();
     assert!((6e-4..4e-3).contains(&sd), "{sd}");
     assert!(without.at[0].mean.norm() < 5e-4, "{}", without.at[0].mean);
-    // Stones share what is uncertain, the more the nearer they are.
+    // The nearer two stones are, the more of the error they share.
     let between = [0, 1, 2].map(|k| without.between[k].trace().sqrt());
     assert!(0.0 < between[0] && between[0] < 0.5 * between[1], "{between:?}");
     assert!(between[1] < 0.5 * sd && between[2] < 1e-9, "{between:?} {sd}");

@@ -9,8 +9,8 @@ use nalgebra::Vector2;
 
 /// Rounds in which the template follows the photos.
 const ROUNDS: usize = 3;
-/// Distance within which photos of one epoch are sought on each other, standard deviations of their poses'
-/// difference.
+/// Distance within which photos of one epoch are searched for on each other, in standard deviations of the
+/// difference that errors of two poses cause.
 const POSE_SDS: f64 = 4.0;
 /// Distance in which a least-squares match may end from its start, cells: within the grain that smoothing
 /// leaves.
@@ -22,7 +22,7 @@ pub(super) struct Face {
     pub cells: FaceCells,
     /// Correlation below which a photo is left out.
     min_correlation: f64,
-    /// Distance within which photos of one epoch are sought on each other, cells.
+    /// Distance within which photos of one epoch are searched for on each other, cells.
     pose_reach: isize,
 }
 
@@ -35,7 +35,7 @@ pub(super) struct Mean {
 impl Face {
     /// `pixel_m`: size of a pixel on the face, metres.
     pub fn new(surface: Surface, pixel_m: f64, params: &PhotoParams) -> Self {
-        // Position and attitude each shift two photos by the error of a pose.
+        // Two photos, each shifted by errors of position and of attitude: the root of four variances.
         let apart_px = 2.0 * params.pose_error_px;
         Self {
             cells: FaceCells::new(&surface),
@@ -45,7 +45,7 @@ impl Face {
         }
     }
 
-    /// The mean of photos of one epoch brought onto each other, refined in rounds; `None` where none matches.
+    /// The mean of photos of one epoch aligned with each other, refined in rounds; `None` if none matches.
     pub fn template(&self, patches: &[Patch]) -> Option<Mean> {
         let mut mean = self.first_mean(patches)?;
         for round in 1..ROUNDS {
@@ -57,7 +57,7 @@ impl Face {
         Some(mean)
     }
 
-    /// The mean of photos of one epoch brought onto one of them: enough to search with.
+    /// The mean of photos of one epoch aligned with one of them: accurate enough for a search.
     pub fn first_mean(&self, patches: &[Patch]) -> Option<Mean> {
         let matches = self.first_matches(patches)?;
         let template = self.mean(patches, &matches)?;
@@ -111,8 +111,8 @@ impl Face {
 
     /// Photos of an epoch matched with the template of the other epoch.
     ///
-    /// Their own template is sought within `reach` cells, so that errors of single poses do not blur the
-    /// search; each photo starts from where it lies on that.
+    /// The mean of their own epoch is searched for within `reach` cells, so that errors of single poses do
+    /// not blur the search. Each photo starts from its own shift on that mean.
     pub fn matches_across(
         &self,
         template: &Template,
@@ -209,8 +209,8 @@ mod tests {
         POSES.iter().map(photo).collect()
     }
 
-    /// The largest distance of matches from the shifts of the photos' poses and of `moved`, cells, with the
-    /// shift that all have in common left out.
+    /// The largest distance of matches from the shifts that the photos' poses and `moved` cause, cells, after
+    /// the shift that all have in common is removed.
     fn largest_error(matches: &[Option<Match>], moved: [f64; 2]) -> Option<f64> {
         let errors: Option<Vec<Vector2<f64>>> = matches
             .iter()

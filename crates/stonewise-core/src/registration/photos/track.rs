@@ -173,7 +173,8 @@ impl Tracker<'_> {
         grey.iter().map(|g| normalised(g, surface, window_m)).collect()
     }
 
-    /// The second epoch's photos on the template, taken about where the stone is found from `start` on.
+    /// Matches the second epoch's photos with the template. Patches are first taken about `start`, then again
+    /// about where the stone was found.
     fn followed(
         &self,
         face: &Face,
@@ -210,13 +211,13 @@ impl Tracker<'_> {
         })
     }
 
-    /// The mean of an epoch's photos, where enough of them agree.
+    /// The mean of an epoch's photos, if enough of them agree.
     fn agreeing(&self, mean: Option<Mean>) -> Result<Mean, PhotoStatus> {
         mean.filter(|m| self.are_enough(&m.matches))
             .ok_or(PhotoStatus::NoTemplate)
     }
 
-    /// Matches of the second epoch with the template, where they are enough.
+    /// Matches of the second epoch with the template, if there are enough.
     fn found(&self, matches: Option<Vec<Option<Match>>>) -> Result<Vec<Option<Match>>, PhotoStatus> {
         matches
             .filter(|m| self.are_enough(m))
@@ -270,7 +271,7 @@ impl Tracker<'_> {
     }
 }
 
-/// Where a match starts after its patch was taken again with the face moved by `shift`, cells.
+/// Start of a match whose patch was taken again with the face moved by `shift`, cells.
 fn start_after(found: &Option<Match>, shift: Vector2<f64>) -> Warp {
     match found {
         Some(found) => Warp {

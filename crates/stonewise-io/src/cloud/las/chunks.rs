@@ -30,7 +30,7 @@ pub enum Chunks {
     Known(Vec<Chunk>),
     /// One of them is too large to be held in memory.
     Large(Vec<Chunk>),
-    /// Nothing says where they end.
+    /// The file does not say where they end.
     Unknown {
         /// Where the first one begins.
         start: u64,
@@ -54,7 +54,7 @@ impl Chunks {
     pub fn check(file: &Envelope, compression: &Compression) -> Result<Self, CloudError> {
         let (points, path) = (file.points(), &file.path);
         if points == 0 {
-            // Whatever its table says, it must not be read.
+            // The chunks must not be read, whatever their table says.
             return Ok(Self::Known(Vec::new()));
         }
         let bytes = file.length - file.start();
@@ -197,7 +197,7 @@ fn walk_layers(file: &Envelope, vlr: &LazVlr) -> Result<Vec<Chunk>, CloudError> 
     Ok(chunks)
 }
 
-/// A chunk of layers, as its head describes it, the bytes of the head included.
+/// A chunk of layers as its head describes it; its bytes include the head.
 fn layered_chunk(
     file: &Envelope,
     vlr: &LazVlr,

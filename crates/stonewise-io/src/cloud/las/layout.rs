@@ -18,7 +18,7 @@ pub struct Layout {
     /// All extended variable length records, of which the header has only the first.
     pub extended: Vec<las::Vlr>,
     pub corrections: Corrections,
-    /// How the points are compressed, where they are.
+    /// How the points are compressed; `None` if they are not.
     pub packing: Option<Packing>,
 }
 

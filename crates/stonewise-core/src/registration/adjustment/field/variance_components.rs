@@ -38,7 +38,8 @@ const RARE_RAD: f64 = 5e-3;
 
 /// Number of components; the last one counts where photos take part.
 pub(crate) const COUNT: usize = 9;
-/// Least appearance bias, metres: a thirtieth of a pixel, as far as interpolation and lens model are trusted.
+/// Least appearance bias, metres: a thirtieth of a pixel, the accuracy expected of interpolation and lens
+/// model.
 pub(crate) const LEAST_APPEARANCE_M: f64 = 1e-4;
 /// Appearance bias before it is estimated, metres: a fifth of a pixel.
 pub(crate) const START_APPEARANCE_M: f64 = 7e-4;

@@ -12,8 +12,8 @@ use super::point::Point;
 
 /// Groups of returns for which coordinates are predicted separately.
 const GROUPS: usize = 6;
-/// Group of the return in a column of all returns of a pulse, a row (LASzip:
-/// `number_return_map_6ctx`). Numbers that cannot be, as the third of two returns, have groups too.
+/// Group of a return. Rows: number of returns of the pulse; columns: number of the return (LASzip:
+/// `number_return_map_6ctx`). Impossible numbers, such as the third of two returns, have groups too.
 const GROUP: [[u8; 16]; 16] = [
     [0, 1, 2, 3, 4, 5, 3, 4, 4, 5, 5, 5, 5, 5, 5, 5],
     [1, 0, 1, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3, 3],
@@ -32,9 +32,10 @@ const GROUP: [[u8; 16]; 16] = [
     [5, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5, 5],
     [5, 3, 3, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 5, 5],
 ];
-/// Returns between this one and the last of its pulse, at most, for which heights are predicted separately.
+/// Levels for which heights are predicted separately: how many returns of the pulse follow, 7 or more
+/// together.
 const LEVELS: u8 = 8;
-/// Contexts of the corrections of y and z: pairs of numbers of bits, up to these.
+/// The contexts of the corrections of y and z are numbers of bits, rounded down to even ones, up to these.
 const Y_BITS: u32 = 20;
 const Z_BITS: u32 = 18;
 
@@ -80,7 +81,7 @@ enum ReturnNumber {
     Other,
 }
 
-/// Models of symbols, each made where it is first needed.
+/// Models of symbols, each made when it is first needed.
 struct Models {
     symbols: u32,
     models: Vec<Option<ArithmeticModel>>,
@@ -172,12 +173,12 @@ impl Context {
         layer.decode_symbol(self.changes.get(context)).map(Changes)
     }
 
-    /// By how many channels the next point is further, of four.
+    /// By how many channels, counted around all four, the next point's channel differs from this one.
     pub fn read_channel_step(&mut self, layer: &mut Layer) -> io::Result<usize> {
         Ok(layer.decode_symbol(&mut self.channel)? as usize + 1)
     }
 
-    /// Makes the last point the next one.
+    /// Replaces the last point by the next one.
     pub fn read_point(&mut self, changes: Changes, layers: &mut Layers) -> io::Result<()> {
         let layer = layers.position()?;
         self.read_returns(changes, layer)?;
@@ -273,7 +274,7 @@ impl Context {
         Ok(())
     }
 
-    /// Angle, user data and number of the scan.
+    /// Scan angle, user data and point source.
     fn read_origin(&mut self, changes: Changes, layers: &mut Layers) -> io::Result<()> {
         let last = &mut self.last;
         if let Some(layer) = layers.get(Attribute::ScanAngle).filter(|_| changes.scan_angle()) {
@@ -299,7 +300,7 @@ impl Context {
     }
 }
 
-/// The even one of a pair of numbers of bits, up to a largest.
+/// A number of bits, rounded down to an even one, at most `most`.
 fn pair_of_bits(bits: u32, most: u32) -> u32 {
     if bits < most { bits & !1 } else { most }
 }

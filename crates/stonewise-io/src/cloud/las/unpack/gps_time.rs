@@ -1,9 +1,9 @@
 //! GPS times of compressed points (LASzip: item GPSTIME11 of version 2, and the times of item POINT14).
 //!
-//! A time is stored as its difference from the last one of its sequence, in multiples of the difference
-//! before; a file keeps four sequences and can switch between them in front of a time (LASzip 3.4,
-//! `lasreaditemcompressed_v2.cpp` and `_v3.cpp`). The laz library follows every switch by a call of itself.
-//! A byte of damaged data can hold 45,000 of them, and the calls overflow the stack; here they are counted.
+//! A time is stored as its difference from the last time of its sequence, in multiples of the sequence's
+//! step. A file keeps four sequences and can switch between them before each time (LASzip 3.4,
+//! `lasreaditemcompressed_v2.cpp` and `_v3.cpp`). The laz library makes a recursive call for every switch. A
+//! byte of damaged data can stand for 45,000 switches, which overflow the stack; here switches are counted.
 
 use std::io::{self, Read};
 
@@ -14,15 +14,16 @@ use laz::record::FieldDecompressor;
 
 /// Sequences of times in a file.
 const SEQUENCES: usize = 4;
-/// Largest multiple of the last difference that has a symbol of its own.
+/// Largest multiple of the step that has a symbol of its own.
 const LARGEST_MULTIPLE: u32 = 500;
-/// Smallest one.
+/// Smallest multiple that has a symbol of its own.
 const SMALLEST_MULTIPLE: i32 = -10;
 /// Symbols of multiples: 0 to 500, and -1 to -10 after them.
 const MULTIPLES: u32 = LARGEST_MULTIPLE + SMALLEST_MULTIPLE.unsigned_abs() + 1;
 /// Symbols after those of the multiples: a whole time, and switches by one, two and three sequences.
 const OTHERS: u32 = 4;
-/// Differences that are no multiple, one after the other, before a sequence takes a new one.
+/// Differences with the multiple 0, the largest or the smallest, that a sequence takes before it gets a new
+/// step.
 const MOST_EXTREMES: u32 = 3;
 
 /// How the corrections of a difference are told apart: the contexts of its coder.
@@ -101,7 +102,7 @@ impl GpsTimes {
 
     /// The next time; an error where a file switches between its sequences without end.
     pub fn next<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> io::Result<f64> {
-        // A writer switches once at most; after as many switches as there are sequences all have been tried.
+        // A writer switches at most once; four switches before one time mean that the data are damaged.
         for _ in 0..SEQUENCES {
             let symbol = if self.sequences[self.current].step == 0 {
                 self.next_without_step(decoder)?
@@ -152,7 +153,7 @@ impl GpsTimes {
         }
     }
 
-    /// A time that differs by about a multiple of the last difference.
+    /// A time that differs from the last one by about a multiple of the step.
     fn multiple<R: Read>(&mut self, symbol: u32, decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
         let (multiple, context) = match symbol {
             0 => (0, correction::ZERO),
@@ -179,7 +180,7 @@ impl GpsTimes {
         Ok(())
     }
 
-    /// A time far from the last one: it begins the sequence that was begun longest ago anew.
+    /// A time far from the last one: it restarts the oldest sequence.
     fn whole_time<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> io::Result<Symbol> {
         let expected = (self.sequences[self.current].time >> 32) as i32;
         let high = self

@@ -1,6 +1,6 @@
 //! The running median that predicts coordinates (LASzip: `StreamingMedian5`).
 
-/// Five values, of which every new one pushes out the largest or the smallest.
+/// Five values; each new one replaces the largest or the smallest.
 #[derive(Clone, Copy)]
 pub struct Median {
     /// In rising order.

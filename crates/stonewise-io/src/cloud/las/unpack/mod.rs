@@ -41,7 +41,7 @@ pub struct LazReader {
 
 /// How the chunks are read.
 enum Reading {
-    /// Several at a time; their places are known.
+    /// Several at a time, because their places are known.
     Parallel(ParallelChunks),
     /// One after the other, each from where the one before it ends.
     Serial(Box<SerialChunks>),
@@ -97,7 +97,7 @@ struct Format<'a> {
     record_bytes: usize,
 }
 
-/// The number of the chunk, from 0, that an error is in.
+/// An error comes with the number of its chunk, counted from 0.
 type ChunkResult = Result<(), (usize, las::Error)>;
 
 fn chunk_error(path: &Path, chunk: usize, error: las::Error) -> CloudError {
@@ -122,7 +122,7 @@ impl<R> Unpacking<R> {
     }
 }
 
-/// Bytes of records for at most this many points, cut off from the front.
+/// Cuts the bytes of at most this many points off the front of `records`.
 fn split<'a>(records: &mut &'a mut [u8], points: u64, record_bytes: usize) -> &'a mut [u8] {
     let all = (records.len() / record_bytes) as u64;
     let bytes = points.min(all) as usize * record_bytes;
@@ -141,7 +141,7 @@ struct ParallelChunks {
 /// A chunk of which some points are still packed.
 struct OpenChunk {
     number: usize,
-    /// Until the first points are unpacked.
+    /// Bytes of the chunk; empty once the first points are unpacked.
     packed: Vec<u8>,
     points: u64,
     unpacking: Option<Unpacking<Cursor<Vec<u8>>>>,
@@ -209,11 +209,11 @@ fn ended() -> las::Error {
 
 /// Chunks whose ends are unknown, or that are too large to be held in memory.
 struct SerialChunks {
-    /// While no chunk is open.
+    /// The file, while no chunk is open.
     file: Option<BufReader<File>>,
-    /// Empty where nothing says where they are: then one begins where the one before it ends.
+    /// Empty if their places are unknown: each chunk then begins where the one before it ends.
     known: Vec<Chunk>,
-    /// Points of a chunk that nothing is known of.
+    /// Points of each chunk whose place is unknown.
     points: u64,
     number: usize,
     unpacking: Option<Unpacking<BufReader<File>>>,

@@ -14,7 +14,7 @@ const CHANNELS: usize = 4;
 
 /// Decoder of points.
 pub struct PointItem {
-    /// Version 3 tells the items after it the channel of a point only where it changes, version 4 always.
+    /// Version 3 passes the channel of a point to the items after it only when it changes, version 4 always.
     always_tells_channel: bool,
     layers: Layers,
     current: usize,

@@ -12,7 +12,7 @@ use crate::cloud::las::compression::{Compression, Order};
 /// The decoder of the points of a chunk.
 pub type Decoder<R> = Box<dyn RecordDecompressor<R> + Send>;
 
-/// The laz library's decoder, but for the items with GPS times.
+/// The laz library's decoder, except for the items with GPS times, which are decoded here.
 pub fn decoder<R: Read + Seek + Send + 'static>(
     compression: &Compression,
     source: R,

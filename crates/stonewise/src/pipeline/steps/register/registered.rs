@@ -16,7 +16,7 @@ pub(super) const STEP: &str = "register";
 pub struct Registered {
     /// One result per matched stone, ascending by stone of the first epoch.
     pub results: Vec<PairResult>,
-    /// How certain the motions of neighbours are against each other; empty where the estimator gives none.
+    /// Covariances of the motions of neighbours relative to each other; empty if the estimator gives none.
     pub contrasts: Vec<Contrast>,
     /// What the estimator says about itself.
     pub estimator: EstimatorRecord,
@@ -37,8 +37,8 @@ impl Registered {
         self.error_stones.iter().copied().zip(errors).collect()
     }
 
-    /// The two stones of each contrast as indices into `stones`; contrasts of others are left out here and in
-    /// the results.
+    /// The two stones of each contrast as indices into `stones`. Contrasts of other stones are removed, also
+    /// from the results.
     pub(super) fn neighbours_among(&mut self, stones: &[StoneId]) -> Vec<[usize; 2]> {
         let index: BTreeMap<StoneId, usize> = stones.iter().copied().zip(0..).collect();
         self.contrasts
@@ -49,7 +49,8 @@ impl Registered {
             .collect()
     }
 
-    /// Adds to each contrast the covariance of what the error of the epochs differs by between its stones.
+    /// Adds to each contrast the covariance of the difference that the error of the epochs has between its
+    /// stones.
     pub(super) fn add_registration(&mut self, between: &[Matrix3<f64>]) {
         for (contrast, covariance) in self.contrasts.iter_mut().zip(between) {
             contrast.covariance += covariance;

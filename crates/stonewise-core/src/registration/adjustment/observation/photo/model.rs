@@ -162,8 +162,8 @@ impl PhotoModel {
         self.stones[i].as_ref()
     }
 
-    /// Covariance, caused by errors of the poses, of two stones' displacements by their photos, each in its
-    /// frame.
+    /// Covariance between two stones' displacements by their photos that errors of the poses cause, each
+    /// stone in its own frame.
     pub fn pose_covariance(&self, first: &StonePhotos, second: &StonePhotos) -> Matrix3<f64> {
         first.by_poses.covariance_with(&second.by_poses, &self.of_poses)
     }

@@ -85,12 +85,12 @@ pub(super) struct StoneSystem {
     columns: Vec<usize>,
 }
 
-/// What errors of the poses change of a stone's displacement by its photos, in the stone's frame.
+/// How errors of the poses change a stone's displacement by its photos, in the stone's frame.
 #[derive(Clone, Debug)]
 pub(crate) struct PoseInfluence {
-    /// Which unknowns of the poses.
+    /// Indices of the unknowns of the poses.
     columns: Vec<usize>,
-    /// Displacement by these unknowns, three rows.
+    /// Derivative of the displacement with respect to these unknowns, three rows.
     matrix: Matrix3xX<f64>,
 }
 
@@ -329,7 +329,7 @@ impl StoneSystem {
     }
 
     /// What the photos alone say of the displacement, template and height eliminated: information,
-    /// information times displacement, and what the poses' errors change of it.
+    /// information times displacement, and how the poses' errors change the displacement.
     pub fn displacement(&self, poses: &Poses) -> Option<(Matrix3<f64>, Vector3<f64>, PoseInfluence)> {
         let right = self.right - &self.cross * self.of(&poses.corrections);
         let inner = self.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;
@@ -466,7 +466,7 @@ mod tests {
             (joined - expected).norm() < 1e-6 * expected.norm(),
             "{joined} {expected}"
         );
-        // Errors of the poses: the displacements change by what each unknown changes them.
+        // Derivatives by differences: each unknown of the poses is changed by one.
         let other = problem.system(&problem.stones[5], &weights[5], factor);
         let changes = |system: &StoneSystem| -> DMatrix<f64> {
             let displacement = |step: Option<usize>| {

@@ -20,7 +20,7 @@ pub(crate) struct StonePhotos {
     /// Factor on the variance of the stone's appearance bias: faces that seem strained, which stones cannot
     /// be, have more.
     pub bias_factor: f64,
-    /// What errors of the poses change of the displacement; other stones share them.
+    /// How errors of the poses change the displacement; other stones share these errors.
     pub by_poses: PoseInfluence,
 }
 
