@@ -274,9 +274,13 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     assert!((6e-4..4e-3).contains(&sd), "{sd}");
     assert!(without.at[0].mean.norm() < 5e-4, "{}", without.at[0].mean);
     // The nearer two stones are, the more of the error they share.
-    let between = [0, 1, 2].map(|k| without.between[k].trace().sqrt());
-    assert!(0.0 < between[0] && between[0] < 0.5 * between[1], "{between:?}");
-    assert!(between[1] < 0.5 * sd && between[2] < 1e-9, "{between:?} {sd}");
+    let [near, far] = [0, 1].map(|k| without.between[k].trace().sqrt());
+    assert!(
+        0.0 < near && near < 0.5 * far && far < 0.5 * sd,
+        "{near} {far} {sd}"
+    );
+    let itself = without.between[2].trace();
+    assert!(itself.abs() < 1e-12 * sd * sd, "{itself}");
 }
 
 #[test]
