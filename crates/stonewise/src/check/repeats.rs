@@ -9,6 +9,7 @@ use crate::project::Project;
 use crate::texts::findings::{CLOUDS, ROUNDED, SAME_POINTS, TWICE};
 use nalgebra::Point3;
 use stonewise_core::geometry::cell_of;
+use stonewise_core::statistics::upper_median;
 
 /// Edge of the cells, metres; points in the same cell count as the same point. A tenth of what scanners
 /// resolve.
@@ -120,11 +121,7 @@ fn step(points: &[Point3<f64>]) -> f64 {
         let steps = values.windows(2).map(|pair| pair[1] - pair[0]);
         // Large coordinates that differ only in their last bits are equal.
         let mut steps: Vec<f64> = steps.filter(|s| *s > SAME_M / 100.0).collect();
-        let middle = steps.len() / 2;
-        match steps.len() {
-            0 => 0.0,
-            _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
-        }
+        upper_median(&mut steps).unwrap_or(0.0)
     };
     // Among few points no two coordinates need be one step apart.
     match points.len() {

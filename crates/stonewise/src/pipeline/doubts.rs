@@ -7,6 +7,7 @@ use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
 use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, Message, NOT_CONVERGED, TORN};
+use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::{Stone, StoneMotion};
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
@@ -99,8 +100,7 @@ fn torn(stones: &[Stone]) -> Option<String> {
     // A single photo agrees with itself.
     let seen_twice = stones.iter().filter(|s| s.photos >= 2);
     let mut shares: Vec<f64> = seen_twice.map(|s| s.confidence).collect();
-    shares.sort_by(f64::total_cmp);
-    let median = *shares.get(shares.len() / 2)?;
+    let median = upper_median(&mut shares)?;
     (shares.len() >= LEAST_STONES && median < AGREED).then(|| {
         let share = format!("{:.0}", 100.0 * median);
         TORN.say(&[("share", &*share)])

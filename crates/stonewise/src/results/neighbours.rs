@@ -1,12 +1,13 @@
 //! `neighbours.parquet`: covariances of the motions of neighbours relative to each other.
 
+use super::evidence::read_table;
 use super::names::PairFile;
 use crate::error::Error;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::stone::Contrast;
-use stonewise_io::table::{Table, read_parquet, write_parquet};
+use stonewise_io::table::{Table, write_parquet};
 
 /// Columns of the covariance, with row and column of the matrix.
 const COVARIANCE: [(&str, [usize; 2]); 6] = [
@@ -59,10 +60,9 @@ fn by_ids(contrast: &Contrast) -> ([u32; 2], Matrix3<f64>) {
 /// The file is damaged.
 pub(crate) fn read_neighbours(dir: &Path, pair: usize) -> Result<NeighbourCovariances, Error> {
     let path = dir.join(PairFile::Neighbours.name(pair));
-    if !path.exists() {
+    let Some(table) = read_table(&path)? else {
         return Ok(NeighbourCovariances::new());
-    }
-    let table = read_parquet(&path)?;
+    };
     let [first, second] = ["stone_1", "stone_2"].map(|name| table.required::<u32>(name));
     let (first, second) = (first?, second?);
     let values = COVARIANCE

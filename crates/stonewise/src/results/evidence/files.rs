@@ -17,7 +17,7 @@ pub(super) fn make_dir(dir: &Path) -> Result<(), Error> {
 }
 
 /// A table, or `None` where the file is missing.
-pub(super) fn read_table(path: &Path) -> Result<Option<Table>, Error> {
+pub(in crate::results) fn read_table(path: &Path) -> Result<Option<Table>, Error> {
     if !path.exists() {
         return Ok(None);
     }

@@ -13,6 +13,7 @@ mod sections;
 pub use cameras::{PosedPhoto, write_cameras};
 pub use cloud::{ThinPoint, write_thin_cloud};
 pub use crops::{Crop, crop_side_px, write_crops};
+pub(super) use files::read_table;
 pub use logo::{Logo, write_logo};
 pub use sections::{Cut, SectionPoint, write_sections};
 

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
+use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::{Contrast, PairResult};
 
 /// Name of the step.
@@ -66,8 +67,7 @@ impl Registered {
             EstimatorRecord::Gicp(_) => {
                 let motions = self.results.iter().filter_map(|r| r.motion.as_ref().ok());
                 let mut residuals: Vec<f64> = motions.map(|m| m.rmse_m).filter(|r| r.is_finite()).collect();
-                residuals.sort_by(f64::total_cmp);
-                residuals.get(residuals.len() / 2).copied().unwrap_or(0.0)
+                upper_median(&mut residuals).unwrap_or(0.0)
             }
         }
     }
