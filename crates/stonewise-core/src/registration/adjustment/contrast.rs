@@ -1,13 +1,14 @@
 //! Covariances of the motions of neighbours relative to each other.
 
 use super::estimate::{Estimate, widening};
-use super::field::stone_from_field;
+use super::field::{Edge, stone_from_field};
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Matrix9;
+use super::tracking::PhotoPart;
 use crate::statistics::{UPPER_95, student_95};
-use crate::stone::{Contrast, PairResult};
-use nalgebra::Matrix3;
+use crate::stone::{Contrast, MotionFailure, PairResult};
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -27,45 +28,77 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// the covariance of f is that of a normal distribution with the weights that result from them. The
 /// covariance is therefore scaled so that 1.96 standard deviations contain 95 % of the distribution of the
 /// ties.
+///
+/// `shared`: variances of the shortest octave of the errors that a stone's points share.
 pub(crate) fn contrasts(
     adjustment: &Adjustment,
     solution: &Solution,
     results: &[PairResult],
+    estimates: &[Result<Estimate, MotionFailure>],
+    shared: &[f64; 9],
 ) -> Vec<Contrast> {
-    let shared = adjustment.shared_variances(1.0);
-    let estimates: Vec<Option<Estimate>> = results
+    let tails = tail_factor(adjustment.params.tie_freedom);
+    let octave = Matrix3::from_diagonal(&Vector3::new(shared[0], shared[1], shared[2]));
+    let measured: Vec<Option<Measured>> = estimates
         .par_iter()
         .enumerate()
-        .map(|(i, r)| {
-            r.motion
-                .as_ref()
-                .ok()
-                .map(|_| adjustment.estimate(i, solution, &shared))
+        .map(|(i, estimate)| {
+            let estimate = estimate.as_ref().ok().filter(|_| results[i].motion.is_ok())?;
+            Some(Measured::new(adjustment, i, estimate, &octave))
         })
         .collect();
-    let tails = tail_factor(adjustment.params.tie_freedom);
-    let own = Matrix3::from_diagonal(&nalgebra::Vector3::new(shared[0], shared[1], shared[2]));
-    let edges = adjustment.graph.edges.par_iter().enumerate();
-    let contrast = |(k, edge): (usize, &super::field::Edge)| {
-        let [low, high] = [edge.low, edge.high];
-        let [a, b] = [estimates[low].as_ref()?, estimates[high].as_ref()?];
-        let frames = [low, high].map(|i| &adjustment.graph.nodes[i].face_from_world);
-        let between = between(frames, [a, b], &solution.field.inverse.edges[k].transpose());
-        let spread = in_world(frames[0], &translation(a)) + in_world(frames[1], &translation(b))
-            - between
-            - between.transpose();
-        let both_missed = a.missed + b.missed;
+    let contrast = |(k, edge): (usize, &Edge)| {
+        let [a, b] = [measured[edge.low].as_ref()?, measured[edge.high].as_ref()?];
+        let between = between([a, b], &solution.field.inverse.edges[k].transpose());
+        let spread = a.translation + b.translation - between - between.transpose();
+        let both_missed = a.estimate.missed + b.estimate.missed;
         Some(Contrast {
-            stones: [low, high].map(|i| results[i].first),
+            stones: [edge.low, edge.high].map(|i| results[i].first),
             covariance: without_negative(&spread) * (widening(both_missed) * tails)
-                + in_world(frames[0], &own)
-                + in_world(frames[1], &own)
-                + in_world(frames[0], &adjustment.least_photo_error(low))
-                + in_world(frames[1], &adjustment.least_photo_error(high))
-                + of_poses(adjustment, [low, high]),
+                + a.octave
+                + b.octave
+                + a.least_photo_error
+                + b.least_photo_error
+                + of_poses([a, b]),
         })
     };
+    let edges = adjustment.graph.edges.par_iter().enumerate();
     edges.filter_map(contrast).collect()
+}
+
+/// What a measured stone brings to every contrast; covariances in the world.
+struct Measured<'a> {
+    estimate: &'a Estimate,
+    face_from_world: &'a Matrix3<f64>,
+    photos: Option<PhotoPart<'a>>,
+    /// Of the translation, not widened for the chance that the stone is loose.
+    translation: Matrix3<f64>,
+    /// Of the shortest octave of the errors that its points share.
+    octave: Matrix3<f64>,
+    least_photo_error: Matrix3<f64>,
+    /// Of what errors of the poses cause.
+    of_poses: Matrix3<f64>,
+}
+
+impl<'a> Measured<'a> {
+    fn new(adjustment: &'a Adjustment, i: usize, estimate: &'a Estimate, octave: &Matrix3<f64>) -> Self {
+        let face_from_world = &adjustment.graph.nodes[i].face_from_world;
+        let in_world = |covariance: &Matrix3<f64>| face_from_world.transpose() * covariance * face_from_world;
+        let photos = adjustment.photo_part(i);
+        let translation = estimate.covariance.fixed_view::<3, 3>(0, 0) / widening(estimate.missed);
+        let of_photos = |covariance: &dyn Fn(&PhotoPart) -> Matrix3<f64>| {
+            in_world(&photos.as_ref().map_or_else(Matrix3::zeros, covariance))
+        };
+        Self {
+            estimate,
+            face_from_world,
+            translation: in_world(&translation),
+            octave: in_world(octave),
+            least_photo_error: of_photos(&|part| part.least_error()),
+            of_poses: of_photos(&|part| part.pose_covariance(part)),
+            photos,
+        }
+    }
 }
 
 /// Factor on a variance with which 1.96 standard deviations contain 95 % of a t distribution with these
@@ -75,31 +108,22 @@ fn tail_factor(freedom: f64) -> f64 {
     (student_95(freedom, normal) / normal).powi(2)
 }
 
-/// Covariance of a stone's translation, not widened for the chance that it is loose.
-fn translation(estimate: &Estimate) -> Matrix3<f64> {
-    estimate.covariance.fixed_view::<3, 3>(0, 0) / widening(estimate.missed)
-}
-
 /// Covariance between two stones' translations, world, from the covariance between the field at the first and
 /// the field at the second.
-fn between(frames: [&Matrix3<f64>; 2], estimates: [&Estimate; 2], field: &Matrix9) -> Matrix3<f64> {
-    let [a, b] = [0, 1].map(|k| estimates[k].by_field * stone_from_field(frames[k]));
-    let local = a * field * b.transpose();
-    frames[0].transpose() * local.fixed_view::<3, 3>(0, 0) * frames[1]
+fn between([a, b]: [&Measured; 2], field: &Matrix9) -> Matrix3<f64> {
+    let [by_first, by_second] = [a, b].map(|s| s.estimate.by_field * stone_from_field(s.face_from_world));
+    let local = by_first * field * by_second.transpose();
+    a.face_from_world.transpose() * local.fixed_view::<3, 3>(0, 0) * b.face_from_world
 }
 
 /// Covariance of the difference of two displacements that errors of the poses cause, world.
-fn of_poses(adjustment: &Adjustment, stones: [usize; 2]) -> Matrix3<f64> {
-    let block = |a: usize, b: usize| {
-        let [from, to] = [a, b].map(|k| &adjustment.graph.nodes[stones[k]].face_from_world);
-        from.transpose() * adjustment.pose_covariance(stones[a], stones[b]) * to
+fn of_poses([a, b]: [&Measured; 2]) -> Matrix3<f64> {
+    let local = match [&a.photos, &b.photos] {
+        [Some(first), Some(second)] => first.pose_covariance(second),
+        _ => Matrix3::zeros(),
     };
-    let between = block(0, 1);
-    without_negative(&(block(0, 0) + block(1, 1) - between - between.transpose()))
-}
-
-fn in_world(face_from_world: &Matrix3<f64>, covariance: &Matrix3<f64>) -> Matrix3<f64> {
-    face_from_world.transpose() * covariance * face_from_world
+    let between = a.face_from_world.transpose() * local * b.face_from_world;
+    without_negative(&(a.of_poses + b.of_poses - between - between.transpose()))
 }
 
 /// Symmetric, and without the negative eigenvalues that rounding leaves.
@@ -164,7 +188,16 @@ mod tests {
                 &own,
             ),
         });
-        let found = between([&frames[0], &frames[1]], [&estimates[0], &estimates[1]], &field);
+        let measured = [0, 1].map(|k| Measured {
+            estimate: &estimates[k],
+            face_from_world: &frames[k],
+            photos: None,
+            translation: Matrix3::zeros(),
+            octave: Matrix3::zeros(),
+            least_photo_error: Matrix3::zeros(),
+            of_poses: Matrix3::zeros(),
+        });
+        let found = between([&measured[0], &measured[1]], &field);
         assert!(
             (found - expected).norm() < 1e-6 * expected.norm(),
             "{found} {expected}"

@@ -2,6 +2,7 @@
 
 use super::breaks::find_breaks;
 use super::contrast::contrasts;
+use super::estimate::Estimate;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
 use super::params::AdjustmentReport;
@@ -12,6 +13,7 @@ use super::stone_vector::Matrix9;
 use crate::geometry::Rigid3;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 
 /// A cell whose epochs differ by this many times the expected variance shows two surfaces (1 in 400 by
 /// chance).
@@ -37,7 +39,11 @@ pub(crate) fn report(
     converged: bool,
 ) -> AdjustmentReport {
     let tested = last.map_or_else(Vec::new, |solution| test_stones(adjustment, solution));
-    let results = last.map_or_else(Vec::new, |solution| results(adjustment, solution, &tested));
+    let shared = adjustment.shared_variances(1.0);
+    let estimates = last.map_or_else(Vec::new, |solution| estimates(adjustment, solution, &shared));
+    let results = last.map_or_else(Vec::new, |solution| {
+        results(adjustment, solution, &tested, &estimates)
+    });
     let breaks = last.map_or_else(Vec::new, |solution| {
         find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose)
     });
@@ -46,7 +52,9 @@ pub(crate) fn report(
         .filter_map(|r| r.motion.as_ref().ok().filter(|m| !m.loose))
         .map(|m| m.displacement)
         .collect();
-    let contrasts = last.map_or_else(Vec::new, |solution| contrasts(adjustment, solution, &results));
+    let contrasts = last.map_or_else(Vec::new, |solution| {
+        contrasts(adjustment, solution, &results, &estimates, &shared)
+    });
     let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
     AdjustmentReport {
         loose: results.iter().filter(is_loose).count(),
@@ -57,7 +65,7 @@ pub(crate) fn report(
         correlation_factor: adjustment.surface.correlation.factor(),
         components: adjustment.components,
         common_motion: moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64,
-        common_covariance: last.map_or_else(Matrix3::zeros, |s| common_covariance(adjustment, s)),
+        common_covariance: last.map_or_else(Matrix3::zeros, |s| common_covariance(adjustment, s, &shared)),
         iterations,
         converged,
         breaks,
@@ -70,28 +78,49 @@ pub(crate) fn report(
 /// and of errors that points share over whole octaves of length. Of these the longest is one error of the
 /// whole wall, the next has four patches, and so on: 1 + 1/4 + 1/16 + ... of an octave's variance is left in
 /// the mean.
-fn common_covariance(adjustment: &Adjustment, solution: &Solution) -> Matrix3<f64> {
-    let (own, shared) = (
-        adjustment.components.own_variances(),
-        adjustment.shared_variances(1.0),
-    );
+///
+/// `shared`: variances of errors that all points of a stone share, over one octave.
+fn common_covariance(adjustment: &Adjustment, solution: &Solution, shared: &[f64; 9]) -> Matrix3<f64> {
+    let own = adjustment.components.own_variances();
     let octave = shared[0];
     let of_stone = (0..3).map(|k| own[k] + shared[k] - octave).fold(0.0, f64::max);
     let stones = adjustment.stones.len().max(1) as f64;
     solution.field.mean_covariance + Matrix3::identity() * (of_stone / stones + OCTAVES_IN_MEAN * octave)
 }
 
-fn results(adjustment: &Adjustment, solution: &Solution, tested: &[Tested]) -> Vec<PairResult> {
-    let shared = [1.0, adjustment.octaves()].map(|octaves| adjustment.shared_variances(octaves));
-    let stones = adjustment.stones.iter().zip(tested).enumerate();
+/// The stones' motions, or why there is none; `shared`: variances of errors that all points of a stone share,
+/// against its neighbours.
+fn estimates(
+    adjustment: &Adjustment,
+    solution: &Solution,
+    shared: &[f64; 9],
+) -> Vec<Result<Estimate, MotionFailure>> {
+    let estimate = |i: usize| match failure(adjustment, i) {
+        Some(failure) => Err(failure),
+        None => Ok(adjustment.estimate(i, solution, shared)),
+    };
+    (0..adjustment.stones.len())
+        .into_par_iter()
+        .map(estimate)
+        .collect()
+}
+
+fn results(
+    adjustment: &Adjustment,
+    solution: &Solution,
+    tested: &[Tested],
+    estimates: &[Result<Estimate, MotionFailure>],
+) -> Vec<PairResult> {
+    let shared = adjustment.shared_variances(adjustment.octaves());
+    let stones = adjustment.stones.iter().zip(estimates).enumerate();
     stones
-        .map(|(i, (stone, tested))| PairResult {
+        .map(|(i, (stone, estimate))| PairResult {
             first: stone.info.first,
             second: stone.info.second,
-            motion: match failure(adjustment, i) {
-                Some(failure) => Err(failure),
-                None => observable(
-                    motion(adjustment, i, solution, *tested, &shared),
+            motion: match estimate {
+                Err(failure) => Err(failure.clone()),
+                Ok(estimate) => observable(
+                    motion(adjustment, i, solution, tested[i], estimate, &shared),
                     adjustment.params.max_sd_m,
                 ),
             },
@@ -148,29 +177,30 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
-/// `shared`: variances of errors that all points of a stone share, against its neighbours and against the
-/// other epoch.
+/// `shared`: variances of errors that all points of a stone share, against the other epoch.
 fn motion(
     adjustment: &Adjustment,
     i: usize,
     solution: &Solution,
     tested: Tested,
-    shared: &[[f64; 9]; 2],
+    estimate: &Estimate,
+    shared: &[f64; 9],
 ) -> StoneMotion {
     let node = &adjustment.graph.nodes[i];
     let world = node.face_from_world.transpose();
-    let estimate = adjustment.estimate(i, solution, &shared[0]);
     let x = estimate.mean + adjustment.common_in(i);
     let displacement = world * x.translation();
     let rotation = world * x.rotation();
     let turned = UnitQuaternion::from_scaled_axis(rotation);
     let arm = node.centroid.coords;
     let mut local = estimate.covariance;
-    for (k, variance) in shared[1].iter().enumerate() {
+    for (k, variance) in shared.iter().enumerate() {
         local[(k, k)] += variance;
     }
-    let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
-    of_poses += adjustment.pose_covariance(i, i);
+    if let Some(photos) = adjustment.photo_part(i) {
+        let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
+        of_poses += photos.pose_covariance(&photos);
+    }
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];
     let common = adjustment.common_in(i).translation();

@@ -18,6 +18,30 @@ const OPEN: [f64; 2] = [0.2, 1.0];
 /// Standard deviations of the clouds' place within which a stone is sought.
 const SEARCH_SDS: f64 = 3.0;
 
+/// The part of the photos in a stone's displacement.
+pub(crate) struct PhotoPart<'a> {
+    model: &'a PhotoModel,
+    stone: &'a StonePhotos,
+    /// Share of the photos in the displacement.
+    share: Matrix3<f64>,
+}
+
+impl PhotoPart<'_> {
+    /// Covariance between two stones' displacements that errors of the poses cause, each stone in its own
+    /// frame; with itself, the covariance of one displacement. The stones share these errors, so no number of
+    /// stones averages them away.
+    pub fn pose_covariance(&self, other: &Self) -> Matrix3<f64> {
+        self.share * self.model.pose_covariance(self.stone, other.stone) * other.share.transpose()
+    }
+
+    /// Covariance of the stone's displacement, in its frame, that the least appearance bias causes.
+    pub fn least_error(&self) -> Matrix3<f64> {
+        let variance = LEAST_APPEARANCE_M.powi(2) * self.stone.bias_factor;
+        let bias = Matrix3::from_diagonal(&Vector3::new(variance, variance, 0.0));
+        self.share * bias * self.share.transpose()
+    }
+}
+
 impl Adjustment {
     /// Tracks every stone, batch by batch.
     pub fn track<S: PairSource>(
@@ -92,42 +116,18 @@ impl Adjustment {
         }
     }
 
-    /// Covariance between two stones' displacements that errors of the poses cause, each stone in its own
-    /// frame; for `i == j`, the covariance of one displacement. The stones share these errors, so no number
-    /// of stones averages them away. They are weighted by the share that the photos have in a stone's motion.
-    pub fn pose_covariance(&self, i: usize, j: usize) -> Matrix3<f64> {
-        let Some(photos) = &self.photos else {
-            return Matrix3::zeros();
-        };
-        let covariance = || {
-            let [first, second] = [photos.stone(i)?, photos.stone(j)?];
-            let [by_first, by_second] = [self.share_of(i, first)?, self.share_of(j, second)?];
-            Some(by_first * photos.pose_covariance(first, second) * by_second.transpose())
-        };
-        covariance().unwrap_or_else(Matrix3::zeros)
-    }
-
-    /// Covariance of a stone's displacement, in its frame, that the least appearance bias causes, weighted by
-    /// the share of the photos in the displacement.
-    pub fn least_photo_error(&self, i: usize) -> Matrix3<f64> {
-        let covariance = || {
-            let photos = self.photos.as_ref()?.stone(i)?;
-            let share = self.share_of(i, photos)?;
-            let variance = LEAST_APPEARANCE_M.powi(2) * photos.bias_factor;
-            let bias = Matrix3::from_diagonal(&Vector3::new(variance, variance, 0.0));
-            Some(share * bias * share.transpose())
-        };
-        covariance().unwrap_or_else(Matrix3::zeros)
-    }
-
-    /// Share of the photos in a stone's displacement; `None` where neither photos nor points determine it.
-    fn share_of(&self, i: usize, photos: &StonePhotos) -> Option<Matrix3<f64>> {
-        let (information, _, _) = photos.with_bias(self.components.appearance_m());
+    /// The part of the photos in a stone's displacement; `None` where they show nothing of it, or where
+    /// neither photos nor points determine it.
+    pub fn photo_part(&self, i: usize) -> Option<PhotoPart<'_>> {
+        let model = self.photos.as_ref()?;
+        let stone = model.stone(i)?;
+        let (information, _, _) = stone.with_bias(self.components.appearance_m());
         let by_clouds = self
             .cloud_motion(i, [0.0; 2])
             .and_then(|c| c.covariance.try_inverse())
             .unwrap_or_else(Matrix3::zeros);
-        Some((by_clouds + information).try_inverse()? * information)
+        let share = (by_clouds + information).try_inverse()? * information;
+        Some(PhotoPart { model, stone, share })
     }
 
     /// Whether a stone's photos alone make it more probable that it is loose than that it moves as
