@@ -6,6 +6,7 @@ use super::observation::Observation;
 use super::sight::StablePlane;
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 /// Probability at which something is left out that stood still, divided by the number of things tested: the
@@ -89,16 +90,17 @@ fn most_moved<G: Ord + Copy>(
     let tested = groups.into_iter().filter_map(|g| {
         let (information, vector) = problem.motion_of(&solution, &components, |o| of(o) == Some(g));
         let motion = Motion::of(&information, &vector);
-        (motion.length_m > least_m).then_some((motion.p_still, g))
+        (motion.length_m > least_m).then_some((motion, g))
     });
-    let (p, least) = tested.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (p < RATE / tests).then_some(least)
+    let (motion, moved) = tested.min_by(|a, b| a.0.by_significance(&b.0))?;
+    (motion.p_still < RATE / tests).then_some(moved)
 }
 
 /// The apparent motion of a group of cells, along the directions that are seen.
 struct Motion {
     /// Probability of so large a motion of what stood still.
     p_still: f64,
+    chi_square: f64,
     length_m: f64,
 }
 
@@ -116,8 +118,16 @@ impl Motion {
         }
         Self {
             p_still: ChiSquared::new(f64::from(seen)).map_or(1.0, |law| law.sf(chi_square)),
+            chi_square,
             length_m: f64::sqrt(square),
         }
+    }
+
+    /// The more significant first. Probabilities of large motions are all zero in numbers of 64 bits; then
+    /// the squares tell them apart.
+    fn by_significance(&self, other: &Self) -> Ordering {
+        let by_p = self.p_still.total_cmp(&other.p_still);
+        by_p.then(other.chi_square.total_cmp(&self.chi_square))
     }
 }
 
