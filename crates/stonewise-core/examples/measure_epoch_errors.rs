@@ -164,6 +164,7 @@ fn main() {
         stones: &stones,
         neighbours: &[],
         stable: &stable,
+        offered: &[],
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());

@@ -13,7 +13,9 @@ use crate::report_params::Language;
 use crate::results::Status;
 use crate::results::records::State;
 pub(crate) use braces::fill;
-pub(crate) use doubts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, NOT_CONVERGED, TORN};
+pub(crate) use doubts::{
+    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, TORN,
+};
 pub(crate) use message::Message;
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,

@@ -83,6 +83,7 @@ fn measure(case: &Case, seed: u64, is_full: bool) -> Wall {
         stones: &survey.stones,
         neighbours: &[],
         stable: &survey.stable,
+        offered: &[],
         sigma_m: survey.sigma_m,
     };
     Wall::new(&survey, &epoch_errors(&pair, &EpochErrorParams::default()))

@@ -6,7 +6,11 @@ use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, Message, NOT_CONVERGED, TORN};
+use crate::texts::{
+    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, Message, NOT_CONVERGED, TORN,
+};
+use nalgebra::Vector3;
+use stonewise_core::registration::observers::CrossCheck;
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::{Stone, StoneMotion};
 
@@ -25,6 +29,10 @@ const UNLIKE: f64 = 0.6;
 /// The best place is no chance from this correlation on: that of wrong places reaches 0.17, that of the same
 /// surface is about 0.9.
 const LIKE: f64 = 0.3;
+
+/// A registration error is doubted where what surfaces off the wall show has a smaller probability: one sound
+/// survey in a thousand.
+const MISREGISTERED: f64 = 1e-3;
 
 /// Median over the stones of their share of the photos' votes on their points, below which the photos
 /// disagree on where the stones are. Cameras in one frame with the cloud gave 0.94 to 0.99 (simulated) and
@@ -54,7 +62,17 @@ pub fn note_doubts(
     for (name, message) in beside(context, number, offsets) {
         context.warnings.doubt("label", name, message);
     }
-    let found = [unsettled(registered), few_measured(rows), blind(registered, rows)];
+    let cross_check = registered
+        .epoch_errors
+        .as_ref()
+        .and_then(|e| e.cross_check.as_ref());
+    let stated_m = context.project.settings.registration.epoch_error_m;
+    let found = [
+        unsettled(registered),
+        cross_check.and_then(|check| misregistered(stated_m, check)),
+        few_measured(rows),
+        blind(registered, rows),
+    ];
     for message in found.into_iter().flatten() {
         context.warnings.doubt("register", epoch, message);
     }
@@ -116,6 +134,23 @@ fn unsettled(registered: &Registered) -> Option<String> {
     (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
 }
 
+/// Surfaces off the wall show a registration error that differs from what the motions are corrected by, far
+/// beyond its uncertainty. Where the project states the error, it stands.
+fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<String> {
+    if stated_m.is_some() || check.p >= MISREGISTERED {
+        return None;
+    }
+    let mm = |v: &Vector3<f64>| format!("({:+.1}, {:+.1}, {:+.1})", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
+    let sd = check.covariance.diagonal().max().max(0.0).sqrt();
+    let values = [
+        ("cells", &*check.cells.to_string()),
+        ("shown", &*mm(&check.error)),
+        ("found", &*mm(&check.found)),
+        ("sd", &*format!("{:.1}", 1e3 * sd)),
+    ];
+    Some(MISREGISTERED_EPOCH.say(&values))
+}
+
 /// Most of the stones that were found in both epochs could not be measured.
 fn few_measured(rows: &[StoneRow]) -> Option<String> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
@@ -165,7 +200,7 @@ fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Point3, Vector3};
+    use nalgebra::Point3;
     use stonewise_core::id::StoneId;
 
     fn stones(count: u32, photos: u32, confidence: impl Fn(u32) -> f64) -> Vec<Stone> {
@@ -190,5 +225,22 @@ mod tests {
         assert_eq!(torn(&stones(21, 1, |_| 0.5)), None);
         assert_eq!(torn(&stones(7, 3, |_| 0.5)), None);
         assert_eq!(torn(&[]), None);
+    }
+
+    #[test]
+    fn what_surfaces_off_the_wall_show_is_doubted_only_against_an_assumption() {
+        let with = |p| CrossCheck {
+            cells: 30,
+            error: Vector3::new(0.02, 0.0, -0.001),
+            found: Vector3::zeros(),
+            covariance: nalgebra::Matrix3::identity() * 25e-8,
+            p,
+        };
+        assert_eq!(misregistered(None, &with(0.01)), None);
+        assert_eq!(misregistered(Some(0.02), &with(1e-9)), None);
+        let message = misregistered(None, &with(1e-9)).unwrap();
+        for part in ["30 pieces", "(+20.0, +0.0, -1.0) mm", "of 0.5 mm"] {
+            assert!(message.contains(part), "{message}");
+        }
     }
 }

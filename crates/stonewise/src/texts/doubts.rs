@@ -38,6 +38,16 @@ messages! {
             ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
             die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
+        MISREGISTERED_EPOCH:
+            "{cells} pieces of plane off the wall show this epoch shifted by {shown} mm (x, y, z) against the first, while its stations \
+            and strips by themselves show {found} mm with a standard deviation of {sd} mm. If those surfaces did not move, all motions \
+            are wrong by the difference: use them with auto_stable = true, or name some under [[registration.stable]]. If they did \
+            move, state the error of the registration as epoch_error_m",
+            "{cells} Ebenenstücke neben der Mauer zeigen diese Epoche um {shown} mm (x, y, z) gegen die erste verschoben, während ihre \
+            Standpunkte und Streifen für sich {found} mm mit einer Standardabweichung von {sd} mm zeigen. Haben sich diese Flächen \
+            nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: mit auto_stable = true verwenden oder einige unter \
+            [[registration.stable]] angeben. Haben sie sich bewegt, den Fehler der Registrierung als epoch_error_m angeben";
+
         FEW_MEASURED:
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
             the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \

@@ -4,31 +4,18 @@ use super::assumptions::{Model, WIDE, whole_m};
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
 use super::congruence::{reweighted, standing};
-use super::contrast::{ContrastParams, contrasts};
+use super::contrast::contrasts;
+use super::cross_check::{CrossCheck, cross_check};
+use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
-use super::sight::{SeenStone, Sight, Source, SourcePoints};
-use super::stable::{StableParams, StablePoints, stable_observations};
-use crate::geometry::lever;
-use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use super::rigid::{RigidError, difference_row, rigid_rows, shares};
+use super::sight::{SeenStone, Sight, Source};
+use super::stable::stable_observations;
+use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
-use std::collections::BTreeMap;
-
-/// Parameters of [`epoch_errors`].
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct EpochErrorParams {
-    /// Comparison of the sources of an epoch.
-    pub contrasts: ContrastParams,
-    /// Planes in stable areas.
-    pub stable: StableParams,
-    /// Error that all sources of an epoch share, 1 sigma per axis, metres; absent: by the class of the
-    /// sensor.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub shared_error_m: Option<f64>,
-}
 
 /// Where the knowledge of the epochs' common frame comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,24 +51,6 @@ pub struct SourceError {
     pub sd: Vector3<f64>,
 }
 
-/// The rigid motion that lies closest to the later epoch's error at the stones.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RigidError {
-    /// Middle of the stones, world, metres.
-    pub centre: Point3<f64>,
-    /// Shift of the centre and rotation vector about it, m, rad.
-    pub error: Vector6<f64>,
-    /// Covariance of that, m^2, m rad, rad^2.
-    pub covariance: Matrix6<f64>,
-}
-
-impl RigidError {
-    /// The error at a place, world, metres.
-    pub fn at(&self, place: &Point3<f64>) -> Vector3<f64> {
-        lever(&(place - self.centre)) * self.error
-    }
-}
-
 /// Result of [`epoch_errors`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpochErrors {
@@ -104,29 +73,15 @@ pub struct EpochErrors {
     pub sources: Vec<SourceError>,
     /// The rigid part of the error over all stones.
     pub rigid: RigidError,
+    /// What surfaces off the wall show; only where the datum comes from the sources.
+    #[serde(default)]
+    pub cross_check: Option<CrossCheck>,
     /// Error at each stone, in their order.
     pub at: Vec<ErrorAt>,
     /// Covariance of the error at the second of two neighbours less the error at the first, world, m^2, in
     /// the order of [`EpochPair::neighbours`].
     #[serde(skip)]
     pub between: Vec<Matrix3<f64>>,
-}
-
-/// What is measured and stated about two epochs.
-pub struct EpochPair<'a> {
-    /// Sources of both epochs.
-    pub sources: &'a [Source],
-    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the
-    /// other half.
-    pub same_as: &'a [usize],
-    /// The stones.
-    pub stones: &'a [SeenStone],
-    /// Pairs of neighbours among them, as indices.
-    pub neighbours: &'a [[usize; 2]],
-    /// Points in stable areas.
-    pub stable: &'a [StablePoints],
-    /// Noise of single points along the normal, metres.
-    pub sigma_m: f64,
 }
 
 /// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one
@@ -139,8 +94,6 @@ const LEAST_WEIGHT: f64 = 1e-3;
 /// Error of a source on a plane as a whole, as a share of that of a single cell: most of it differs with
 /// incidence and surface.
 const PLANE_SHARE: f64 = 0.5;
-/// Most stones by which the rigid part of the error is found.
-const RIGID_STONES: usize = 500;
 /// Prior of a source's error where nothing but stable areas shows it, metres.
 const OPEN_M: f64 = 0.03;
 
@@ -197,10 +150,15 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
     let model = match datum {
         Datum::Stable => model.widened(&unknowns, &all),
-        _ => model,
+        Datum::Sources | Datum::Unknown => model,
     };
     let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
+    let rigid = rigid_rows(pair, &unknowns).error(&found.weighted());
+    let cross_check = match datum {
+        Datum::Sources => cross_check(pair, &within, &rigid, &model, params),
+        Datum::Stable | Datum::Unknown => None,
+    };
     EpochErrors {
         datum,
         class,
@@ -210,7 +168,8 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         observations,
         moved_areas,
         sources: found.sources(pair, &unknowns),
-        rigid: found.rigid(pair, &unknowns),
+        rigid,
+        cross_check,
         at: found.at_stones(pair, &unknowns, model.components.nugget_m),
         between: found.between(pair, &unknowns),
     }
@@ -224,27 +183,6 @@ fn is_one_survey(pair: &EpochPair) -> bool {
 /// Number of sources of each epoch.
 fn counts(pair: &EpochPair) -> [usize; 2] {
     [0, 1].map(|e| pair.sources.iter().filter(|s| s.epoch == e).count())
-}
-
-/// All sights, by which the blocks of the unknowns are laid out.
-fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
-    let of_stone = |stone: &super::sight::SeenStone| {
-        let centroid = stone.centroid;
-        stone
-            .sights
-            .iter()
-            .map(|s| Sight {
-                source: s.source,
-                time_s: s.time_s,
-                place: centroid,
-                plane: None,
-            })
-            .collect::<Vec<_>>()
-    };
-    let stones = pair.stones.iter().flat_map(of_stone);
-    stones
-        .chain(stable.iter().flat_map(|o| o.sights.clone()))
-        .collect()
 }
 
 /// The components, and twice what they gain in log likelihood over sources without errors; disturbed stones
@@ -370,38 +308,9 @@ impl Averaged {
         pair.neighbours.par_iter().map(difference).collect()
     }
 
-    /// The rigid motion closest to the error at the stones, which is linear in the unknowns.
-    fn rigid(&self, pair: &EpochPair, unknowns: &Unknowns) -> RigidError {
-        let stride = pair.stones.len().div_ceil(RIGID_STONES).max(1);
-        let stones: Vec<&SeenStone> = pair.stones.iter().step_by(stride).collect();
-        let count = stones.len().max(1) as f64;
-        let centre = Point3::from(stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / count);
-        let mut normal = Matrix6::identity() * 1e-9;
-        let mut parts: BTreeMap<usize, SMatrix<f64, 6, 3>> = BTreeMap::new();
-        for stone in &stones {
-            let j = lever(&(stone.centroid - centre)).transpose();
-            normal += j * j.transpose();
-            for (first, coefficients) in difference_row(stone, pair.sources, unknowns) {
-                *parts.entry(first).or_default() += j * coefficients;
-            }
-        }
-        let inverse = normal.try_inverse().unwrap_or_else(Matrix6::zeros);
-        let mut error = Vector6::zeros();
-        let mut covariance = Matrix6::zeros();
-        for (w, solution) in &self.solutions {
-            for (a, of_a) in &parts {
-                error += inverse * of_a * solution.mean.fixed_rows::<3>(*a) * *w;
-                for (b, of_b) in &parts {
-                    let block = solution.covariance.fixed_view::<3, 3>(*a, *b);
-                    covariance += inverse * of_a * block * of_b.transpose() * inverse * *w;
-                }
-            }
-        }
-        RigidError {
-            centre,
-            error,
-            covariance: 0.5 * (covariance + covariance.transpose()),
-        }
+    /// The solutions with their weights.
+    fn weighted(&self) -> Vec<(f64, &Solution)> {
+        self.solutions.iter().map(|(w, s)| (*w, s)).collect()
     }
 
     fn sources(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<SourceError> {
@@ -428,35 +337,6 @@ impl Averaged {
         };
         pair.sources.iter().enumerate().map(describe).collect()
     }
-}
-
-/// How much each sight of a stone counts in its motion: each source by its share of its epoch's points, the
-/// reference with the other sign.
-fn shares(stone: &SeenStone, sources: &[Source]) -> Vec<f64> {
-    let total = [0, 1].map(|e| {
-        let own = stone.sights.iter().filter(|s| sources[s.source].epoch == e);
-        own.map(|s| s.count as f64).sum::<f64>().max(1.0)
-    });
-    let share = |s: &SourcePoints| {
-        let epoch = sources[s.source].epoch;
-        [-1.0, 1.0][epoch] * s.count as f64 / total[epoch]
-    };
-    stone.sights.iter().map(share).collect()
-}
-
-/// The later epoch's error less that of the reference at a stone.
-fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &Unknowns) -> Row {
-    let mut row = Row::new();
-    for (s, share) in stone.sights.iter().zip(shares(stone, sources)) {
-        let sight = Sight {
-            source: s.source,
-            time_s: s.time_s,
-            place: stone.centroid,
-            plane: None,
-        };
-        row.extend(unknowns.row(&sight).into_iter().map(|(k, m)| (k, m * share)));
-    }
-    row
 }
 
 fn applied(row: &Row, solution: &Solution) -> (Vector3<f64>, Matrix3<f64>) {

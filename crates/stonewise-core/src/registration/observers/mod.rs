@@ -24,9 +24,12 @@ mod component_estimate;
 mod components;
 mod congruence;
 mod contrast;
+mod cross_check;
 mod epoch_error;
+mod epoch_pair;
 mod model;
 mod observation;
+mod rigid;
 mod sight;
 mod stable;
 #[cfg(test)]
@@ -34,6 +37,8 @@ mod tests;
 
 pub use components::{ObserverComponents, SensorClass};
 pub use contrast::ContrastParams;
-pub use epoch_error::{Datum, EpochErrorParams, EpochErrors, EpochPair, ErrorAt, SourceError, epoch_errors};
+pub use cross_check::CrossCheck;
+pub use epoch_error::{Datum, EpochErrors, ErrorAt, SourceError, epoch_errors};
+pub use epoch_pair::{EpochErrorParams, EpochPair};
 pub use sight::{SeenStone, Source, SourcePoints};
 pub use stable::{StableParams, StablePoints};

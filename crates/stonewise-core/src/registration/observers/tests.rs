@@ -2,7 +2,8 @@
 
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
-use super::epoch_error::{Datum, EpochErrorParams, EpochPair, epoch_errors};
+use super::epoch_error::{Datum, EpochErrors, epoch_errors};
+use super::epoch_pair::{EpochErrorParams, EpochPair};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
 use super::sight::{SeenStone, Sight, Source, SourcePoints};
@@ -250,6 +251,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
             stones: &stones,
             neighbours: &[[0, 1], [0, 4], [3, 3]],
             stable,
+            offered: &[],
             sigma_m: 0.002,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
@@ -348,6 +350,7 @@ fn an_area_that_moved_is_named_and_left_out() {
             stones: &stones,
             neighbours: &[],
             stable: &stable,
+            offered: &[],
             sigma_m: 0.002,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
@@ -380,6 +383,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         stones: &stones,
         neighbours: &[],
         stable: &stable_points(&errors, 0.002),
+        offered: &[],
         sigma_m: 0.002,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
@@ -388,6 +392,48 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         let rest = at.mean - truth;
         assert!(rest.norm() < 3e-4, "{rest}");
     }
+}
+
+#[test]
+fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
+    let sources = sources(2);
+    // The third area settled by itself by `settled_m`.
+    let errors_with = |shift: &Vector3<f64>, settled_m: f64, is_offered: bool| {
+        let mut errors = ERRORS;
+        errors[2..].iter_mut().for_each(|e| *e += shift);
+        let mut offered = stable_points(&errors, 0.002);
+        for (area, x, down_m) in [(1, 3.0, 0.0), (2, -3.0, settled_m)] {
+            let mut of_area = errors;
+            of_area[2..].iter_mut().for_each(|e| e.z -= down_m);
+            offered.extend(stable_area(area, &Vector3::new(x, 0.0, 0.0), &of_area, 0.002));
+        }
+        let pair = EpochPair {
+            sources: &sources,
+            same_as: &[0, 1, 2, 3],
+            stones: &wall(&errors, 0.002, 1),
+            neighbours: &[],
+            stable: &[],
+            offered: if is_offered { &offered } else { &[] },
+            sigma_m: 0.002,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default())
+    };
+    // Errors of the size by which the sources of an epoch differ.
+    let own = 0.5 * (ERRORS[2] + ERRORS[3] - ERRORS[0] - ERRORS[1]);
+    let sound = errors_with(&(-0.6 * own), 0.0, true);
+    let check = sound.cross_check.clone().unwrap();
+    assert!(check.p > 0.01, "{check:?}");
+    assert!((check.error - 0.4 * own).norm() < 5e-4, "{check:?} {own}");
+    let unused = EpochErrors {
+        cross_check: None,
+        ..sound
+    };
+    assert_eq!(unused, errors_with(&(-0.6 * own), 0.0, false));
+    let shift = Vector3::new(-0.01, 0.01, 0.012);
+    let check = errors_with(&shift, 0.05, true).cross_check.unwrap();
+    assert!(check.p < 1e-6, "{check:?}");
+    assert!((check.error - shift - own).norm() < 1e-3, "{check:?} {own}");
+    assert!(check.found.norm() < 5e-4, "{check:?}");
 }
 
 #[test]
@@ -413,6 +459,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
         stones: &stones,
         neighbours: &[],
         stable: &[],
+        offered: &[],
         sigma_m: 0.002,
     };
     // One survey: nothing else is uncertain where the same sources count alike.
@@ -439,6 +486,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
         stones: &stones,
         neighbours: &[],
         stable: &[],
+        offered: &[],
         sigma_m: 0.002,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());

@@ -107,7 +107,7 @@ pub fn register(
             [first, second],
             number,
             &matches,
-            params.auto_stable.then_some(&off_wall),
+            &off_wall,
             context.progress,
         )?;
         let neighbours = registered.neighbours_among(&sights.stones);
@@ -117,6 +117,7 @@ pub fn register(
             stones: &sights.seen,
             neighbours: &neighbours,
             stable: &sights.stable,
+            offered: &sights.offered,
             sigma_m: registered.noise_m(),
         };
         let observers = EpochErrorParams {

@@ -5,7 +5,7 @@ use crate::pipeline::steps::label::Labelled;
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::{BTreeMap, HashMap};
 use stonewise_core::cloud::TileSource;
-use stonewise_core::geometry::cell_of;
+use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
 
@@ -112,6 +112,31 @@ impl OffWall {
     /// The area that a point lies in.
     pub fn area(&self, p: &Point3<f64>) -> Option<usize> {
         self.cells.get(&cell_of(p, CELL_M)).copied()
+    }
+
+    /// Every so many areas, so that at most `most` are left, in their order.
+    pub fn thinned(&self, most: usize) -> Self {
+        let stride = self.areas.len().div_ceil(most.max(1)).max(1);
+        let kept = |area: usize| area.is_multiple_of(stride);
+        Self {
+            cells: self
+                .cells
+                .iter()
+                .filter(|(_, area)| kept(**area))
+                .map(|(cell, area)| (*cell, area / stride))
+                .collect(),
+            areas: self.areas.iter().step_by(stride).copied().collect(),
+        }
+    }
+
+    /// Bounds of each area and of the cells in front of and behind it.
+    pub fn bounds(&self) -> Vec<Bounds> {
+        let layer = Vector3::repeat(CELL_M);
+        let widened = |[low, high]: &[Point3<f64>; 2]| Bounds {
+            min: low - layer,
+            max: high + layer,
+        };
+        self.areas.iter().map(widened).collect()
     }
 
     /// Lowest and highest corner of each area.
@@ -243,6 +268,11 @@ mod tests {
         assert_eq!(found.area(&Point3::new(3.9, 0.2, 0.1)), Some(1));
         assert_eq!(found.area(&Point3::new(3.9, 0.2, 0.3)), None);
         assert_eq!(found.area(&Point3::new(4.1, 0.2, -0.1)), None);
+        let thinned = found.thinned(1);
+        assert_eq!(thinned.areas(), &found.areas()[..1]);
+        assert_eq!(thinned.area(&Point3::new(0.1, 0.2, 0.1)), Some(0));
+        assert_eq!(thinned.area(&Point3::new(3.9, 0.2, -0.1)), None);
+        assert!(thinned.bounds()[0].contains(&Point3::new(0.1, 0.2, 0.2)));
     }
 
     #[test]

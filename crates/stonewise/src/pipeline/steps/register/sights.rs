@@ -34,18 +34,24 @@ pub struct Sights {
     pub seen: Vec<SeenStone>,
     /// Points in stable areas.
     pub stable: Vec<StablePoints>,
+    /// Points in areas off the wall that do not count as stable.
+    pub offered: Vec<StablePoints>,
 }
 
+/// Areas off the wall that are compared with the sources' errors, at most: a hundred plane cells show an
+/// error far better than sources hide it.
+const MOST_OFFERED: usize = 40;
+
 impl Sights {
-    /// `number`: of the later epoch, from 1. `off_wall`: areas that count as stable beside those of the
-    /// project. The project's parameters say how many stones keep their points, evenly chosen among the
-    /// matches.
+    /// `number`: of the later epoch, from 1. `off_wall`: areas off the wall, which count as stable if the
+    /// project sets `auto_stable`. The project's parameters say how many stones keep their points, evenly
+    /// chosen among the matches.
     pub fn gather(
         project: &Project,
         epochs: [&Labelled; 2],
         number: usize,
         matches: &[(StoneId, StoneId)],
-        off_wall: Option<&OffWall>,
+        off_wall: &OffWall,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let numbers = [1, number];
@@ -72,7 +78,13 @@ impl Sights {
             stones: places.iter().map(|(first, _, _)| *first).collect(),
             seen: Vec::new(),
             stable: Vec::new(),
+            offered: Vec::new(),
             sources,
+        };
+        let auto_stable = project.settings.registration.auto_stable;
+        let offered = match auto_stable {
+            true => OffWall::default(),
+            false => off_wall.thinned(MOST_OFFERED),
         };
         let most_stones = project.settings.registration.observers.contrasts.max_stones;
         let stride = places.len().div_ceil(most_stones.max(1)).max(1);
@@ -91,9 +103,10 @@ impl Sights {
             };
             pass.stones(&places, stride, &mut collected, progress)?;
             pass.stable(&mut sights.stable)?;
-            if let Some(off_wall) = off_wall {
+            if auto_stable {
                 pass.off_wall(off_wall, &mut sights.stable)?;
             }
+            pass.off_wall(&offered, &mut sights.offered)?;
         }
         sights.seen = places
             .iter()
@@ -261,7 +274,9 @@ impl Pass<'_> {
     fn off_wall(&self, off_wall: &OffWall, list: &mut Vec<StablePoints>) -> Result<()> {
         let mut parts = StableParts::default();
         let area = |p: &Point3<f64>| Some(self.areas.len() + off_wall.area(p)?);
-        for tile in 0..self.epoch.ingested.tiles.tile_count() {
+        let (tiles, bounds) = (&self.epoch.ingested.tiles, off_wall.bounds());
+        let has_area = |tile: &usize| bounds.iter().any(|b| tiles.bounds(*tile).intersects(b));
+        for tile in (0..tiles.tile_count()).filter(has_area) {
             self.stable_in(tile, area, &mut parts)?;
         }
         parts.finish(list);

@@ -1,0 +1,62 @@
+//! What is compared: two epochs with their sources, stones and surfaces, and the parameters.
+
+use super::contrast::ContrastParams;
+use super::observation::Observation;
+use super::sight::{SeenStone, Sight, Source};
+use super::stable::{StableParams, StablePoints};
+use serde::{Deserialize, Serialize};
+
+/// Parameters of [`epoch_errors`](super::epoch_errors).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct EpochErrorParams {
+    /// Comparison of the sources of an epoch.
+    pub contrasts: ContrastParams,
+    /// Planes in stable areas.
+    pub stable: StableParams,
+    /// Error that all sources of an epoch share, 1 sigma per axis, metres; absent: by the class of the
+    /// sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared_error_m: Option<f64>,
+}
+
+/// What is measured and stated about two epochs.
+pub struct EpochPair<'a> {
+    /// Sources of both epochs.
+    pub sources: &'a [Source],
+    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the
+    /// other half.
+    pub same_as: &'a [usize],
+    /// The stones.
+    pub stones: &'a [SeenStone],
+    /// Pairs of neighbours among them, as indices.
+    pub neighbours: &'a [[usize; 2]],
+    /// Points in stable areas.
+    pub stable: &'a [StablePoints],
+    /// Points on other surfaces off the wall: they are not used, but what they show is compared with what is
+    /// found.
+    pub offered: &'a [StablePoints],
+    /// Noise of single points along the normal, metres.
+    pub sigma_m: f64,
+}
+
+/// All sights, by which the blocks of the unknowns are laid out.
+pub(super) fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
+    let of_stone = |stone: &SeenStone| {
+        let centroid = stone.centroid;
+        stone
+            .sights
+            .iter()
+            .map(|s| Sight {
+                source: s.source,
+                time_s: s.time_s,
+                place: centroid,
+                plane: None,
+            })
+            .collect::<Vec<_>>()
+    };
+    let stones = pair.stones.iter().flat_map(of_stone);
+    stones
+        .chain(stable.iter().flat_map(|o| o.sights.clone()))
+        .collect()
+}
