@@ -12,6 +12,13 @@ messages! {
             "auto_stable: {count} areas off the wall are taken for stable, as far as they agree with each other",
             "auto_stable: {count} Flächen neben der Mauer gelten als stabil, soweit sie miteinander übereinstimmen";
 
+        COMPONENT_AT_BOUND:
+            "the variance component \"{name}\" lies at the upper end of its range: neighbouring stones differ by more than motions of masonry \
+            do, and say almost nothing about each other. Most often the clouds of the epochs do not fit each other or their photos",
+            "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: benachbarte Steine unterscheiden sich stärker, als sich \
+            Mauerwerk bewegt, und sagen fast nichts übereinander. Meist passen die Punktwolken der Epochen nicht zueinander oder \
+            nicht zu ihren Fotos";
+
         COULD_BE_STABLE:
             "{count} areas off the wall are seen in both epochs and could show their registration: auto_stable = true uses them all, \
             [[registration.stable]] those that you know did not move, such as corners = {corners}",

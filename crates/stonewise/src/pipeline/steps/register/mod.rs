@@ -19,7 +19,8 @@ use crate::results::records::{AdjustmentRecord, Datum, EstimatorRecord, GicpReco
 use crate::settings::Estimator;
 use crate::storage::step::Key;
 use crate::texts::notices::{
-    AUTO_STABLE, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED, STABLE_TOO_FEW,
+    AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
+    STABLE_TOO_FEW,
 };
 pub use datum::datum;
 use mean_motion::mean_motion;
@@ -139,6 +140,7 @@ pub fn register(
         &registered,
         &datum(context.project, number, &registered, &first.stones),
     );
+    report_components(context, number, &registered);
     report_datum(context, number, &registered);
     report_off_wall(context, number, &registered);
     Ok(registered)
@@ -163,6 +165,18 @@ fn report_off_wall(context: &Context, number: usize, registered: &Registered) {
     };
     let message = message.say(&[("count", &*count), ("corners", &*corners)]);
     context.warnings.notice(STEP, epoch, message);
+}
+
+/// Names the variance components for which the survey wants more than their range allows.
+fn report_components(context: &Context, number: usize, registered: &Registered) {
+    let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
+        return;
+    };
+    let epoch = &context.project.epochs[number - 1].name;
+    for name in adjustment.variance_components.at_upper_bound() {
+        let message = COMPONENT_AT_BOUND.say(&[("name", name)]);
+        context.warnings.notice(STEP, epoch, message);
+    }
 }
 
 /// Says how the stones moved on the mean.
