@@ -4,19 +4,22 @@
 //! `cargo run --release -p stonewise-core --example measure_coverage [WORD ...]`. Words: sensors `tls uav`
 //! (default both), kinds of error by their names (`usual walk jump ...`, see [`errors::Kind`]; default all),
 //! `sources=2,3` (numbers of stations or strips of an epoch), `stable=none,ground,building,moved` (default
-//! none), `walls=N` (of a row, default 200), `first=N` (seed of the first wall), `full` (walls of 3 x 2 m
-//! with a bulge, scanned and adjusted; minutes for a few walls; no stable areas).
+//! none), `without=times,sources` (what the files leave out), `walls=N` (of a row, default 200), `first=N`
+//! (seed of the first wall), `full` (walls of 3 x 2 m with a bulge, scanned and adjusted; minutes for a few
+//! walls; no stable areas).
 //!
 //! A row pools the stones of its walls. Errors are shared by all stones of a wall, so ranges are those of
 //! walls drawn anew (percentile bootstrap, Efron 1979); the first row says between which figures the coverage
 //! of a perfect method would lie.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
+mod ablation;
 mod errors;
 mod figures;
 mod full;
 mod survey;
 
+use ablation::Kept;
 use errors::{Kind, Sensor};
 use figures::{Wall, print, print_head};
 use rayon::prelude::*;
@@ -35,6 +38,12 @@ fn main() {
     let sensors = [("tls", Sensor::Tls, "2,3,4"), ("uav", Sensor::Uav, "3,4,6")];
     let all_sensors = !sensors.iter().any(|s| has(s.0));
     let (walls, first) = (number("walls=", "200"), number("first=", "1"));
+    let without = list("without=", "");
+    let is_kept = |part: &str| !without.iter().any(|w| w == part);
+    let kept = Kept {
+        times: is_kept("times"),
+        sources: is_kept("sources"),
+    };
     print_head(walls);
     for (sensor_name, sensor, usual) in sensors.into_iter().filter(|s| all_sensors || has(s.0)) {
         for stable in list("stable=", "none") {
@@ -52,7 +61,7 @@ fn main() {
                     let started = std::time::Instant::now();
                     let found: Vec<Wall> = (first..first + walls)
                         .into_par_iter()
-                        .map(|seed| measure(&case, seed, has("full")))
+                        .map(|seed| measure(&case, seed, has("full"), kept))
                         .collect();
                     let label = format!("{sensor_name} {sources} {stable} {kind_name}");
                     print(&label, &found, started.elapsed().as_secs_f64());
@@ -71,11 +80,12 @@ fn stable_of(word: &str) -> Stable {
     }
 }
 
-fn measure(case: &Case, seed: u64, is_full: bool) -> Wall {
+fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
     let survey = match is_full {
         true => full::simulate(case, seed),
         false => simulate(case, seed),
     };
+    let survey = kept.apply(survey);
     let same: Vec<usize> = (0..survey.sources.len()).collect();
     let pair = EpochPair {
         sources: &survey.sources,
