@@ -184,7 +184,6 @@ impl FaceCells {
             if pairs.len() < LEAST_CELLS || (pairs.len() as f64) < LEAST_SHARE * self.count() as f64 {
                 return None;
             }
-            let correlation = correlation(&pairs);
             let (step, covariance) = solve(&pairs, is_affine)?;
             warp = warp.after_inverse_of(&step)?;
             let strain = (warp.matrix - Matrix2::identity()).amax();
@@ -195,7 +194,7 @@ impl FaceCells {
                 return Some(Match {
                     warp,
                     covariance,
-                    correlation,
+                    correlation: correlation(&pairs),
                 });
             }
         }

@@ -99,10 +99,11 @@ impl Face {
         patches: &[Patch],
         before: &[Option<Match>],
     ) -> Vec<Option<Match>> {
+        let search = Search::new(template, &self.surface);
         let one = |(i, patch): (usize, &Patch)| {
             let start = match before.get(i).copied().flatten() {
                 Some(found) => found.warp,
-                None => self.sought(template, patch, self.pose_reach)?,
+                None => Warp::shift(search.best_shift(patch, self.pose_reach)?.0),
             };
             self.matched(template, patch, start)
         };
@@ -120,7 +121,8 @@ impl Face {
         own: &Mean,
         reach: isize,
     ) -> Option<Vec<Option<Match>>> {
-        let between = self.sought(template, &own.template.patch, reach)?;
+        let (shift, _) = Search::new(template, &self.surface).best_shift(&own.template.patch, reach)?;
+        let between = Warp::shift(shift);
         let start = |found: &Option<Match>| found.map_or(between, |m| m.warp.after(&between));
         let starts: Vec<Warp> = own.matches.iter().map(start).collect();
         Some(self.matches_from(template, patches, &starts))
@@ -137,12 +139,6 @@ impl Face {
         photos
             .map(|(p, start)| self.matched(template, p, *start))
             .collect()
-    }
-
-    /// Where a photo agrees best with a template, within `reach` cells.
-    fn sought(&self, template: &Template, photo: &Patch, reach: isize) -> Option<Warp> {
-        let (shift, _) = Search::new(template, &self.surface).best_shift(photo, reach)?;
-        Some(Warp::shift(shift))
     }
 
     /// A photo's match with a template near a start; `None` where it does not settle or correlates too
