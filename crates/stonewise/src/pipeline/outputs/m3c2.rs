@@ -6,7 +6,7 @@ use crate::results::{ColumnNote, write_csv_metadata};
 use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{ChangeField, ChangePoint};
-use stonewise_io::cloud::{ExtraColumn, write_points_laz};
+use stonewise_io::cloud::{Dimension, ExtraColumn, write_points_laz};
 use stonewise_io::crs::Crs;
 use stonewise_io::table::{Table, write_csv};
 
@@ -30,6 +30,21 @@ const COLUMNS: [ColumnNote; 13] = [
     ColumnNote::new("m3c2_significant", "integer", "", "1 where the distance exceeds its detection limit, else 0"),
     ColumnNote::new("m3c2_count1", "integer", "", "points of the first epoch in the cylinder"),
     ColumnNote::new("m3c2_count2", "integer", "", "points of the later epoch in the cylinder"),
+];
+
+/// The extra dimensions of the cloud: the columns after the place, described in the 32 bytes that LAS has for
+/// that.
+const DIMENSIONS: [Dimension; 10] = [
+    Dimension::new("NormalX", "", "unit normal, world x"),
+    Dimension::new("NormalY", "", "unit normal, world y"),
+    Dimension::new("NormalZ", "", "unit normal, world z"),
+    Dimension::new("m3c2_distance", "m", "distance along the normal"),
+    Dimension::new("m3c2_uncertainty", "m", "95 % detection limit"),
+    Dimension::new("m3c2_std_dev1", "m", "spread, first epoch"),
+    Dimension::new("m3c2_std_dev2", "m", "spread, later epoch"),
+    Dimension::new("m3c2_significant", "", "1: beyond the detection limit"),
+    Dimension::new("m3c2_count1", "", "points, first epoch"),
+    Dimension::new("m3c2_count2", "", "points, later epoch"),
 ];
 
 /// Writes `m3c2.laz`, `m3c2.csv` and the metadata of its columns (of the third epoch `m3c2_2.laz`, and so on)
@@ -69,17 +84,14 @@ pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeFiel
     write_csv_metadata(&csv, DESCRIPTION, None, COLUMNS)?;
 
     let positions: Vec<Point3<f64>> = points.iter().map(|p| p.position).collect();
-    let dense: Vec<(&str, Vec<f64>)> = columns
+    let dense: Vec<Vec<f64>> = columns
         .iter()
-        .map(|(name, v)| (*name, v.iter().map(|c| c.unwrap_or(f64::NAN)).collect()))
+        .map(|(_, v)| v.iter().map(|c| c.unwrap_or(f64::NAN)).collect())
         .collect();
-    let mut extra: Vec<(&str, ExtraColumn)> = dense
-        .iter()
-        .map(|(name, v)| (*name, ExtraColumn::F64(v)))
-        .collect();
-    extra.push(("m3c2_significant", ExtraColumn::U16(&significant)));
-    extra.push(("m3c2_count1", ExtraColumn::U32(&counts[0])));
-    extra.push(("m3c2_count2", ExtraColumn::U32(&counts[1])));
+    let mut extra: Vec<ExtraColumn> = dense.iter().map(|v| ExtraColumn::F64(v)).collect();
+    extra.push(ExtraColumn::U16(&significant));
+    extra.extend(counts.iter().map(|c| ExtraColumn::U32(c)));
+    let extra: Vec<(Dimension, ExtraColumn)> = DIMENSIONS.into_iter().zip(extra).collect();
     Ok(write_points_laz(
         &dir.join(PairFile::M3c2Laz.name(pair)),
         crs.map(Crs::text).as_deref(),
