@@ -2,7 +2,6 @@
 //! evidence, records.
 
 mod change_points;
-mod column_metadata;
 mod columns;
 mod comparison;
 mod evidence;
@@ -21,9 +20,6 @@ mod stone_table;
 pub(crate) mod testing;
 
 pub use change_points::DistancePoint;
-#[cfg(test)]
-pub(crate) use column_metadata::check_csv_metadata;
-pub(crate) use column_metadata::{ColumnNote, INTEGERS, write_csv_metadata};
 pub(crate) use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};
 pub(crate) use comparison::{Comparison, compare};

@@ -32,18 +32,18 @@ pub(crate) fn write_neighbours(dir: &Path, pair: usize, contrasts: &[Contrast]) 
     let mut table = Table::new();
     let columns = [("stone_1", "one of two neighbours"), ("stone_2", "the other")];
     for (k, (name, meaning)) in columns.into_iter().enumerate() {
-        table.push(name, covariances.keys().map(|ids| ids[k]).collect::<Vec<u32>>())?;
-        table.describe(name, "", meaning);
+        let ids: Vec<u32> = covariances.keys().map(|ids| ids[k]).collect();
+        table.push(name, "", meaning, ids)?;
     }
     for (name, [r, c]) in COVARIANCE {
         let values: Vec<f64> = covariances.values().map(|m| m[(r, c)]).collect();
-        table.push(name, values)?;
-        table.describe(
+        table.push(
             name,
             "m2",
             "covariance of the displacement of stone_2 less that of stone_1, world; errors that both \
              share cancel",
-        );
+            values,
+        )?;
     }
     Ok(write_parquet(&dir.join(PairFile::Neighbours.name(pair)), &table)?)
 }
