@@ -342,8 +342,8 @@ fn measure(
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
     };
     write_readable_json(&file(PairFile::Registration), &record)?;
-    if !registered.contrasts.is_empty() {
-        write_neighbours(&context.out, pair, &registered.contrasts)?;
+    if !registered.neighbours.is_empty() {
+        write_neighbours(&context.out, pair, &registered.neighbours)?;
     }
     let change = if until > Until::Registered {
         let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();

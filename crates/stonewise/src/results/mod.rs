@@ -29,7 +29,6 @@ pub use evidence::{
 };
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};
-pub use neighbours::NeighbourCovariances;
 pub(crate) use neighbours::{read_neighbours, write_neighbours};
 pub use outlines::{StoneOutline, read_outlines, write_outlines};
 pub use result_set::ResultSet;

@@ -231,7 +231,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
     };
     Registered {
         results: report.results,
-        contrasts: report.contrasts,
+        neighbours: report.neighbours,
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
         epoch_errors: None,
         error_stones: Vec::new(),
@@ -248,7 +248,7 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
     };
     Registered {
         results,
-        contrasts: Vec::new(),
+        neighbours: Vec::new(),
         estimator: EstimatorRecord::Gicp(gicp),
         epoch_errors: None,
         error_stones: Vec::new(),
