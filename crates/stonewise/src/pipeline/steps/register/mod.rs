@@ -21,7 +21,7 @@ use crate::storage::step::Key;
 use crate::texts::notices::{
     AUTO_STABLE, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED, STABLE_TOO_FEW,
 };
-pub use datum::datum;
+use datum::datum;
 use mean_motion::mean_motion;
 use nalgebra::Point3;
 use off_wall::OffWall;
@@ -36,14 +36,14 @@ use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 use windows::align_windows;
 
-/// Measures the motion of every matched stone.
+/// Measures the motion of every matched stone; what is known about the registration of the epochs.
 pub fn register(
     context: &Context,
     photos: [&Segmented; 2],
     [first, second]: [&Labelled; 2],
     matched: &Matched,
     number: usize,
-) -> Result<Registered> {
+) -> Result<(Registered, Datum)> {
     let params = &context.project.settings.registration;
     // The pairs themselves, not how they were found: other parameters of the matching that find the same
     // pairs cost nothing.
@@ -132,15 +132,11 @@ pub fn register(
         write_json(&step.file("motions.json"), &registered)
     })?;
     let registered: Registered = read_json(&step.file("motions.json"))?;
-    report_mean_motion(
-        context,
-        number,
-        &registered,
-        &datum(context.project, number, &registered, &first.stones),
-    );
+    let datum = datum(context.project, number, &registered, &first.stones);
+    report_mean_motion(context, number, &registered, &datum);
     report_datum(context, number, &registered);
     report_off_wall(context, number, &registered);
-    Ok(registered)
+    Ok((registered, datum))
 }
 
 /// Names surfaces off the wall that could show, or that showed, the registration of the epochs.
