@@ -408,8 +408,8 @@ fn the_layer_of_the_geopackage_comes_back_as_edits() {
     push(None, boxed([-2.0, -2.0, -1.5, -1.5]), "ok");
     push(None, boxed([-4.0, -2.0, -3.5, -1.5]), "ignore");
     let mut attributes = Table::new();
-    attributes.push("stone_id", ids).unwrap();
-    attributes.push("status", status).unwrap();
+    attributes.push("stone_id", "", "stone_id", ids).unwrap();
+    attributes.push("status", "", "status", status).unwrap();
     let layer = Layer {
         name: "stones_facade".into(),
         title: "Stones".into(),

@@ -119,8 +119,8 @@ pub struct PairResult {
 
 /// Covariance of the displacements of two neighbours relative to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Contrast {
-    /// Two stones of the first epoch.
+pub struct NeighbourCovariance {
+    /// Two stones of the first epoch, the lower number first.
     pub stones: [StoneId; 2],
     /// Covariance of the second stone's displacement less the first stone's, world, m^2; errors that both
     /// have in common cancel.

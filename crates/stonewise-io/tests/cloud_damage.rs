@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Point3;
 use stonewise_io::cloud::{
-    CloudError, ExtraColumn, LabelColumns, PointChunk, PointLabel, ReadSummary, cloud_info, read_cloud,
-    write_labelled, write_points_laz,
+    CloudError, Dimension, ExtraColumn, LabelColumns, PointChunk, PointLabel, ReadSummary, cloud_info,
+    read_cloud, write_labelled, write_points_laz,
 };
 
 fn fixture(name: &str) -> PathBuf {
@@ -260,15 +260,25 @@ fn points_that_cannot_be_written_are_refused() {
     let points = [Point3::origin(), Point3::new(1.0, f64::NAN, 0.0)];
     let error = write_points_laz(&path, None, &points, &[]).unwrap_err();
     assert!(error.to_string().ends_with("point 1 has no position"), "{error}");
-    let long = "a name that is longer than 32 bytes";
-    let error = write_points_laz(&path, None, &points[..1], &[(long, ExtraColumn::F32(&[0.0]))]);
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("not a name of a dimension")
-    );
-    let error = write_points_laz(&path, None, &points[..1], &[("d", ExtraColumn::U32(&[]))]);
+    let long = "a text that is longer than 32 bytes";
+    for dimension in [
+        Dimension::new(long, "m", "distance"),
+        Dimension::new("d", "m", long),
+        Dimension::new("d", "m", "a text of 30 bytes with its unit"),
+        Dimension::new("d", "", ""),
+        Dimension::new("d", "µm", "distance"),
+    ] {
+        let error = write_points_laz(
+            &path,
+            None,
+            &points[..1],
+            &[(dimension, ExtraColumn::F32(&[0.0]))],
+        );
+        let message = error.unwrap_err().to_string();
+        assert!(message.contains("not a name or a description"), "{message}");
+    }
+    let distance = Dimension::new("d", "m", "distance");
+    let error = write_points_laz(&path, None, &points[..1], &[(distance, ExtraColumn::U32(&[]))]);
     assert!(
         error
             .unwrap_err()

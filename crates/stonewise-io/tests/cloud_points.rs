@@ -9,8 +9,8 @@ use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cloud::{
-    CloudError, ExtraColumn, ExtraType, Observed, cloud_info, read_cloud, stream_points_laz, stream_scan_laz,
-    write_points_laz,
+    CloudError, Dimension, ExtraColumn, ExtraType, Observed, cloud_info, read_cloud, stream_points_laz,
+    stream_scan_laz, write_points_laz,
 };
 
 /// Keeps a file for `testdata/clouds/check_written.py`, where an environment variable names its folder.
@@ -29,9 +29,10 @@ fn points_that_come_in_pieces_make_the_same_file_and_strays_are_refused() {
         .map(|i| Point3::new(f64::from(i) * 0.01, 2.0, -1.0))
         .collect();
     let ids: Vec<u32> = (0..1000).collect();
-    write_points_laz(&whole, None, &points, &[("stone_id", ExtraColumn::U32(&ids))]).unwrap();
+    let stone = Dimension::new("stone_id", "", "stone");
+    write_points_laz(&whole, None, &points, &[(stone, ExtraColumn::U32(&ids))]).unwrap();
     let bounds = Bounds::of(points.iter().copied()).unwrap();
-    let columns = [("stone_id", ExtraType::U32)];
+    let columns = [(stone, ExtraType::U32)];
     stream_points_laz(&pieces, None, &bounds, &columns, |sink| {
         for (p, i) in points.chunks(300).zip(ids.chunks(300)) {
             sink.append(p, &[ExtraColumn::U32(i)])?;
@@ -97,13 +98,38 @@ fn core_points_come_back_with_their_dimensions() {
     let count: Vec<u32> = (0..n as u32).rev().collect();
     let flag: Vec<u16> = (0..n).map(|i| (i % 2) as u16).collect();
     let columns = [
-        ("m3c2_distance", ExtraColumn::F64(&distance)),
-        ("m3c2_std_dev1", ExtraColumn::F32(&spread)),
-        ("m3c2_count1", ExtraColumn::U32(&count)),
-        ("m3c2_significant", ExtraColumn::U16(&flag)),
+        (
+            Dimension::new("m3c2_distance", "m", "distance along the normal"),
+            ExtraColumn::F64(&distance),
+        ),
+        (
+            Dimension::new("m3c2_std_dev1", "m", "spread"),
+            ExtraColumn::F32(&spread),
+        ),
+        (
+            Dimension::new("m3c2_count1", "", "points"),
+            ExtraColumn::U32(&count),
+        ),
+        (
+            Dimension::new("m3c2_significant", "", "1: significant"),
+            ExtraColumn::U16(&flag),
+        ),
     ];
     write_points_laz(&path, None, &points, &columns).unwrap();
-    let data = Reader::from_path(&path).unwrap().read_all().unwrap();
+    let mut reader = Reader::from_path(&path).unwrap();
+    let described = reader.header().vlrs().iter().find(|v| v.record_id == 4).unwrap();
+    // LAS 1.4 R15, table 24: 192 bytes a dimension, the name from byte 4 and the description from byte 160 on.
+    let texts: Vec<[&[u8]; 2]> = described
+        .data
+        .chunks(192)
+        .map(|d| [&d[4..36], &d[160..]].map(|text| text.trim_ascii_end().split(|b| *b == 0).next().unwrap()))
+        .collect();
+    assert_eq!(
+        texts[0],
+        [b"m3c2_distance".as_slice(), b"distance along the normal, m"]
+    );
+    assert_eq!(texts[2], [b"m3c2_count1".as_slice(), b"points"]);
+    let data = reader.read_all().unwrap();
     assert_eq!((data.len(), data.record_len()), (n, 30 + 18));
     for (i, record) in data.raw_bytes().chunks(48).enumerate() {
         assert_eq!(record[30..38], distance[i].to_le_bytes());
@@ -130,7 +156,13 @@ fn core_points_come_back_with_their_dimensions() {
 fn no_points_and_far_points_can_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m3c2.laz");
-    write_points_laz(&path, None, &[], &[("d", ExtraColumn::F32(&[]))]).unwrap();
+    write_points_laz(
+        &path,
+        None,
+        &[],
+        &[(Dimension::new("d", "m", "x"), ExtraColumn::F32(&[]))],
+    )
+    .unwrap();
     let info = cloud_info(&path).unwrap();
     assert_eq!((info.records, info.bounds), (0, None));
     assert_eq!(

@@ -13,7 +13,6 @@ use stonewise_core::evaluate::{
     score_neighbours,
 };
 use stonewise_core::id::StoneId;
-use stonewise_core::stone::Contrast;
 
 /// Columns that a table of true stones must have.
 const NEEDED: [&str; 11] = [
@@ -43,18 +42,9 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     let owners = owners_by_centroid(&centroids, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
-    evaluation.neighbours = score_neighbours(&outcomes, &owners, &stones, &contrasts(&set), params);
+    evaluation.neighbours = score_neighbours(&outcomes, &owners, &stones, &set.neighbours, params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
-}
-
-/// The covariances of neighbours in the form that the evaluation takes.
-fn contrasts(set: &ResultSet) -> Vec<Contrast> {
-    let contrast = |(ids, covariance): (&[u32; 2], &Matrix3<f64>)| Contrast {
-        stones: ids.map(StoneId),
-        covariance: *covariance,
-    };
-    set.neighbours.iter().map(contrast).collect()
 }
 
 /// A row as the evaluation takes it; `datum`: what is known about the registration of its epoch.

@@ -5,7 +5,8 @@ use super::external_truth::{Owner, TrueStone};
 use super::sample::{EvaluationParams, MotionSample, StoneOutcome};
 use super::score::{Directions, directions};
 use crate::id::StoneId;
-use crate::stone::Contrast;
+use crate::stone::NeighbourCovariance;
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -26,7 +27,7 @@ pub fn score_neighbours(
     outcomes: &[StoneOutcome],
     owners: &[Owner],
     stones: &[TrueStone],
-    contrasts: &[Contrast],
+    neighbours: &[NeighbourCovariance],
     params: &EvaluationParams,
 ) -> Option<NeighbourScore> {
     let true_stones: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
@@ -36,11 +37,11 @@ pub fn score_neighbours(
         .filter_map(|(outcome, owner)| Some((outcome.stone, (outcome, *true_stones.get(&(*owner)?)?))))
         .filter(|(_, (_, stone))| stone.is_countable(params))
         .collect();
-    let samples: Vec<MotionSample> = contrasts
+    let samples: Vec<MotionSample> = neighbours
         .iter()
-        .filter_map(|contrast| {
-            let [first, second] = contrast.stones.map(|id| known.get(&id));
-            sample(contrast, [*first?, *second?])
+        .filter_map(|pair| {
+            let [first, second] = pair.stones.map(|id| known.get(&id));
+            sample(&pair.covariance, [*first?, *second?])
         })
         .collect();
     (!samples.is_empty()).then(|| NeighbourScore {
@@ -51,14 +52,14 @@ pub fn score_neighbours(
 }
 
 fn sample(
-    contrast: &Contrast,
+    covariance: &Matrix3<f64>,
     [(first, first_true), (second, second_true)]: [(&StoneOutcome, &TrueStone); 2],
 ) -> Option<MotionSample> {
     let truth = second_true.displacement_at(&second.centroid) - first_true.displacement_at(&first.centroid);
     let difference = StoneOutcome {
         displacement: Some(second.displacement? - first.displacement?),
-        covariance: Some(contrast.covariance),
-        covariance_without_datum: Some(contrast.covariance),
+        covariance: Some(*covariance),
+        covariance_without_datum: Some(*covariance),
         ..first.clone()
     };
     MotionSample::of_stone(&difference, &first_true.normal, truth, None)
@@ -67,7 +68,7 @@ fn sample(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Matrix3, Point3, Vector3};
+    use nalgebra::{Point3, Vector3};
 
     #[test]
     fn a_motion_that_neighbours_share_is_no_error_of_their_difference() {
@@ -98,19 +99,19 @@ mod tests {
         let outcomes: Vec<StoneOutcome> = (0..3).map(outcome).collect();
         let stones: Vec<TrueStone> = (0..3).map(stone).collect();
         let owners: Vec<Owner> = (0..3).map(|k| Some(k + 10)).collect();
-        let contrast = |a: u32, b: u32| Contrast {
+        let pair = |a: u32, b: u32| NeighbourCovariance {
             stones: [StoneId(a), StoneId(b)],
             covariance: Matrix3::identity() * 1e-6,
         };
-        let contrasts = [contrast(0, 1), contrast(1, 2), contrast(2, 7)];
+        let pairs = [pair(0, 1), pair(1, 2), pair(2, 7)];
         let params = EvaluationParams::default();
-        let score = score_neighbours(&outcomes, &owners, &stones, &contrasts, &params).unwrap();
+        let score = score_neighbours(&outcomes, &owners, &stones, &pairs, &params).unwrap();
         // Errors of 1 and 3 mm with a stated standard deviation of 1 mm.
         assert_eq!(score.pairs, 2);
         let along = score.errors.along.unwrap();
         assert!((along.rmse_m - 5e-6f64.sqrt()).abs() < 1e-12);
         assert!((score.calibration.chi_square_mean.unwrap() - 5.0).abs() < 1e-9);
         assert_eq!(score.calibration.coverage_95.along, Some(0.5));
-        assert!(score_neighbours(&outcomes, &owners, &stones, &contrasts[2..], &params).is_none());
+        assert!(score_neighbours(&outcomes, &owners, &stones, &pairs[2..], &params).is_none());
     }
 }

@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::CloudError;
-use super::extra_bytes::{ExtraType, describe};
+use super::extra_bytes::{Dimension, ExtraType, describe_all};
 use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
 use super::whole::write_whole;
 
@@ -64,34 +64,30 @@ impl ColouredPoints {
 
 /// Writes a LAZ file (LAS 1.4, point format 7) of coloured points with single-precision extra dimensions.
 ///
-/// `bounds`: a box around all points. `names`: of the dimensions, at most 32 ASCII characters. `crs`: the
-/// coordinate system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points.
+/// `bounds`: a box around all points. `dimensions`: one for each number of a point. `crs`: the coordinate
+/// system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points.
 ///
 /// # Errors
-/// A name does not fit, the box is too large, `fill` fails, or the file cannot be written; an earlier file is
+/// A name or a description does not fit, the box is too large, `fill` fails, or the file cannot be written; an earlier file is
 /// kept then.
 pub fn write_coloured_laz<E: From<CloudError>>(
     path: &Path,
     bounds: &Bounds,
-    names: &[&str],
+    dimensions: &[Dimension<'_>],
     crs: Option<&str>,
     fill: impl FnOnce(&mut ColouredPoints) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut descriptors = Vec::new();
-    for name in names {
-        let reason = || CloudError::unwritable(path, format!("not a name of a dimension: {name:?}"));
-        descriptors.extend(describe(name, ExtraType::F32, "").ok_or_else(reason)?);
-    }
+    let descriptors = describe_all(path, dimensions.iter().map(|d| (*d, ExtraType::F32)))?;
     let transforms = transforms_for(bounds, FINEST_M)
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
     write_whole(path, |partial| {
-        let extra_bytes = names.len() as u16 * ExtraType::F32.size();
+        let extra_bytes = dimensions.len() as u16 * ExtraType::F32.size();
         let mut header = export_header(true, transforms, extra_bytes, descriptors);
         header.vlrs.extend(crs.and_then(crs_record));
         let mut points = ColouredPoints {
             writer: LazWriter::create(partial, path, header)?,
             transforms,
-            numbers: names.len(),
+            numbers: dimensions.len(),
             records: Vec::new(),
             waiting: 0,
         };
@@ -113,7 +109,8 @@ mod tests {
         let at = |i: u32| Point3::new(451_000.0 + f64::from(i) * 0.01, 5_601_000.0, 310.25);
         let bounds = Bounds::of((0..1000).map(at)).unwrap();
         let wkt = "PROJCS[\"x\",AUTHORITY[\"EPSG\",\"25832\"]]";
-        write_coloured_laz::<CloudError>(&path, &bounds, &["d_out"], Some(wkt), |points| {
+        let dimensions = [Dimension::new("d_out", "m", "displacement")];
+        write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, Some(wkt), |points| {
             (0..1000).try_for_each(|i| points.push(at(i), [i as u8, 0, 255], &[i as f32]))
         })
         .unwrap();
@@ -130,7 +127,7 @@ mod tests {
             Ok::<(), CloudError>(())
         })
         .unwrap();
-        let wrong = write_coloured_laz::<CloudError>(&path, &bounds, &["d_out"], None, |p| {
+        let wrong = write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, None, |p| {
             p.push(at(0), [0; 3], &[])
         });
         assert!(wrong.is_err());

@@ -29,7 +29,7 @@ pub(super) fn export_labelled<E: From<CloudError>>(
         survey.has_color,
         transforms,
         columns.size(),
-        columns.descriptors(),
+        columns.descriptors(name)?,
     );
     header.vlrs.extend(survey.crs.as_deref().and_then(crs_record));
     let mut writer = LazWriter::create(partial, name, header)?;

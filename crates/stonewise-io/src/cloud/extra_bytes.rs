@@ -1,6 +1,9 @@
 //! Extra dimensions of LAS points: the "Extra Bytes" record of LAS 1.4 R15, section 2.8.
 
 use std::ops::Range;
+use std::path::Path;
+
+use super::CloudError;
 
 /// Size of the description of one dimension.
 pub const DESCRIPTOR_BYTES: usize = 192;
@@ -42,17 +45,64 @@ impl ExtraType {
     }
 }
 
-/// The description of a dimension; `None` where the name is longer than 32 bytes, empty or not plain ASCII.
-pub fn describe(name: &str, kind: ExtraType, description: &str) -> Option<[u8; DESCRIPTOR_BYTES]> {
-    if name.is_empty() || name.len() > NAME.len() || !name.is_ascii() {
-        return None;
+/// Name, unit and meaning of an extra dimension.
+///
+/// The file holds the name, and `MEANING, UNIT` as its description; each is plain ASCII of at most 32 bytes,
+/// and neither is empty.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dimension<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Unit; empty for counts, numbers of things and flags.
+    pub unit: &'a str,
+    /// What it holds.
+    pub meaning: &'a str,
+}
+
+impl<'a> Dimension<'a> {
+    /// A dimension of this name.
+    pub const fn new(name: &'a str, unit: &'a str, meaning: &'a str) -> Self {
+        Self { name, unit, meaning }
     }
+
+    fn description(&self) -> String {
+        let separator = if self.unit.is_empty() { "" } else { ", " };
+        format!("{}{separator}{}", self.meaning, self.unit)
+    }
+}
+
+/// The description of a dimension; `None` where its name or its description does not fit the file.
+pub fn describe(dimension: Dimension<'_>, kind: ExtraType) -> Option<[u8; DESCRIPTOR_BYTES]> {
     let mut bytes = [0; DESCRIPTOR_BYTES];
     bytes[2] = kind.code();
-    bytes[NAME][..name.len()].copy_from_slice(name.as_bytes());
-    let length = description.len().min(DESCRIPTION.len());
-    bytes[DESCRIPTION][..length].copy_from_slice(&description.as_bytes()[..length]);
+    for (place, text) in [(NAME, dimension.name), (DESCRIPTION, &dimension.description())] {
+        if text.is_empty() || text.len() > place.len() || !text.is_ascii() {
+            return None;
+        }
+        bytes[place][..text.len()].copy_from_slice(text.as_bytes());
+    }
     Some(bytes)
+}
+
+/// The descriptions of the dimensions of a file that is written.
+///
+/// # Errors
+/// A name or a description does not fit; `file` is named.
+pub fn describe_all<'a>(
+    file: &Path,
+    dimensions: impl IntoIterator<Item = (Dimension<'a>, ExtraType)>,
+) -> Result<Vec<u8>, CloudError> {
+    let mut all = Vec::new();
+    for (dimension, kind) in dimensions {
+        let reason = || {
+            CloudError::unwritable(
+                file,
+                format!("not a name or a description of a dimension: {dimension:?}"),
+            )
+        };
+        all.extend(describe(dimension, kind).ok_or_else(reason)?);
+    }
+    Ok(all)
 }
 
 /// A dimension that a file already has.

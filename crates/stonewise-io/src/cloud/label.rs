@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Vector3;
 use stonewise_core::id::StoneId;
 
-use super::extra_bytes::{DESCRIPTOR_BYTES, ExtraType, describe};
+use super::extra_bytes::{Dimension, ExtraType, describe_all};
 use super::{CloudError, PointChunk};
 
 /// What is known about one point.
@@ -44,13 +44,19 @@ pub enum LabelColumns {
 pub(super) type Fill<'a, E> = &'a mut dyn FnMut(&PointChunk) -> Result<Vec<PointLabel>, E>;
 
 impl LabelColumns {
-    fn dimensions(self) -> &'static [(&'static str, ExtraType, &'static str)] {
-        const ALL: [(&str, ExtraType, &str); 5] = [
-            ("stone_id", ExtraType::U32, "stone, 0 for none"),
-            ("dx", ExtraType::F32, "displacement x, m"),
-            ("dy", ExtraType::F32, "displacement y, m"),
-            ("dz", ExtraType::F32, "displacement z, m"),
-            ("significant", ExtraType::U16, "1: beyond the detection limit"),
+    fn dimensions(self) -> &'static [(Dimension<'static>, ExtraType)] {
+        const ALL: [(Dimension, ExtraType); 5] = [
+            (
+                Dimension::new("stone_id", "", "stone, 0 for none"),
+                ExtraType::U32,
+            ),
+            (Dimension::new("dx", "m", "displacement x"), ExtraType::F32),
+            (Dimension::new("dy", "m", "displacement y"), ExtraType::F32),
+            (Dimension::new("dz", "m", "displacement z"), ExtraType::F32),
+            (
+                Dimension::new("significant", "", "1: beyond the detection limit"),
+                ExtraType::U16,
+            ),
         ];
         match self {
             Self::Nothing => &[],
@@ -60,18 +66,16 @@ impl LabelColumns {
     }
 
     pub(super) fn names(self) -> impl Iterator<Item = &'static str> {
-        self.dimensions().iter().map(|(name, _, _)| *name)
+        self.dimensions().iter().map(|(d, _)| d.name)
     }
 
     /// Bytes per point.
     pub(super) fn size(self) -> u16 {
-        self.dimensions().iter().map(|(_, kind, _)| kind.size()).sum()
+        self.dimensions().iter().map(|(_, kind)| kind.size()).sum()
     }
 
-    pub(super) fn descriptors(self) -> Vec<u8> {
-        let all = self.dimensions().iter();
-        let all = all.filter_map(|(name, kind, text)| describe(name, *kind, text));
-        all.flat_map(<[u8; DESCRIPTOR_BYTES]>::into_iter).collect()
+    pub(super) fn descriptors(self, file: &Path) -> Result<Vec<u8>, CloudError> {
+        describe_all(file, self.dimensions().iter().copied())
     }
 
     pub(super) fn append(self, label: &PointLabel, out: &mut Vec<u8>) {

@@ -23,7 +23,7 @@ mod whole;
 pub use chunk::{PointChunk, ReadSummary};
 pub use coloured::{ColouredPoints, write_coloured_laz};
 pub use error::CloudError;
-pub use extra_bytes::ExtraType;
+pub use extra_bytes::{Dimension, ExtraType};
 pub use format::CloudFormat;
 pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_info, measure_cloud};
 pub use label::{LabelColumns, PointLabel, PointMotion};

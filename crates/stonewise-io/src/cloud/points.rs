@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
 use super::CloudError;
-use super::extra_bytes::{ExtraType, describe};
+use super::extra_bytes::{Dimension, ExtraType, describe_all};
 use super::las::{Export, LazWriter, crs_record, export_header, transforms_for};
 use super::whole::write_whole;
 
@@ -31,17 +31,17 @@ pub enum ExtraColumn<'a> {
 /// Writes points with extra dimensions as LAZ (LAS 1.4, point format 6).
 ///
 /// `positions` are in the world frame, metres; the step of the coordinates is 1 micrometre, coarser only
-/// where the extent is above 4 km, about an offset in the middle. Names of dimensions are at most 32 ASCII
-/// characters. `crs`: the coordinate system, where it is known: WKT, or `EPSG:` and a code.
+/// where the extent is above 4 km, about an offset in the middle. `crs`: the coordinate system, where it is known: WKT, or `EPSG:` and a code.
 ///
 /// # Errors
-/// A position is not finite, a column has another length, a name does not fit, or the file cannot be written;
+/// A position is not finite, a column has another length, a name or a description of a dimension
+/// does not fit, or the file cannot be written;
 /// `path` then stays as it was.
 pub fn write_points_laz(
     path: &Path,
     crs: Option<&str>,
     positions: &[Point3<f64>],
-    columns: &[(&str, ExtraColumn<'_>)],
+    columns: &[(Dimension<'_>, ExtraColumn<'_>)],
 ) -> Result<(), CloudError> {
     let origin = Point3::origin();
     let finite = positions
@@ -52,7 +52,7 @@ pub fn write_points_laz(
         min: origin,
         max: origin,
     });
-    let kinds: Vec<(&str, ExtraType)> = columns.iter().map(|(name, c)| (*name, c.kind())).collect();
+    let kinds: Vec<(Dimension<'_>, ExtraType)> = columns.iter().map(|(d, c)| (*d, c.kind())).collect();
     let values: Vec<ExtraColumn<'_>> = columns.iter().map(|(_, c)| *c).collect();
     stream_points_laz(path, crs, &bounds, &kinds, |sink| sink.append(positions, &values))
 }
@@ -60,8 +60,8 @@ pub fn write_points_laz(
 /// Writes points that come piece by piece, as [`write_points_laz`] does; none of them needs to stay in
 /// memory.
 ///
-/// `bounds`: a box that holds all points; the step of the coordinates follows from it. `columns`: names and
-/// types of the extra dimensions, in the order in which `write` gives their values.
+/// `bounds`: a box that holds all points; the step of the coordinates follows from it. `columns`: the extra
+/// dimensions with their types, in the order in which `write` gives their values.
 ///
 /// # Errors
 /// As [`write_points_laz`], a point outside the box, or what `write` returns; `path` then stays as it was.
@@ -69,7 +69,7 @@ pub fn stream_points_laz<E: From<CloudError>>(
     path: &Path,
     crs: Option<&str>,
     bounds: &Bounds,
-    columns: &[(&str, ExtraType)],
+    columns: &[(Dimension<'_>, ExtraType)],
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     stream(path, crs, bounds, columns, GpsTimeType::Week, write)
@@ -92,7 +92,7 @@ pub struct Observed<'a> {
 pub fn stream_scan_laz<E: From<CloudError>>(
     path: &Path,
     bounds: &Bounds,
-    columns: &[(&str, ExtraType)],
+    columns: &[(Dimension<'_>, ExtraType)],
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
     stream(path, None, bounds, columns, GpsTimeType::Standard, write)
@@ -102,15 +102,11 @@ fn stream<E: From<CloudError>>(
     path: &Path,
     crs: Option<&str>,
     bounds: &Bounds,
-    columns: &[(&str, ExtraType)],
+    columns: &[(Dimension<'_>, ExtraType)],
     times: GpsTimeType,
     write: impl FnOnce(&mut PointSink<'_>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut descriptors = Vec::new();
-    for (name, kind) in columns {
-        let reason = || CloudError::unwritable(path, format!("not a name of a dimension: {name:?}"));
-        descriptors.extend(describe(name, *kind, "").ok_or_else(reason)?);
-    }
+    let descriptors = describe_all(path, columns.iter().copied())?;
     let extra_bytes = columns.iter().map(|(_, kind)| kind.size()).sum();
     let transforms = transforms_for(bounds, FINEST_M)
         .ok_or_else(|| CloudError::unwritable(path, format!("too large for LAS: {bounds:?}")))?;
@@ -133,7 +129,7 @@ fn stream<E: From<CloudError>>(
 /// A LAZ file that takes points.
 pub struct PointSink<'a> {
     path: &'a Path,
-    columns: &'a [(&'a str, ExtraType)],
+    columns: &'a [(Dimension<'a>, ExtraType)],
     bounds: Bounds,
     transforms: Vector<Transform>,
     writer: LazWriter,
@@ -212,11 +208,12 @@ impl PointSink<'_> {
         if columns.len() != self.columns.len() || !kinds.eq(self.columns.iter().map(|(_, kind)| *kind)) {
             return fail("other dimensions than the file has".to_owned());
         }
-        for ((name, _), column) in self.columns.iter().zip(columns) {
+        for ((dimension, _), column) in self.columns.iter().zip(columns) {
             if column.len() != positions.len() {
                 return fail(format!(
-                    "{} values of {name:?} for {} points",
+                    "{} values of {:?} for {} points",
                     column.len(),
+                    dimension.name,
                     positions.len()
                 ));
             }

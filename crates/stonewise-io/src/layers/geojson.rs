@@ -88,7 +88,9 @@ mod tests {
     #[test]
     fn rings_are_closed_and_missing_values_null() {
         let mut attributes = Table::new();
-        attributes.push("d_out", vec![Some(0.25), None]).unwrap();
+        attributes
+            .push("d_out", "", "d_out", vec![Some(0.25), None])
+            .unwrap();
         let p = Point3::new;
         let layer = Layer {
             name: "stones".into(),

@@ -283,15 +283,28 @@ mod tests {
 
     fn layer() -> Layer {
         let mut attributes = Table::new();
-        attributes.push("stone_id", vec![7u32, 9, 11]).unwrap();
         attributes
-            .push("d_out", vec![Some(0.012), None, Some(f64::NAN)])
+            .push("stone_id", "", "stone", vec![7u32, 9, 11])
             .unwrap();
         attributes
-            .push("status", ["ok", "<script>'\"", ""].map(str::to_owned).to_vec())
+            .push(
+                "d_out",
+                "m",
+                "displacement out of the wall",
+                vec![Some(0.012), None, Some(f64::NAN)],
+            )
             .unwrap();
-        attributes.push("loose", vec![Some(1u8), Some(0), None]).unwrap();
-        attributes.describe("d_out", "m", "displacement out of the wall");
+        attributes
+            .push(
+                "status",
+                "",
+                "status",
+                ["ok", "<script>'\"", ""].map(str::to_owned).to_vec(),
+            )
+            .unwrap();
+        attributes
+            .push("loose", "", "flag", vec![Some(1u8), Some(0), None])
+            .unwrap();
         let p = Point3::new;
         let triangle = vec![p(1.0, 2.0, 3.0), p(4.0, 2.0, 3.0), p(4.0, 6.0, 5.0)];
         let style = LayerStyle {
@@ -347,7 +360,9 @@ mod tests {
         assert_eq!(one("SELECT count(*) FROM rtree_stones_geom"), Value::Integer(2));
         assert_eq!(
             one("SELECT group_concat(column_name || ': ' || description) FROM gpkg_data_columns"),
-            Value::Text("d_out: displacement out of the wall (m)".into())
+            Value::Text(
+                "stone_id: stone,d_out: displacement out of the wall (m),status: status,loose: flag".into()
+            )
         );
         assert_eq!(
             one("SELECT styleQML FROM layer_styles WHERE useAsDefault"),

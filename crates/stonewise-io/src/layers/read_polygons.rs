@@ -98,11 +98,15 @@ mod tests {
     #[test]
     fn a_written_layer_comes_back_and_other_files_are_named() {
         let mut attributes = Table::new();
-        attributes.push("stone_id", vec![7u32, 9]).unwrap();
         attributes
-            .push("status", ["ok", "it's"].map(str::to_owned).to_vec())
+            .push("stone_id", "", "stone_id", vec![7u32, 9])
             .unwrap();
-        attributes.push("d_out", vec![Some(0.5), None]).unwrap();
+        attributes
+            .push("status", "", "status", ["ok", "it's"].map(str::to_owned).to_vec())
+            .unwrap();
+        attributes
+            .push("d_out", "", "d_out", vec![Some(0.5), None])
+            .unwrap();
         let ring = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]];
         let layer = Layer {
             name: "stones_facade".into(),

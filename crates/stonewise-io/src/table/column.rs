@@ -6,6 +6,8 @@ pub struct Column {
     values: Values,
     /// One flag per row; `None` where the column may not hold empty cells.
     filled: Option<Vec<bool>>,
+    /// Whether the cells are lists of integers, as text with spaces between them.
+    is_list: bool,
 }
 
 /// A type that cells can have: `f64`, `f32`, `i64`, `u64`, `u32`, `u16`, `u8`, `bool` or `String`.
@@ -45,14 +47,14 @@ macro_rules! cells {
             }
             impl From<Vec<$type>> for Column {
                 fn from(values: Vec<$type>) -> Self {
-                    Self { values: Values::$variant(values), filled: None }
+                    Self::new(Values::$variant(values), None)
                 }
             }
             impl From<Vec<Option<$type>>> for Column {
                 fn from(cells: Vec<Option<$type>>) -> Self {
                     let filled = Some(cells.iter().map(Option::is_some).collect());
                     let values = cells.into_iter().map(Option::unwrap_or_default).collect();
-                    Self { values: Values::$variant(values), filled }
+                    Self::new(Values::$variant(values), filled)
                 }
             }
         )*
@@ -71,9 +73,24 @@ cells! {
     Text String, "text";
 }
 
+/// A list of integers in each cell, written as text with spaces between them.
+impl From<Vec<Vec<u32>>> for Column {
+    fn from(lists: Vec<Vec<u32>>) -> Self {
+        let text = |list: &Vec<u32>| list.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+        Self {
+            is_list: true,
+            ..lists.iter().map(text).collect::<Vec<String>>().into()
+        }
+    }
+}
+
 impl Column {
     pub(super) fn new(values: Values, filled: Option<Vec<bool>>) -> Self {
-        Self { values, filled }
+        Self {
+            values,
+            filled,
+            is_list: false,
+        }
     }
 
     /// Number of rows.
@@ -98,6 +115,10 @@ impl Column {
 
     pub(super) fn raw(&self) -> &Values {
         &self.values
+    }
+
+    pub(super) fn is_list(&self) -> bool {
+        self.is_list
     }
 
     pub(super) fn filled(&self) -> Option<&[bool]> {

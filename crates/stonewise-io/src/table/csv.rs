@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::column::Values;
+use super::csv_metadata::write_csv_metadata;
 use super::{Column, Table, TableError};
 use crate::atomic::write_atomically;
 
@@ -13,20 +14,27 @@ use crate::atomic::write_atomically;
 /// An empty cell stays empty; an empty string is written as `""`. Floats have the fewest digits that read
 /// back to the same value; booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break
 /// or spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with
-/// =, +, - or @, gets an apostrophe in front. Metadata is not written.
+/// =, +, - or @, gets an apostrophe in front.
+///
+/// Units and meanings of the columns go into `NAME.csv-metadata.json` beside it, after the W3C's CSV on the
+/// Web. `description`: what the table as a whole holds. `primary_key`: the column that tells rows apart, where
+/// there is one.
 ///
 /// # Errors
-/// The file cannot be written; an earlier file is kept then.
-pub fn write_csv(path: &Path, table: &Table) -> Result<(), TableError> {
+/// A file cannot be written; an earlier file is kept then.
+pub fn write_csv(
+    path: &Path,
+    table: &Table,
+    description: &str,
+    primary_key: Option<&str>,
+) -> Result<(), TableError> {
     write_atomically(path, |partial| {
         let mut out = BufWriter::new(File::create(partial)?);
         write_rows(&mut out, table)?;
         out.flush()
     })
-    .map_err(|e| TableError::Write {
-        path: path.to_owned(),
-        reason: e.to_string(),
-    })
+    .map_err(|e| TableError::unwritable(path, e))?;
+    write_csv_metadata(path, table, description, primary_key)
 }
 
 fn write_rows(out: &mut impl Write, table: &Table) -> io::Result<()> {
@@ -93,8 +101,10 @@ mod tests {
     fn no_text_begins_like_a_formula() {
         let mut table = Table::new();
         let names = ["=1+1", "+a", "-b.jpg", "@c", " =HYPERLINK(\"x\")", "a=b"];
-        table.push("photo", names.map(str::to_owned).to_vec()).unwrap();
-        table.push("number", vec![-1.5; 6]).unwrap();
+        table
+            .push("photo", "", "photo", names.map(str::to_owned).to_vec())
+            .unwrap();
+        table.push("number", "", "number", vec![-1.5; 6]).unwrap();
         let mut out = Vec::new();
         write_rows(&mut out, &table).unwrap();
         let expected = "photo,number\n'=1+1,-1.5\n'+a,-1.5\n'-b.jpg,-1.5\n'@c,-1.5\n\
@@ -105,12 +115,16 @@ mod tests {
     #[test]
     fn cells_are_written_by_type() {
         let mut table = Table::new();
-        table.push("id", vec![1u32, 2, 3]).unwrap();
-        table.push("d, m", vec![Some(0.1), None, Some(1.5e-9)]).unwrap();
-        table.push("f", vec![0.1f32, 1e20, -2.0]).unwrap();
-        table.push("ok", vec![Some(true), Some(false), None]).unwrap();
+        table.push("id", "", "id", vec![1u32, 2, 3]).unwrap();
+        table
+            .push("d, m", "", "d, m", vec![Some(0.1), None, Some(1.5e-9)])
+            .unwrap();
+        table.push("f", "", "f", vec![0.1f32, 1e20, -2.0]).unwrap();
+        table
+            .push("ok", "", "ok", vec![Some(true), Some(false), None])
+            .unwrap();
         let words = ["plain", "", "say \"no\", twice"].map(str::to_owned);
-        table.push("word", words.to_vec()).unwrap();
+        table.push("word", "", "word", words.to_vec()).unwrap();
         let mut out = Vec::new();
         write_rows(&mut out, &table).unwrap();
         let expected = "id,\"d, m\",f,ok,word\n\

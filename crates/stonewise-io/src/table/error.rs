@@ -1,7 +1,7 @@
 //! What can go wrong with tables.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why a table could not be built, read or written.
 #[derive(Debug, thiserror::Error)]
@@ -60,4 +60,13 @@ pub enum TableError {
     /// The operating system refused.
     #[error(transparent)]
     Io(#[from] io::Error),
+}
+
+impl TableError {
+    pub(super) fn unwritable(path: &Path, reason: impl ToString) -> Self {
+        Self::Write {
+            path: path.to_owned(),
+            reason: reason.to_string(),
+        }
+    }
 }

@@ -1,7 +1,8 @@
-//! Tables of named columns: written as Parquet or CSV, read back from Parquet.
+//! Tables of named columns with units and meanings: written as Parquet or CSV, read back from Parquet.
 
 mod column;
 mod csv;
+mod csv_metadata;
 mod error;
 mod parquet_read;
 mod parquet_write;

@@ -76,7 +76,7 @@ fn read_selected(path: &Path, names: Option<&[&str]>) -> Result<Table, TableErro
     }
     for index in selected {
         let column = read_column(&reader, index, &descriptors[index]).map_err(|e| unreadable(path, e))?;
-        table.push(&present[index], column)?;
+        table.push_column(&present[index], column)?;
     }
     Ok(table)
 }
@@ -202,16 +202,29 @@ mod tests {
 
     fn example() -> Table {
         let mut table = Table::new();
-        table.push("x", vec![0.5f32, f32::NAN, -1.0]).unwrap();
-        table.push("y", vec![Some(1.0f64), None, Some(-0.0)]).unwrap();
-        table.push("i", vec![i64::MIN, 0, 7]).unwrap();
-        table.push("u", vec![u64::MAX, 0, 7]).unwrap();
-        table.push("id", vec![Some(u32::MAX), None, Some(0)]).unwrap();
-        table.push("file", vec![u16::MAX, 0, 1]).unwrap();
-        table.push("small", vec![u8::MAX, 0, 1]).unwrap();
-        table.push("flag", vec![Some(true), Some(false), None]).unwrap();
         table
-            .push("name", vec![Some("Größe".to_owned()), None, Some(String::new())])
+            .push("x", "m", "of x", vec![0.5f32, f32::NAN, -1.0])
+            .unwrap();
+        table
+            .push("y", "m", "of y", vec![Some(1.0f64), None, Some(-0.0)])
+            .unwrap();
+        table.push("i", "m", "of i", vec![i64::MIN, 0, 7]).unwrap();
+        table.push("u", "m", "of u", vec![u64::MAX, 0, 7]).unwrap();
+        table
+            .push("id", "m", "of id", vec![Some(u32::MAX), None, Some(0)])
+            .unwrap();
+        table.push("file", "m", "of file", vec![u16::MAX, 0, 1]).unwrap();
+        table.push("small", "m", "of small", vec![u8::MAX, 0, 1]).unwrap();
+        table
+            .push("flag", "m", "of flag", vec![Some(true), Some(false), None])
+            .unwrap();
+        table
+            .push(
+                "name",
+                "",
+                "name",
+                vec![Some("Größe".to_owned()), None, Some(String::new())],
+            )
             .unwrap();
         table.set_metadata("origin", "[1.25, -3.0, 1e300]");
         table.set_metadata("empty", "");
@@ -237,7 +250,7 @@ mod tests {
             [Some(u32::MAX), None, Some(0)]
         );
         let (rows, metadata) = read_metadata(&path).unwrap();
-        assert_eq!((rows, metadata.len()), (3, 2));
+        assert_eq!((rows, metadata.len()), (3, 2 * 9 + 2));
         assert!(matches!(
             read_columns(&path, &["no"]),
             Err(TableError::Missing { .. })
@@ -250,11 +263,11 @@ mod tests {
         let path = folder.path().join("t.parquet");
         let mut table = Table::new();
         let values: Vec<Option<u32>> = (0..1_200_000).map(|i| (i % 3 != 0).then_some(i)).collect();
-        table.push("a", values.clone()).unwrap();
+        table.push("a", "", "number", values.clone()).unwrap();
         write_parquet(&path, &table).unwrap();
         assert_eq!(read_parquet(&path).unwrap().optional::<u32>("a").unwrap(), values);
         let mut empty = Table::new();
-        empty.push("a", Vec::<f64>::new()).unwrap();
+        empty.push("a", "m", "length", Vec::<f64>::new()).unwrap();
         write_parquet(&path, &empty).unwrap();
         assert_eq!(read_parquet(&path).unwrap(), empty);
     }

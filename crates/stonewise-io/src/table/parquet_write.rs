@@ -45,10 +45,7 @@ pub fn write_parquet(path: &Path, table: &Table) -> Result<(), TableError> {
         writer.close()?;
         Ok(())
     });
-    written.map_err(|e| TableError::Write {
-        path: path.to_owned(),
-        reason: e.to_string(),
-    })
+    written.map_err(|e| TableError::unwritable(path, e))
 }
 
 fn schema(table: &Table) -> Result<Type, ParquetError> {

@@ -7,10 +7,11 @@ use super::{Cell, Column, TableError};
 /// ```
 /// use stonewise_io::table::Table;
 /// let mut stones = Table::new();
-/// stones.push("stone_id", vec![1u32, 2])?;
-/// stones.push("lod95", vec![Some(0.004), None])?;
+/// stones.push("stone_id", "", "stone of the first epoch", vec![1u32, 2])?;
+/// stones.push("lod95", "m", "detection limit", vec![Some(0.004), None])?;
 /// assert_eq!(stones.required::<u32>("stone_id")?, [1, 2]);
 /// assert_eq!(stones.optional::<f64>("lod95")?, [Some(0.004), None]);
+/// assert_eq!(stones.description("lod95"), Some(("m", "detection limit")));
 /// # Ok::<(), stonewise_io::table::TableError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,10 +28,26 @@ impl Table {
 
     /// Adds a column at the end: a `Vec` of values, or of options where cells may be empty.
     ///
+    /// `unit`: empty for counts, names and flags. Unit and meaning become the metadata entries `NAME.unit` and
+    /// `NAME.meaning`.
+    ///
     /// # Errors
     /// The length differs from the columns before, or the name is taken.
-    pub fn push(&mut self, name: &str, column: impl Into<Column>) -> Result<(), TableError> {
-        let column = column.into();
+    pub fn push(
+        &mut self,
+        name: &str,
+        unit: &str,
+        meaning: &str,
+        column: impl Into<Column>,
+    ) -> Result<(), TableError> {
+        self.push_column(name, column.into())?;
+        self.set_metadata(&format!("{name}.unit"), unit);
+        self.set_metadata(&format!("{name}.meaning"), meaning);
+        Ok(())
+    }
+
+    /// The same for a column whose metadata, if it has any, are set already.
+    pub(super) fn push_column(&mut self, name: &str, column: Column) -> Result<(), TableError> {
         if !self.columns.is_empty() && column.len() != self.rows() {
             return Err(TableError::Rows {
                 name: name.to_owned(),
@@ -104,14 +121,7 @@ impl Table {
         self.metadata.push((key.to_owned(), value.into()));
     }
 
-    /// Says what a column holds: metadata entries `NAME.unit` (empty for counts, names and flags) and
-    /// `NAME.meaning`.
-    pub fn describe(&mut self, name: &str, unit: &str, meaning: &str) {
-        self.set_metadata(&format!("{name}.unit"), unit);
-        self.set_metadata(&format!("{name}.meaning"), meaning);
-    }
-
-    /// What [`describe`](Self::describe) said of a column: unit and meaning.
+    /// Unit and meaning of a column.
     pub fn description(&self, name: &str) -> Option<(&str, &str)> {
         let entry = |what: &str| self.metadata(&format!("{name}.{what}"));
         entry("unit").zip(entry("meaning"))
@@ -144,21 +154,23 @@ mod tests {
     #[test]
     fn columns_that_do_not_fit_are_refused() {
         let mut table = Table::new();
-        table.push("a", vec![1.0, 2.0]).unwrap();
+        table.push("a", "m", "length", vec![1.0, 2.0]).unwrap();
         assert!(matches!(
-            table.push("b", vec![1u32]),
+            table.push("b", "", "count", vec![1u32]),
             Err(TableError::Rows { rows: 1, .. })
         ));
         assert!(matches!(
-            table.push("a", vec![1u32, 2]),
+            table.push("a", "", "count", vec![1u32, 2]),
             Err(TableError::Duplicate(_))
         ));
+        assert_eq!(table.description("a"), Some(("m", "length")));
+        assert_eq!(table.description("b"), None);
         assert!(matches!(
             table.required::<f64>("c"),
             Err(TableError::Missing { .. })
         ));
         assert!(matches!(table.required::<f32>("a"), Err(TableError::Type { .. })));
-        table.push("e", vec![Some(true), None]).unwrap();
+        table.push("e", "", "flag", vec![Some(true), None]).unwrap();
         assert!(matches!(table.required::<bool>("e"), Err(TableError::Empty(_))));
         assert_eq!(table.optional::<bool>("e").unwrap(), [Some(true), None]);
     }

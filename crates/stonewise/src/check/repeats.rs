@@ -9,7 +9,7 @@ use crate::project::Project;
 use crate::texts::findings::{CLOUDS, ROUNDED, SAME_POINTS, TWICE};
 use nalgebra::Point3;
 use stonewise_core::geometry::cell_of;
-use stonewise_core::statistics::upper_median;
+use stonewise_core::statistics::{split_mix, upper_median};
 
 /// Edge of the cells, metres; points in the same cell count as the same point. A tenth of what scanners
 /// resolve.
@@ -103,13 +103,10 @@ impl Cells {
     }
 }
 
-/// Whether a cell is among those that are counted, by a hash of its place (Teschner et al. 2003).
+/// Whether a cell is among those that are counted, by a hash of its place.
 fn is_counted(cell: &[i64; 3], thinning: u64) -> bool {
-    let primes = [73_856_093, 19_349_663, 83_492_791];
-    let parts = cell.iter().zip(primes);
-    let hash = parts.fold(0, |hash, (i, prime): (&i64, i64)| hash ^ i.wrapping_mul(prime));
-    // The low bits of a product depend only on the low bits of its factors.
-    (hash ^ hash >> 17).cast_unsigned() % thinning == 0
+    let hash = cell.iter().fold(0, |hash, i| split_mix(hash ^ i.cast_unsigned()));
+    hash % thinning == 0
 }
 
 /// The step of the coordinates, metres: the median difference between successive values of an axis, the

@@ -18,42 +18,57 @@ pub(super) fn joint_layer(
     line: impl Fn(&Joint) -> Vec<Point3<f64>>,
 ) -> Result<Layer, TableError> {
     let mut table = Table::new();
-    for (k, column) in ["stone_1", "stone_2"].into_iter().enumerate() {
+    let sides = [
+        ("stone_1", "number of one stone beside the joint"),
+        ("stone_2", "number of the other stone"),
+    ];
+    for (k, (column, meaning)) in sides.into_iter().enumerate() {
         let id = |j: &Joint| results.stones[j.stones[k]].stone_id;
-        table.push(column, joints.iter().map(id).collect::<Vec<u32>>())?;
+        table.push(column, "", meaning, joints.iter().map(id).collect::<Vec<u32>>())?;
     }
-    table.push("width", joints.iter().map(|j| j.width_m).collect::<Vec<f64>>())?;
+    let widths: Vec<f64> = joints.iter().map(|j| j.width_m).collect();
+    table.push(
+        "width",
+        "m",
+        "distance between the outlines of the stones",
+        widths,
+    )?;
     let of = |pick: fn(&JointMotion) -> f64| -> Vec<Option<f64>> {
         joints.iter().map(|j| j.motion.as_ref().map(pick)).collect()
     };
-    table.push("opening", of(|m| m.opening_m))?;
-    table.push("sliding", of(|m| m.sliding_m))?;
-    table.push("step_out", of(|m| m.step_m))?;
-    table.push("sigma_opening", of(|m| m.opening_sigma_m))?;
-    let significant = joints
-        .iter()
-        .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
-    table.push("significant", significant.collect::<Vec<Option<u8>>>())?;
-    table.describe("stone_1", "", "number of one stone beside the joint");
-    table.describe("stone_2", "", "number of the other stone");
-    table.describe("width", "m", "distance between the outlines of the stones");
-    table.describe("opening", "m", "motion of the stones apart, across the joint");
-    table.describe(
+    table.push(
+        "opening",
+        "m",
+        "motion of the stones apart, across the joint",
+        of(|m| m.opening_m),
+    )?;
+    table.push(
         "sliding",
         "m",
         "motion of the second stone along the joint against the first",
-    );
-    table.describe(
+        of(|m| m.sliding_m),
+    )?;
+    table.push(
         "step_out",
         "m",
         "motion of the second stone out of the face against the first",
-    );
-    table.describe("sigma_opening", "m", "standard deviation of the opening");
-    table.describe(
+        of(|m| m.step_m),
+    )?;
+    table.push(
+        "sigma_opening",
+        "m",
+        "standard deviation of the opening",
+        of(|m| m.opening_sigma_m),
+    )?;
+    let significant = joints
+        .iter()
+        .map(|j| j.motion.as_ref().map(|m| u8::from(m.is_significant())));
+    table.push(
         "significant",
         "",
         "1 where the opening differs from zero at 95 %, else 0; empty where a stone was not measured",
-    );
+        significant.collect::<Vec<Option<u8>>>(),
+    )?;
     let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
     Ok(Layer {
         name: name.to_owned(),

@@ -5,13 +5,13 @@ use super::layer_style::{arrow_style, stone_style};
 use crate::figure::Scale;
 use crate::results::names::numbered;
 use crate::results::{
-    ResultSet, RowMotion, STONE_COLUMNS, Sorted, StoneOutline, StoneRow, component_limit_m, joints,
-    nice_scale_m, stone_table,
+    ResultSet, RowMotion, Sorted, StoneOutline, StoneRow, column, component_limit_m, joints, nice_scale_m,
+    stone_table,
 };
 use nalgebra::{Point2, Point3};
 use stonewise_io::crs::Crs;
 use stonewise_io::layers::{Geometry, Layer, LayerStyle};
-use stonewise_io::table::{Table, TableError};
+use stonewise_io::table::{Column, Table, TableError};
 
 /// The layers of the GeoPackage; the first is that of the world frame.
 pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
@@ -136,34 +136,27 @@ fn styles(measured: &[(&StoneRow, &RowMotion)]) -> Vec<LayerStyle> {
 
 fn motion_table(moved: &[(&StoneRow, &RowMotion)], factor: f64) -> Result<Table, TableError> {
     let mut table = Table::new();
+    let as_in_stones = |table: &mut Table, name: &str, values: Column| {
+        let (unit, meaning) = column(name).map_or(("", ""), |c| (c.unit, c.meaning));
+        table.push(name, unit, meaning, values)
+    };
     let real = |of: fn(&RowMotion) -> f64| moved.iter().map(|(_, m)| of(m)).collect::<Vec<f64>>();
+    let stones: Vec<u32> = moved.iter().map(|(s, _)| s.stone_id).collect();
+    as_in_stones(&mut table, "stone_id", stones.into())?;
+    as_in_stones(&mut table, "d_along", real(|m| m.face.x).into())?;
+    as_in_stones(&mut table, "d_up", real(|m| m.face.y).into())?;
+    as_in_stones(&mut table, "d_out", real(|m| m.face.z).into())?;
+    let lengths = real(|m| m.displacement.norm());
+    table.push("norm", "m", "length of the displacement", lengths)?;
+    as_in_stones(&mut table, "lod95", real(|m| m.detection_limit_m).into())?;
+    let significant: Vec<u8> = moved.iter().map(|(_, m)| u8::from(m.significant)).collect();
+    as_in_stones(&mut table, "significant", significant.into())?;
     table.push(
-        "stone_id",
-        moved.iter().map(|(s, _)| s.stone_id).collect::<Vec<u32>>(),
-    )?;
-    table.push("d_along", real(|m| m.face.x))?;
-    table.push("d_up", real(|m| m.face.y))?;
-    table.push("d_out", real(|m| m.face.z))?;
-    table.push("norm", real(|m| m.displacement.norm()))?;
-    table.push("lod95", real(|m| m.detection_limit_m))?;
-    table.push(
-        "significant",
-        moved
-            .iter()
-            .map(|(_, m)| u8::from(m.significant))
-            .collect::<Vec<u8>>(),
-    )?;
-    table.push("exaggeration", vec![factor; moved.len()])?;
-    let same = |name: &str| ["stone_id", "d_along", "d_up", "d_out", "lod95", "significant"].contains(&name);
-    for column in STONE_COLUMNS.iter().filter(|c| same(c.name)) {
-        table.describe(column.name, column.unit, column.meaning);
-    }
-    table.describe("norm", "m", "length of the displacement");
-    table.describe(
         "exaggeration",
         "",
         "how many times longer than the displacement the line is",
-    );
+        vec![factor; moved.len()],
+    )?;
     Ok(table)
 }
 

@@ -14,11 +14,13 @@ use std::path::Path;
 use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_io::cloud::{ExtraColumn, read_mesh, write_points_laz};
+use stonewise_io::cloud::{Dimension, ExtraColumn, read_mesh, write_points_laz};
 
 /// Names of the steps that leave nothing for later runs.
 const C2C: &str = "c2c";
 const C2M: &str = "c2m";
+const C2C_DISTANCE: Dimension = Dimension::new("c2c_distance", "m", "distance to nearest point");
+const C2M_DISTANCE: Dimension = Dimension::new("c2m_distance", "m", "distance to the mesh");
 
 /// What to compare with what.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +78,7 @@ pub fn compare_clouds(
             let [first, second] = [ingest(&context, 1)?, ingest(&context, 2)?];
             context.timed(C2C, || {
                 let measure = |sink: Sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink);
-                Distances::collect(measure)?.write(project, &out.join("c2c.laz"), "c2c_distance")
+                Distances::collect(measure)?.write(project, &out.join("c2c.laz"), C2C_DISTANCE)
             })
         }
         Comparison::C2m { mesh, max_m } => {
@@ -84,7 +86,7 @@ pub fn compare_clouds(
             context.timed(C2M, || {
                 let index = MeshIndex::new(read_mesh(mesh)?);
                 let measure = |sink: Sink| c2m_survey(&index, &second.tiles, max_m, progress, sink);
-                Distances::collect(measure)?.write(project, &out.join("c2m.laz"), "c2m_distance")
+                Distances::collect(measure)?.write(project, &out.join("c2m.laz"), C2M_DISTANCE)
             })
         }
     }
@@ -138,13 +140,13 @@ impl Distances {
         Ok(all)
     }
 
-    fn write(&self, project: &Project, path: &Path, name: &str) -> Result<()> {
+    fn write(&self, project: &Project, path: &Path, dimension: Dimension) -> Result<()> {
         let crs = coordinate_system(project)?.map(|c| c.text());
         Ok(write_points_laz(
             path,
             crs.as_deref(),
             &self.points,
-            &[(name, ExtraColumn::F64(&self.distances))],
+            &[(dimension, ExtraColumn::F64(&self.distances))],
         )?)
     }
 }

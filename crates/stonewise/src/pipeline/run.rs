@@ -27,7 +27,7 @@ use crate::pipeline::steps::label::{Labelled, label};
 use crate::pipeline::steps::m3c2::{m3c2, with_datum};
 use crate::pipeline::steps::r#match::{Matched, r#match};
 use crate::pipeline::steps::offsets::label_offsets;
-use crate::pipeline::steps::register::{Registered, datum, register};
+use crate::pipeline::steps::register::{Registered, register};
 use crate::pipeline::steps::segment::{Segmented, segment};
 use crate::pipeline::units::forget;
 use crate::pipeline::until::Until;
@@ -249,9 +249,8 @@ pub(super) fn measured(
     facade: &Facade,
     number: usize,
 ) -> Result<Measured> {
-    let registered = register(context, photos, [first, second], matched, number)?;
-    let common = motion_in_common(first, &registered);
-    let datum = datum(context.project, number, &registered, &first.stones).against(common.as_ref());
+    let (registered, datum) = register(context, photos, [first, second], matched, number)?;
+    let datum = datum.against(motion_in_common(first, &registered).as_ref());
     let rows = stone_rows([first, second], matched, &registered, &datum, facade);
     Ok(Measured {
         registered,
@@ -342,8 +341,8 @@ fn measure(
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
     };
     write_readable_json(&file(PairFile::Registration), &record)?;
-    if !registered.contrasts.is_empty() {
-        write_neighbours(&context.out, pair, &registered.contrasts)?;
+    if !registered.neighbours.is_empty() {
+        write_neighbours(&context.out, pair, &registered.neighbours)?;
     }
     let change = if until > Until::Registered {
         let centres: Vec<Point3<f64>> = photos[0].views.iter().map(View::centre).collect();

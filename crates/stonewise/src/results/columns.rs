@@ -1,7 +1,7 @@
 //! The columns of the stone table: one list, from which every file with stones is written, read and
 //! described.
 
-use super::{ColumnNote, RowMotion, Status, StoneRow};
+use super::{RowMotion, Status, StoneRow};
 use crate::error::{Error, Result};
 use std::path::Path;
 use stonewise_io::table::{Column, Table};
@@ -205,20 +205,6 @@ impl StoneColumn {
             Cells::Flag(f) => motion.map_or(f64::NAN, |m| f64::from(u8::from((f.get)(m)))),
             Cells::Derived(get) => motion.map_or(f64::NAN, get),
         })
-    }
-
-    /// What the column of the text table holds.
-    pub(super) fn note(&self) -> ColumnNote {
-        ColumnNote::new(self.name, self.datatype(), self.unit, self.meaning)
-    }
-
-    /// Type of the cells in the words of XML Schema.
-    fn datatype(&self) -> &'static str {
-        match &self.cells {
-            Cells::Count(_) | Cells::OptionalCount(_) | Cells::Flag(_) => "integer",
-            Cells::Status(_) => "string",
-            Cells::Real(_) | Cells::Motion(_) | Cells::OptionalMotion(_) | Cells::Derived(_) => "number",
-        }
     }
 }
 

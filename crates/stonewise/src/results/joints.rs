@@ -4,6 +4,7 @@ use super::statistics::Sorted;
 use super::{ResultSet, RowMotion, StoneRow};
 use nalgebra::{Matrix3, Point2, Point3, Vector2, Vector3};
 use std::collections::BTreeMap;
+use stonewise_core::id::StoneId;
 
 /// Distance between samples of an outline, metres.
 const STEP_M: f64 = 0.02;
@@ -152,9 +153,13 @@ fn motion(results: &ResultSet, stones: [usize; 2], across: &Vector2<f64>) -> Opt
 /// Variance of the motion of two stones against each other in a direction (along, up, out) of the first;
 /// `None` where their joint covariance is not known.
 fn between_neighbours(results: &ResultSet, [a, b]: [&StoneRow; 2], direction: &Vector3<f64>) -> Option<f64> {
-    let ids = [a.stone_id.min(b.stone_id), a.stone_id.max(b.stone_id)];
+    let ids = [a.stone_id.min(b.stone_id), a.stone_id.max(b.stone_id)].map(StoneId);
     let world = results.world_from_face(a) * direction;
-    let covariance = results.neighbours.get(&ids)?;
+    let found = results
+        .neighbours
+        .binary_search_by_key(&ids, |pair| pair.stones)
+        .ok()?;
+    let covariance = &results.neighbours[found].covariance;
     Some(world.dot(&(covariance * world)).max(0.0))
 }
 
@@ -264,6 +269,7 @@ mod tests {
     use crate::results::records::{Datum, DatumState};
     use crate::results::testing::{folder, registration_record, rows};
     use nalgebra::Matrix6;
+    use stonewise_core::stone::NeighbourCovariance;
 
     #[test]
     fn a_bonded_wall_has_its_bed_and_head_joints() {
@@ -308,7 +314,10 @@ mod tests {
         let ids = [6, 7].map(|i: usize| results.stones[i].stone_id);
         // The wall looks along x; the joint opens along y.
         let covariance = Matrix3::from_diagonal(&Vector3::new(1e-4, 9e-8, 1e-4));
-        results.neighbours.insert(ids, covariance);
+        results.neighbours.push(NeighbourCovariance {
+            stones: ids.map(StoneId),
+            covariance,
+        });
         let all = joints(&results);
         let sigma = |stones: [usize; 2]| {
             let joint = all.iter().find(|j| j.stones == stones).unwrap();

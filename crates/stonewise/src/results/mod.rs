@@ -2,7 +2,6 @@
 //! evidence, records.
 
 mod change_points;
-mod column_metadata;
 mod columns;
 mod comparison;
 mod evidence;
@@ -21,9 +20,6 @@ mod stone_table;
 pub(crate) mod testing;
 
 pub use change_points::DistancePoint;
-#[cfg(test)]
-pub(crate) use column_metadata::check_csv_metadata;
-pub(crate) use column_metadata::{ColumnNote, INTEGERS, write_csv_metadata};
 pub(crate) use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};
 pub(crate) use comparison::{Comparison, compare};
@@ -33,7 +29,6 @@ pub use evidence::{
 };
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};
-pub use neighbours::NeighbourCovariances;
 pub(crate) use neighbours::{read_neighbours, write_neighbours};
 pub use outlines::{StoneOutline, read_outlines, write_outlines};
 pub use result_set::ResultSet;

@@ -5,7 +5,7 @@ use super::names::{EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
 use super::stone_table::read_stones;
-use super::{Evidence, Facade, NeighbourCovariances, RowMotion, StoneRow, read_neighbours};
+use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours};
 use crate::error::Error;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use serde::de::DeserializeOwned;
@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::FaceFrame;
+use stonewise_core::stone::NeighbourCovariance;
 
 /// The result files of one pair of epochs, read back; photos and clouds are not needed.
 #[derive(Clone, Debug)]
@@ -33,8 +34,8 @@ pub struct ResultSet {
     pub run: Option<RunRecord>,
     /// `registration.json`, where there is one.
     pub registration: Option<RegistrationRecord>,
-    /// `neighbours.parquet`; empty where the file is missing.
-    pub neighbours: NeighbourCovariances,
+    /// `neighbours.parquet`, by the stones' numbers; empty where the file is missing.
+    pub neighbours: Vec<NeighbourCovariance>,
     /// `verdict.json`, where there is one.
     pub verdict: Option<Verdict>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,

@@ -1,8 +1,8 @@
 //! Files of stone rows: CSV with its metadata and Parquet, with the columns of the contract.
 
-use super::columns::{EDITED, STONE_COLUMNS, StoneColumn, columns_of};
+use super::columns::{EDITED, STONE_COLUMNS, columns_of};
 use super::names::PairFile;
-use super::{RowMotion, StoneRow, write_csv_metadata};
+use super::{RowMotion, StoneRow};
 use crate::error::Result;
 use std::path::Path;
 use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parquet};
@@ -16,9 +16,7 @@ pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     let table = stone_table(rows)?;
     write_parquet(&dir.join(PairFile::StonesParquet.name(pair)), &table)?;
     let csv = dir.join(PairFile::StonesCsv.name(pair));
-    write_csv(&csv, &table)?;
-    let notes = columns_of(rows).map(StoneColumn::note);
-    write_csv_metadata(&csv, DESCRIPTION, Some("stone_id"), notes)
+    Ok(write_csv(&csv, &table, DESCRIPTION, Some("stone_id"))?)
 }
 
 /// What the stone table as a whole holds.
@@ -58,8 +56,7 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
 pub fn stone_table(rows: &[StoneRow]) -> std::result::Result<Table, TableError> {
     let mut table = Table::new();
     for column in columns_of(rows) {
-        table.push(column.name, column.of(rows))?;
-        table.describe(column.name, column.unit, column.meaning);
+        table.push(column.name, column.unit, column.meaning, column.of(rows))?;
     }
     Ok(table)
 }

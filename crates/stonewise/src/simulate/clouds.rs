@@ -9,7 +9,7 @@ use stonewise_core::simulate::{
     FacePoint, SampledFaces, Scan, SeenCells, Sensor, StoneTruth, Window, scan_window, stone_truths,
     window_truths,
 };
-use stonewise_io::cloud::{ExtraColumn, ExtraType, Observed, PointSink, stream_scan_laz};
+use stonewise_io::cloud::{Dimension, ExtraColumn, ExtraType, Observed, PointSink, stream_scan_laz};
 
 impl Survey<'_> {
     /// The clouds of both scanners, written unless they are there; gives back what they saw. `truths`: of all
@@ -89,7 +89,8 @@ impl Survey<'_> {
             .folder
             .join(format!("truth/epoch{number}_cloud_{name}_truth.laz"));
         let bounds = self.bounds();
-        let columns = [("stone_id", ExtraType::U32)];
+        let stone = Dimension::new("stone_id", "", "stone, 0 for none");
+        let columns = [(stone, ExtraType::U32)];
         stream_scan_laz(&path, &bounds, &[], |cloud| {
             stream_scan_laz(&truth, &bounds, &columns, |known| {
                 write(Some(Box::new(|scan| append(cloud, known, scan))))

@@ -12,6 +12,9 @@ use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::{CocoPhoto, InstanceInfo, write_coco, write_label_png};
 use stonewise_io::table::{Table, write_csv};
 
+/// What the table of masks as a whole holds.
+const DESCRIPTION: &str = "Which stone each mask of an epoch's photos shows, one row per mask.";
+
 /// What is known of a photo whose files are whole.
 #[derive(Serialize, Deserialize)]
 pub(super) struct FinishedPhoto {
@@ -87,16 +90,19 @@ impl<'a> MaskWriter<'a> {
         if self.folder.is_some() {
             self.known.sort();
             let mut table = Table::new();
+            let photos: Vec<String> = self.known.iter().map(|k| k.0.clone()).collect();
+            table.push("photo", "", "file name of the photo", photos)?;
+            let instances: Vec<u32> = self.known.iter().map(|k| k.1).collect();
             table.push(
-                "photo",
-                self.known.iter().map(|k| k.0.clone()).collect::<Vec<_>>(),
+                "instance",
+                "",
+                "value of the mask in the label PNG of the photo",
+                instances,
             )?;
-            table.push("instance", self.known.iter().map(|k| k.1).collect::<Vec<_>>())?;
-            table.push("stone_id", self.known.iter().map(|k| k.2).collect::<Vec<_>>())?;
-            return Ok(write_csv(
-                &truth.join(format!("epoch{number}_stones.csv")),
-                &table,
-            )?);
+            let stones: Vec<u32> = self.known.iter().map(|k| k.2).collect();
+            table.push("stone_id", "", "stone that the mask shows", stones)?;
+            let csv = truth.join(format!("epoch{number}_stones.csv"));
+            return Ok(write_csv(&csv, &table, DESCRIPTION, None)?);
         }
         self.kept.sort_by(|a, b| a.0.cmp(&b.0));
         let (names, labels): (Vec<String>, Vec<LabelImage>) = self.kept.into_iter().unzip();

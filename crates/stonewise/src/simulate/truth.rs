@@ -1,6 +1,7 @@
 //! The truth of a simulated survey as files; never an input of the method.
 
 use crate::simulate::SimulateError;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stonewise_core::simulate::{Sensor, StoneTruth};
@@ -28,55 +29,111 @@ pub struct SeenByScans {
 /// A stone counts as shown in a photo from this many pixels on.
 pub const SHOWN_PIXELS: u32 = 150;
 
-/// Writes truth/stones.csv, one row a stone.
+/// What the table as a whole holds.
+const DESCRIPTION: &str =
+    "The true stones of a simulated wall, one row per stone. Motions are later epoch minus first.";
+
+/// Writes truth/stones.csv, one row a stone, and the metadata of its columns.
 pub fn write_stone_table(path: &Path, truths: &[StoneTruth], seen: &[Seen]) -> Result<(), SimulateError> {
-    Ok(write_csv(path, &stone_table(truths, seen)?)?)
+    let table = stone_table(truths, seen)?;
+    Ok(write_csv(path, &table, DESCRIPTION, Some("stone_id"))?)
 }
 
 fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError> {
     let mut table = Table::new();
-    table.push("stone_id", truths.iter().map(|t| t.id.0).collect::<Vec<_>>())?;
     let real = |get: &dyn Fn(&StoneTruth) -> f64| truths.iter().map(get).collect::<Vec<f64>>();
     let flag =
         |get: &dyn Fn(&StoneTruth) -> bool| truths.iter().map(|t| u32::from(get(t))).collect::<Vec<_>>();
-    for (axis, name) in ["cx", "cy", "cz"].iter().enumerate() {
-        table.push(name, real(&|t| t.centroid[axis]))?;
-    }
-    table.push("u", real(&|t| t.middle[0]))?;
-    table.push("v", real(&|t| t.middle[1]))?;
-    table.push("area_m2", real(&|t| t.area_m2))?;
-    table.push("width", real(&|t| t.size_m[0]))?;
-    table.push("height", real(&|t| t.size_m[1]))?;
-    for (axis, name) in ["dx", "dy", "dz"].iter().enumerate() {
-        table.push(name, real(&|t| t.displacement[axis]))?;
-    }
-    for (axis, name) in ["rx", "ry", "rz"].iter().enumerate() {
-        table.push(name, real(&|t| t.rotation[axis]))?;
-    }
-    table.push("loose", flag(&|t| t.loose))?;
-    for (axis, name) in ["bgx", "bgy", "bgz"].iter().enumerate() {
-        table.push(name, real(&|t| t.shared[axis]))?;
-    }
-    table.push("edge", flag(&|t| t.edge))?;
-    for (axis, name) in ["nx", "ny", "nz"].iter().enumerate() {
-        table.push(name, real(&|t| t.normal[axis]))?;
-    }
+    let numbers: Vec<u32> = truths.iter().map(|t| t.id.0).collect();
+    table.push("stone_id", "", "number of the stone in the wall", numbers)?;
+    let vector = |table: &mut Table, stem: &str, unit: &str, meaning: &str, of: VectorOf| {
+        AXES.iter().enumerate().try_for_each(|(axis, name)| {
+            let meaning = format!("{meaning}, world {name}");
+            table.push(&format!("{stem}{name}"), unit, &meaning, real(&|t| of(t)[axis]))
+        })
+    };
+    let meaning = "centroid of the face in the first epoch, as seen square on";
+    vector(&mut table, "c", "m", meaning, |t| t.centroid.coords)?;
+    table.push(
+        "u",
+        "m",
+        "middle of the stone along the face",
+        real(&|t| t.middle[0]),
+    )?;
+    table.push(
+        "v",
+        "m",
+        "middle of the stone up the face",
+        real(&|t| t.middle[1]),
+    )?;
+    let meaning = "area of the face as seen square on";
+    table.push("area_m2", "m2", meaning, real(&|t| t.area_m2))?;
+    table.push("width", "m", "width on the face", real(&|t| t.size_m[0]))?;
+    table.push("height", "m", "height on the face", real(&|t| t.size_m[1]))?;
+    let meaning = "displacement of the centroid, later epoch minus first";
+    vector(&mut table, "d", "m", meaning, |t| t.displacement)?;
+    vector(&mut table, "r", "rad", "rotation vector", |t| t.rotation)?;
+    let meaning = "1 where the stone moves on its own, else 0";
+    table.push("loose", "", meaning, flag(&|t| t.loose))?;
+    let meaning = "displacement that the stone shares with its neighbours";
+    vector(&mut table, "bg", "m", meaning, |t| t.shared)?;
+    let meaning = "1 where the end of the section, the crown or the ground cuts the stone, else 0";
+    table.push("edge", "", meaning, flag(&|t| t.edge))?;
+    vector(&mut table, "n", "", "outward unit normal of the face", |t| {
+        t.normal
+    })?;
+    push_visibility(&mut table, truths, seen)?;
+    Ok(table)
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// One of the vectors of a stone.
+type VectorOf = fn(&StoneTruth) -> Vector3<f64>;
+
+fn push_visibility(table: &mut Table, truths: &[StoneTruth], seen: &[Seen]) -> Result<(), TableError> {
     let sensors = || Sensor::ALL.iter().map(|s| s.name()).enumerate();
     for (sensor, name) in sensors() {
         for (number, epoch) in (1..).zip(seen) {
-            table.push(&format!("n_{name}_{number}"), epoch.scans.points[sensor].clone())?;
+            let meaning = format!("points of the cloud cloud_{name} of epoch {number} on the stone");
+            let points = epoch.scans.points[sensor].clone();
+            table.push(&format!("n_{name}_{number}"), "", &meaning, points)?;
         }
     }
     for (number, epoch) in (1..).zip(seen) {
-        table.push(&format!("n_img_{number}"), epoch.photos.clone())?;
+        let meaning = format!("photos of epoch {number} with {SHOWN_PIXELS} or more pixels of the stone");
+        table.push(&format!("n_img_{number}"), "", &meaning, epoch.photos.clone())?;
     }
     for (sensor, name) in sensors() {
         let share = |i: usize, epoch: &Seen| truths[i].seen_share(epoch.scans.cells[sensor][i]);
         let least = |i: usize| seen.iter().map(|e| share(i, e)).fold(1.0, f64::min);
-        table.push(
-            &format!("vis_{name}"),
-            (0..truths.len()).map(least).collect::<Vec<f64>>(),
-        )?;
+        let meaning =
+            format!("share of the face that cloud_{name} shows, in the epoch where that is less, 0 to 1");
+        let shares: Vec<f64> = (0..truths.len()).map(least).collect();
+        table.push(&format!("vis_{name}"), "", &meaning, shares)?;
     }
-    Ok(table)
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::testing::check_csv_metadata;
+
+    #[test]
+    fn the_metadata_describe_every_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let csv = folder.path().join("stones.csv");
+        let scans = || SeenByScans {
+            total: 0,
+            points: Default::default(),
+            cells: Default::default(),
+        };
+        let seen = || Seen {
+            scans: scans(),
+            photos: Vec::new(),
+        };
+        write_stone_table(&csv, &[], &[seen(), seen()]).unwrap();
+        check_csv_metadata(&csv);
+    }
 }

@@ -376,16 +376,17 @@ fn write_tile(step: &StepDir, name: &str, origin: Point3<f64>, records: &[Record
     let cloud = Cloud::new(origin, records.iter().map(|r| r.offset).collect());
     let mut table = Table::new();
     for (axis, column) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push(
-            column,
-            records.iter().map(|r| r.offset[axis]).collect::<Vec<f32>>(),
-        )?;
+        let values: Vec<f32> = records.iter().map(|r| r.offset[axis]).collect();
+        table.push(column, "m", "point, from the origin of its tile", values)?;
     }
-    table.push("file", records.iter().map(|r| r.file).collect::<Vec<u32>>())?;
-    table.push("index", records.iter().map(|r| r.index).collect::<Vec<u64>>())?;
-    let sources = records.iter().map(|r| u32::from(r.source.0));
-    table.push("source", sources.collect::<Vec<u32>>())?;
-    table.push("time", records.iter().map(|r| r.source.1).collect::<Vec<f32>>())?;
+    let files: Vec<u32> = records.iter().map(|r| r.file).collect();
+    table.push("file", "", "number of the input file, from 0", files)?;
+    let indices: Vec<u64> = records.iter().map(|r| r.index).collect();
+    table.push("index", "", "number of the record in its file, from 0", indices)?;
+    let sources: Vec<u32> = records.iter().map(|r| u32::from(r.source.0)).collect();
+    table.push("source", "", "entry of sources.json", sources)?;
+    let times: Vec<f32> = records.iter().map(|r| r.source.1).collect();
+    table.push("time", "s", "time since the first point of its source", times)?;
     write_parquet(&step.file(format!("{name}.parquet")), &table)?;
     let points = (0..cloud.len()).map(|i| cloud.world(i));
     let bounds = Bounds::of(points).unwrap_or(Bounds {

@@ -7,13 +7,13 @@
 mod adjust;
 mod breaks;
 mod candidate;
-mod contrast;
 mod equations;
 mod error;
 mod estimate;
 mod evaluate;
 mod field;
 mod hypothesis;
+mod neighbour_covariances;
 pub(crate) mod observation;
 mod outcome;
 mod params;

@@ -1,8 +1,8 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
 use super::breaks::find_breaks;
-use super::contrast::contrasts;
 use super::estimate::Estimate;
+use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
 use super::params::AdjustmentReport;
@@ -52,8 +52,8 @@ pub(crate) fn report(
         .filter_map(|r| r.motion.as_ref().ok().filter(|m| !m.loose))
         .map(|m| m.displacement)
         .collect();
-    let contrasts = last.map_or_else(Vec::new, |solution| {
-        contrasts(adjustment, solution, &results, &estimates, &shared)
+    let neighbours = last.map_or_else(Vec::new, |solution| {
+        neighbour_covariances(adjustment, solution, &results, &estimates, &shared)
     });
     let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
     AdjustmentReport {
@@ -69,7 +69,7 @@ pub(crate) fn report(
         iterations,
         converged,
         breaks,
-        contrasts,
+        neighbours,
         photos: adjustment.photo_report(),
     }
 }

@@ -3,7 +3,7 @@
 use super::field::VarianceComponents;
 use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
-use crate::stone::{Contrast, PairResult};
+use crate::stone::{NeighbourCovariance, PairResult};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -111,7 +111,7 @@ pub struct AdjustmentReport {
     /// Neighbours between which the field broke.
     pub breaks: Vec<Break>,
     /// Covariances of the motions of neighbours relative to each other.
-    pub contrasts: Vec<Contrast>,
+    pub neighbours: Vec<NeighbourCovariance>,
     /// What photos contributed, where they took part.
     pub photos: Option<PhotoReport>,
 }

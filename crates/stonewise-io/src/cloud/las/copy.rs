@@ -7,7 +7,7 @@ use las::{Builder, PointData, Vlr};
 
 use super::read::{LasSource, fill_chunk};
 use super::{Layout, LazWriter};
-use crate::cloud::extra_bytes::{self, ExistingDimension};
+use crate::cloud::extra_bytes;
 use crate::cloud::label::{Fill, LabelColumns, PointLabel};
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
 
@@ -41,17 +41,18 @@ pub fn copy_labelled<E: From<CloudError>>(
 /// How a record of the input becomes one of the output.
 struct RecordCopy {
     columns: LabelColumns,
-    /// Dimensions of the input that are kept: all but those that are written anew.
-    kept: Vec<ExistingDimension>,
     /// Bytes of the record that are copied, without gaps where possible.
     copied: Vec<Range<usize>>,
     extra_bytes: u16,
+    /// Of all extra dimensions of the output.
+    descriptors: Vec<u8>,
 }
 
 impl RecordCopy {
     fn new(input: &Path, layout: &Layout, columns: LabelColumns) -> Result<Self, CloudError> {
         let format = layout.header.point_format();
         let records = layout.header.vlrs().iter().chain(&layout.extended);
+        // All but those that are written anew.
         let mut kept = extra_bytes::existing(records, format.extra_bytes);
         kept.retain(|dimension| !columns.names().any(|n| n.as_bytes() == dimension.name()));
         let base = usize::from(format.len() - format.extra_bytes);
@@ -73,18 +74,14 @@ impl RecordCopy {
             );
             CloudError::malformed(input, reason)
         })?;
+        let mut descriptors: Vec<u8> = kept.iter().flat_map(|d| d.descriptor).collect();
+        descriptors.extend(columns.descriptors(input)?);
         Ok(Self {
             columns,
-            kept,
             copied,
             extra_bytes: record_bytes - base as u16,
+            descriptors,
         })
-    }
-
-    fn descriptors(&self) -> Vec<u8> {
-        let mut all: Vec<u8> = self.kept.iter().flat_map(|d| d.descriptor).collect();
-        all.extend(self.columns.descriptors());
-        all
     }
 
     fn copy(&self, first: u64, data: &PointData, chunk: &PointChunk, labels: &[PointLabel]) -> Vec<u8> {
@@ -124,8 +121,8 @@ fn builder(layout: &Layout, record: &RecordCopy) -> Builder {
         record.user_id = plain(&record.user_id, 16);
         record.description = plain(&record.description, 32);
     }
-    let descriptors = record.descriptors();
-    if !descriptors.is_empty() {
+    if !record.descriptors.is_empty() {
+        let descriptors = record.descriptors.clone();
         builder.vlrs.push(extra_bytes::description_record(descriptors));
     }
     builder

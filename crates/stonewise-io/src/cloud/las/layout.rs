@@ -7,7 +7,7 @@ use super::compression::Compression;
 use super::crs_record::named_crs;
 use super::envelope::Envelope;
 use super::las_error::las_error;
-use super::stream::{Corrections, LasStream};
+use super::stream::LasStream;
 use super::unpack::Packing;
 use crate::cloud::CloudError;
 use crate::cloud::guard::guarded;
@@ -17,7 +17,8 @@ pub struct Layout {
     pub header: las::Header,
     /// All extended variable length records, of which the header has only the first.
     pub extended: Vec<las::Vlr>,
-    pub corrections: Corrections,
+    /// Number of variable length records between the header and the points.
+    pub record_count: u32,
     /// How the points are compressed; `None` if they are not.
     pub packing: Option<Packing>,
 }
@@ -37,18 +38,15 @@ impl Layout {
             })
         });
         let packing = packing.transpose()?;
-        let corrections = Corrections {
-            record_count: records.count,
-        };
         let extended = envelope.extended_records()?;
         let header = guarded(path, || {
-            let stream = LasStream::open(path, corrections).map_err(|e| CloudError::read(path, e))?;
+            let stream = LasStream::open(path, records.count).map_err(|e| CloudError::read(path, e))?;
             las::Header::new(stream).map_err(|e| las_error(path, e))
         })?;
         Ok(Self {
             header,
             extended,
-            corrections,
+            record_count: records.count,
             packing,
         })
     }

@@ -38,7 +38,7 @@ impl LasSource {
             Some(packing) => Records::Packed(LazReader::open(path, packing)?),
             None => Records::Plain(guarded(path, || {
                 let stream =
-                    LasStream::open(path, layout.corrections).map_err(|e| CloudError::read(path, e))?;
+                    LasStream::open(path, layout.record_count).map_err(|e| CloudError::read(path, e))?;
                 Reader::new(stream).map_err(|e| las_error(path, e))
             })?),
         };

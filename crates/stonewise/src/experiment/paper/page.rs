@@ -10,6 +10,9 @@ use std::fs;
 use std::path::Path;
 use stonewise_io::table::write_csv;
 
+/// What `table2.csv` as a whole holds.
+const TABLE2: &str = "One row per method, survey, motion and region.";
+
 /// Writes everything that the experiment came to.
 pub(super) fn write(
     cases: &[Case],
@@ -18,7 +21,7 @@ pub(super) fn write(
     out: &Path,
 ) -> Result<()> {
     write_text(&out.join("tables.md"), &tables.markdown())?;
-    write_csv(&out.join("table2.csv"), &tables.csv()?)?;
+    write_csv(&out.join("table2.csv"), &tables.csv()?, TABLE2, None)?;
     let folder = out.join("figures");
     fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
     let mut page = Page::new("The paper's experiment");

@@ -119,25 +119,38 @@ impl PaperTables {
         let mut table = Table::new();
         let text = |of: &dyn Fn(&Detail) -> &String| all.iter().map(|d| of(d).clone()).collect::<Vec<_>>();
         let real = |of: &dyn Fn(&Detail) -> f64| all.iter().map(of).collect::<Vec<f64>>();
-        table.push("method", text(&|d| &d.method))?;
-        table.push("survey", text(&|d| &d.survey))?;
-        table.push("motion", text(&|d| &d.motion))?;
-        table.push(
-            "expected",
-            all.iter().map(|d| d.count[0] as u32).collect::<Vec<_>>(),
-        )?;
-        table.push(
-            "estimated",
-            all.iter().map(|d| d.count[1] as u32).collect::<Vec<_>>(),
-        )?;
-        let directions = ["in_plane_per_axis", "in_plane_2d", "out_of_plane", "3d"];
-        for (i, direction) in directions.iter().enumerate() {
-            table.push(&format!("rmse_{direction}_m"), real(&|d| d.rmse_m[i]))?;
-            table.push(&format!("zero_{direction}_m"), real(&|d| d.zero_m[i]))?;
+        let count = |i: usize| all.iter().map(|d| d.count[i] as u32).collect::<Vec<u32>>();
+        table.push("method", "", "method of measurement", text(&|d| &d.method))?;
+        table.push("survey", "", "clouds that were compared", text(&|d| &d.survey))?;
+        let meaning = "motion of the second half of the points, and the region of the wall";
+        table.push("motion", "", meaning, text(&|d| &d.motion))?;
+        let meaning = "stones or core points that could have an estimate";
+        table.push("expected", "", meaning, count(0))?;
+        table.push("estimated", "", "those that have one", count(1))?;
+        let directions = [
+            ("in_plane_per_axis", "per axis in the plane of the face"),
+            ("in_plane_2d", "in the plane of the face, 2D"),
+            ("out_of_plane", "out of the plane of the face"),
+            ("3d", "3D"),
+        ];
+        for (i, (direction, words)) in directions.into_iter().enumerate() {
+            let (rmse, zero) = (
+                format!("RMSE {words}"),
+                format!("RMSE of always answering zero, {words}"),
+            );
+            table.push(&format!("rmse_{direction}_m"), "m", &rmse, real(&|d| d.rmse_m[i]))?;
+            table.push(&format!("zero_{direction}_m"), "m", &zero, real(&|d| d.zero_m[i]))?;
         }
-        table.push("median_3d_m", real(&|d| d.norm_m[0]))?;
-        table.push("p95_3d_m", real(&|d| d.norm_m[1]))?;
-        table.push("outlier_rate", real(&|d| d.outlier_rate))?;
+        table.push(
+            "median_3d_m",
+            "m",
+            "median of the 3D error",
+            real(&|d| d.norm_m[0]),
+        )?;
+        let meaning = "95th percentile of the 3D error";
+        table.push("p95_3d_m", "m", meaning, real(&|d| d.norm_m[1]))?;
+        let meaning = "share of the estimates that are wrong by more than 1 cm, 0 to 1";
+        table.push("outlier_rate", "", meaning, real(&|d| d.outlier_rate))?;
         Ok(table)
     }
 }

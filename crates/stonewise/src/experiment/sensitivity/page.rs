@@ -8,9 +8,13 @@ use crate::files::write_text;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `sensitivity.csv`, `index.html` and the plots.
+/// What the table as a whole holds.
+const DESCRIPTION: &str =
+    "One row per influence, scanner, method and value. Empty cells: no stone was measured.";
+
+/// Writes `sensitivity.csv` with the metadata of its columns, `index.html` and the plots.
 pub(super) fn write(points: &[SensitivityPoint], options: &SensitivityOptions, out: &Path) -> Result<()> {
-    write_csv(&out.join("sensitivity.csv"), &rows(points)?)?;
+    write_csv(&out.join("sensitivity.csv"), &rows(points)?, DESCRIPTION, None)?;
     let mut page = Page::new("What the results depend on");
     let [width, height] = options.size_m;
     page.note(&format!(
@@ -144,23 +148,29 @@ fn rows(points: &[SensitivityPoint]) -> Result<Table> {
             .map(|p| Some(of(p)).filter(|v| v.is_finite()))
             .collect::<Vec<Option<f64>>>()
     };
-    rows.push("influence", text(&|p| p.influence.word().to_owned()))?;
-    rows.push("kind", text(&|p| p.kind.clone()))?;
-    rows.push("scanner", text(&|p| p.scanner.clone()))?;
-    rows.push("method", text(&|p| p.method.clone()))?;
-    rows.push("value", real(&|p| p.x))?;
+    let count = |i: usize| points.iter().map(|p| p.stones[i] as u32).collect::<Vec<u32>>();
+    let influence = text(&|p| p.influence.word().to_owned());
+    rows.push("influence", "", "what is varied", influence)?;
+    let meaning = "which curve of the influence; empty where there is one";
+    rows.push("kind", "", meaning, text(&|p| p.kind.clone()))?;
+    rows.push("scanner", "", "TLS or UAV", text(&|p| p.scanner.clone()))?;
+    rows.push("method", "", "stonewise or paper", text(&|p| p.method.clone()))?;
+    let meaning = "value of the influence: mean IoU, mm, px or number of photos";
+    rows.push("value", "", meaning, real(&|p| p.x))?;
+    rows.push("stones", "", "stones that both surveys show", count(0))?;
+    rows.push("measured", "", "stones that were measured", count(1))?;
+    rows.push("rmse_3d_m", "m", "RMSE of the 3D error", real(&|p| p.rmse_m[0]))?;
+    let meaning = "RMSE per axis in the plane of the face";
+    rows.push("rmse_in_plane_per_axis_m", "m", meaning, real(&|p| p.rmse_m[1]))?;
+    let meaning = "RMSE out of the plane of the face";
+    rows.push("rmse_out_of_plane_m", "m", meaning, real(&|p| p.rmse_m[2]))?;
     rows.push(
-        "stones",
-        points.iter().map(|p| p.stones[0] as u32).collect::<Vec<_>>(),
+        "median_3d_m",
+        "m",
+        "median of the 3D error",
+        real(&|p| p.median_m),
     )?;
-    rows.push(
-        "measured",
-        points.iter().map(|p| p.stones[1] as u32).collect::<Vec<_>>(),
-    )?;
-    rows.push("rmse_3d_m", real(&|p| p.rmse_m[0]))?;
-    rows.push("rmse_in_plane_per_axis_m", real(&|p| p.rmse_m[1]))?;
-    rows.push("rmse_out_of_plane_m", real(&|p| p.rmse_m[2]))?;
-    rows.push("median_3d_m", real(&|p| p.median_m))?;
-    rows.push("outlier_rate", real(&|p| p.outlier_rate))?;
+    let meaning = "share of the measured stones that are wrong by more than 1 cm, 0 to 1";
+    rows.push("outlier_rate", "", meaning, real(&|p| p.outlier_rate))?;
     Ok(rows)
 }

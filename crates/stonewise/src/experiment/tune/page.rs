@@ -1,5 +1,6 @@
 //! The grid as a table, a plot and a page.
 
+use super::tuned::PointErrors;
 use super::{Tuned, TunedPoint};
 use crate::error::Result;
 use crate::figure::number;
@@ -9,9 +10,12 @@ use crate::project::Project;
 use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 
-/// Writes `tune.csv`, `tune.svg` and `index.html`.
+/// What the table as a whole holds.
+const DESCRIPTION: &str = "One row per combination of parameters, all motions that were tried together. Empty cells: no stone was measured.";
+
+/// Writes `tune.csv` with the metadata of its columns, `tune.svg` and `index.html`.
 pub(super) fn write(tuned: &Tuned, project: &Project, cases: &[(String, Project)], out: &Path) -> Result<()> {
-    write_csv(&out.join("tune.csv"), &rows(tuned)?)?;
+    write_csv(&out.join("tune.csv"), &rows(tuned)?, DESCRIPTION, None)?;
     let plot = scatter(tuned).svg();
     write_text(&out.join("tune.svg"), &plot)?;
     let mut page = Page::new(&format!("Parameters of {}", project.name));
@@ -49,28 +53,48 @@ fn rows(tuned: &Tuned) -> Result<Table> {
     let mut rows = Table::new();
     for (i, dimension) in tuned.grid.iter().enumerate() {
         let values: Vec<String> = points.iter().map(|p| text(&p.values[i])).collect();
-        rows.push(&dimension.key, values)?;
+        rows.push(&dimension.key, "", "parameter of the project file", values)?;
     }
     let real = |of: &dyn Fn(&TunedPoint) -> Option<f64>| points.iter().map(of).collect::<Vec<Option<f64>>>();
-    rows.push("stones", real(&|p| Some(p.stones)))?;
-    rows.push("matched", real(&|p| Some(p.matched)))?;
-    rows.push("measured", real(&|p| Some(p.measured)))?;
-    rows.push("rmse_3d_m", real(&|p| p.errors.map(|e| e.rmse_m)))?;
-    rows.push(
-        "rmse_in_plane_per_axis_m",
-        real(&|p| p.errors.map(|e| e.in_plane_m)),
-    )?;
-    rows.push(
-        "rmse_out_of_plane_m",
-        real(&|p| p.errors.map(|e| e.out_of_plane_m)),
-    )?;
-    rows.push("p95_3d_m", real(&|p| p.errors.map(|e| e.p95_m)))?;
-    rows.push("outlier_rate", real(&|p| p.errors.map(|e| e.outlier_rate)))?;
+    let error = |of: fn(PointErrors) -> f64| {
+        points
+            .iter()
+            .map(|p| p.errors.map(of))
+            .collect::<Vec<Option<f64>>>()
+    };
+    let meaning = "stones of the first epoch";
+    rows.push("stones", "", meaning, real(&|p| Some(p.stones)))?;
+    let meaning = "stones that were matched, mean over the motions";
+    rows.push("matched", "", meaning, real(&|p| Some(p.matched)))?;
+    let meaning = "stones that were measured, mean over the motions";
+    rows.push("measured", "", meaning, real(&|p| Some(p.measured)))?;
+    let meaning = "RMSE of the norm of the 3D error";
+    rows.push("rmse_3d_m", "m", meaning, error(|e| e.rmse_m))?;
+    let meaning = "RMSE per axis in the plane of the face";
+    rows.push("rmse_in_plane_per_axis_m", "m", meaning, error(|e| e.in_plane_m))?;
+    let meaning = "RMSE out of the plane of the face";
+    rows.push("rmse_out_of_plane_m", "m", meaning, error(|e| e.out_of_plane_m))?;
+    let meaning = "95th percentile of the norm of the 3D error, that of the motion where it is largest";
+    rows.push("p95_3d_m", "m", meaning, error(|e| e.p95_m))?;
+    let meaning = "share of the measured stones that are outliers, 0 to 1";
+    rows.push("outlier_rate", "", meaning, error(|e| e.outlier_rate))?;
     let flag = |is: &dyn Fn(usize) -> bool| (0..points.len()).map(|i| u32::from(is(i))).collect::<Vec<u32>>();
-    rows.push("front", flag(&|i| tuned.front.contains(&i)))?;
-    rows.push("recommended", flag(&|i| tuned.recommended == Some(i)))?;
+    let meaning = "1 where no other combination is better in error and number of stones, else 0";
+    rows.push("front", "", meaning, flag(&|i| tuned.front.contains(&i)))?;
+    let meaning = "1 for the combination that is recommended, else 0";
+    rows.push(
+        "recommended",
+        "",
+        meaning,
+        flag(&|i| tuned.recommended == Some(i)),
+    )?;
     let failures: Vec<Option<String>> = points.iter().map(|p| p.failure.clone()).collect();
-    rows.push("failure", failures)?;
+    rows.push(
+        "failure",
+        "",
+        "why the stones could not be measured, or empty",
+        failures,
+    )?;
     Ok(rows)
 }
 

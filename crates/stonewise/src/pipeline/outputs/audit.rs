@@ -5,7 +5,6 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::names::audit;
-use crate::results::{ColumnNote, INTEGERS, write_csv_metadata};
 use std::path::Path;
 use stonewise_core::id::ImageId;
 use stonewise_core::transfer::AuditEvent;
@@ -15,17 +14,9 @@ use stonewise_io::table::{Table, write_csv};
 const DESCRIPTION: &str = "What the majority of the photos decided about merged, split and dropped instances of an epoch, one row per \
     decision. Empty cells: the decision has no such number.";
 
-/// The columns of the table: name, type, meaning.
-#[rustfmt::skip]
-const COLUMNS: [ColumnNote; 6] = [
-    ColumnNote::new("event", "string", "", "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
-        outvoted_instance (most photos show something else there), dropped_islands (parts cut off from their stone), dropped_stone (too few points)"),
-    ColumnNote::new("photo", "string", "", "photo of the mask, as the cameras name it"),
-    ColumnNote::new("instance", "integer", "", "number of the mask in the photo"),
-    ColumnNote::new("stones", INTEGERS, "", "stones that the decision is about"),
-    ColumnNote::new("share", "number", "", "share of the mask that the stone won, 0 to 1"),
-    ColumnNote::new("points", "integer", "", "points that lost their label"),
-];
+/// What the decisions mean.
+const EVENTS: &str = "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
+        outvoted_instance (most photos show something else there), dropped_islands (parts cut off from their stone), dropped_stone (too few points)";
 
 /// Writes `audit_epochN.csv`, what the majority of the photos decided about merged, split and dropped
 /// instances, and the metadata of its columns.
@@ -37,32 +28,31 @@ pub fn write_audit(context: &Context, number: usize, photos: &Segmented, labelle
 
 fn write_rows(csv: &Path, rows: &[AuditRow]) -> Result<()> {
     let mut table = Table::new();
+    let events: Vec<String> = rows.iter().map(|r| r.event.to_owned()).collect();
+    table.push("event", "", EVENTS, events)?;
+    let photos: Vec<Option<String>> = rows.iter().map(|r| r.photo.clone()).collect();
+    table.push("photo", "", "photo of the mask, as the cameras name it", photos)?;
+    let instances: Vec<Option<u32>> = rows.iter().map(|r| r.instance).collect();
+    table.push("instance", "", "number of the mask in the photo", instances)?;
+    let stones: Vec<Vec<u32>> = rows.iter().map(|r| r.stones.clone()).collect();
+    table.push("stones", "", "stones that the decision is about", stones)?;
+    let shares: Vec<Option<f64>> = rows.iter().map(|r| r.share).collect();
     table.push(
-        "event",
-        rows.iter().map(|r| r.event.to_owned()).collect::<Vec<_>>(),
+        "share",
+        "",
+        "share of the mask that the stone won, 0 to 1",
+        shares,
     )?;
-    table.push(
-        "photo",
-        rows.iter()
-            .map(|r| r.photo.clone())
-            .collect::<Vec<Option<String>>>(),
-    )?;
-    table.push("instance", rows.iter().map(|r| r.instance).collect::<Vec<_>>())?;
-    table.push(
-        "stones",
-        rows.iter().map(|r| r.stones.clone()).collect::<Vec<_>>(),
-    )?;
-    table.push("share", rows.iter().map(|r| r.share).collect::<Vec<_>>())?;
-    table.push("points", rows.iter().map(|r| r.points).collect::<Vec<_>>())?;
-    write_csv(csv, &table)?;
-    write_csv_metadata(csv, DESCRIPTION, None, COLUMNS)
+    let points: Vec<Option<u64>> = rows.iter().map(|r| r.points).collect();
+    table.push("points", "", "points that lost their label", points)?;
+    Ok(write_csv(csv, &table, DESCRIPTION, None)?)
 }
 
 struct AuditRow {
     event: &'static str,
     photo: Option<String>,
     instance: Option<u32>,
-    stones: String,
+    stones: Vec<u32>,
     share: Option<f64>,
     points: Option<u64>,
 }
@@ -74,7 +64,7 @@ impl AuditRow {
             event: "",
             photo: None,
             instance: None,
-            stones: String::new(),
+            stones: Vec::new(),
             share: None,
             points: None,
         };
@@ -83,16 +73,13 @@ impl AuditRow {
                 photo,
                 instance,
                 stones,
-            } => {
-                let stones: Vec<String> = stones.iter().map(|s| s.0.to_string()).collect();
-                Self {
-                    event: "split_instance",
-                    photo: name(photo),
-                    instance: Some(instance.0),
-                    stones: stones.join(" "),
-                    ..empty
-                }
-            }
+            } => Self {
+                event: "split_instance",
+                photo: name(photo),
+                instance: Some(instance.0),
+                stones: stones.iter().map(|s| s.0).collect(),
+                ..empty
+            },
             AuditEvent::JoinedFragment {
                 photo,
                 instance,
@@ -102,7 +89,7 @@ impl AuditRow {
                 event: "joined_fragment",
                 photo: name(photo),
                 instance: Some(instance.0),
-                stones: stone.0.to_string(),
+                stones: vec![stone.0],
                 share: Some(*share),
                 ..empty
             },
@@ -119,13 +106,13 @@ impl AuditRow {
             },
             AuditEvent::DroppedIslands { stone, points, .. } => Self {
                 event: "dropped_islands",
-                stones: stone.0.to_string(),
+                stones: vec![stone.0],
                 points: Some(*points),
                 ..empty
             },
             AuditEvent::DroppedStone { stone, points, .. } => Self {
                 event: "dropped_stone",
-                stones: stone.0.to_string(),
+                stones: vec![stone.0],
                 points: Some(*points),
                 ..empty
             },
@@ -136,7 +123,7 @@ impl AuditRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::check_csv_metadata;
+    use crate::results::testing::check_csv_metadata;
 
     #[test]
     fn the_metadata_describe_every_column() {

@@ -5,43 +5,11 @@ use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::edit::Edited;
 use crate::results::names::{EDITS_AUDIT, FACADE};
-use crate::results::{ColumnNote, INTEGERS, write_csv_metadata};
 use stonewise_core::transfer::{EditEffect, NoEffect};
 use stonewise_io::table::{Table, write_csv};
 
 /// What the table as a whole holds.
 const DESCRIPTION: &str = "Edits by hand and what each did in each epoch, one row per edit and epoch.";
-
-/// The columns of the table: name, type, meaning.
-const COLUMNS: [ColumnNote; 12] = [
-    ColumnNote::new("edit", "integer", "", "number of the edit in the file, from 1"),
-    ColumnNote::new("do", "string", "", "merge, split, delete, add or ignore"),
-    ColumnNote::new("who", "string", "", "who made the edit"),
-    ColumnNote::new("when", "string", "", "when"),
-    ColumnNote::new("why", "string", "", "why"),
-    ColumnNote::new("place", "string", "", "the file of edits and the place in it"),
-    ColumnNote::new(
-        "drawn_in",
-        "string",
-        "",
-        "the photo in which it was drawn, or facade",
-    ),
-    ColumnNote::new("epoch", "string", "", "name of the epoch"),
-    ColumnNote::new("stones_before", INTEGERS, "", "stones that it changed"),
-    ColumnNote::new("stones_after", INTEGERS, "", "stones that it left"),
-    ColumnNote::new(
-        "points",
-        "integer",
-        "",
-        "points whose label changed; empty without effect",
-    ),
-    ColumnNote::new(
-        "no_effect",
-        "string",
-        "",
-        "why it did nothing in this epoch; empty where it did something",
-    ),
-];
 
 /// Writes `audit_edits.csv`, one row for each edit and epoch, with the metadata of its columns, and
 /// `facade.json`, the wall on which the stones
@@ -73,40 +41,46 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     let edit = |row: &Row| &file.edits[row.0];
     let text = |of: &dyn Fn(&Row) -> String| rows.iter().map(|r| one_line(&of(r))).collect::<Vec<_>>();
     let done = |row: &Row| row.2.as_ref().ok().cloned();
-    let stones = |all: Vec<u32>| all.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
+    let stones = |of: &dyn Fn(EditEffect) -> Vec<u32>| {
+        let lists = rows.iter().map(|r| done(r).map_or(Vec::new(), of));
+        lists.collect::<Vec<Vec<u32>>>()
+    };
+    let numbers: Vec<u32> = rows.iter().map(|r| r.0 as u32 + 1).collect();
+    let points: Vec<Option<u64>> = rows.iter().map(|r| done(r).map(|e| e.points)).collect();
     let mut table = Table::new();
-    table.push("edit", rows.iter().map(|r| r.0 as u32 + 1).collect::<Vec<_>>())?;
-    table.push("do", text(&|r| edit(r).action.word().to_owned()))?;
-    table.push("who", text(&|r| edit(r).who.clone()))?;
-    table.push("when", text(&|r| edit(r).when.clone()))?;
-    table.push("why", text(&|r| edit(r).why.clone()))?;
-    table.push("place", text(&|r| file.place(r.0)))?;
+    table.push("edit", "", "number of the edit in the file, from 1", numbers)?;
+    let meaning = "merge, split, delete, add or ignore";
+    table.push("do", "", meaning, text(&|r| edit(r).action.word().to_owned()))?;
+    table.push("who", "", "who made the edit", text(&|r| edit(r).who.clone()))?;
+    table.push("when", "", "when", text(&|r| edit(r).when.clone()))?;
+    table.push("why", "", "why", text(&|r| edit(r).why.clone()))?;
+    let meaning = "the file of edits and the place in it";
+    table.push("place", "", meaning, text(&|r| file.place(r.0)))?;
     table.push(
         "drawn_in",
+        "",
+        "the photo in which it was drawn, or facade",
         text(&|r| edit(r).photo.clone().unwrap_or("facade".to_owned())),
     )?;
-    table.push("epoch", text(&|r| r.1.clone()))?;
-    table.push(
-        "stones_before",
-        text(&|r| done(r).map_or(String::new(), |e| stones(e.before))),
-    )?;
-    table.push(
-        "stones_after",
-        text(&|r| done(r).map_or(String::new(), |e| stones(e.after))),
-    )?;
-    table.push(
-        "points",
-        rows.iter()
-            .map(|r| done(r).map(|e| e.points))
-            .collect::<Vec<Option<u64>>>(),
-    )?;
+    table.push("epoch", "", "name of the epoch", text(&|r| r.1.clone()))?;
+    let before = stones(&|e| e.before);
+    table.push("stones_before", "", "stones that it changed", before)?;
+    let after = stones(&|e| e.after);
+    table.push("stones_after", "", "stones that it left", after)?;
+    let meaning = "points whose label changed; empty without effect";
+    table.push("points", "", meaning, points)?;
     table.push(
         "no_effect",
+        "",
+        "why it did nothing in this epoch; empty where it did something",
         text(&|r| r.2.as_ref().err().map_or(String::new(), NoEffect::to_string)),
     )?;
-    let csv = context.out.join(EDITS_AUDIT);
-    write_csv(&csv, &table)?;
-    write_csv_metadata(&csv, DESCRIPTION, None, COLUMNS)
+    Ok(write_csv(
+        &context.out.join(EDITS_AUDIT),
+        &table,
+        DESCRIPTION,
+        None,
+    )?)
 }
 
 /// Edit, epoch, and what it did there.

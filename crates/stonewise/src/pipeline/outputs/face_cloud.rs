@@ -10,16 +10,16 @@ use crate::results::names::FACE_CLOUD;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::cloud::write_coloured_laz;
+use stonewise_io::cloud::{Dimension, write_coloured_laz};
 
-/// Extra dimensions, millimetres where a motion; NaN where it was not measured.
-const DIMENSIONS: [&str; 6] = [
-    "stone_id",
-    "d_along_mm",
-    "d_up_mm",
-    "d_out_mm",
-    "norm_mm",
-    "lod95_mm",
+/// Extra dimensions; NaN where the motion was not measured.
+const DIMENSIONS: [Dimension; 6] = [
+    Dimension::new("stone_id", "", "number of the stone"),
+    Dimension::new("d_along_mm", "mm", "displacement along the wall"),
+    Dimension::new("d_up_mm", "mm", "displacement up the face"),
+    Dimension::new("d_out_mm", "mm", "displacement out of the face"),
+    Dimension::new("norm_mm", "mm", "length of the displacement"),
+    Dimension::new("lod95_mm", "mm", "95 % detection limit"),
 ];
 
 /// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on

@@ -2,11 +2,10 @@
 
 use crate::error::Result;
 use crate::results::names::PairFile;
-use crate::results::{ColumnNote, write_csv_metadata};
 use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{ChangeField, ChangePoint};
-use stonewise_io::cloud::{ExtraColumn, write_points_laz};
+use stonewise_io::cloud::{Dimension, ExtraColumn, write_points_laz};
 use stonewise_io::crs::Crs;
 use stonewise_io::table::{Table, write_csv};
 
@@ -14,22 +13,19 @@ use stonewise_io::table::{Table, write_csv};
 const DESCRIPTION: &str = "M3C2 (Lague, Brodu & Leroux 2013), one row per core point of the first epoch. Distances are later epoch minus first, \
     along the normal. Empty cells: not known.";
 
-/// The columns of the table.
-#[rustfmt::skip]
-const COLUMNS: [ColumnNote; 13] = [
-    ColumnNote::new("x", "number", "m", "core point, world x"),
-    ColumnNote::new("y", "number", "m", "core point, world y"),
-    ColumnNote::new("z", "number", "m", "core point, world z"),
-    ColumnNote::new("NormalX", "number", "", "unit normal out of the wall, world x"),
-    ColumnNote::new("NormalY", "number", "", "unit normal out of the wall, world y"),
-    ColumnNote::new("NormalZ", "number", "", "unit normal out of the wall, world z"),
-    ColumnNote::new("m3c2_distance", "number", "m", "distance along the normal, positive out of the wall"),
-    ColumnNote::new("m3c2_uncertainty", "number", "m", "95 % detection limit of the distance"),
-    ColumnNote::new("m3c2_std_dev1", "number", "m", "spread of the first epoch's points along the normal"),
-    ColumnNote::new("m3c2_std_dev2", "number", "m", "spread of the later epoch's points along the normal"),
-    ColumnNote::new("m3c2_significant", "integer", "", "1 where the distance exceeds its detection limit, else 0"),
-    ColumnNote::new("m3c2_count1", "integer", "", "points of the first epoch in the cylinder"),
-    ColumnNote::new("m3c2_count2", "integer", "", "points of the later epoch in the cylinder"),
+/// The extra dimensions of the cloud: the columns after the place, described in the 32 bytes that LAS has for
+/// that.
+const DIMENSIONS: [Dimension; 10] = [
+    Dimension::new("NormalX", "", "unit normal, world x"),
+    Dimension::new("NormalY", "", "unit normal, world y"),
+    Dimension::new("NormalZ", "", "unit normal, world z"),
+    Dimension::new("m3c2_distance", "m", "distance along the normal"),
+    Dimension::new("m3c2_uncertainty", "m", "95 % detection limit"),
+    Dimension::new("m3c2_std_dev1", "m", "spread, first epoch"),
+    Dimension::new("m3c2_std_dev2", "m", "spread, later epoch"),
+    Dimension::new("m3c2_significant", "", "1: beyond the detection limit"),
+    Dimension::new("m3c2_count1", "", "points, first epoch"),
+    Dimension::new("m3c2_count2", "", "points, later epoch"),
 ];
 
 /// Writes `m3c2.laz`, `m3c2.csv` and the metadata of its columns (of the third epoch `m3c2_2.laz`, and so on)
@@ -37,61 +33,77 @@ const COLUMNS: [ColumnNote; 13] = [
 ///
 /// In the LAZ an unknown number is NaN; in the CSV its cell is empty.
 pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
+    let csv = dir.join(PairFile::M3c2Csv.name(pair));
+    write_csv(&csv, &table(field)?, DESCRIPTION, None)?;
+    write_cloud(&dir.join(PairFile::M3c2Laz.name(pair)), crs, field)
+}
+
+fn table(field: &ChangeField) -> Result<Table> {
     let points = &field.points;
-    let real = |of: fn(&ChangePoint) -> Option<f64>| points.iter().map(of).collect::<Vec<_>>();
-    let columns: [(&str, Vec<Option<f64>>); 7] = [
-        ("NormalX", real(|p| Some(p.normal.x))),
-        ("NormalY", real(|p| Some(p.normal.y))),
-        ("NormalZ", real(|p| Some(p.normal.z))),
-        ("m3c2_distance", real(|p| p.distance_m)),
-        ("m3c2_uncertainty", real(|p| p.detection_limit_m)),
-        ("m3c2_std_dev1", real(|p| p.spread_m[0])),
-        ("m3c2_std_dev2", real(|p| p.spread_m[1])),
+    let real = |of: fn(&ChangePoint) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+    let known = |of: fn(&ChangePoint) -> Option<f64>| points.iter().map(of).collect::<Vec<_>>();
+    let count = |of: fn(&ChangePoint) -> u32| points.iter().map(of).collect::<Vec<u32>>();
+    let mut table = Table::new();
+    table.push("x", "m", "core point, world x", real(|p| p.position.x))?;
+    table.push("y", "m", "core point, world y", real(|p| p.position.y))?;
+    table.push("z", "m", "core point, world z", real(|p| p.position.z))?;
+    let outward = "unit normal out of the wall, world";
+    table.push("NormalX", "", &format!("{outward} x"), real(|p| p.normal.x))?;
+    table.push("NormalY", "", &format!("{outward} y"), real(|p| p.normal.y))?;
+    table.push("NormalZ", "", &format!("{outward} z"), real(|p| p.normal.z))?;
+    let meaning = "distance along the normal, positive out of the wall";
+    table.push("m3c2_distance", "m", meaning, known(|p| p.distance_m))?;
+    let meaning = "95 % detection limit of the distance";
+    table.push("m3c2_uncertainty", "m", meaning, known(|p| p.detection_limit_m))?;
+    let meaning = "spread of the first epoch's points along the normal";
+    table.push("m3c2_std_dev1", "m", meaning, known(|p| p.spread_m[0]))?;
+    let meaning = "spread of the later epoch's points along the normal";
+    table.push("m3c2_std_dev2", "m", meaning, known(|p| p.spread_m[1]))?;
+    let meaning = "1 where the distance exceeds its detection limit, else 0";
+    table.push(
+        "m3c2_significant",
+        "",
+        meaning,
+        count(|p| u32::from(p.is_significant())),
+    )?;
+    let meaning = "points of the first epoch in the cylinder";
+    table.push("m3c2_count1", "", meaning, count(|p| p.counts[0]))?;
+    let meaning = "points of the later epoch in the cylinder";
+    table.push("m3c2_count2", "", meaning, count(|p| p.counts[1]))?;
+    Ok(table)
+}
+
+fn write_cloud(path: &Path, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
+    let points = &field.points;
+    let real = |of: fn(&ChangePoint) -> f64| points.iter().map(of).collect::<Vec<f64>>();
+    let reals = [
+        real(|p| p.normal.x),
+        real(|p| p.normal.y),
+        real(|p| p.normal.z),
+        real(|p| p.distance_m.unwrap_or(f64::NAN)),
+        real(|p| p.detection_limit_m.unwrap_or(f64::NAN)),
+        real(|p| p.spread_m[0].unwrap_or(f64::NAN)),
+        real(|p| p.spread_m[1].unwrap_or(f64::NAN)),
     ];
     let significant: Vec<u16> = points.iter().map(|p| u16::from(p.is_significant())).collect();
     let counts = [0, 1].map(|e| points.iter().map(|p| p.counts[e]).collect::<Vec<u32>>());
-
-    let mut table = Table::new();
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push(
-            name,
-            points.iter().map(|p| p.position[axis]).collect::<Vec<f64>>(),
-        )?;
-    }
-    for (name, values) in &columns {
-        table.push(name, values.clone())?;
-    }
-    table.push("m3c2_significant", significant.clone())?;
-    table.push("m3c2_count1", counts[0].clone())?;
-    table.push("m3c2_count2", counts[1].clone())?;
-    let csv = dir.join(PairFile::M3c2Csv.name(pair));
-    write_csv(&csv, &table)?;
-    write_csv_metadata(&csv, DESCRIPTION, None, COLUMNS)?;
-
+    let mut values: Vec<ExtraColumn> = reals.iter().map(|v| ExtraColumn::F64(v)).collect();
+    values.push(ExtraColumn::U16(&significant));
+    values.extend(counts.iter().map(|c| ExtraColumn::U32(c)));
+    let columns: Vec<(Dimension, ExtraColumn)> = DIMENSIONS.into_iter().zip(values).collect();
     let positions: Vec<Point3<f64>> = points.iter().map(|p| p.position).collect();
-    let dense: Vec<(&str, Vec<f64>)> = columns
-        .iter()
-        .map(|(name, v)| (*name, v.iter().map(|c| c.unwrap_or(f64::NAN)).collect()))
-        .collect();
-    let mut extra: Vec<(&str, ExtraColumn)> = dense
-        .iter()
-        .map(|(name, v)| (*name, ExtraColumn::F64(v)))
-        .collect();
-    extra.push(("m3c2_significant", ExtraColumn::U16(&significant)));
-    extra.push(("m3c2_count1", ExtraColumn::U32(&counts[0])));
-    extra.push(("m3c2_count2", ExtraColumn::U32(&counts[1])));
     Ok(write_points_laz(
-        &dir.join(PairFile::M3c2Laz.name(pair)),
+        path,
         crs.map(Crs::text).as_deref(),
         &positions,
-        &extra,
+        &columns,
     )?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::check_csv_metadata;
+    use crate::results::testing::check_csv_metadata;
 
     #[test]
     fn the_metadata_describe_every_column() {
@@ -99,5 +111,13 @@ mod tests {
         let field = ChangeField { points: Vec::new() };
         write_m3c2(folder.path(), 2, None, &field).unwrap();
         check_csv_metadata(&folder.path().join("m3c2_2.csv"));
+    }
+
+    #[test]
+    fn cloud_and_table_name_and_measure_the_same() {
+        let table = table(&ChangeField { points: Vec::new() }).unwrap();
+        let unit = |name| table.description(name).unwrap().0;
+        let of_table = table.names().skip(3).map(|name| (name, unit(name)));
+        assert!(DIMENSIONS.iter().map(|d| (d.name, d.unit)).eq(of_table));
     }
 }

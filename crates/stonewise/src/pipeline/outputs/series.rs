@@ -18,14 +18,11 @@ pub fn write_series(context: &Context, pairs: &[&[StoneRow]]) -> Result<()> {
         .collect();
     let rows: Vec<StoneRow> = pairs.concat();
     let mut series = Table::new();
-    series.push("epoch", epochs)?;
+    series.push("epoch", "", "name of the later epoch", epochs)?;
     let stones = stone_table(&rows)?;
     for (name, column) in stones.columns() {
-        series.push(name, column.clone())?;
-    }
-    series.describe("epoch", "", "name of the later epoch");
-    for (key, value) in stones.metadata_entries() {
-        series.set_metadata(key, value);
+        let (unit, meaning) = stones.description(name).unwrap_or_default();
+        series.push(name, unit, meaning, column.clone())?;
     }
     Ok(write_parquet(&context.out.join(SERIES), &series)?)
 }

@@ -136,18 +136,29 @@ fn write_field(path: &Path, field: &ChangeField) -> Result<()> {
     };
     let counts = |value: fn(&ChangePoint) -> u32| field.points.iter().map(value).collect::<Vec<u32>>();
     let mut table = Table::new();
-    table.push("x", numbers(|p| p.position.x))?;
-    table.push("y", numbers(|p| p.position.y))?;
-    table.push("z", numbers(|p| p.position.z))?;
-    table.push("nx", numbers(|p| p.normal.x))?;
-    table.push("ny", numbers(|p| p.normal.y))?;
-    table.push("nz", numbers(|p| p.normal.z))?;
-    table.push("distance_m", options(|p| p.distance_m))?;
-    table.push("detection_limit_m", options(|p| p.detection_limit_m))?;
-    table.push("spread_1_m", options(|p| p.spread_m[0]))?;
-    table.push("spread_2_m", options(|p| p.spread_m[1]))?;
-    table.push("count_1", counts(|p| p.counts[0]))?;
-    table.push("count_2", counts(|p| p.counts[1]))?;
+    table.push("x", "m", "core point, world x", numbers(|p| p.position.x))?;
+    table.push("y", "m", "core point, world y", numbers(|p| p.position.y))?;
+    table.push("z", "m", "core point, world z", numbers(|p| p.position.z))?;
+    table.push("nx", "", "unit normal, world x", numbers(|p| p.normal.x))?;
+    table.push("ny", "", "unit normal, world y", numbers(|p| p.normal.y))?;
+    table.push("nz", "", "unit normal, world z", numbers(|p| p.normal.z))?;
+    let meaning = "distance along the normal";
+    table.push("distance_m", "m", meaning, options(|p| p.distance_m))?;
+    let meaning = "95 % detection limit of the distance";
+    table.push(
+        "detection_limit_m",
+        "m",
+        meaning,
+        options(|p| p.detection_limit_m),
+    )?;
+    let meaning = "spread along the normal, first epoch";
+    table.push("spread_1_m", "m", meaning, options(|p| p.spread_m[0]))?;
+    let meaning = "spread along the normal, later epoch";
+    table.push("spread_2_m", "m", meaning, options(|p| p.spread_m[1]))?;
+    let meaning = "points in the cylinder, first epoch";
+    table.push("count_1", "", meaning, counts(|p| p.counts[0]))?;
+    let meaning = "points in the cylinder, later epoch";
+    table.push("count_2", "", meaning, counts(|p| p.counts[1]))?;
     Ok(write_parquet(path, &table)?)
 }
 

@@ -47,8 +47,8 @@ type VectorOf = fn(&PosedPhoto) -> Vector3<f64>;
 pub fn write_cameras(dir: &Path, epoch: usize, photos: &[PosedPhoto]) -> Result<(), Error> {
     make_dir(dir)?;
     let mut table = Table::new();
-    table.push("name", photos.iter().map(|p| p.name.clone()).collect::<Vec<_>>())?;
-    table.describe("name", "", "name of the photo");
+    let names: Vec<String> = photos.iter().map(|p| p.name.clone()).collect();
+    table.push("name", "", "name of the photo", names)?;
     let vectors: [(&str, &str, &str, VectorOf); 4] = [
         ("centre", "m", "projection centre", |p| p.centre.coords),
         ("axis", "", "unit vector of the view", |p| p.axis),
@@ -67,9 +67,9 @@ pub fn write_cameras(dir: &Path, epoch: usize, photos: &[PosedPhoto]) -> Result<
     ];
     for (stem, unit, meaning, of) in vectors {
         for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-            let name = format!("{stem}_{axis}");
-            table.push(&name, photos.iter().map(|p| of(p)[k]).collect::<Vec<f64>>())?;
-            table.describe(&name, unit, &format!("{meaning}, world {axis}"));
+            let (name, meaning) = (format!("{stem}_{axis}"), format!("{meaning}, world {axis}"));
+            let values: Vec<f64> = photos.iter().map(|p| of(p)[k]).collect();
+            table.push(&name, unit, &meaning, values)?;
         }
     }
     Ok(write_parquet(&path(dir, "cameras", epoch, "parquet"), &table)?)

@@ -24,24 +24,17 @@ pub struct ThinPoint {
 pub fn write_thin_cloud(dir: &Path, epoch: usize, points: &[ThinPoint]) -> Result<(), Error> {
     make_dir(dir)?;
     let mut table = Table::new();
-    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table.push(name, points.iter().map(|p| p.position[k]).collect::<Vec<f64>>())?;
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        let values: Vec<f64> = points.iter().map(|p| p.position[k]).collect();
+        table.push(axis, "m", &format!("point, world {axis}"), values)?;
     }
-    for (k, name) in ["red", "green", "blue"].into_iter().enumerate() {
-        table.push(name, points.iter().map(|p| p.colour[k]).collect::<Vec<u8>>())?;
+    for (k, channel) in ["red", "green", "blue"].into_iter().enumerate() {
+        let meaning = format!("{channel} of the photos at the point, 0 to 255");
+        let values: Vec<u8> = points.iter().map(|p| p.colour[k]).collect();
+        table.push(channel, "", &meaning, values)?;
     }
-    table.push("stone_id", points.iter().map(|p| p.stone).collect::<Vec<u32>>())?;
-    for axis in ["x", "y", "z"] {
-        table.describe(axis, "m", &format!("point, world {axis}"));
-    }
-    for channel in ["red", "green", "blue"] {
-        table.describe(
-            channel,
-            "",
-            &format!("{channel} of the photos at the point, 0 to 255"),
-        );
-    }
-    table.describe("stone_id", "", "number of the stone, 0 for none");
+    let stones: Vec<u32> = points.iter().map(|p| p.stone).collect();
+    table.push("stone_id", "", "number of the stone, 0 for none", stones)?;
     Ok(write_parquet(&path(dir, "cloud", epoch, "parquet"), &table)?)
 }
 

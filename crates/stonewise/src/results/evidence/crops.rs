@@ -69,19 +69,16 @@ pub fn write_crops(
     make_dir(dir)?;
     let per_row = (ATLAS_PX / side_px).clamp(1, (crops.len() as f64).sqrt().ceil().max(1.0) as u32);
     let mut table = Table::new();
-    table.push("stone_id", crops.iter().map(|c| c.stone_id).collect::<Vec<u32>>())?;
+    let stones: Vec<u32> = crops.iter().map(|c| c.stone_id).collect();
+    table.push("stone_id", "", "number of the stone", stones)?;
+    let photos: Vec<String> = crops.iter().map(|c| c.photo.clone()).collect();
+    table.push("photo", "", "name of the photo", photos)?;
     table.push(
-        "photo",
-        crops.iter().map(|c| c.photo.clone()).collect::<Vec<String>>(),
-    )?;
-    table.push("half_m", crops.iter().map(|c| c.half_m).collect::<Vec<f64>>())?;
-    table.describe("stone_id", "", "number of the stone");
-    table.describe("photo", "", "name of the photo");
-    table.describe(
         "half_m",
         "m",
         "half the edge of the crop on the plane of the stone's face",
-    );
+        crops.iter().map(|c| c.half_m).collect::<Vec<f64>>(),
+    )?;
     table.set_metadata(SIDE, side_px.to_string());
     table.set_metadata(PER_ROW, per_row.to_string());
     write_outlines(&path(dir, "crop_outlines", epoch, "parquet"), crops)?;
@@ -104,14 +101,10 @@ fn write_outlines(path: &Path, crops: &[Crop]) -> Result<(), Error> {
         }
     }
     let mut table = Table::new();
-    table.push("stone_id", stone)?;
-    table.push("ring", ring)?;
-    table.push("x_px", x)?;
-    table.push("y_px", y)?;
-    table.describe("stone_id", "", "number of the stone");
-    table.describe("ring", "", "number of the ring, from 0");
-    table.describe("x_px", "px", "vertex, to the right from the crop's left edge");
-    table.describe("y_px", "px", "vertex, down from the crop's upper edge");
+    table.push("stone_id", "", "number of the stone", stone)?;
+    table.push("ring", "", "number of the ring, from 0", ring)?;
+    table.push("x_px", "px", "vertex, to the right from the crop's left edge", x)?;
+    table.push("y_px", "px", "vertex, down from the crop's upper edge", y)?;
     Ok(write_parquet(path, &table)?)
 }
 

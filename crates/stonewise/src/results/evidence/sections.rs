@@ -36,28 +36,29 @@ pub struct SectionPoint {
 pub fn write_sections(dir: &Path, later: usize, points: &[SectionPoint]) -> Result<(), Error> {
     make_dir(dir)?;
     let mut table = Table::new();
+    let stones: Vec<u32> = points.iter().map(|p| p.stone_id).collect();
+    table.push("stone_id", "", "number of the stone", stones)?;
+    let is_later: Vec<bool> = points.iter().map(|p| p.is_later).collect();
+    table.push("later", "", "whether the point is of the later epoch", is_later)?;
+    let upright: Vec<bool> = points.iter().map(|p| p.cut == Cut::Upright).collect();
     table.push(
-        "stone_id",
-        points.iter().map(|p| p.stone_id).collect::<Vec<u32>>(),
+        "upright",
+        "",
+        "whether the section is upright, else level",
+        upright,
     )?;
-    table.push("later", points.iter().map(|p| p.is_later).collect::<Vec<bool>>())?;
-    let upright = points.iter().map(|p| p.cut == Cut::Upright);
-    table.push("upright", upright.collect::<Vec<bool>>())?;
-    table.push("place", points.iter().map(|p| p.place_m).collect::<Vec<f32>>())?;
-    table.push("out", points.iter().map(|p| p.out_m).collect::<Vec<f32>>())?;
-    table.describe("stone_id", "", "number of the stone");
-    table.describe("later", "", "whether the point is of the later epoch");
-    table.describe("upright", "", "whether the section is upright, else level");
-    table.describe(
+    table.push(
         "place",
         "m",
         "along the section, from the stone's centroid in the first epoch",
-    );
-    table.describe(
+        points.iter().map(|p| p.place_m).collect::<Vec<f32>>(),
+    )?;
+    table.push(
         "out",
         "m",
         "out of the face, from the stone's centroid in the first epoch",
-    );
+        points.iter().map(|p| p.out_m).collect::<Vec<f32>>(),
+    )?;
     Ok(write_parquet(&path(dir, "sections", later, "parquet"), &table)?)
 }
 

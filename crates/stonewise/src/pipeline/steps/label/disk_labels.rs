@@ -41,9 +41,20 @@ impl LabelStore for DiskLabels {
 
     fn write(&mut self, tile: usize, labels: &TileLabels) -> Result<()> {
         let mut table = Table::new();
-        table.push("stone", labels.stone.clone())?;
-        table.push("confidence", labels.confidence.clone())?;
-        table.push("seen", labels.seen.clone())?;
+        table.push(
+            "stone",
+            "",
+            "stone of the point, 0 for none",
+            labels.stone.clone(),
+        )?;
+        let meaning = "share of the photos' votes that the outcome got, 0 to 1";
+        table.push("confidence", "", meaning, labels.confidence.clone())?;
+        table.push(
+            "seen",
+            "",
+            "whether any photo voted on the point",
+            labels.seen.clone(),
+        )?;
         Ok(write_parquet(&self.files[tile], &table)?)
     }
 

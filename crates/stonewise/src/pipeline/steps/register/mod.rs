@@ -22,7 +22,7 @@ use crate::texts::notices::{
     AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
     STABLE_TOO_FEW,
 };
-pub use datum::datum;
+use datum::datum;
 use mean_motion::mean_motion;
 use nalgebra::Point3;
 use off_wall::OffWall;
@@ -37,14 +37,14 @@ use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 use windows::align_windows;
 
-/// Measures the motion of every matched stone.
+/// Measures the motion of every matched stone; what is known about the registration of the epochs.
 pub fn register(
     context: &Context,
     photos: [&Segmented; 2],
     [first, second]: [&Labelled; 2],
     matched: &Matched,
     number: usize,
-) -> Result<Registered> {
+) -> Result<(Registered, Datum)> {
     let params = &context.project.settings.registration;
     // The pairs themselves, not how they were found: other parameters of the matching that find the same
     // pairs cost nothing.
@@ -134,16 +134,12 @@ pub fn register(
         write_json(&step.file("motions.json"), &registered)
     })?;
     let registered: Registered = read_json(&step.file("motions.json"))?;
-    report_mean_motion(
-        context,
-        number,
-        &registered,
-        &datum(context.project, number, &registered, &first.stones),
-    );
+    let datum = datum(context.project, number, &registered, &first.stones);
+    report_mean_motion(context, number, &registered, &datum);
     report_components(context, number, &registered);
     report_datum(context, number, &registered);
     report_off_wall(context, number, &registered);
-    Ok(registered)
+    Ok((registered, datum))
 }
 
 /// Names surfaces off the wall that could show, or that showed, the registration of the epochs.
@@ -246,7 +242,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
     };
     Registered {
         results: report.results,
-        contrasts: report.contrasts,
+        neighbours: report.neighbours,
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
         epoch_errors: None,
         error_stones: Vec::new(),
@@ -263,7 +259,7 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
     };
     Registered {
         results,
-        contrasts: Vec::new(),
+        neighbours: Vec::new(),
         estimator: EstimatorRecord::Gicp(gicp),
         epoch_errors: None,
         error_stones: Vec::new(),

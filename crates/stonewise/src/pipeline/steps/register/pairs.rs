@@ -114,12 +114,20 @@ impl DiskPairs {
             }
         }
         let mut table = Table::new();
-        table.push("slot", slots)?;
-        table.push("part", parts)?;
+        table.push("slot", "", "place of the pair of stones in its batch", slots)?;
+        table.push(
+            "part",
+            "",
+            "0: first epoch, 1: second, 2: second, near the stone",
+            parts,
+        )?;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let values: Vec<f32> = offsets.iter().map(|o: &[f32; 3]| o[axis]).collect();
             table.push(
                 name,
-                offsets.iter().map(|o: &[f32; 3]| o[axis]).collect::<Vec<f32>>(),
+                "m",
+                "point, from the centroid of its stone in the first epoch",
+                values,
             )?;
         }
         write_parquet(&self.file(batch), &table)?;

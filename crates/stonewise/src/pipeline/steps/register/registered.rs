@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
 use stonewise_core::statistics::upper_median;
-use stonewise_core::stone::{Contrast, PairResult};
+use stonewise_core::stone::{NeighbourCovariance, PairResult};
 
 /// Name of the step.
 pub(super) const STEP: &str = "register";
@@ -18,7 +18,7 @@ pub struct Registered {
     /// One result per matched stone, ascending by stone of the first epoch.
     pub results: Vec<PairResult>,
     /// Covariances of the motions of neighbours relative to each other; empty if the estimator gives none.
-    pub contrasts: Vec<Contrast>,
+    pub neighbours: Vec<NeighbourCovariance>,
     /// What the estimator says about itself.
     pub estimator: EstimatorRecord,
     /// Error of the later epoch against the reference, as sources and stable areas show it.
@@ -38,23 +38,21 @@ impl Registered {
         self.error_stones.iter().copied().zip(errors).collect()
     }
 
-    /// The two stones of each contrast as indices into `stones`. Contrasts of other stones are removed, also
-    /// from the results.
+    /// The pairs of neighbours as indices into `stones`. Pairs with other stones are removed, also from the
+    /// results.
     pub(super) fn neighbours_among(&mut self, stones: &[StoneId]) -> Vec<[usize; 2]> {
         let index: BTreeMap<StoneId, usize> = stones.iter().copied().zip(0..).collect();
-        self.contrasts
-            .retain(|c| c.stones.iter().all(|s| index.contains_key(s)));
-        self.contrasts
-            .iter()
-            .map(|c| c.stones.map(|s| index[&s]))
-            .collect()
+        self.neighbours
+            .retain(|pair| pair.stones.iter().all(|s| index.contains_key(s)));
+        let pairs = self.neighbours.iter();
+        pairs.map(|pair| pair.stones.map(|s| index[&s])).collect()
     }
 
-    /// Adds to each contrast the covariance of the difference that the error of the epochs has between its
-    /// stones.
+    /// Adds to each pair of neighbours the covariance of the difference that the error of the epochs has
+    /// between them.
     pub(super) fn add_registration(&mut self, between: &[Matrix3<f64>]) {
-        for (contrast, covariance) in self.contrasts.iter_mut().zip(between) {
-            contrast.covariance += covariance;
+        for (pair, covariance) in self.neighbours.iter_mut().zip(between) {
+            pair.covariance += covariance;
         }
     }
 

@@ -7,7 +7,7 @@ use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use super::tracking::PhotoPart;
 use crate::statistics::{UPPER_95, student_95};
-use crate::stone::{Contrast, MotionFailure, PairResult};
+use crate::stone::{MotionFailure, NeighbourCovariance, PairResult};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -30,13 +30,13 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// ties.
 ///
 /// `shared`: variances of the shortest octave of the errors that a stone's points share.
-pub(crate) fn contrasts(
+pub(crate) fn neighbour_covariances(
     adjustment: &Adjustment,
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
     shared: &[f64; 9],
-) -> Vec<Contrast> {
+) -> Vec<NeighbourCovariance> {
     let tails = tail_factor(adjustment.params.tie_freedom);
     let octave = Matrix3::from_diagonal(&Vector3::new(shared[0], shared[1], shared[2]));
     let measured: Vec<Option<Measured>> = estimates
@@ -47,13 +47,15 @@ pub(crate) fn contrasts(
             Some(Measured::new(adjustment, i, estimate, &octave))
         })
         .collect();
-    let contrast = |(k, edge): (usize, &Edge)| {
+    let of_edge = |(k, edge): (usize, &Edge)| {
         let [a, b] = [measured[edge.low].as_ref()?, measured[edge.high].as_ref()?];
         let between = between([a, b], &solution.field.inverse.edges[k].transpose());
         let spread = a.translation + b.translation - between - between.transpose();
         let both_missed = a.estimate.missed + b.estimate.missed;
-        Some(Contrast {
-            stones: [edge.low, edge.high].map(|i| results[i].first),
+        let mut stones = [edge.low, edge.high].map(|i| results[i].first);
+        stones.sort_unstable();
+        Some(NeighbourCovariance {
+            stones,
             covariance: without_negative(&spread) * (widening(both_missed) * tails)
                 + a.octave
                 + b.octave
@@ -63,10 +65,10 @@ pub(crate) fn contrasts(
         })
     };
     let edges = adjustment.graph.edges.par_iter().enumerate();
-    edges.filter_map(contrast).collect()
+    edges.filter_map(of_edge).collect()
 }
 
-/// What a measured stone brings to every contrast; covariances in the world.
+/// What a measured stone contributes to the covariance with each neighbour; covariances in the world.
 struct Measured<'a> {
     estimate: &'a Estimate,
     face_from_world: &'a Matrix3<f64>,
