@@ -39,14 +39,15 @@ messages! {
             die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
         MISREGISTERED_EPOCH:
-            "{cells} pieces of plane off the wall show this epoch shifted by {shown} mm (x, y, z) against the first, while its stations \
-            and strips by themselves show {found} mm with a standard deviation of {sd} mm. If those surfaces did not move, all motions \
-            are wrong by the difference: use them with auto_stable = true, or name some under [[registration.stable]]. If they did \
-            move, state the error of the registration as epoch_error_m",
-            "{cells} Ebenenstücke neben der Mauer zeigen diese Epoche um {shown} mm (x, y, z) gegen die erste verschoben, während ihre \
-            Standpunkte und Streifen für sich {found} mm mit einer Standardabweichung von {sd} mm zeigen. Haben sich diese Flächen \
-            nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: mit auto_stable = true verwenden oder einige unter \
-            [[registration.stable]] angeben. Haben sie sich bewegt, den Fehler der Registrierung als epoch_error_m angeben";
+            "{cells} pieces of plane surfaces off the wall appear shifted by {shown} mm (x, y, z) against the first epoch. The stations \
+            and strips alone give a shift of {found} mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
+            motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
+            [[registration.stable]]. If they did move, state the registration error as epoch_error_m",
+            "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um {shown} mm (x, y, z) verschoben. Aus \
+            den Standpunkten und Streifen allein folgt eine Verschiebung von {found} mm mit einer Standardabweichung von {sd} mm. \
+            Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: die Flächen mit auto_stable = true \
+            verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
+            epoch_error_m angeben";
 
         FEW_MEASURED:
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \

@@ -13,11 +13,10 @@ messages! {
             "auto_stable: {count} Flächen neben der Mauer gelten als stabil, soweit sie miteinander übereinstimmen";
 
         COMPONENT_AT_BOUND:
-            "the variance component \"{name}\" lies at the upper end of its range: neighbouring stones differ by more than motions of masonry \
-            do, and say almost nothing about each other. Most often the clouds of the epochs do not fit each other or their photos",
-            "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: benachbarte Steine unterscheiden sich stärker, als sich \
-            Mauerwerk bewegt, und sagen fast nichts übereinander. Meist passen die Punktwolken der Epochen nicht zueinander oder \
-            nicht zu ihren Fotos";
+            "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
+            masonry. Most often the clouds of the epochs do not fit each other or their photos",
+            "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
+            zu erwarten sind. Meist passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Fotos";
 
         COULD_BE_STABLE:
             "{count} areas off the wall are seen in both epochs and could show their registration: auto_stable = true uses them all, \
