@@ -1,4 +1,4 @@
-//! Surveys with less in their files: what sources and times are worth.
+//! Surveys whose files lack sources or times, to measure what these contribute.
 
 use crate::survey::Survey;
 use stonewise_core::cloud::Cloud;

@@ -68,8 +68,8 @@ impl ColouredPoints {
 /// system, where it is known: WKT, or `EPSG:` and a code. `fill` hands over the points.
 ///
 /// # Errors
-/// A name or a description does not fit, the box is too large, `fill` fails, or the file cannot be written; an earlier file is
-/// kept then.
+/// A name or a description does not fit, the box is too large, `fill` fails, or the file cannot be written;
+/// an earlier file is kept then.
 pub fn write_coloured_laz<E: From<CloudError>>(
     path: &Path,
     bounds: &Bounds,

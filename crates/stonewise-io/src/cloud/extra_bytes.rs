@@ -47,20 +47,20 @@ impl ExtraType {
 
 /// Name, unit and meaning of an extra dimension.
 ///
-/// The file holds the name, and `MEANING, UNIT` as its description; each is plain ASCII of at most 32 bytes,
-/// and neither is empty.
+/// The file holds the name, and `MEANING, UNIT` as the description. Each of the two is plain ASCII of 1 to 32
+/// bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dimension<'a> {
     /// Name.
     pub name: &'a str,
-    /// Unit; empty for counts, numbers of things and flags.
+    /// Unit; empty for counts, identifiers, ratios and flags.
     pub unit: &'a str,
     /// What it holds.
     pub meaning: &'a str,
 }
 
 impl<'a> Dimension<'a> {
-    /// A dimension of this name.
+    /// A dimension with this name, unit and meaning.
     pub const fn new(name: &'a str, unit: &'a str, meaning: &'a str) -> Self {
         Self { name, unit, meaning }
     }
@@ -71,7 +71,7 @@ impl<'a> Dimension<'a> {
     }
 }
 
-/// The description of a dimension; `None` where its name or its description does not fit the file.
+/// The descriptor of a dimension; `None` where its name or its description does not fit.
 pub fn describe(dimension: Dimension<'_>, kind: ExtraType) -> Option<[u8; DESCRIPTOR_BYTES]> {
     let mut bytes = [0; DESCRIPTOR_BYTES];
     bytes[2] = kind.code();
@@ -84,10 +84,10 @@ pub fn describe(dimension: Dimension<'_>, kind: ExtraType) -> Option<[u8; DESCRI
     Some(bytes)
 }
 
-/// The descriptions of the dimensions of a file that is written.
+/// The descriptors of all extra dimensions of a file to be written.
 ///
 /// # Errors
-/// A name or a description does not fit; `file` is named.
+/// A name or a description does not fit; the error names `file`.
 pub fn describe_all<'a>(
     file: &Path,
     dimensions: impl IntoIterator<Item = (Dimension<'a>, ExtraType)>,

@@ -31,12 +31,12 @@ pub enum ExtraColumn<'a> {
 /// Writes points with extra dimensions as LAZ (LAS 1.4, point format 6).
 ///
 /// `positions` are in the world frame, metres; the step of the coordinates is 1 micrometre, coarser only
-/// where the extent is above 4 km, about an offset in the middle. `crs`: the coordinate system, where it is known: WKT, or `EPSG:` and a code.
+/// where the extent is above 4 km, about an offset in the middle. `crs`: the coordinate system, where it is
+/// known: WKT, or `EPSG:` and a code.
 ///
 /// # Errors
-/// A position is not finite, a column has another length, a name or a description of a dimension
-/// does not fit, or the file cannot be written;
-/// `path` then stays as it was.
+/// A position is not finite, a column has another length, a name or a description of a dimension does not
+/// fit, or the file cannot be written; `path` then stays as it was.
 pub fn write_points_laz(
     path: &Path,
     crs: Option<&str>,

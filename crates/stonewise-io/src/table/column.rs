@@ -6,7 +6,7 @@ pub struct Column {
     values: Values,
     /// One flag per row; `None` where the column may not hold empty cells.
     filled: Option<Vec<bool>>,
-    /// Whether the cells are lists of integers, as text with spaces between them.
+    /// Whether each cell is a list of integers, written as text with spaces between them.
     is_list: bool,
 }
 

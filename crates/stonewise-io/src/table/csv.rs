@@ -16,9 +16,9 @@ use crate::atomic::write_atomically;
 /// or spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with
 /// =, +, - or @, gets an apostrophe in front.
 ///
-/// Units and meanings of the columns go into `NAME.csv-metadata.json` beside it, after the W3C's CSV on the
-/// Web. `description`: what the table as a whole holds. `primary_key`: the column that tells rows apart, where
-/// there is one.
+/// Units and meanings of the columns go into `NAME.csv-metadata.json` beside it (W3C CSV on the Web).
+/// `description`: what the table as a whole holds. `primary_key`: the column that identifies a row, if there
+/// is one.
 ///
 /// # Errors
 /// A file cannot be written; an earlier file is kept then.

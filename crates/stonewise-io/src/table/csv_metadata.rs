@@ -57,7 +57,7 @@ fn csv_metadata(csv: &str, table: &Table, description: &str, primary_key: Option
     format!("{document:#}\n")
 }
 
-/// Type of the cells in the words of XML Schema.
+/// Type of the cells in the terms of XML Schema; for lists, that of their items.
 fn datatype(column: &Column) -> &'static str {
     match column.raw() {
         Values::F64(_) | Values::F32(_) => "number",

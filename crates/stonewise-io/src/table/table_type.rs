@@ -28,8 +28,8 @@ impl Table {
 
     /// Adds a column at the end: a `Vec` of values, or of options where cells may be empty.
     ///
-    /// `unit`: empty for counts, names and flags. Unit and meaning become the metadata entries `NAME.unit` and
-    /// `NAME.meaning`.
+    /// `unit`: empty for counts, ratios, names and flags. Unit and meaning become the metadata entries
+    /// `NAME.unit` and `NAME.meaning`.
     ///
     /// # Errors
     /// The length differs from the columns before, or the name is taken.
@@ -46,7 +46,7 @@ impl Table {
         Ok(())
     }
 
-    /// The same for a column whose metadata, if it has any, are set already.
+    /// As [`push`](Self::push), for a column whose metadata, if any, are set already.
     pub(super) fn push_column(&mut self, name: &str, column: Column) -> Result<(), TableError> {
         if !self.columns.is_empty() && column.len() != self.rows() {
             return Err(TableError::Rows {

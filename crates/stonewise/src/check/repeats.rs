@@ -103,7 +103,7 @@ impl Cells {
     }
 }
 
-/// Whether a cell is among those that are counted, by a hash of its place.
+/// Whether a cell is counted; a hash of its position decides.
 fn is_counted(cell: &[i64; 3], thinning: u64) -> bool {
     let hash = cell.iter().fold(0, |hash, i| split_mix(hash ^ i.cast_unsigned()));
     hash % thinning == 0

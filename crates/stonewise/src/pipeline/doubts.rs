@@ -30,8 +30,8 @@ const UNLIKE: f64 = 0.6;
 /// surface is about 0.9.
 const LIKE: f64 = 0.3;
 
-/// A registration error is doubted where what surfaces off the wall show has a smaller probability: one sound
-/// survey in a thousand.
+/// Probability of the difference between the registration errors with and without surfaces off the wall,
+/// below which the run is in doubt: one sound survey in a thousand.
 const MISREGISTERED: f64 = 1e-3;
 
 /// Median over the stones of their share of the photos' votes on their points, below which the photos
@@ -134,8 +134,8 @@ fn unsettled(registered: &Registered) -> Option<String> {
     (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
 }
 
-/// Surfaces off the wall show a registration error that differs from what the motions are corrected by, far
-/// beyond its uncertainty. Where the project states the error, it stands.
+/// Surfaces off the wall show a registration error that differs significantly from the one found without
+/// them. An error that the project states is not questioned.
 fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<String> {
     if stated_m.is_some() || check.p >= MISREGISTERED {
         return None;

@@ -34,7 +34,7 @@ pub struct ResultSet {
     pub run: Option<RunRecord>,
     /// `registration.json`, where there is one.
     pub registration: Option<RegistrationRecord>,
-    /// `neighbours.parquet`, by the stones' numbers; empty where the file is missing.
+    /// `neighbours.parquet`, in the order of the stones' numbers; empty where the file is missing.
     pub neighbours: Vec<NeighbourCovariance>,
     /// `verdict.json`, where there is one.
     pub verdict: Option<Verdict>,

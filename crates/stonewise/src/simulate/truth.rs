@@ -52,21 +52,21 @@ fn stone_table(truths: &[StoneTruth], seen: &[Seen]) -> Result<Table, TableError
             table.push(&format!("{stem}{name}"), unit, &meaning, real(&|t| of(t)[axis]))
         })
     };
-    let meaning = "centroid of the face in the first epoch, as seen square on";
+    let meaning = "centroid of the face in the first epoch, seen at right angles to the wall";
     vector(&mut table, "c", "m", meaning, |t| t.centroid.coords)?;
     table.push(
         "u",
         "m",
-        "middle of the stone along the face",
+        "position of the middle of the stone along the face",
         real(&|t| t.middle[0]),
     )?;
     table.push(
         "v",
         "m",
-        "middle of the stone up the face",
+        "position of the middle of the stone up the face",
         real(&|t| t.middle[1]),
     )?;
-    let meaning = "area of the face as seen square on";
+    let meaning = "area of the face, seen at right angles to the wall";
     table.push("area_m2", "m2", meaning, real(&|t| t.area_m2))?;
     table.push("width", "m", "width on the face", real(&|t| t.size_m[0]))?;
     table.push("height", "m", "height on the face", real(&|t| t.size_m[1]))?;
@@ -95,20 +95,20 @@ fn push_visibility(table: &mut Table, truths: &[StoneTruth], seen: &[Seen]) -> R
     let sensors = || Sensor::ALL.iter().map(|s| s.name()).enumerate();
     for (sensor, name) in sensors() {
         for (number, epoch) in (1..).zip(seen) {
-            let meaning = format!("points of the cloud cloud_{name} of epoch {number} on the stone");
+            let meaning = format!("points on the stone in cloud_{name} of epoch {number}");
             let points = epoch.scans.points[sensor].clone();
             table.push(&format!("n_{name}_{number}"), "", &meaning, points)?;
         }
     }
     for (number, epoch) in (1..).zip(seen) {
-        let meaning = format!("photos of epoch {number} with {SHOWN_PIXELS} or more pixels of the stone");
+        let meaning = format!("photos of epoch {number} with at least {SHOWN_PIXELS} pixels of the stone");
         table.push(&format!("n_img_{number}"), "", &meaning, epoch.photos.clone())?;
     }
     for (sensor, name) in sensors() {
         let share = |i: usize, epoch: &Seen| truths[i].seen_share(epoch.scans.cells[sensor][i]);
         let least = |i: usize| seen.iter().map(|e| share(i, e)).fold(1.0, f64::min);
         let meaning =
-            format!("share of the face that cloud_{name} shows, in the epoch where that is less, 0 to 1");
+            format!("share of the face that cloud_{name} shows, in the epoch where it is smallest, 0 to 1");
         let shares: Vec<f64> = (0..truths.len()).map(least).collect();
         table.push(&format!("vis_{name}"), "", &meaning, shares)?;
     }

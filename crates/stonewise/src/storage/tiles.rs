@@ -377,14 +377,14 @@ fn write_tile(step: &StepDir, name: &str, origin: Point3<f64>, records: &[Record
     let mut table = Table::new();
     for (axis, column) in ["x", "y", "z"].into_iter().enumerate() {
         let values: Vec<f32> = records.iter().map(|r| r.offset[axis]).collect();
-        table.push(column, "m", "point, from the origin of its tile", values)?;
+        table.push(column, "m", "point, relative to the origin of its tile", values)?;
     }
     let files: Vec<u32> = records.iter().map(|r| r.file).collect();
     table.push("file", "", "number of the input file, from 0", files)?;
     let indices: Vec<u64> = records.iter().map(|r| r.index).collect();
     table.push("index", "", "number of the record in its file, from 0", indices)?;
     let sources: Vec<u32> = records.iter().map(|r| u32::from(r.source.0)).collect();
-    table.push("source", "", "entry of sources.json", sources)?;
+    table.push("source", "", "index of the source in sources.json", sources)?;
     let times: Vec<f32> = records.iter().map(|r| r.source.1).collect();
     table.push("time", "s", "time since the first point of its source", times)?;
     write_parquet(&step.file(format!("{name}.parquet")), &table)?;

@@ -68,7 +68,7 @@ pub(crate) fn neighbour_covariances(
     edges.filter_map(of_edge).collect()
 }
 
-/// What a measured stone contributes to the covariance with each neighbour; covariances in the world.
+/// What a measured stone contributes to the covariance with each neighbour; in world coordinates.
 struct Measured<'a> {
     estimate: &'a Estimate,
     face_from_world: &'a Matrix3<f64>,

@@ -123,8 +123,8 @@ impl Motion {
         }
     }
 
-    /// The more significant first. Probabilities of large motions are all zero in numbers of 64 bits; then
-    /// the squares tell them apart.
+    /// Orders the more significant motion first. The probabilities of large motions underflow to zero in
+    /// 64-bit numbers; chi-square then decides.
     fn by_significance(&self, other: &Self) -> Ordering {
         let by_p = self.p_still.total_cmp(&other.p_still);
         by_p.then(other.chi_square.total_cmp(&self.chi_square))

@@ -1,4 +1,4 @@
-//! Whether surfaces that are not used as stable areas agree with the errors that the sources show.
+//! Test whether surfaces that are not used as stable areas agree with the error found from the sources.
 
 use super::assumptions::Model;
 use super::congruence::{reweighted, standing};
@@ -12,15 +12,16 @@ use nalgebra::{Cholesky, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// What surfaces off the wall show of the later epoch's error, beside what was found without them.
+/// The later epoch's error as surfaces off the wall show it, and as it was found without them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrossCheck {
-    /// Cells of plane that agree on one error.
+    /// Number of plane cells that agree on one error.
     pub cells: usize,
-    /// Error of the later epoch minus that of the reference in the middle of the stones if these surfaces did
-    /// not move, world, metres. No error is assumed along directions that they do not show.
+    /// Error of the later epoch minus that of the reference in the middle of the stones, if these surfaces
+    /// did not move; world, metres. Along directions that the surfaces do not show, it tends to zero, with a
+    /// large uncertainty.
     pub error: Vector3<f64>,
-    /// The same as found without them, and its covariance, m^2.
+    /// The same error as found without the surfaces, metres.
     pub found: Vector3<f64>,
     /// Covariance of `found`, m^2.
     pub covariance: Matrix3<f64>,
@@ -31,10 +32,10 @@ pub struct CrossCheck {
 
 /// Compares the error found with what surfaces off the wall show ([`EpochPair::offered`]).
 ///
-/// `found`: the rigid part of the error without these surfaces; `model`: what it was found with. The surfaces
-/// speak for themselves: the error of the epoch as a whole is left open, and areas that moved against the
-/// others are left out. The two errors share the comparisons within the epochs; their covariances are added
-/// as if they did not, which makes the test conservative.
+/// `found`: the rigid part of the error without these surfaces; `model`: the model with which it was found.
+/// For the error that the surfaces show, the error of the epoch as a whole is left open, and areas that moved
+/// against the others are left out. Both errors use the same comparisons within the epochs. Their covariances
+/// are added as if they were independent, which makes the test conservative.
 ///
 /// `None` where fewer than [`StableParams::min_cells`](super::StableParams) cells are left.
 pub(super) fn cross_check(

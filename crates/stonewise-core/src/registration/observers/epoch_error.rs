@@ -73,7 +73,7 @@ pub struct EpochErrors {
     pub sources: Vec<SourceError>,
     /// The rigid part of the error over all stones.
     pub rigid: RigidError,
-    /// What surfaces off the wall show; only where the datum comes from the sources.
+    /// Comparison with surfaces off the wall; only where the datum comes from the sources.
     #[serde(default)]
     pub cross_check: Option<CrossCheck>,
     /// Error at each stone, in their order.

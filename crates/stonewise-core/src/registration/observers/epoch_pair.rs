@@ -1,4 +1,4 @@
-//! What is compared: two epochs with their sources, stones and surfaces, and the parameters.
+//! Input of the comparison of two epochs: sources, stones, surfaces and parameters.
 
 use super::contrast::ContrastParams;
 use super::observation::Observation;
@@ -33,14 +33,14 @@ pub struct EpochPair<'a> {
     pub neighbours: &'a [[usize; 2]],
     /// Points in stable areas.
     pub stable: &'a [StablePoints],
-    /// Points on other surfaces off the wall: they are not used, but what they show is compared with what is
-    /// found.
+    /// Points on other surfaces off the wall. They do not enter the estimate; the error that they show is
+    /// compared with it.
     pub offered: &'a [StablePoints],
     /// Noise of single points along the normal, metres.
     pub sigma_m: f64,
 }
 
-/// All sights, by which the blocks of the unknowns are laid out.
+/// All sights; they determine the blocks of the unknowns.
 pub(super) fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
     let of_stone = |stone: &SeenStone| {
         let centroid = stone.centroid;

@@ -1,4 +1,4 @@
-//! The error of the later epoch at the stones as a function of the unknowns, and the rigid motion in it.
+//! The error of the later epoch at the stones as a function of the unknowns, and its rigid part.
 
 use super::epoch_pair::EpochPair;
 use super::model::{Row, Solution, Unknowns};
@@ -8,7 +8,7 @@ use nalgebra::{Matrix6, Point3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Most stones by which the rigid part of the error is found.
+/// Largest number of stones from which the rigid part of the error is computed.
 const RIGID_STONES: usize = 500;
 
 /// The rigid motion that lies closest to the later epoch's error at the stones.
@@ -62,7 +62,7 @@ pub(super) fn rigid_rows(pair: &EpochPair, unknowns: &Unknowns) -> RigidRows {
 }
 
 impl RigidRows {
-    /// The rigid motion; `solutions`: with their weights, whose sum is one.
+    /// The rigid motion. `solutions`: solutions with their weights, which sum to one.
     pub fn error(&self, solutions: &[(f64, &Solution)]) -> RigidError {
         let mut error = Vector6::zeros();
         let mut covariance = Matrix6::zeros();

@@ -362,7 +362,7 @@ fn an_area_that_moved_is_named_and_left_out() {
     assert!(moved.observations[2] < still.observations[2]);
     let off = moved.at[0].mean - still.at[0].mean;
     assert!(off.norm() < 3e-4, "{off}");
-    // So far that the probabilities of all areas are zero in numbers of 64 bits.
+    // So large a motion that the probabilities of all areas underflow to zero in 64-bit numbers.
     assert_eq!(found(Vector3::new(0.0, 0.0, -0.05)).moved_areas, [4]);
 }
 
@@ -397,7 +397,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
 #[test]
 fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
     let sources = sources(2);
-    // The third area settled by itself by `settled_m`.
+    // The third area alone settled, by `settled_m`.
     let errors_with = |shift: &Vector3<f64>, settled_m: f64, is_offered: bool| {
         let mut errors = ERRORS;
         errors[2..].iter_mut().for_each(|e| *e += shift);
@@ -418,7 +418,7 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };
-    // Errors of the size by which the sources of an epoch differ.
+    // An error of the epoch as small as the differences between its sources: no contradiction.
     let own = 0.5 * (ERRORS[2] + ERRORS[3] - ERRORS[0] - ERRORS[1]);
     let sound = errors_with(&(-0.6 * own), 0.0, true);
     let check = sound.cross_check.clone().unwrap();

@@ -44,7 +44,7 @@ struct RecordCopy {
     /// Bytes of the record that are copied, without gaps where possible.
     copied: Vec<Range<usize>>,
     extra_bytes: u16,
-    /// Of all extra dimensions of the output.
+    /// Descriptors of all extra dimensions of the output.
     descriptors: Vec<u8>,
 }
 
@@ -52,7 +52,7 @@ impl RecordCopy {
     fn new(input: &Path, layout: &Layout, columns: LabelColumns) -> Result<Self, CloudError> {
         let format = layout.header.point_format();
         let records = layout.header.vlrs().iter().chain(&layout.extended);
-        // All but those that are written anew.
+        // All dimensions of the input except those that are written anew.
         let mut kept = extra_bytes::existing(records, format.extra_bytes);
         kept.retain(|dimension| !columns.names().any(|n| n.as_bytes() == dimension.name()));
         let base = usize::from(format.len() - format.extra_bytes);

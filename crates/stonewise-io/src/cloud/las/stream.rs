@@ -7,7 +7,8 @@ use std::path::Path;
 /// Where the header holds the number of its variable length records (LAS 1.4 R15, table 3).
 const RECORD_COUNT: std::ops::Range<u64> = 100..104;
 
-/// A file whose header states the right number of variable length records, whatever is in the file.
+/// A file, read with the right number of variable length records in its header even where the file has a
+/// wrong one.
 pub struct LasStream {
     file: BufReader<File>,
     position: u64,
@@ -15,7 +16,7 @@ pub struct LasStream {
 }
 
 impl LasStream {
-    /// `record_count`: of the variable length records between the header and the points.
+    /// `record_count`: number of variable length records between the header and the points.
     pub fn open(path: &Path, record_count: u32) -> io::Result<Self> {
         Ok(Self {
             file: BufReader::with_capacity(1 << 20, File::open(path)?),

@@ -122,11 +122,12 @@ impl PaperTables {
         let count = |i: usize| all.iter().map(|d| d.count[i] as u32).collect::<Vec<u32>>();
         table.push("method", "", "method of measurement", text(&|d| &d.method))?;
         table.push("survey", "", "clouds that were compared", text(&|d| &d.survey))?;
-        let meaning = "motion of the second half of the points, and the region of the wall";
+        let meaning = "motion given to the second half of the points, and region of the wall";
         table.push("motion", "", meaning, text(&|d| &d.motion))?;
         let meaning = "stones or core points that could have an estimate";
         table.push("expected", "", meaning, count(0))?;
-        table.push("estimated", "", "those that have one", count(1))?;
+        let meaning = "stones or core points that have an estimate";
+        table.push("estimated", "", meaning, count(1))?;
         let directions = [
             ("in_plane_per_axis", "per axis in the plane of the face"),
             ("in_plane_2d", "in the plane of the face, 2D"),
@@ -136,7 +137,7 @@ impl PaperTables {
         for (i, (direction, words)) in directions.into_iter().enumerate() {
             let (rmse, zero) = (
                 format!("RMSE {words}"),
-                format!("RMSE of always answering zero, {words}"),
+                format!("RMSE if every motion is estimated as zero, {words}"),
             );
             table.push(&format!("rmse_{direction}_m"), "m", &rmse, real(&|d| d.rmse_m[i]))?;
             table.push(&format!("zero_{direction}_m"), "m", &zero, real(&|d| d.zero_m[i]))?;

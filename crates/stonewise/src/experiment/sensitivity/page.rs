@@ -150,12 +150,12 @@ fn rows(points: &[SensitivityPoint]) -> Result<Table> {
     };
     let count = |i: usize| points.iter().map(|p| p.stones[i] as u32).collect::<Vec<u32>>();
     let influence = text(&|p| p.influence.word().to_owned());
-    rows.push("influence", "", "what is varied", influence)?;
-    let meaning = "which curve of the influence; empty where there is one";
+    rows.push("influence", "", "quantity that is varied", influence)?;
+    let meaning = "curve of the influence; empty if it has only one curve";
     rows.push("kind", "", meaning, text(&|p| p.kind.clone()))?;
     rows.push("scanner", "", "TLS or UAV", text(&|p| p.scanner.clone()))?;
     rows.push("method", "", "stonewise or paper", text(&|p| p.method.clone()))?;
-    let meaning = "value of the influence: mean IoU, mm, px or number of photos";
+    let meaning = "value of the influence: mean IoU, length in mm or px, or number of photos";
     rows.push("value", "", meaning, real(&|p| p.x))?;
     rows.push("stones", "", "stones that both surveys show", count(0))?;
     rows.push("measured", "", "stones that were measured", count(1))?;

@@ -11,7 +11,7 @@ use std::path::Path;
 use stonewise_io::table::{Table, write_csv};
 
 /// What the table as a whole holds.
-const DESCRIPTION: &str = "One row per combination of parameters, all motions that were tried together. Empty cells: no stone was measured.";
+const DESCRIPTION: &str = "One row per combination of parameters, over all motions that were tried. Empty error columns: no stone was measured.";
 
 /// Writes `tune.csv` with the metadata of its columns, `tune.svg` and `index.html`.
 pub(super) fn write(tuned: &Tuned, project: &Project, cases: &[(String, Project)], out: &Path) -> Result<()> {
@@ -74,12 +74,12 @@ fn rows(tuned: &Tuned) -> Result<Table> {
     rows.push("rmse_in_plane_per_axis_m", "m", meaning, error(|e| e.in_plane_m))?;
     let meaning = "RMSE out of the plane of the face";
     rows.push("rmse_out_of_plane_m", "m", meaning, error(|e| e.out_of_plane_m))?;
-    let meaning = "95th percentile of the norm of the 3D error, that of the motion where it is largest";
+    let meaning = "95th percentile of the norm of the 3D error, for the motion for which it is largest";
     rows.push("p95_3d_m", "m", meaning, error(|e| e.p95_m))?;
     let meaning = "share of the measured stones that are outliers, 0 to 1";
     rows.push("outlier_rate", "", meaning, error(|e| e.outlier_rate))?;
     let flag = |is: &dyn Fn(usize) -> bool| (0..points.len()).map(|i| u32::from(is(i))).collect::<Vec<u32>>();
-    let meaning = "1 where no other combination is better in error and number of stones, else 0";
+    let meaning = "1 on the Pareto front (no other row is better in both error and number of stones), else 0";
     rows.push("front", "", meaning, flag(&|i| tuned.front.contains(&i)))?;
     let meaning = "1 for the combination that is recommended, else 0";
     rows.push(
@@ -92,7 +92,7 @@ fn rows(tuned: &Tuned) -> Result<Table> {
     rows.push(
         "failure",
         "",
-        "why the stones could not be measured, or empty",
+        "why the stones could not be measured; else empty",
         failures,
     )?;
     Ok(rows)

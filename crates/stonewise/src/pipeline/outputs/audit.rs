@@ -14,7 +14,7 @@ use stonewise_io::table::{Table, write_csv};
 const DESCRIPTION: &str = "What the majority of the photos decided about merged, split and dropped instances of an epoch, one row per \
     decision. Empty cells: the decision has no such number.";
 
-/// What the decisions mean.
+/// Meaning of the column `event`.
 const EVENTS: &str = "the decision: split_instance (a mask that covers several stones was divided), joined_fragment (a mask of a part was given to its stone), \
         outvoted_instance (most photos show something else there), dropped_islands (parts cut off from their stone), dropped_stone (too few points)";
 

@@ -52,8 +52,8 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     let meaning = "merge, split, delete, add or ignore";
     table.push("do", "", meaning, text(&|r| edit(r).action.word().to_owned()))?;
     table.push("who", "", "who made the edit", text(&|r| edit(r).who.clone()))?;
-    table.push("when", "", "when", text(&|r| edit(r).when.clone()))?;
-    table.push("why", "", "why", text(&|r| edit(r).why.clone()))?;
+    table.push("when", "", "when it was made", text(&|r| edit(r).when.clone()))?;
+    table.push("why", "", "why it was made", text(&|r| edit(r).why.clone()))?;
     let meaning = "the file of edits and the place in it";
     table.push("place", "", meaning, text(&|r| file.place(r.0)))?;
     table.push(
@@ -64,10 +64,10 @@ pub fn write_edits_audit(context: &Context, edited: Option<&Edited>) -> Result<(
     )?;
     table.push("epoch", "", "name of the epoch", text(&|r| r.1.clone()))?;
     let before = stones(&|e| e.before);
-    table.push("stones_before", "", "stones that it changed", before)?;
+    table.push("stones_before", "", "stones that the edit changed", before)?;
     let after = stones(&|e| e.after);
-    table.push("stones_after", "", "stones that it left", after)?;
-    let meaning = "points whose label changed; empty without effect";
+    table.push("stones_after", "", "stones that the edit made or changed", after)?;
+    let meaning = "points whose label changed; empty where the edit had no effect";
     table.push("points", "", meaning, points)?;
     table.push(
         "no_effect",

@@ -13,8 +13,8 @@ use stonewise_io::table::{Table, write_csv};
 const DESCRIPTION: &str = "M3C2 (Lague, Brodu & Leroux 2013), one row per core point of the first epoch. Distances are later epoch minus first, \
     along the normal. Empty cells: not known.";
 
-/// The extra dimensions of the cloud: the columns after the place, described in the 32 bytes that LAS has for
-/// that.
+/// The extra dimensions of the cloud: the columns of the table after x, y and z. A LAS description has 32
+/// bytes.
 const DIMENSIONS: [Dimension; 10] = [
     Dimension::new("NormalX", "", "unit normal, world x"),
     Dimension::new("NormalY", "", "unit normal, world y"),

@@ -10,8 +10,8 @@ pub struct VarianceComponents {
     /// Growth of the motion's gradient with distance, per square root metre: in the face, out of it.
     pub drift: [f64; 2],
     /// The motion's gradient itself, metre per metre: in the face (strain, shear and rotation alike), out of
-    /// it (tilt). It is stated for each stone by itself: a gradient that n stones have in common has a
-    /// standard deviation of strain / sqrt(n), so that 0.02 on 150 stones allows a wall 1.6 mm per metre.
+    /// it (tilt). The prior holds for each stone separately: a gradient common to n stones has a standard
+    /// deviation of strain / sqrt(n), which is 1.6 mm per metre for a strain of 0.02 and 150 stones.
     pub strain: [f64; 2],
     /// A stone's own translation beside the common field, across the face, metres.
     pub own_m: f64,
@@ -66,10 +66,12 @@ impl VarianceComponents {
         self.appearance_m.unwrap_or(0.0)
     }
 
-    /// Names of the components at the upper end of their range: that far, neighbours say almost nothing
-    /// about a stone. Tilt, the strain out of the face, is left out: bulging walls reach its bound, where it
-    /// is as good as free: ten times the bound changed the motions of simulated walls by 0.09 mm (root mean
-    /// square) at most.
+    /// Names of the components at the upper end of their range, where the survey shows larger differences
+    /// than are expected of masonry.
+    ///
+    /// Tilt (strain out of the face) is excluded: bulging walls reach its upper bound, which hardly
+    /// constrains them. A bound ten times as large changed the motions of simulated walls by at most 0.09 mm
+    /// (root mean square).
     pub fn at_upper_bound(&self) -> Vec<&'static str> {
         let log = self.to_log();
         let count = self.count();
@@ -138,9 +140,9 @@ impl VarianceComponents {
 /// As good as no motion, metres: a hundredth of the best accuracy of a stone.
 const NONE_M: f64 = 2e-6;
 
-/// A component whose logarithm lies closer to a bound than this lies at it: rounding.
+/// A component counts as lying at a bound if their logarithms differ by less than this (rounding).
 const AT_BOUND: f64 = 1e-9;
-/// Place of the strain out of the face.
+/// Index of the strain out of the face.
 const TILT: usize = 3;
 /// Names of the components in messages, in the order of their logarithms.
 const NAMES: [&str; COUNT] = [

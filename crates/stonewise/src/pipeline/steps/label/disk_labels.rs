@@ -47,7 +47,7 @@ impl LabelStore for DiskLabels {
             "stone of the point, 0 for none",
             labels.stone.clone(),
         )?;
-        let meaning = "share of the photos' votes that the outcome got, 0 to 1";
+        let meaning = "share of the photos' votes for this stone, or for none, 0 to 1";
         table.push("confidence", "", meaning, labels.confidence.clone())?;
         table.push(
             "seen",

@@ -37,7 +37,8 @@ use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 use windows::align_windows;
 
-/// Measures the motion of every matched stone; what is known about the registration of the epochs.
+/// Measures the motion of every matched stone. Also returns what is known about the registration of the
+/// epochs.
 pub fn register(
     context: &Context,
     photos: [&Segmented; 2],
@@ -163,7 +164,7 @@ fn report_off_wall(context: &Context, number: usize, registered: &Registered) {
     context.warnings.notice(STEP, epoch, message);
 }
 
-/// Names the variance components for which the survey wants more than their range allows.
+/// Notes the variance components that lie at the upper end of their range.
 fn report_components(context: &Context, number: usize, registered: &Registered) {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return;

@@ -114,7 +114,7 @@ impl OffWall {
         self.cells.get(&cell_of(p, CELL_M)).copied()
     }
 
-    /// Every so many areas, so that at most `most` are left, in their order.
+    /// Every nth area in order, with n such that at most `most` areas are left.
     pub fn thinned(&self, most: usize) -> Self {
         let stride = self.areas.len().div_ceil(most.max(1)).max(1);
         let kept = |area: usize| area.is_multiple_of(stride);

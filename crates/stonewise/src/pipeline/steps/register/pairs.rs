@@ -114,11 +114,11 @@ impl DiskPairs {
             }
         }
         let mut table = Table::new();
-        table.push("slot", "", "place of the pair of stones in its batch", slots)?;
+        table.push("slot", "", "index of the pair of stones in its batch", slots)?;
         table.push(
             "part",
             "",
-            "0: first epoch, 1: second, 2: second, near the stone",
+            "0: first epoch, 1: second epoch, 2: second epoch, near the stone",
             parts,
         )?;
         for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
@@ -126,7 +126,7 @@ impl DiskPairs {
             table.push(
                 name,
                 "m",
-                "point, from the centroid of its stone in the first epoch",
+                "offset of the point from the centroid of its stone in the first epoch",
                 values,
             )?;
         }

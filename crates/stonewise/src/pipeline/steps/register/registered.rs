@@ -48,8 +48,8 @@ impl Registered {
         pairs.map(|pair| pair.stones.map(|s| index[&s])).collect()
     }
 
-    /// Adds to each pair of neighbours the covariance of the difference that the error of the epochs has
-    /// between them.
+    /// Adds to the covariance of each pair of neighbours that of the difference between the epochs' errors at
+    /// the two stones.
     pub(super) fn add_registration(&mut self, between: &[Matrix3<f64>]) {
         for (pair, covariance) in self.neighbours.iter_mut().zip(between) {
             pair.covariance += covariance;

@@ -38,14 +38,14 @@ pub struct Sights {
     pub offered: Vec<StablePoints>,
 }
 
-/// Areas off the wall that are compared with the sources' errors, at most: a hundred plane cells show an
-/// error far better than sources hide it.
+/// Largest number of areas off the wall that are compared with the sources' errors. Their plane cells
+/// determine an error far more accurately than the sources do.
 const MOST_OFFERED: usize = 40;
 
 impl Sights {
     /// `number`: of the later epoch, from 1. `off_wall`: areas off the wall, which count as stable if the
-    /// project sets `auto_stable`. The project's parameters say how many stones keep their points, evenly
-    /// chosen among the matches.
+    /// project sets `auto_stable`. The project's parameters set how many stones keep their points; they are
+    /// evenly chosen among the matches.
     pub fn gather(
         project: &Project,
         epochs: [&Labelled; 2],
