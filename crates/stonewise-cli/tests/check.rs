@@ -286,6 +286,69 @@ fn limited(kib: u32, command: &str) -> assert_cmd::Command {
     shell
 }
 
+/// A stack of 2^62 bytes is more than any system gives a thread, so that it starts none.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_do_not_start_are_said_before_the_work() {
+    let out = tempfile::tempdir().unwrap();
+    let mut run = stonewise();
+    run.env("RUST_MIN_STACK", (1u64 << 62).to_string())
+        .arg("run")
+        .arg(tiny_survey().join("stonewise.toml"))
+        .arg("--out")
+        .arg(out.path().join("results"));
+    let (code, log) = outcome(&mut run);
+    assert_eq!(code, 1, "{log}");
+    assert!(
+        log.contains("error: the threads cannot be started (fewer: --threads)"),
+        "{log}"
+    );
+    assert!(!out.path().join("results").exists(), "something was written");
+}
+
+/// A `df` that finds 1 MB free stands before that of the system.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_too_small_is_said_and_stops_nothing() {
+    use std::os::unix::fs::PermissionsExt;
+    let home = tempfile::tempdir().unwrap();
+    let df = home.path().join("df");
+    let answer = "Filesystem 1024-blocks Used Available Capacity Mounted on\ndisk 2000 1000 1000 50% /";
+    fs::write(&df, format!("#!/bin/sh\ncat <<END\n{answer}\nEND\n")).unwrap();
+    fs::set_permissions(&df, fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var("PATH").unwrap();
+    for (command, code) in [("check", 3), ("run", 0)] {
+        let mut program = stonewise();
+        program
+            .env("PATH", format!("{}:{path}", home.path().display()))
+            .arg(command)
+            .arg(tiny_survey().join("stonewise.toml"))
+            .arg("--out")
+            .arg(home.path().join("results"));
+        let output = program.output().unwrap();
+        let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{text}");
+        assert!(
+            text.contains("0.0 GB free: make room, or give --out on another disk"),
+            "{text}"
+        );
+    }
+}
+
+/// 530,000 KiB leave a little more than 200 MB after program and threads, half of what `check` counts on.
+#[cfg(target_os = "linux")]
+#[test]
+fn too_little_memory_is_said_by_check() {
+    let mut check = limited(530_000, "check");
+    let output = check.arg(tiny_survey().join("stonewise.toml")).output().unwrap();
+    let text = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    assert!(
+        text.contains("end other programs, or run on a part of the survey"),
+        "{text}"
+    );
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn the_demo_says_that_no_limit_leaves_it_enough() {

@@ -6,7 +6,7 @@ mod support;
 
 use std::fs::{self, File};
 use std::path::Path;
-use support::{contents, copy_of, outcome, run, stonewise, survey};
+use support::{contents, copy_of, outcome, run, stonewise, survey, tiny_survey};
 
 /// What a run writes that may differ between two runs: times, and what only resuming needs.
 const NOT_COMPARED: [&str; 2] = ["run.json", "work"];
@@ -97,6 +97,47 @@ fn a_survey_of_another_seed_is_not_replaced() {
     assert!(contents(&survey, &[]) == before);
     assert_eq!(simulate("1", &[]).0, 0);
     assert_eq!(simulate("2", &["--force"]).0, 0);
+}
+
+/// A limit on the size of files makes writing fail in the middle of a file, as a full disk does: in a tile, in
+/// a table, in the report.
+#[cfg(target_os = "linux")]
+#[test]
+fn writing_that_fails_leaves_no_half_of_a_file() {
+    let reference = tempfile::tempdir().unwrap();
+    assert_eq!(run(tiny_survey(), reference.path(), &[]).0, 0);
+    let whole = results(reference.path());
+    let out = tempfile::tempdir().unwrap();
+    for (blocks, file) in [(64, "ingest-1"), (400, "m3c2.csv"), (1600, "report/index.html")] {
+        let mut shell = assert_cmd::Command::new("sh");
+        shell
+            .arg("-c")
+            .arg(format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\""))
+            .arg(support::program())
+            .arg("run")
+            .arg(tiny_survey().join("stonewise.toml"))
+            .arg("--out")
+            .arg(out.path());
+        let (code, log) = outcome(&mut shell);
+        assert_eq!(code, 1, "{log}");
+        let error = log.lines().last().unwrap();
+        assert!(
+            error.contains(file) && error.contains("File too large"),
+            "{error}"
+        );
+        assert!(out.path().join("UNFINISHED.txt").exists(), "{error}");
+        for (name, bytes) in results(out.path()) {
+            let finished = whole.iter().find(|(n, _)| *n == name);
+            let is_whole = finished.is_some_and(|(_, whole)| *whole == bytes);
+            assert!(
+                is_whole || name == Path::new("UNFINISHED.txt"),
+                "{}",
+                name.display()
+            );
+        }
+    }
+    assert_eq!(run(tiny_survey(), out.path(), &[]).0, 0);
+    assert!(results(out.path()) == whole, "other results after the failures");
 }
 
 #[test]

@@ -61,6 +61,40 @@ fn clouds_that_lie_about_their_sizes_are_refused_at_once() {
     assert!(mesh.contains("element"), "{mesh}");
 }
 
+/// Points of constants take no bits, so that a file of a kilobyte can claim any number of them.
+#[test]
+fn a_scan_of_constants_is_refused_at_once() {
+    use e57::{E57Writer, Record, RecordDataType, RecordName, RecordValue};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("constants.e57");
+    let mut file = E57Writer::from_file(&path, "file").unwrap();
+    let names = [
+        RecordName::CartesianX,
+        RecordName::CartesianY,
+        RecordName::CartesianZ,
+    ];
+    let prototype = names.map(|name| Record {
+        name,
+        data_type: RecordDataType::Integer { min: 5, max: 6 },
+    });
+    let mut scan = file.add_pointcloud("scan", prototype.to_vec()).unwrap();
+    scan.set_name(Some("tower".to_owned()));
+    for _ in 0..3 {
+        scan.add_point(vec![RecordValue::Integer(5); 3]).unwrap();
+    }
+    scan.finalize().unwrap();
+    // The writer takes no constants.
+    let (range, constant) = ("minimum=\"5\" maximum=\"6\"", "minimum=\"5\" maximum=\"5\"");
+    file.finalize_customized_xml(|xml| {
+        assert_eq!(xml.matches(range).count(), 3, "{xml}");
+        Ok(xml.replace(range, constant))
+    })
+    .unwrap();
+    let expected = "FILE: all values of scan tower are constants, so that nothing tells its points apart";
+    assert_eq!(refusal(&path, measure_cloud), expected);
+    assert_eq!(refusal(&path, cloud_info), expected);
+}
+
 #[test]
 fn layers_under_a_compressor_without_layers_are_refused_at_once() {
     let mut bytes = std::fs::read(testdata("hostile/layer_sizes.laz")).unwrap();

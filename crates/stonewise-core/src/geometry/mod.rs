@@ -14,6 +14,7 @@ mod rigid;
 mod ring;
 mod rotation;
 mod small_motion;
+mod strain;
 mod triangulate;
 mod view;
 
@@ -30,5 +31,6 @@ pub use rigid::Rigid3;
 pub use ring::{is_simple, ring_contains, signed_area};
 pub use rotation::nearest_rotation;
 pub use small_motion::{DisplacementSample, SmallMotion, lever};
+pub use strain::Strain;
 pub use triangulate::triangulate;
 pub use view::{Projection, View};

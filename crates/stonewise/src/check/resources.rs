@@ -23,24 +23,6 @@ const GIB: f64 = (1u64 << 30) as f64;
 
 pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Finding> {
     let points: u64 = surveys.iter().map(|s| s.records).sum();
-    let amount = |topic: &str, needed: u64, free: Option<u64>, advice: &str| {
-        let needs = format!("about {:.1} GB needed", (needed as f64 / GIB).max(0.1));
-        match free {
-            None => Finding::new(
-                "",
-                topic,
-                Verdict::Note,
-                format!("{needs}; what is free is not known here"),
-            ),
-            Some(free) => {
-                let text = format!("{needs}, {:.1} GB free", free as f64 / GIB);
-                match free < needed {
-                    true => Finding::new("", topic, Verdict::Doubt, format!("{text}: {advice}")),
-                    false => Finding::new("", topic, Verdict::Fine, text),
-                }
-            }
-        }
-    };
     let cores = rayon::current_num_threads().max(1);
     let minutes = 0.1 + SECONDS_PER_POINT * points as f64 / cores as f64 / 60.0;
     let without_masks = project.epochs.iter().filter(|e| e.masks.is_none()).count();
@@ -68,6 +50,22 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
             format!("about {:.0} min on {cores} cores{search}", minutes.max(1.0)),
         ),
     ]
+}
+
+/// What is needed beside what is free, bytes; `None`: nobody knows how much is free.
+fn amount(topic: &str, needed: u64, free: Option<u64>, advice: &str) -> Finding {
+    let needs = format!("about {:.1} GB needed", (needed as f64 / GIB).max(0.1));
+    let (verdict, text) = match free {
+        None => (Verdict::Note, format!("{needs}; what is free is not known here")),
+        Some(free) => {
+            let text = format!("{needs}, {:.1} GB free", free as f64 / GIB);
+            match free < needed {
+                true => (Verdict::Doubt, format!("{text}: {advice}")),
+                false => (Verdict::Fine, text),
+            }
+        }
+    };
+    Finding::new("", topic, verdict, text)
 }
 
 /// Compares the limit on the address space with what a run of a project takes, from the points that the
@@ -151,6 +149,23 @@ fn free_memory() -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn less_than_needed_is_a_doubt_with_advice() {
+        let look = |free| amount("memory", 3 << 30, free, "end other programs");
+        let short = look(Some((3 << 30) - 1));
+        assert_eq!(short.verdict, Verdict::Doubt);
+        assert_eq!(short.text, "about 3.0 GB needed, 3.0 GB free: end other programs");
+        assert!(is_about_this_machine(&short));
+        let enough = look(Some(3 << 30));
+        assert_eq!(
+            (enough.verdict, &*enough.text),
+            (Verdict::Fine, "about 3.0 GB needed, 3.0 GB free")
+        );
+        let unknown = look(None);
+        assert_eq!(unknown.verdict, Verdict::Note);
+        assert!(unknown.text.ends_with("not known here"), "{}", unknown.text);
+    }
 
     #[test]
     fn the_posix_answer_of_df_is_read() {

@@ -333,7 +333,14 @@ fn measure(
         let epoch = &context.project.epochs[number - 1].name;
         context.warnings.notice("register", epoch, &datum.note);
     }
-    note_doubts(context, number, [first, second], &offsets, &registered, &rows);
+    note_doubts(
+        context,
+        number,
+        [first, second],
+        &offsets,
+        (&registered, &datum),
+        &rows,
+    );
     write_stones(&context.out, pair, &rows)?;
     let record = RegistrationRecord {
         estimator: registered.estimator,

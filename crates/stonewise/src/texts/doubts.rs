@@ -64,5 +64,15 @@ messages! {
             "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
             Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
             wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden";
+
+        STRETCHED:
+            "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
+            changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
+            has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
+            block, and the map projection with its scale factor, in both epochs",
+            "die Wand hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
+            {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
+            Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
+            den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
     }
 }

@@ -44,6 +44,27 @@ fn mutated_inputs_do_no_harm() {
     in_a_pool(|| campaign(60, 1));
 }
 
+/// Inputs that took 1.5 GB before each change was cut: lines of `A[` or `{"a":`, repeated twice by a factor of
+/// 200.
+#[test]
+fn inputs_of_repeated_lines_take_little_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, input) in [("coco", 249), ("regions", 4960)] {
+        let targets = targets();
+        let found = (0..).zip(&targets).find(|(_, t)| t.name == name);
+        let (number, target) = found.unwrap();
+        let bench = Bench::new(folder.path(), 20_261_201, number, target);
+        let memory = Memory::now();
+        let trial = bench.read(input);
+        assert!(
+            memory.highest() < MOST_MEMORY,
+            "{name}: {} bytes",
+            memory.highest()
+        );
+        assert_eq!(judge(&trial, &bench.home), Ok(false), "{name}");
+    }
+}
+
 #[test]
 #[ignore = "runs as long as it is told; see the top of the file"]
 fn campaign_of_any_length() {

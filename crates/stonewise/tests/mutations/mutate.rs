@@ -45,6 +45,9 @@ const WORDS: [&str; 24] = [
     "\u{feff}",
 ];
 
+/// Longest input, bytes.
+const LONGEST: usize = 1 << 20;
+
 /// Changes an input a few times; `other` is one to take pieces from.
 pub fn mutate(bytes: &mut Vec<u8>, other: &[u8], is_text: bool, random: &mut Random) {
     for _ in 0..1 + random.below(4) {
@@ -54,7 +57,7 @@ pub fn mutate(bytes: &mut Vec<u8>, other: &[u8], is_text: bool, random: &mut Ran
             change_bytes(bytes, other, random);
         }
         // After every change: lines that are repeated twice would take gigabytes.
-        bytes.truncate(1 << 20);
+        bytes.truncate(LONGEST);
     }
 }
 
@@ -135,7 +138,9 @@ fn change_text(bytes: &mut Vec<u8>, random: &mut Random) {
     match random.below(8) {
         0 => drop(bytes.drain(line)),
         1 => {
-            let copy = bytes[line].repeat(*random.of(&[1, 3, 200]));
+            // More would be cut off.
+            let most = LONGEST / line.len().max(1) + 1;
+            let copy = bytes[line].repeat((*random.of(&[1, 3, 200])).min(most));
             bytes.splice(line_start..line_start, copy);
         }
         2 => {

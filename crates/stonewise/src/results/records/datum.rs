@@ -125,6 +125,12 @@ impl Datum {
         Some(lever * covariance * lever.transpose())
     }
 
+    /// Covariance of the rotation vector of the registration error, rad^2; `None` where the state is unknown.
+    pub fn rotation_covariance(&self) -> Option<Matrix3<f64>> {
+        let rows = self.covariance_6x6.as_ref()?;
+        Some(Matrix3::from_fn(|i, j| rows[3 + i][3 + j]))
+    }
+
     /// The common rigid motion at a place, metres, world; `None` where motions are tested against the ground.
     pub fn common_motion_at(&self, place: &Point3<f64>) -> Option<Vector3<f64>> {
         let motion = Vector6::from(self.common_motion?);

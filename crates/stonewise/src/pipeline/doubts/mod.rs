@@ -1,0 +1,55 @@
+//! Doubts about the results of a pair of epochs as a whole.
+
+mod labels;
+mod motions;
+mod registration;
+mod scale;
+
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::offsets::LabelOffsets;
+use crate::pipeline::steps::register::Registered;
+use crate::results::StoneRow;
+use crate::results::records::Datum;
+use labels::{beside, torn};
+use motions::{blind, few_measured, unsettled};
+use registration::misregistered;
+use scale::stretched;
+
+/// Warns where the motions of a pair of epochs cannot be relied on.
+pub fn note_doubts(
+    context: &Context,
+    number: usize,
+    labelled: [&Labelled; 2],
+    offsets: &LabelOffsets,
+    (registered, datum): (&Registered, &Datum),
+    rows: &[StoneRow],
+) {
+    let epoch = &context.project.epochs[number - 1].name;
+    // The first epoch takes part in every pair.
+    let first_time = usize::from(number > 2);
+    for (which, labels) in [0, number - 1].into_iter().zip(labelled).skip(first_time) {
+        if let Some(message) = torn(&labels.stones) {
+            let name = &context.project.epochs[which].name;
+            context.warnings.doubt("label", name, message);
+        }
+    }
+    for (name, message) in beside(context, number, offsets) {
+        context.warnings.doubt("label", name, message);
+    }
+    let cross_check = registered
+        .epoch_errors
+        .as_ref()
+        .and_then(|e| e.cross_check.as_ref());
+    let stated_m = context.project.settings.registration.epoch_error_m;
+    let found = [
+        unsettled(registered),
+        cross_check.and_then(|check| misregistered(stated_m, check)),
+        few_measured(rows),
+        blind(registered, rows),
+        stretched(rows, datum),
+    ];
+    for message in found.into_iter().flatten() {
+        context.warnings.doubt("register", epoch, message);
+    }
+}

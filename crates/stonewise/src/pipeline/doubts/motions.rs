@@ -1,0 +1,164 @@
+//! Doubts about the motions of a pair of epochs.
+
+use crate::pipeline::steps::register::Registered;
+use crate::results::records::EstimatorRecord;
+use crate::results::{Status, StoneRow};
+use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED};
+use std::collections::BTreeMap;
+use stonewise_core::stone::StoneMotion;
+
+/// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
+/// something other than noise hides the motions.
+const LIMIT_EXCESS: f64 = 100.0;
+/// Half width of a 95 % interval, in standard deviations.
+const SIGMAS_95: f64 = 1.96;
+
+/// The adjustment stopped before its motions had settled.
+pub(super) fn unsettled(registered: &Registered) -> Option<String> {
+    let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
+        return None;
+    };
+    let iterations = adjustment.iterations.to_string();
+    (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
+}
+
+/// Most of the stones that were found in both epochs could not be measured.
+pub(super) fn few_measured(rows: &[StoneRow]) -> Option<String> {
+    let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
+    let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
+    (2 * measured < matched).then(|| {
+        let counts = Status::ALL.iter().filter_map(|status| {
+            let n = rows
+                .iter()
+                .filter(|r| r.status == *status && r.matched_id.is_some() && *status != Status::Ok)
+                .count();
+            (n > 0).then(|| format!("{n} {}", status.word()))
+        });
+        let values = [
+            ("measured", &*measured.to_string()),
+            ("matched", &*matched.to_string()),
+            ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
+        ];
+        FEW_MEASURED.say(&values)
+    })
+}
+
+/// Motions are far less certain than the points allow.
+pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
+    let points: BTreeMap<u32, [f64; 2]> = rows
+        .iter()
+        .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
+        .collect();
+    let ratio = |(stone, motion): (u32, &StoneMotion)| {
+        let [one, two] = points.get(&stone)?.map(|n| n.max(1.0));
+        let allowed = motion.rmse_m * (1.0 / one + 1.0 / two).sqrt();
+        let covariance = motion.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        let sd = covariance.symmetric_eigenvalues().max().max(0.0).sqrt();
+        (allowed > 0.0).then_some((sd / allowed, sd))
+    };
+    let measured = registered.results.iter();
+    let measured = measured.filter_map(|r| Some((r.first.0, r.motion.as_ref().ok()?)));
+    let mut all: Vec<(f64, f64)> = measured.filter_map(ratio).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let &(excess, sd) = all.get(all.len() / 2)?;
+    (excess > LIMIT_EXCESS).then(|| {
+        let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
+        let values = [("limit", &*limit), ("excess", &*format!("{excess:.0}"))];
+        BLIND.say(&values)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::testing::{registration_record, rows};
+    use nalgebra::{Matrix3, Matrix6, Vector3};
+    use stonewise_core::geometry::Rigid3;
+    use stonewise_core::id::StoneId;
+    use stonewise_core::stone::{MotionFailure, PairResult};
+
+    /// Motions of the stones that have one in `rows`, with these standard deviations and residuals.
+    fn registered(rows: &[StoneRow], sd_m: f64, rmse_m: f64) -> Registered {
+        let motion = StoneMotion {
+            second_from_first: Rigid3::identity(),
+            displacement: Vector3::zeros(),
+            rotation: Vector3::zeros(),
+            covariance: Matrix6::identity() * sd_m.powi(2),
+            relative: Vector3::zeros(),
+            relative_covariance: Matrix3::identity(),
+            own_motion_p: 1.0,
+            loose: false,
+            p_loose: None,
+            observability: 1.0,
+            rmse_m,
+        };
+        let pair = |row: &StoneRow| PairResult {
+            first: StoneId(row.stone_id),
+            second: StoneId(row.stone_id),
+            motion: match row.status {
+                Status::Ok => Ok(motion.clone()),
+                _ => Err(MotionFailure::NotConverged),
+            },
+        };
+        Registered {
+            results: rows.iter().map(pair).collect(),
+            neighbours: Vec::new(),
+            estimator: registration_record().estimator,
+            epoch_errors: None,
+            error_stones: Vec::new(),
+            off_wall: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn an_adjustment_that_did_not_converge_is_a_doubt() {
+        let mut registered = registered(&rows(), 0.001, 0.001);
+        let message = unsettled(&registered).unwrap();
+        assert!(message.contains("did not converge in 32 iterations"), "{message}");
+        if let EstimatorRecord::Adjustment(adjustment) = &mut registered.estimator {
+            adjustment.converged = true;
+        }
+        assert_eq!(unsettled(&registered), None);
+    }
+
+    #[test]
+    fn less_than_half_of_the_matched_stones_measured_is_a_doubt() {
+        // 22 of 24 stones are matched and 20 measured.
+        let mut rows = rows();
+        assert_eq!(few_measured(&rows), None);
+        let measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
+        measured
+            .take(9)
+            .for_each(|r| r.status = Status::FailedConvergence);
+        // 11 of 22 are half.
+        assert_eq!(few_measured(&rows), None);
+        let mut measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
+        measured.next().unwrap().status = Status::FailedDisagreement;
+        let message = few_measured(&rows).unwrap();
+        for part in [
+            "only 10 of the 22 stones",
+            "1 failed_points",
+            "9 failed_convergence",
+            "1 failed_disagreement",
+            "1 unobservable",
+        ] {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+        assert!(!message.contains("unmatched"), "{message}");
+    }
+
+    #[test]
+    fn limits_a_hundred_times_what_the_points_allow_are_a_doubt() {
+        // About 2,000 and 1,900 points with residuals of 1 mm allow 0.032 mm.
+        let rows = rows();
+        assert_eq!(blind(&registered(&rows, 0.0031, 0.001), &rows), None);
+        let message = blind(&registered(&rows, 0.0033, 0.001), &rows).unwrap();
+        assert!(
+            message.contains("below about 6 mm") && message.contains("103 times"),
+            "{message}"
+        );
+        // A wall without measured stones, and stones whose residuals are zero, show no limit.
+        assert_eq!(blind(&registered(&[], 1.0, 0.001), &rows), None);
+        assert_eq!(blind(&registered(&rows, 1.0, 0.0), &rows), None);
+    }
+}
