@@ -13,7 +13,6 @@ use crate::results::StoneRow;
 use crate::results::records::Datum;
 use labels::{beside, torn};
 use motions::{blind, few_measured, unsettled};
-use registration::misregistered;
 use scale::stretched;
 
 /// Warns where the motions of a pair of epochs cannot be relied on.
@@ -37,19 +36,26 @@ pub fn note_doubts(
     for (name, message) in beside(context, number, offsets) {
         context.warnings.doubt("label", name, message);
     }
-    let cross_check = registered
-        .epoch_errors
-        .as_ref()
-        .and_then(|e| e.cross_check.as_ref());
-    let stated_m = context.project.settings.registration.epoch_error_m;
-    let found = [
-        unsettled(registered),
-        cross_check.and_then(|check| misregistered(stated_m, check)),
-        few_measured(rows),
-        blind(registered, rows),
-        stretched(rows, datum),
-    ];
-    for message in found.into_iter().flatten() {
+    let of_motions = [unsettled(registered), few_measured(rows), blind(registered, rows)];
+    let of_epochs = match is_prescribed(context, number) {
+        true => [None, None],
+        false => [misregistered(context, registered), stretched(rows, datum)],
+    };
+    for message in of_motions.into_iter().chain(of_epochs).flatten() {
         context.warnings.doubt("register", epoch, message);
     }
+}
+
+/// Whether the project prescribes a motion of one of the two epochs. It moves all points, those off the wall
+/// too, which would otherwise show a wrong registration or scale.
+fn is_prescribed(context: &Context, number: usize) -> bool {
+    [0, number - 1]
+        .into_iter()
+        .any(|e| context.project.epochs[e].motion.is_some())
+}
+
+/// See [`registration::misregistered`].
+fn misregistered(context: &Context, registered: &Registered) -> Option<String> {
+    let check = registered.epoch_errors.as_ref()?.cross_check.as_ref()?;
+    registration::misregistered(context.project.settings.registration.epoch_error_m, check)
 }
