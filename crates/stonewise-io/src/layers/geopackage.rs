@@ -54,9 +54,8 @@ pub enum LayerError {
 
 /// Writes layers into a new GeoPackage; replaces the file at `path` when all is written.
 ///
-/// Columns are `fid`, `geom` and those of each layer's table; what [`Table::describe`] said of them is in
-/// `gpkg_data_columns`. A feature with too few or infinite vertices has
-/// no geometry. `last_change`: time stamp of the content, as `2026-04-30T12:00:00.000Z`; given, not taken
+/// Columns are `fid`, `geom` and those of each layer's table; their units and meanings ([`Table::push`]) are
+/// in `gpkg_data_columns`. A feature with too few or infinite vertices has no geometry. `last_change`: time stamp of the content, as `2026-04-30T12:00:00.000Z`; given, not taken
 /// from the clock, so that the same results give the same bytes.
 ///
 /// # Errors
