@@ -52,7 +52,7 @@ pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Fin
     ]
 }
 
-/// What is needed beside what is free, bytes; `None`: nobody knows how much is free.
+/// What is needed beside what is free, bytes; `None`: the system does not report how much is free.
 fn amount(topic: &str, needed: u64, free: Option<u64>, advice: &str) -> Finding {
     let needs = format!("about {:.1} GB needed", (needed as f64 / GIB).max(0.1));
     let (verdict, text) = match free {

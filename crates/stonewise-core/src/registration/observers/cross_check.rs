@@ -6,7 +6,6 @@ use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Problem, Unknowns};
 use super::observation::Observation;
 use super::rigid::{RigidError, rigid_rows};
-use super::sight::Sight;
 use super::stable::stable_observations;
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -49,9 +48,8 @@ pub(super) fn cross_check(
     if offered.len() < params.stable.min_cells {
         return None;
     }
-    let sights: Vec<Sight> = offered.iter().flat_map(|o| o.sights.clone()).collect();
     let unknowns =
-        Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &offered)).with_planes(&sights);
+        Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &offered)).with_planes(&offered);
     let all: Vec<&Observation> = within.iter().flatten().chain(&offered).collect();
     let judging = model.widened(&unknowns, &all);
     let (kept, _) = standing(&unknowns, within, offered, &judging);

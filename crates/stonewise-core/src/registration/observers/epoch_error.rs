@@ -10,7 +10,7 @@ use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::rigid::{RigidError, difference_row, rigid_rows, shares};
-use super::sight::{SeenStone, Sight, Source};
+use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -130,8 +130,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         plane_m: PLANE_SHARE * params.stable.systematic_share * pair.sigma_m,
         class,
     };
-    let sights: Vec<Sight> = stable.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns = unknowns.with_planes(&sights);
+    let unknowns = unknowns.with_planes(&stable);
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
     let judging = model.widened(&unknowns, &all);
     let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);

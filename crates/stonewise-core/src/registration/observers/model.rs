@@ -106,9 +106,9 @@ impl Unknowns {
         }
     }
 
-    /// The same with the errors of the sources on these planes.
-    pub fn with_planes(mut self, sights: &[Sight]) -> Self {
-        for sight in sights {
+    /// The same with the errors of the sources on the planes of these observations.
+    pub fn with_planes(mut self, observations: &[Observation]) -> Self {
+        for sight in observations.iter().flat_map(|o| &o.sights) {
             let next = self.count();
             if let Some(plane) = sight.plane {
                 let key = (plane, self.of_source[sight.source]);

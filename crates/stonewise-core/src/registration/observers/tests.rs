@@ -299,7 +299,7 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     list.extend(cells.into_iter().step_by(12));
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights).with_planes(&sights);
+    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights).with_planes(&list);
     let c = ObserverComponents::expected(SensorClass::Airborne);
     let prior = Prior::with_planes(&c, 0.01, 0.001);
     let problem = Problem::new(&unknowns, &all);
