@@ -171,7 +171,7 @@ impl<S: PairSource> Run<'_, S> {
                 break;
             }
             self.adjustment.evaluate(self.source, self.progress)?;
-            self.adjustment.update_photos();
+            self.adjustment.update_photos(self.last.as_ref());
             if COMPONENTS_IN.contains(&round) {
                 self.adjustment.estimate_components();
             }

@@ -13,6 +13,25 @@ const SHORTER: [f64; 2] = [0.5, 0.02];
 /// Factor on the share where it does not swing, so that the full step is back after three such iterations.
 const LONGER: f64 = 1.3;
 
+/// How a stone may have moved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Moving {
+    /// As its neighbours predict.
+    WithField,
+    /// On its own, as loose stones do.
+    OnOwn,
+}
+
+impl Moving {
+    pub fn more_probable(p_with_field: f64) -> Self {
+        if p_with_field < 0.5 {
+            Self::OnOwn
+        } else {
+            Self::WithField
+        }
+    }
+}
+
 /// A candidate for a stone's motion: moving with the field, or on its own.
 ///
 /// A stone's likelihood can have several maxima; what the observations say at one must not be read off at

@@ -1,6 +1,6 @@
 //! The normal equations of all stones: what every type of observation hands over, added up.
 
-use super::candidate::CandidateMotion;
+use super::candidate::{CandidateMotion, Moving};
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
 use super::state::Adjustment;
@@ -11,7 +11,7 @@ use crate::statistics::upper_median;
 pub(crate) struct StoneEquations {
     /// Moving with the field.
     pub with_field: NormalEquations,
-    /// Moving on its own, where that is followed.
+    /// Moving on its own, where that is followed or where photos weigh otherwise then.
     pub on_own: Option<NormalEquations>,
 }
 
@@ -19,12 +19,9 @@ impl Adjustment {
     /// Equations of all stones, with correlation between points accounted for.
     pub fn equations(&self) -> Vec<StoneEquations> {
         let error_m = self.components.error_m;
-        let of_stone = |(i, with_field): (usize, NormalEquations)| {
-            let own = self.stones[i].on_own.as_ref();
-            StoneEquations {
-                with_field,
-                on_own: own.map(|c| self.compared(i, self.observed(i, c, error_m))),
-            }
+        let of_stone = |(i, with_field): (usize, NormalEquations)| StoneEquations {
+            with_field,
+            on_own: self.on_own(i, error_m),
         };
         let with_field = self.equations_with_field(error_m);
         with_field.into_iter().enumerate().map(of_stone).collect()
@@ -34,15 +31,33 @@ impl Adjustment {
     pub fn equations_with_field(&self, error_m: f64) -> Vec<NormalEquations> {
         let stones = self.stones.iter().enumerate();
         stones
-            .map(|(i, s)| self.observed(i, &s.with_field, error_m))
+            .map(|(i, s)| self.observed(i, &s.with_field, Moving::WithField, error_m))
             .collect()
     }
 
+    /// Those of a stone that moves on its own; `None` where they are those of moving with the field.
+    fn on_own(&self, i: usize, error_m: f64) -> Option<NormalEquations> {
+        let stone = &self.stones[i];
+        match &stone.on_own {
+            Some(own) => Some(self.compared(i, self.observed(i, own, Moving::OnOwn, error_m))),
+            None => {
+                let is_in_photos = self.photos.as_ref().is_some_and(|p| p.stone(i).is_some());
+                is_in_photos.then(|| self.observed(i, &stone.with_field, Moving::OnOwn, error_m))
+            }
+        }
+    }
+
     /// The sum over all types of observation of a stone at one of its motions.
-    fn observed(&self, i: usize, candidate: &CandidateMotion, error_m: f64) -> NormalEquations {
+    fn observed(
+        &self,
+        i: usize,
+        candidate: &CandidateMotion,
+        moving: Moving,
+        error_m: f64,
+    ) -> NormalEquations {
         let mut sum = self.observed_by_clouds(i, candidate, error_m);
         if self.stones[i].info.usable
-            && let Some(photos) = self.observed_by_photos(i)
+            && let Some(photos) = self.observed_by_photos(i, moving)
         {
             sum += photos;
         }
@@ -50,9 +65,9 @@ impl Adjustment {
     }
 
     /// What photos say of a stone, where they show it.
-    pub fn observed_by_photos(&self, i: usize) -> Option<NormalEquations> {
+    pub fn observed_by_photos(&self, i: usize, moving: Moving) -> Option<NormalEquations> {
         let photos = self.photos.as_ref()?.stone(i)?;
-        Some(photos.normal_equations(&self.common_in(i), self.components.appearance_m()))
+        Some(photos.normal_equations(&self.common_in(i), self.components.appearance_m(), moving))
     }
 
     /// What a stone's own points say at one of its motions.

@@ -48,7 +48,8 @@ impl Adjustment {
         }
         let p_loose = self.p_loose(stone);
         let tied_by_field = by_field(&equations.with_field, &own);
-        let Some(at_own) = &equations.on_own else {
+        let at_own = equations.on_own.as_ref().filter(|_| stone.on_own.is_some());
+        let Some(at_own) = at_own else {
             let factor = widening(p_loose);
             return Estimate {
                 mean: tied.mean,

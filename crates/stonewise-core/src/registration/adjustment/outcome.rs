@@ -1,6 +1,7 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
 use super::breaks::find_breaks;
+use super::candidate::Moving;
 use super::estimate::Estimate;
 use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
@@ -157,7 +158,7 @@ fn failure(adjustment: &Adjustment, i: usize) -> Option<MotionFailure> {
     let Some(e) = stone.more_probable().surface.equations() else {
         return Some(MotionFailure::NotConverged);
     };
-    let share = match stone.is_probably_loose() {
+    let share = match stone.moving() == Moving::OnOwn {
         true => BAD_SHARE_LOOSE,
         false => BAD_SHARE,
     };

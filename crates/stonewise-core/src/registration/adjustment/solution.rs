@@ -154,7 +154,7 @@ impl Adjustment {
 
 #[cfg(test)]
 mod tests {
-    use super::super::observation::photo::{PhotoModel, PoseInfluence, StonePhotos};
+    use super::super::observation::photo::{BiasWeights, PhotoModel, PoseInfluence, StonePhotos};
     use super::super::params::AdjustmentParams;
     use super::super::survey::survey;
     use super::super::testing::{COLUMNS, wall};
@@ -188,6 +188,7 @@ mod tests {
                 * (adjustment.graph.nodes[i].face_from_world * by_photos * f64::from(u8::from(is_right(i)))),
             place: [0.0; 2],
             bias_factor: 1.0,
+            weights: BiasWeights::USUAL,
             by_poses: PoseInfluence::none(),
         };
         let photos = (0..adjustment.stones.len()).map(shown).collect();

@@ -1,6 +1,6 @@
 //! The state of the adjustment between iterations.
 
-use super::candidate::CandidateMotion;
+use super::candidate::{CandidateMotion, Moving};
 use super::field::{Crack, Graph, LoosePrior, Place, Tie, VarianceComponents};
 use super::hypothesis::LikelihoodRatio;
 use super::observation::photo::PhotoModel;
@@ -122,13 +122,13 @@ impl StoneState {
     /// The motion that the stone more probably made: its own or the field's.
     pub fn more_probable(&self) -> &CandidateMotion {
         match &self.on_own {
-            Some(own) if self.is_probably_loose() => own,
+            Some(own) if self.moving() == Moving::OnOwn => own,
             _ => &self.with_field,
         }
     }
 
-    /// Whether it moved more probably on its own than with the field.
-    pub fn is_probably_loose(&self) -> bool {
-        self.p_with_field < 0.5
+    /// How it more probably moved.
+    pub fn moving(&self) -> Moving {
+        Moving::more_probable(self.p_with_field)
     }
 }

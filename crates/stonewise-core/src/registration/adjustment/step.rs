@@ -53,7 +53,8 @@ impl Adjustment {
         }
         let is_suspect = p_loose > SUSPECT * self.loose.share;
         if is_suspect {
-            let start = posterior(&equations.with_field, prediction, &wide).mean + origin;
+            let observed = equations.on_own.as_ref().unwrap_or(&equations.with_field);
+            let start = posterior(observed, prediction, &wide).mean + origin;
             let mut own = CandidateMotion::new(stone.with_field.motion);
             own.move_to(&start, limits.max_step_m);
             stone.on_own = Some(own);

@@ -1,10 +1,12 @@
 //! Stones tracked in the photos from where the clouds put them.
 
+use super::candidate::Moving;
 use super::error::AdjustError;
-use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, log_odds_of_loose};
+use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, log_odds_of_loose, posterior};
 use super::observation::NormalEquations;
 use super::observation::photo::{CloudMotion, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos};
-use super::state::Adjustment;
+use super::solution::Solution;
+use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
 use crate::progress::Progress;
 use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
@@ -87,14 +89,52 @@ impl Adjustment {
         Ok(())
     }
 
-    /// Adjusts the photos' poses to where the clouds now put the stones.
-    pub fn update_photos(&mut self) {
+    /// Adjusts the photos' poses to where the clouds now put the stones; the weights of the stones' biases
+    /// follow from the last solution.
+    pub fn update_photos(&mut self, last: Option<&Solution>) {
         let Some(mut photos) = self.photos.take() else {
             return;
         };
         let stones = self.stones_in_photos(|i| photos.place(i));
         photos.update(&stones, self.components.appearance_m());
+        if let Some(solution) = last {
+            let shared = self.shared_variances(1.0);
+            photos.weigh(|i, stone, moving| {
+                let (expected, covariance) =
+                    self.displacement_without_photos(i, moving, solution, &shared, stone.place);
+                stone.bias_square(self.components.appearance_m(), moving, &expected, &covariance)
+            });
+        }
         self.photos = Some(photos);
+    }
+
+    /// The displacement of a place on a stone's face as its points and the other stones make it, and its
+    /// covariance.
+    fn displacement_without_photos(
+        &self,
+        i: usize,
+        moving: Moving,
+        solution: &Solution,
+        shared: &[f64; 9],
+        place: [f64; 2],
+    ) -> (Vector3<f64>, Matrix3<f64>) {
+        let stone = &self.stones[i];
+        let (candidate, own) = match moving {
+            Moving::WithField => (&stone.with_field, self.components.own_variances()),
+            Moving::OnOwn => (
+                stone.on_own.as_ref().unwrap_or(&stone.with_field),
+                self.loose.own_variances(&self.components),
+            ),
+        };
+        let own = std::array::from_fn(|k| own[k] + shared[k]);
+        let equations = self.observed_by_clouds(i, candidate, self.components.error_m);
+        let known = posterior(&equations, &solution.field.from_others[i], &own);
+        let lever = StonePhotos::lever(place);
+        let motion = known.mean + self.common_in(i);
+        (
+            lever * motion.unknowns(),
+            lever * known.covariance * lever.transpose(),
+        )
     }
 
     /// What the stones' own points say, moving with the field.
@@ -111,7 +151,7 @@ impl Adjustment {
     pub fn undetected_slide_m(&self, i: usize) -> f64 {
         let error_m = self.components.error_m;
         match self.photos.as_ref().and_then(|p| p.stone(i)) {
-            Some(photos) => error_m.min(self.components.appearance_m() * photos.bias_factor.sqrt()),
+            Some(photos) => error_m.min(photos.bias_sd_m(self.components.appearance_m(), Moving::WithField)),
             None => error_m,
         }
     }
@@ -121,7 +161,7 @@ impl Adjustment {
     pub fn photo_part(&self, i: usize) -> Option<PhotoPart<'_>> {
         let model = self.photos.as_ref()?;
         let stone = model.stone(i)?;
-        let (information, _, _) = stone.with_bias(self.components.appearance_m());
+        let (information, _, _) = stone.with_bias(self.components.appearance_m(), self.stones[i].moving());
         let by_clouds = self
             .cloud_motion(i, [0.0; 2])
             .and_then(|c| c.covariance.try_inverse())
@@ -137,15 +177,18 @@ impl Adjustment {
             self.components.own_variances(),
             self.loose.own_variances(&self.components),
         ];
-        self.observed_by_photos(i).is_some_and(|equations| {
-            log_odds_of_loose([&equations; 2], prediction, &own, self.loose.share) > 0.0
+        let [with_field, on_own] =
+            [Moving::WithField, Moving::OnOwn].map(|moving| self.observed_by_photos(i, moving));
+        with_field.zip(on_own).is_some_and(|(with_field, on_own)| {
+            log_odds_of_loose([&with_field, &on_own], prediction, &own, self.loose.share) > 0.0
         })
     }
 
     /// What photos contributed.
     pub fn photo_report(&self) -> Option<PhotoReport> {
         let photos = self.photos.as_ref()?;
-        Some(photos.report(self.components.appearance_m()))
+        let moving: Vec<Moving> = self.stones.iter().map(StoneState::moving).collect();
+        Some(photos.report(self.components.appearance_m(), &moving))
     }
 
     fn stones_in_photos(&self, place: impl Fn(usize) -> [f64; 2]) -> Vec<StoneInPhotos> {

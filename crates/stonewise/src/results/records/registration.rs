@@ -103,7 +103,8 @@ pub struct PhotosRecord {
     pub statuses: BTreeMap<PhotoStatus, usize>,
     /// Factor on the formal standard deviations of matches, from their residuals.
     pub sigma_factor: f64,
-    /// Standard deviation of a stone's appearance bias between the epochs, metres.
+    /// Scale of a stone's appearance bias between the epochs, metres: of Student's t with eight degrees of
+    /// freedom.
     pub appearance_m: f64,
     /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
     pub poses_px: Vec<(String, f64)>,

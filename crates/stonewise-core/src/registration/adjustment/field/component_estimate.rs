@@ -129,7 +129,7 @@ mod tests {
     use crate::registration::adjustment::field::PhotoTerms;
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::observation::NormalEquations;
-    use crate::registration::adjustment::observation::photo::{PoseInfluence, StonePhotos};
+    use crate::registration::adjustment::observation::photo::{BiasWeights, PoseInfluence, StonePhotos};
     use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
     use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
     use rand::{RngExt, SeedableRng};
@@ -225,6 +225,7 @@ mod tests {
                     vector: information * Vector3::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
                     place: [0.01 * f64::from(k), -0.02],
                     bias_factor: 1.0 + 0.2 * f64::from(k),
+                    weights: BiasWeights::USUAL,
                     by_poses: PoseInfluence::none(),
                 }
             })

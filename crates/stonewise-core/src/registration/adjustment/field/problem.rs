@@ -4,6 +4,7 @@ use super::graph::Graph;
 use super::loose_prior::LoosePrior;
 use super::prior::Tie;
 use super::variance_components::VarianceComponents;
+use crate::registration::adjustment::candidate::Moving;
 use crate::registration::adjustment::observation::NormalEquations;
 use crate::registration::adjustment::observation::photo::StonePhotos;
 use crate::registration::adjustment::observation::surface::with_error_likelihood;
@@ -44,7 +45,8 @@ impl PhotoTerms<'_> {
                 sum = with_error_likelihood(sum, components.error_m);
             }
             if let Some(photos) = photos {
-                sum += photos.normal_equations(origin, components.appearance_m());
+                let moving = Moving::more_probable(stone.p_with_field);
+                sum += photos.normal_equations(origin, components.appearance_m(), moving);
             }
             sum
         };

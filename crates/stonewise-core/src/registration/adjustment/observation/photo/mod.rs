@@ -1,9 +1,12 @@
 //! What photos show of the stones' motions.
 
+mod bias;
 mod model;
 mod poses;
 mod stone_photos;
 
+#[cfg(test)]
+pub(crate) use bias::BiasWeights;
 pub(crate) use model::{PhotoModel, StoneInPhotos};
 pub use model::{PhotoReport, StonePhotoReport};
 pub(crate) use poses::CloudMotion;

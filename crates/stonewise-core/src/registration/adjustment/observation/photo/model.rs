@@ -1,8 +1,10 @@
 //! All stones' photos as one type of observation.
 
+use super::bias::BiasWeights;
 use super::poses::{CloudMotion, PoseProblem, PoseStone};
 use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
+use crate::registration::adjustment::candidate::Moving;
 use crate::registration::photos::{Photo, PhotoParams, PhotoStatus, Track};
 use crate::statistics::upper_median;
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3};
@@ -51,7 +53,8 @@ pub struct PhotoReport {
     pub stones: Vec<StonePhotoReport>,
     /// Factor on the formal standard deviations of matches, from their residuals.
     pub sigma_factor: f64,
-    /// Standard deviation of a stone's appearance bias between the epochs, metres.
+    /// Scale of a stone's appearance bias between the epochs, metres: of Student's t with eight degrees of
+    /// freedom.
     pub appearance_m: f64,
     /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
@@ -144,6 +147,7 @@ impl PhotoModel {
                     vector,
                     place: self.tracks[i].place,
                     bias_factor: factors[i],
+                    weights: self.stones[i].as_ref().map_or(BiasWeights::USUAL, |s| s.weights),
                     by_poses,
                 });
         }
@@ -160,6 +164,16 @@ impl PhotoModel {
     /// What the photos say of a stone.
     pub fn stone(&self, i: usize) -> Option<&StonePhotos> {
         self.stones[i].as_ref()
+    }
+
+    /// Gives each stone that photos show the weights of its bias, from the expected square of the bias over
+    /// its variance.
+    pub fn weigh(&mut self, square: impl Fn(usize, &StonePhotos, Moving) -> f64) {
+        for (i, stone) in self.stones.iter_mut().enumerate() {
+            if let Some(stone) = stone {
+                stone.weights = BiasWeights::from_squares(|moving| square(i, stone, moving));
+            }
+        }
     }
 
     /// Covariance between two stones' displacements by their photos that errors of the poses cause, each
@@ -207,8 +221,8 @@ impl PhotoModel {
         (formal > 0.0).then_some([formal, apart])
     }
 
-    /// What the photos contributed. `bias_m`: appearance bias.
-    pub fn report(&self, bias_m: f64) -> PhotoReport {
+    /// What the photos contributed. `bias_m`: scale of the appearance bias; `moving`: how each stone moved.
+    pub fn report(&self, bias_m: f64, moving: &[Moving]) -> PhotoReport {
         let of_stone = |(i, track): (usize, &Track)| {
             let count = |epoch| {
                 track
@@ -219,7 +233,7 @@ impl PhotoModel {
             };
             let correlations = track.sights.iter().map(|s| s.correlation);
             let found = self.stones[i].as_ref();
-            let variance = found.and_then(|s| s.with_bias(bias_m).0.try_inverse());
+            let variance = found.and_then(|s| s.with_bias(bias_m, moving[i]).0.try_inverse());
             StonePhotoReport {
                 status: track.status,
                 photos: [count(0), count(1)],
