@@ -2,12 +2,12 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components, find_crack, posterior,
-    probabilities_with_field, reweight_ties, solve,
+    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components, find_crack,
+    posterior, probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
-use nalgebra::Vector3;
+use nalgebra::Matrix3;
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
 /// is expensive.
@@ -46,11 +46,22 @@ impl Adjustment {
         };
     }
 
-    /// Where the stones are so far, moving with the field: displacements, world.
-    fn displacements(&self) -> Vec<Vector3<f64>> {
-        let stones = self.stones.iter().zip(&self.graph.nodes);
+    /// Where the stones are so far. Stones that seem loose count where they went: many of them together are a
+    /// bulge.
+    fn displacements(&self) -> Vec<Displacement> {
+        let stones = self.stones.iter().zip(&self.graph.nodes).enumerate();
         stones
-            .map(|(stone, node)| node.face_from_world.transpose() * stone.with_field.motion.translation())
+            .map(|(i, (stone, node))| {
+                let world = node.face_from_world.transpose();
+                let covariance = self.cloud_motion(i, [0.0; 2]).map_or_else(
+                    || Matrix3::identity() * self.loose.move_m.powi(2),
+                    |clouds| clouds.covariance,
+                );
+                Displacement {
+                    mean: world * stone.more_probable().motion.translation(),
+                    covariance: world * covariance * node.face_from_world,
+                }
+            })
             .collect()
     }
 
@@ -161,7 +172,7 @@ mod tests {
     use super::*;
     use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
-    use nalgebra::Matrix3;
+    use nalgebra::Vector3;
 
     fn is_right(stone: usize) -> bool {
         stone as u32 % COLUMNS >= COLUMNS / 2

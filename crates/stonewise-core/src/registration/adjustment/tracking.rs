@@ -201,7 +201,7 @@ impl Adjustment {
     }
 
     /// The displacement of a place on a stone's face by its own points alone; `None` where they show none.
-    fn cloud_motion(&self, i: usize, place: [f64; 2]) -> Option<CloudMotion> {
+    pub fn cloud_motion(&self, i: usize, place: [f64; 2]) -> Option<CloudMotion> {
         let equations = self.observed_by_clouds(i, &self.stones[i].with_field, self.components.error_m);
         if equations.information.trace() <= 0.0 {
             return None;

@@ -28,7 +28,7 @@ pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior}
 pub(crate) use prior::Tie;
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
 pub(crate) use solve::{Field, solve};
-pub(crate) use subgraph::Subgraph;
+pub(crate) use subgraph::{Displacement, Subgraph};
 pub(crate) use ties::reweight_ties;
 pub use variance_components::VarianceComponents;
 pub(crate) use variance_components::{LEAST_APPEARANCE_M, START_APPEARANCE_M};

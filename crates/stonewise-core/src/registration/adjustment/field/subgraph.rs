@@ -3,7 +3,7 @@
 use super::graph::{Edge, Graph};
 use super::problem::{FieldProblem, PhotoTerms};
 use crate::statistics::upper_median;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::collections::{BTreeSet, VecDeque};
 
 /// Walls up to this number of stones are used whole: below it an estimate of the variance components costs
@@ -11,11 +11,20 @@ use std::collections::{BTreeSet, VecDeque};
 const WHOLE: usize = 600;
 /// Connected parts at fixed places. They lie apart, so that one odd corner of the wall does not decide.
 const SPREAD_PARTS: usize = 3;
-/// Parts where neighbours move most unlike each other: components from places at rest alone would make ties
-/// so stiff that a bulge elsewhere ends as loose stones.
+/// Parts where neighbours move most unlike each other for what their points tell: components from places at
+/// rest alone would make ties so stiff that a bulge elsewhere ends as loose stones.
 const STRAINED_PARTS: usize = 2;
 /// Stones in each part: 600 in all determine the components to a tenth.
 const PART_STONES: usize = 120;
+
+/// The displacement of a stone as it is known so far, world.
+#[derive(Clone, Copy)]
+pub(crate) struct Displacement {
+    /// Metres.
+    pub mean: Vector3<f64>,
+    /// Covariance by the stone's own points, m^2.
+    pub covariance: Matrix3<f64>,
+}
 
 /// Some connected parts of a graph, with their place in the whole.
 pub(crate) struct Subgraph {
@@ -32,9 +41,9 @@ impl Subgraph {
         graph.nodes.len() > WHOLE
     }
 
-    /// `displacements`: of the stones as they are known so far, world, metres. `None` where the graph is
-    /// small enough to be used whole.
-    pub fn new(graph: &Graph, displacements: &[Vector3<f64>]) -> Option<Self> {
+    /// `displacements`: of the stones as they are known so far. `None` where the graph is small enough to be
+    /// used whole.
+    pub fn new(graph: &Graph, displacements: &[Displacement]) -> Option<Self> {
         if !Self::is_needed(graph) {
             return None;
         }
@@ -76,7 +85,7 @@ impl Subgraph {
 }
 
 /// Stones of all parts, ascending: each part grows from a stone along the edges, breadth first.
-fn chosen(graph: &Graph, displacements: &[Vector3<f64>]) -> Vec<usize> {
+fn chosen(graph: &Graph, displacements: &[Displacement]) -> Vec<usize> {
     let count = graph.nodes.len();
     let next = graph.neighbours();
     let mut chosen = BTreeSet::new();
@@ -102,15 +111,24 @@ fn grown(next: &[Vec<usize>], seed: usize) -> BTreeSet<usize> {
     reached
 }
 
-/// By how much stones depart from the mean of their neighbours, metres: the median over each stone and its
-/// neighbours, so that a single stone that is loose or wrong does not count.
-fn departures(next: &[Vec<usize>], displacements: &[Vector3<f64>]) -> Vec<f64> {
+/// By how much stones depart from the mean of their neighbours, squared, over the variance of this departure:
+/// the median over each stone and its neighbours, so that a single stone that is loose or wrong does not
+/// count. Without the variance, noisy stones at the far end of a wall would hide a bulge.
+fn departures(next: &[Vec<usize>], displacements: &[Displacement]) -> Vec<f64> {
     let own: Vec<f64> = next
         .iter()
         .zip(displacements)
         .map(|(neighbours, here)| {
-            let sum: Vector3<f64> = neighbours.iter().map(|&j| displacements[j]).sum();
-            (here - sum / neighbours.len().max(1) as f64).norm()
+            let share = (neighbours.len().max(1) as f64).recip();
+            let around = neighbours.iter().map(|&j| &displacements[j]);
+            let (mut apart, mut covariance) = (here.mean, here.covariance);
+            for other in around {
+                apart -= other.mean * share;
+                covariance += other.covariance * (share * share);
+            }
+            covariance
+                .try_inverse()
+                .map_or(0.0, |inverse| apart.dot(&(inverse * apart)))
         })
         .collect();
     let around = |(i, neighbours): (usize, &Vec<usize>)| {
@@ -127,8 +145,12 @@ mod tests {
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::field::variance_components::VarianceComponents;
 
-    fn at_rest(wall: &SmallWall) -> Vec<Vector3<f64>> {
-        vec![Vector3::zeros(); wall.graph.nodes.len()]
+    fn at_rest(wall: &SmallWall) -> Vec<Displacement> {
+        let still = Displacement {
+            mean: Vector3::zeros(),
+            covariance: Matrix3::identity() * 1e-6,
+        };
+        vec![still; wall.graph.nodes.len()]
     }
 
     #[test]
@@ -149,13 +171,11 @@ mod tests {
                     0.0
                 }
             };
-            let mut displacements: Vec<Vector3<f64>> = wall
-                .graph
-                .nodes
-                .iter()
-                .map(|n| Vector3::new(depth(&n.centroid), 0.0, 0.0))
-                .collect();
-            displacements[900].z += 0.03;
+            let mut displacements = at_rest(&wall);
+            for (displacement, node) in displacements.iter_mut().zip(&wall.graph.nodes) {
+                displacement.mean.x = depth(&node.centroid);
+            }
+            displacements[900].mean.z += 0.03;
             let part = Subgraph::new(&wall.graph, &displacements).unwrap();
             let bulged: Vec<usize> = (0..1800)
                 .filter(|&i| depth(&wall.graph.nodes[i].centroid) > 0.002)
@@ -168,11 +188,35 @@ mod tests {
             );
         }
         let mut displacements = at_rest(&wall);
-        displacements[900].z = 0.03;
+        displacements[900].mean.z = 0.03;
         let next = wall.graph.neighbours();
         let around = departures(&next, &displacements);
         let most = around.iter().copied().fold(0.0, f64::max);
-        assert!(most < 0.01, "{most}");
+        // A hundred standard deviations of a departure of 1 cm.
+        assert!(most < 100.0, "{most}");
+    }
+
+    #[test]
+    fn noisy_stones_do_not_hide_a_bulge() {
+        let wall = SmallWall::new(60, 30, 1);
+        let mut displacements = at_rest(&wall);
+        let is_noisy = |p: &nalgebra::Point3<f64>| p.y > 14.0;
+        let is_bulged = |p: &nalgebra::Point3<f64>| (p.y - 6.3).hypot(p.z - 2.4) < 1.0;
+        for (i, node) in wall.graph.nodes.iter().enumerate() {
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            if is_noisy(&node.centroid) {
+                displacements[i].mean.y = 0.01 * sign;
+                displacements[i].covariance = Matrix3::identity() * 1e-4;
+            } else if is_bulged(&node.centroid) {
+                displacements[i].mean.x = 0.004 * sign;
+            }
+        }
+        let part = Subgraph::new(&wall.graph, &displacements).unwrap();
+        let bulged: Vec<usize> = (0..1800)
+            .filter(|&i| is_bulged(&wall.graph.nodes[i].centroid))
+            .collect();
+        let covered = bulged.iter().filter(|i| part.stones.contains(i)).count();
+        assert!(2 * covered > bulged.len(), "{covered} of {}", bulged.len());
     }
 
     #[test]
