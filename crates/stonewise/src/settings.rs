@@ -11,7 +11,7 @@ use stonewise_core::matching::MatchParams;
 use stonewise_core::registration::observers::EpochErrorParams;
 use stonewise_core::registration::photos::PhotoParams;
 use stonewise_core::registration::{AdjustmentParams, GicpParams};
-use stonewise_core::transfer::{StoneParams, TransferParams};
+use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_segment::tiling::TilingOptions;
 
 /// How stones are found in photos without masks.
@@ -47,6 +47,8 @@ pub struct Settings {
     pub label: TransferParams,
     /// The table of stones.
     pub stones: StoneParams,
+    /// Stones that the detector missed in one epoch, from others.
+    pub carry: CarryParams,
     /// Stones across epochs.
     #[serde(alias = "matching")]
     pub r#match: MatchParams,

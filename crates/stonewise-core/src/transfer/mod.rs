@@ -13,7 +13,9 @@ mod assign;
 mod atoms;
 mod audit;
 mod bytes;
+mod carry;
 mod depth;
+mod each_tile;
 mod edit;
 mod election;
 mod error;
@@ -34,6 +36,10 @@ mod visibility;
 mod vote;
 
 pub use audit::AuditEvent;
+pub use carry::{
+    CarriedStone, CarryParams, CarryReport, NotCarried, PlacedShape, StoneShape, carry_labels, photos_facing,
+    stone_shapes,
+};
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
 pub use election::Election;
 pub use error::TransferError;

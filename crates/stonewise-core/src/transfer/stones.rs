@@ -1,6 +1,7 @@
 //! The table of stones, from points and their labels.
 
 use super::area::Footprint;
+use super::each_tile::each_tile;
 use super::face::FaceCells;
 use super::transfer_labels::count_photos;
 use super::{LabelStore, StoneInstances, TileLabels, TransferError};
@@ -49,7 +50,7 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
 ) -> Result<Vec<Stone>, TransferError> {
     let mut sums: BTreeMap<u32, Sums> = BTreeMap::new();
     let mut face = FaceCells::new();
-    each_tile(tiles, labels, "stones", progress, |cloud, labels| {
+    each_tile(tiles, labels, "stones", progress, |_, cloud, labels| {
         add_tile(&mut sums, &mut face, cloud, labels);
     })?;
     let centres: BTreeMap<ImageId, Point3<f64>> = views.iter().map(|v| (v.image, v.centre())).collect();
@@ -61,7 +62,7 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
             (id, Patch::new(s, s.face_normal(&face, params, &towards)))
         })
         .collect();
-    each_tile(tiles, labels, "stone faces", progress, |cloud, labels| {
+    each_tile(tiles, labels, "stone faces", progress, |_, cloud, labels| {
         for (i, stone) in labels.stone.iter().enumerate() {
             if let Some(patch) = patches.get_mut(stone) {
                 patch.add(&cloud.world(i));
@@ -81,32 +82,6 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
             confidence: s.confidence / f64::from(s.points),
         })
         .collect())
-}
-
-fn each_tile<T: TileSource, S: LabelStore>(
-    tiles: &T,
-    store: &S,
-    what: &str,
-    progress: &dyn Progress,
-    mut visit: impl FnMut(&Cloud, &TileLabels),
-) -> Result<(), TransferError> {
-    progress.begin(what, tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let labels = store.read(tile).map_err(|e| TransferError::labels(tile, e))?;
-        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-        let count = labels.stone.len().min(labels.confidence.len());
-        if count != cloud.len() {
-            return Err(TransferError::LabelCount {
-                tile,
-                points: cloud.len(),
-                labels: count,
-            });
-        }
-        visit(&cloud, &labels);
-        progress.advance(1);
-    }
-    Ok(())
 }
 
 /// Running sums of a stone, about its first point.

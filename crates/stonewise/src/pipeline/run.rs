@@ -9,6 +9,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::doubts::note_doubts;
 use crate::pipeline::look::look;
 use crate::pipeline::outputs::audit::write_audit;
+use crate::pipeline::outputs::carried::write_carry_audit;
 use crate::pipeline::outputs::clouds::write_clouds;
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::edits::{tell_steps, write_edits_audit};
@@ -20,6 +21,7 @@ use crate::pipeline::outputs::run_record::write_run_record;
 use crate::pipeline::outputs::series::write_series;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
 use crate::pipeline::outputs::verdict::write_verdict;
+use crate::pipeline::steps::carry::carry;
 use crate::pipeline::steps::edit::{Edited, edit};
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
@@ -131,6 +133,8 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         return Ok(summary(context, Vec::new()));
     }
     let labelled = all_labelled(context, ingested, &photos)?;
+    let (labelled, attempts) = carry(context, &photos, labelled)?;
+    write_carry_audit(context, &attempts)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
     write_edits_audit(context, edited.as_ref())?;
     for number in epochs.clone() {
@@ -276,6 +280,7 @@ pub(super) fn corrected(context: &Context) -> Result<Corrected> {
         .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
     let labelled = all_labelled(context, ingested, &photos)?;
+    let (labelled, _) = carry(context, &photos, labelled)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
     Ok(Corrected {
         photos,

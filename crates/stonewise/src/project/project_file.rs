@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
-use stonewise_core::transfer::{StoneParams, TransferParams};
+use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::MapSystem;
 use stonewise_segment::Weights;
@@ -40,6 +40,8 @@ struct RawProject {
     label: TransferParams,
     #[serde(default)]
     stones: StoneParams,
+    #[serde(default)]
+    carry: CarryParams,
     #[serde(default, alias = "matching")]
     r#match: MatchParams,
     #[serde(default)]
@@ -149,6 +151,7 @@ impl Project {
             segment: source.segment(raw.segment)?,
             label: raw.label,
             stones: raw.stones,
+            carry: raw.carry,
             r#match: raw.r#match,
             registration: raw.registration,
             m3c2: raw.m3c2,

@@ -12,6 +12,8 @@ pub const OUTLINES: &str = "outlines.json";
 pub const FACADE: &str = "facade.json";
 /// Every edit of a person with who, when and why, and what it did in each epoch.
 pub const EDITS_AUDIT: &str = "audit_edits.csv";
+/// Every stone that was looked for in an epoch whose photos do not show it.
+pub const CARRY_AUDIT: &str = "audit_carried.csv";
 /// Rows of all later epochs, where there are more than one.
 pub const SERIES: &str = "series.parquet";
 /// Scores against a table of true stones.

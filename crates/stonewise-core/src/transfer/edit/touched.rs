@@ -1,9 +1,10 @@
 //! The points that edits can touch.
 
-use super::super::{LabelStore, TileLabels, TransferError};
+use super::super::each_tile::each_tile;
+use super::super::{LabelStore, TransferError};
 use super::edited_wall::EditedWall;
 use super::label_edit::LabelEdit;
-use crate::cloud::{Cloud, TileSource};
+use crate::cloud::TileSource;
 use crate::id::StoneId;
 use crate::progress::Progress;
 use nalgebra::{Point2, Point3};
@@ -236,30 +237,4 @@ fn box_cells(places: &[Point2<f64>], margin_m: f64) -> impl Iterator<Item = [i64
 
 fn cell(place: &Point2<f64>, size_m: f64) -> [i64; 2] {
     [place.x, place.y].map(|v| (v / size_m).floor() as i64)
-}
-
-fn each_tile<T: TileSource, S: LabelStore>(
-    tiles: &T,
-    labels: &S,
-    what: &str,
-    progress: &dyn Progress,
-    mut visit: impl FnMut(usize, &Cloud, &TileLabels),
-) -> Result<(), TransferError> {
-    progress.begin(what, tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let found = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
-        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-        let count = found.stone.len().min(found.confidence.len());
-        if count != cloud.len() {
-            return Err(TransferError::LabelCount {
-                tile,
-                points: cloud.len(),
-                labels: count,
-            });
-        }
-        visit(tile, &cloud, &found);
-        progress.advance(1);
-    }
-    Ok(())
 }

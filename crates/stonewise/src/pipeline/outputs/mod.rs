@@ -1,6 +1,7 @@
 //! The result files that steps do not write themselves.
 
 pub mod audit;
+pub mod carried;
 pub mod clouds;
 pub mod crs;
 pub mod edits;

@@ -34,9 +34,15 @@ impl Matched {
 
 /// Finds the stones of the first epoch in the second.
 pub fn r#match(context: &Context, first: &Labelled, second: &Labelled, number: usize) -> Result<Matched> {
+    let report = match_in(context, &format!("match-{number}"), first, second)?;
+    Ok(Matched { report })
+}
+
+/// The same in a step of this name.
+pub fn match_in(context: &Context, name: &str, first: &Labelled, second: &Labelled) -> Result<MatchReport> {
     let params = &context.project.settings.r#match;
     let key = Key::new("match", params, &[first.key.as_str(), second.key.as_str()]);
-    let step = context.step(&format!("match-{number}"), key, |step, _| {
+    let step = context.step(name, key, |step, _| {
         let (_, footprints) = survey(context, first)?;
         let (covered, footprints_2) = survey(context, second)?;
         let overlap = footprint_overlap(&footprints, &footprints_2);
@@ -49,9 +55,7 @@ pub fn r#match(context: &Context, first: &Labelled, second: &Labelled, number: u
         let report = match_stones(&first.stones, &second.stones, &surroundings, params);
         write_json(&step.file("matches.json"), &report)
     })?;
-    Ok(Matched {
-        report: read_json(&step.file("matches.json"))?,
-    })
+    read_json(&step.file("matches.json"))
 }
 
 type Cell = [i64; 3];

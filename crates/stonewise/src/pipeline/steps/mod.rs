@@ -1,5 +1,6 @@
-//! The steps, in their order: ingest, segment, label, edit, match, offsets, register, m3c2, evaluate.
+//! The steps, in their order: ingest, segment, label, carry, edit, match, offsets, register, m3c2, evaluate.
 
+pub mod carry;
 pub mod edit;
 pub mod evaluate;
 pub mod ingest;

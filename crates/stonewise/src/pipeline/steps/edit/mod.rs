@@ -6,7 +6,7 @@
 
 mod photo_places;
 
-use super::label::{DiskLabels, Labelled, Labels, tabulate};
+use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
 use super::segment::Segmented;
 use crate::edits::EditsFile;
 use crate::error::Result;
@@ -127,6 +127,8 @@ fn edit_epoch(
     let mut store = labelled.store;
     store.replace(&report.tiles, &DiskLabels::new(step.path(), tiles));
     let mut transfer = labelled.transfer;
+    let mut carried = labelled.carried;
+    carried.retain(|stone, _| !report.gone.contains(&stone.0));
     transfer.stones = instances(&transfer.stones, &report);
     let labels = Labels {
         transfer,
@@ -146,16 +148,10 @@ fn edit_epoch(
     )?;
     let tabulated = Labelled {
         edited: edited.collect(),
+        carried,
         ..tabulated
     };
     Ok((tabulated, effects))
-}
-
-/// The last number in use, also by stones of the vote that too few points show to be in the list.
-fn last_number(labelled: &Labelled) -> u32 {
-    let listed = labelled.stones.iter().map(|s| s.id.0);
-    let voted = labelled.transfer.stones.iter().map(|s| s.stone.0);
-    listed.chain(voted).max().unwrap_or(0)
 }
 
 /// What the step says about its edits.

@@ -34,6 +34,8 @@ pub struct Labelled {
     pub transfer: Transfer,
     /// Stones that a person made or changed, with the number of the last edit that did so.
     pub edited: BTreeMap<StoneId, u32>,
+    /// Stones that no photo of the epoch shows, with the number of the epoch from which they were carried.
+    pub carried: BTreeMap<StoneId, usize>,
     /// Key of everything above.
     pub key: Key,
     pub(super) store: DiskLabels,
@@ -161,7 +163,15 @@ pub(super) fn tabulate(
         stones,
         transfer,
         edited: BTreeMap::new(),
+        carried: BTreeMap::new(),
         key: step.key().clone(),
         store,
     })
+}
+
+/// The last number in use, also by stones of the vote that too few points show to be in the list.
+pub(super) fn last_number(labelled: &Labelled) -> u32 {
+    let listed = labelled.stones.iter().map(|s| s.id.0);
+    let voted = labelled.transfer.stones.iter().map(|s| s.stone.0);
+    listed.chain(voted).max().unwrap_or(0)
 }

@@ -1,0 +1,254 @@
+//! The points of another epoch that belong to a stone.
+
+use super::super::each_tile::each_tile;
+use super::super::{LabelStore, TransferError};
+use super::params::CarryParams;
+use super::stone_shape::{Cell, FacePlace, StoneShape};
+use crate::cloud::TileSource;
+use crate::geometry::CellMap;
+use crate::progress::Progress;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Points farther from a stone's surface than this are another object, or the back of the wall, metres. 0.15:
+/// where the transfer takes a step in depth for the silhouette of another object.
+const REACH_M: f64 = 0.15;
+/// A point belongs to a surface within this many times the spread of the surface's own points. 3: nearly all
+/// of them.
+const SPREADS: f64 = 3.0;
+
+/// A stone where another epoch should have it.
+#[derive(Clone, Copy, Debug)]
+pub struct PlacedShape<'a> {
+    /// Its face, as the epoch that shows it has it.
+    pub shape: &'a StoneShape,
+    /// How its surroundings moved from that epoch to the other, metres.
+    pub shift: Vector3<f64>,
+}
+
+/// A stone that was carried into an epoch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CarriedStone {
+    /// Its number there.
+    pub stone: u32,
+    /// Its points there.
+    pub points: u64,
+    /// Share of its cells in which that epoch has points.
+    pub covered_share: f64,
+    /// Share of these cells in which the surface is the same, and no other stone's.
+    pub same_share: f64,
+}
+
+/// Why a stone was not carried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(rename_all = "snake_case")]
+pub enum NotCarried {
+    /// Its points cover no area.
+    #[error("its points cover no area")]
+    NoShape,
+    /// Most photos of both epochs that see its place do not show it.
+    #[error("{photos} photos show it, {missed} that see its place do not")]
+    Outvoted {
+        /// Photos that show it.
+        photos: u32,
+        /// Photos of both epochs that see its place and do not show it.
+        missed: u32,
+    },
+    /// The other epoch has too few points at its place.
+    #[error("points cover {:.0} % of its place", 100.0 * .share)]
+    NotCovered {
+        /// Share of its cells in which the epoch has points.
+        share: f64,
+    },
+    /// Another surface, or other stones, are at its place.
+    #[error("the surface is the same and free in {:.0} % of its place", 100.0 * .share)]
+    Different {
+        /// Share of the covered cells in which the surface is the same, and no other stone's.
+        share: f64,
+    },
+    /// Too few points.
+    #[error("{points} points; {needed} are needed")]
+    FewPoints {
+        /// Points.
+        points: u64,
+        /// Points needed.
+        needed: u32,
+    },
+}
+
+/// What became of stones that were to be carried into an epoch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CarryReport {
+    /// One for each stone, in order.
+    pub outcomes: Vec<Result<CarriedStone, NotCarried>>,
+    /// Tiles whose labels differ now.
+    pub tiles: BTreeSet<usize>,
+}
+
+/// Labels the points of an epoch that belong to stones of another one; labels of tiles that change go to
+/// `target`.
+///
+/// A stone is carried if the epoch has points in most cells of its face, and if in most of these cells they
+/// form the same surface and belong to no other stone. Its points are those without a stone inside its
+/// outline and near its surface; they get confidence 0, because no photo of the epoch voted for it. Where two
+/// stones claim a point, the first has it. Carried stones are numbered from `first_new` on, in order; each
+/// has at least `min_points` points.
+///
+/// Cost: one pass over the tiles and one over those that change; memory holds the points near the stones.
+///
+/// # Errors
+/// A tile or its labels cannot be read or written, interruption.
+pub fn carry_labels<T: TileSource, S: LabelStore>(
+    tiles: &T,
+    labels: &S,
+    target: &mut S,
+    stones: &[PlacedShape],
+    [first_new, min_points]: [u32; 2],
+    params: &CarryParams,
+    progress: &dyn Progress,
+) -> Result<CarryReport, TransferError> {
+    let mut near: Vec<Vec<Near>> = vec![Vec::new(); stones.len()];
+    each_tile(tiles, labels, "stones of another epoch", progress, |tile, cloud, labels| {
+        let bounds = tiles.bounds(tile);
+        for (stone, near) in stones.iter().zip(&mut near) {
+            let reach = stone.shape.bounds().moved(&stone.shift).grown(REACH_M);
+            if !reach.intersects(&bounds) {
+                continue;
+            }
+            for (i, &other) in labels.stone.iter().enumerate() {
+                let world = cloud.world(i);
+                if !reach.contains(&world) {
+                    continue;
+                }
+                let place = stone.shape.place(&(world - stone.shift));
+                if let Some(place) = place.filter(|p| p.height_m.abs() <= REACH_M) {
+                    near.push(Near {
+                        point: (tile as u32, i as u32),
+                        place,
+                        is_free: other == 0,
+                    });
+                }
+            }
+        }
+    })?;
+    let mut claims: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
+    let mut next = first_new;
+    let mut outcomes = Vec::new();
+    for (stone, near) in stones.iter().zip(&mut near) {
+        for n in near.iter_mut() {
+            let (tile, index) = n.point;
+            n.is_free &= !claims.get(&(tile as usize)).is_some_and(|c| c.contains_key(&index));
+        }
+        let outcome = judge(stone.shape, near, [next, min_points], params);
+        if outcome.is_ok() {
+            let tolerance_m = tolerance_m(stone.shape, params);
+            for n in near.iter().filter(|n| n.is_on_surface(tolerance_m)) {
+                claims.entry(n.point.0 as usize).or_default().insert(n.point.1, next);
+            }
+            next += 1;
+        }
+        outcomes.push(outcome);
+    }
+    for (&tile, claimed) in &claims {
+        let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+        for (&i, &stone) in claimed {
+            table.stone[i as usize] = stone;
+            table.confidence[i as usize] = 0.0;
+        }
+        target
+            .write(tile, &table)
+            .map_err(|e| TransferError::labels(tile, e))?;
+    }
+    Ok(CarryReport {
+        outcomes,
+        tiles: claims.into_keys().collect(),
+    })
+}
+
+/// A point near the face of a stone.
+#[derive(Clone, Copy)]
+struct Near {
+    /// Tile, and place in it.
+    point: (u32, u32),
+    place: FacePlace,
+    /// Whether it belongs to no stone.
+    is_free: bool,
+}
+
+impl Near {
+    fn is_on_surface(&self, tolerance_m: f64) -> bool {
+        self.is_free && self.place.height_m.abs() <= tolerance_m
+    }
+}
+
+/// Distance from the surface within which a point belongs to the stone, metres.
+fn tolerance_m(shape: &StoneShape, params: &CarryParams) -> f64 {
+    params.max_height_m + SPREADS * shape.spread_m()
+}
+
+/// What a cell holds.
+#[derive(Clone, Copy, Default)]
+struct CellContent {
+    /// Points on the stone's surface, and the sum of their heights above it.
+    on_surface: usize,
+    height_sum_m: f64,
+    /// Points of other stones, and points behind the surface. What stands in front of it does not count.
+    others: usize,
+}
+
+impl CellContent {
+    fn is_same(&self, params: &CarryParams) -> bool {
+        let mean = self.height_sum_m / self.on_surface as f64;
+        self.on_surface > 0 && self.on_surface >= self.others && mean.abs() <= params.max_height_m
+    }
+}
+
+/// Whether a stone is at its place.
+fn judge(
+    shape: &StoneShape,
+    near: &[Near],
+    [number, min_points]: [u32; 2],
+    params: &CarryParams,
+) -> Result<CarriedStone, NotCarried> {
+    let tolerance_m = tolerance_m(shape, params);
+    let mut cells: CellMap<Cell, CellContent> = CellMap::default();
+    let mut points = 0;
+    for n in near {
+        let is_own = n.is_on_surface(tolerance_m);
+        if n.is_free && !is_own && n.place.height_m > 0.0 {
+            continue;
+        }
+        let content = cells.entry(n.place.cell).or_default();
+        match is_own {
+            true => {
+                points += 1;
+                content.on_surface += 1;
+                content.height_sum_m += n.place.height_m;
+            }
+            false => content.others += 1,
+        }
+    }
+    let share = |part: usize, whole: usize| part as f64 / whole.max(1) as f64;
+    let covered_share = share(cells.len(), shape.cell_count());
+    if covered_share < params.min_covered_share {
+        return Err(NotCarried::NotCovered { share: covered_share });
+    }
+    let same = cells.values().filter(|c| c.is_same(params)).count();
+    let same_share = share(same, cells.len());
+    if same_share < params.min_same_share {
+        return Err(NotCarried::Different { share: same_share });
+    }
+    if points < u64::from(min_points) {
+        return Err(NotCarried::FewPoints {
+            points,
+            needed: min_points,
+        });
+    }
+    Ok(CarriedStone {
+        stone: number,
+        points,
+        covered_share,
+        same_share,
+    })
+}

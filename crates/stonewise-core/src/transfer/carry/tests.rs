@@ -1,0 +1,152 @@
+use super::*;
+use crate::cloud::{Cloud, MemoryTiles};
+use crate::geometry::{Camera, Rigid3, View};
+use crate::id::{ImageId, StoneId};
+use crate::progress::Silent;
+use crate::transfer::{LabelStore, MemoryLabels, TileLabels};
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+
+/// Stones of 0.4 m x 0.3 m on a face that looks along x; joints of 2 cm between them are 2 cm deep. Stone 1
+/// starts at y = 0; stone 2 follows.
+const LENGTH: f64 = 0.4;
+const JOINT: f64 = 0.02;
+
+fn stone_at(y: f64, z: f64) -> u32 {
+    let k = (y / (LENGTH + JOINT)).floor();
+    let is_stone = y - k * (LENGTH + JOINT) < LENGTH && (0.0..0.3).contains(&z) && (0.0..3.0).contains(&k);
+    if is_stone { k as u32 + 1 } else { 0 }
+}
+
+/// Points every 5 mm, in two tiles; `x`: distance of the surface in front of the plane x = 0, by stone.
+/// Returns tiles, true labels and the labels that are in use.
+fn epoch(shift: Vector3<f64>, x: impl Fn(u32) -> f64, known: impl Fn(u32) -> bool) -> (MemoryTiles, Vec<Vec<u32>>, MemoryLabels) {
+    let mut tiles: Vec<Vec<Point3<f64>>> = vec![Vec::new(), Vec::new()];
+    let mut truth = vec![Vec::new(), Vec::new()];
+    for i in -10..270 {
+        for j in -10..70 {
+            // Off the lattice of the cells, and not on borders.
+            let (y, z) = (0.005 * f64::from(i) + 0.0012, 0.005 * f64::from(j) + 0.0017);
+            let stone = stone_at(y, z);
+            let depth = if stone == 0 { -0.02 } else { x(stone) + 0.01 * (12.0 * y).sin() };
+            let tile = usize::from(y > 0.6);
+            tiles[tile].push(Point3::new(depth, y, z) + shift);
+            truth[tile].push(stone);
+        }
+    }
+    let mut labels = MemoryLabels::default();
+    for (tile, truth) in truth.iter().enumerate() {
+        let stone: Vec<u32> = truth.iter().map(|&s| if known(s) { s } else { 0 }).collect();
+        let table = TileLabels {
+            confidence: vec![1.0; stone.len()],
+            seen: vec![true; stone.len()],
+            stone,
+        };
+        labels.write(tile, &table).unwrap();
+    }
+    let clouds = tiles.into_iter().map(|points| Cloud::from_world(Point3::origin(), points));
+    (MemoryTiles::new(clouds), truth, labels)
+}
+
+fn shapes(stones: &[u32]) -> BTreeMap<StoneId, StoneShape> {
+    let (tiles, _, labels) = epoch(Vector3::zeros(), |_| 0.0, |_| true);
+    let wanted = stones.iter().map(|&s| (StoneId(s), Vector3::x())).collect();
+    stone_shapes(&tiles, &labels, &wanted, &Silent).unwrap()
+}
+
+fn carried(
+    shapes: &BTreeMap<StoneId, StoneShape>,
+    shift: Vector3<f64>,
+    (tiles, labels): (&MemoryTiles, &MemoryLabels),
+) -> (CarryReport, MemoryLabels) {
+    let mut target = labels.clone();
+    let stones: Vec<PlacedShape> = shapes.values().map(|shape| PlacedShape { shape, shift }).collect();
+    let params = CarryParams::default();
+    let report = carry_labels(tiles, labels, &mut target, &stones, [100, 30], &params, &Silent).unwrap();
+    (report, target)
+}
+
+#[test]
+fn a_missed_stone_gets_its_points_where_its_neighbours_moved_it() {
+    // Stone 2 lies in both tiles; the detector found the others alone. The place is known to 2 mm.
+    let shift = Vector3::new(0.01, 0.25, -0.04);
+    let (tiles, truth, labels) = epoch(shift, |_| 0.0, |s| s != 2);
+    let near = shift + Vector3::new(0.002, -0.002, 0.001);
+    let (report, target) = carried(&shapes(&[2]), near, (&tiles, &labels));
+    let stone = report.outcomes[0].as_ref().unwrap();
+    assert_eq!((stone.stone, report.tiles.len()), (100, 2));
+    assert!(stone.same_share > 0.95 && stone.covered_share > 0.95, "{stone:?}");
+    let (mut right, mut wrong, mut missed) = (0, 0, 0);
+    for (tile, truth) in truth.iter().enumerate() {
+        for (i, &truth) in truth.iter().enumerate() {
+            let label = target.tiles[tile].stone[i];
+            match (truth == 2, label == 100) {
+                (true, true) => right += 1,
+                (false, true) => wrong += 1,
+                (true, false) => missed += 1,
+                // Other stones keep their points.
+                (false, false) => assert_eq!(label, truth),
+            }
+            assert_eq!(target.tiles[tile].confidence[i] == 0.0, label == 100);
+        }
+    }
+    assert_eq!(stone.points, right + wrong);
+    // 2 mm of the border of a stone of 400 mm x 300 mm.
+    assert!(wrong * 50 < right && missed * 50 < right, "{right} {wrong} {missed}");
+}
+
+#[test]
+fn a_stone_that_fell_out_or_moved_away_is_not_carried() {
+    for depth in [-0.06, -0.3, 0.06] {
+        let (tiles, _, labels) = epoch(Vector3::zeros(), |s| if s == 2 { depth } else { 0.0 }, |s| s != 2);
+        let (report, target) = carried(&shapes(&[2]), Vector3::zeros(), (&tiles, &labels));
+        let why = report.outcomes[0].as_ref().unwrap_err();
+        let is_hole = matches!(why, NotCarried::Different { share } if *share < 0.1);
+        let is_bare = matches!(why, NotCarried::NotCovered { share } if *share < 0.1);
+        assert!(if depth == -0.06 { is_hole } else { is_bare }, "{depth}: {why:?}");
+        assert!(report.tiles.is_empty() && target == labels);
+    }
+}
+
+#[test]
+fn points_of_other_stones_stay_theirs() {
+    // Stone 2 is a part of a larger stone in the other epoch.
+    let (tiles, _, labels) = epoch(Vector3::zeros(), |_| 0.0, |_| true);
+    let (report, target) = carried(&shapes(&[2]), Vector3::zeros(), (&tiles, &labels));
+    assert_eq!(report.outcomes[0], Err(NotCarried::Different { share: 0.0 }));
+    assert_eq!(target, labels);
+}
+
+#[test]
+fn of_two_stones_at_one_place_the_first_is_carried() {
+    let (tiles, _, labels) = epoch(Vector3::zeros(), |_| 0.0, |_| false);
+    let twice = shapes(&[1, 2]);
+    let shape = &twice[&StoneId(2)];
+    let stones = [shape, shape].map(|shape| PlacedShape { shape, shift: Vector3::zeros() });
+    let mut target = labels.clone();
+    let params = CarryParams::default();
+    let report = carry_labels(&tiles, &labels, &mut target, &stones, [7, 30], &params, &Silent).unwrap();
+    assert_eq!(report.outcomes[0].as_ref().unwrap().stone, 7);
+    assert_eq!(report.outcomes[1], Err(NotCarried::Different { share: 0.0 }));
+}
+
+#[test]
+fn photos_from_behind_beside_or_along_the_face_do_not_see_a_place() {
+    // Looks along world x from the origin.
+    let axes = nalgebra::Matrix3::new(0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0);
+    let rotation = nalgebra::UnitQuaternion::from_matrix(&axes);
+    let view = View {
+        image: ImageId(0),
+        name: String::new(),
+        camera: Camera::pinhole(640, 480, 900.0),
+        cam_from_world: Rigid3::from_parts(nalgebra::Translation3::identity(), rotation),
+    };
+    let sees = |place: [f64; 3], outward: [f64; 3]| {
+        photos_facing(std::slice::from_ref(&view), &Point3::from(place), &Vector3::from(outward), 1.4)
+    };
+    assert_eq!(sees([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1);
+    assert_eq!(sees([5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 0);
+    assert_eq!(sees([5.0, 0.0, 0.0], [-0.1, 1.0, 0.0]), 0);
+    assert_eq!(sees([-5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 0);
+    assert_eq!(sees([5.0, 3.0, 0.0], [-1.0, 0.0, 0.0]), 0);
+}
