@@ -105,15 +105,21 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Motion "cov_rel_zz", "m2", "covariance of rel_dz and rel_dz", relative_covariance.m33),
 ];
 
-/// The column that tables have where stones were edited by hand, after all others.
+/// Columns that tables have only where a row fills them, after all others: stones that were edited by hand or
+/// carried from another epoch.
 #[rustfmt::skip]
-pub(super) static EDITED: StoneColumn =
-    column!(OptionalCount "edited", "", "number of the last edit by hand that made or changed the stone, or its partner; else empty", edited);
+pub(super) static RARE_COLUMNS: [StoneColumn; 2] = [
+    column!(OptionalCount "edited", "", "number of the last edit by hand that made or changed the stone, or its partner; else empty", edited),
+    column!(OptionalCount "carried_from", "", "number of the epoch whose photos show the stone, where it was carried into the other; else empty", carried_from),
+];
 
 /// The columns of a table of these rows.
 pub(super) fn columns_of(rows: &[StoneRow]) -> impl Iterator<Item = &'static StoneColumn> {
-    let is_edited = rows.iter().any(|r| r.edited.is_some());
-    STONE_COLUMNS.iter().chain(is_edited.then_some(&EDITED))
+    let is_filled = |column: &&StoneColumn| match &column.cells {
+        Cells::OptionalCount(f) => rows.iter().any(|r| (f.get)(r).is_some()),
+        _ => true,
+    };
+    STONE_COLUMNS.iter().chain(RARE_COLUMNS.iter().filter(is_filled))
 }
 
 impl StoneColumn {

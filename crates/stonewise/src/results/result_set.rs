@@ -1,7 +1,7 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
+use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
 use super::stone_table::read_stones;
@@ -44,6 +44,9 @@ pub struct ResultSet {
     /// Edits by hand, from `audit_edits.csv`: its head and one row for each edit and epoch; empty where there
     /// are none.
     pub edits: Vec<Vec<String>>,
+    /// Stones that were looked for in epochs whose photos do not show them, from `audit_carried.csv`: its head
+    /// and one row for each stone and epoch; empty where there are none.
+    pub carried: Vec<Vec<String>>,
     /// Excerpts of the survey; empty where the folder is missing.
     pub evidence: Evidence,
     /// The unrolled wall.
@@ -68,6 +71,7 @@ impl ResultSet {
             verdict: read_json(&dir.join(VERDICT))?,
             decisions: read_decisions(dir)?,
             edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
+            carried: read_rows(&dir.join(CARRY_AUDIT))?.unwrap_or_default(),
             evidence: Evidence::read(dir, pair + 1)?,
             ..Self::read_measured(dir, pair)?
         })
@@ -103,6 +107,7 @@ impl ResultSet {
             verdict: None,
             decisions: Vec::new(),
             edits: Vec::new(),
+            carried: Vec::new(),
             evidence: Evidence::default(),
         })
     }

@@ -38,6 +38,8 @@ pub struct StoneRow {
     pub motion: Option<RowMotion>,
     /// The last edit by hand that made or changed the stone or its partner: its number in the file of edits.
     pub edited: Option<u32>,
+    /// Number of the epoch whose photos show the stone, where it was carried into the other one.
+    pub carried_from: Option<u32>,
 }
 
 /// The measured motion of a stone.
@@ -203,6 +205,7 @@ impl StoneRow {
             status: status(outcome, pair),
             motion: motion.map(|m| RowMotion::new(m, &first.normal, reference)),
             edited: None,
+            carried_from: None,
         }
     }
 }

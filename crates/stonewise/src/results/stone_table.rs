@@ -1,6 +1,6 @@
 //! Files of stone rows: CSV with its metadata and Parquet, with the columns of the contract.
 
-use super::columns::{EDITED, STONE_COLUMNS, columns_of};
+use super::columns::{RARE_COLUMNS, STONE_COLUMNS, columns_of};
 use super::names::PairFile;
 use super::{RowMotion, StoneRow};
 use crate::error::Result;
@@ -39,8 +39,10 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
     for column in STONE_COLUMNS {
         column.fill(&mut rows, &table, path)?;
     }
-    if table.names().any(|n| n == EDITED.name) {
-        EDITED.fill(&mut rows, &table, path)?;
+    for column in &RARE_COLUMNS {
+        if table.names().any(|n| n == column.name) {
+            column.fill(&mut rows, &table, path)?;
+        }
     }
     rows.iter_mut()
         .filter_map(|r| r.motion.as_mut())
@@ -48,7 +50,7 @@ pub fn read_stones(path: &Path) -> Result<Vec<StoneRow>> {
     Ok(rows)
 }
 
-/// Rows as a table with [`STONE_COLUMNS`], and `edited` where a stone was edited by hand; the metadata hold
+/// Rows as a table with [`STONE_COLUMNS`], and those of rare columns that a row fills; the metadata hold
 /// `NAME.unit` and `NAME.meaning` of every column.
 ///
 /// # Errors
@@ -89,9 +91,10 @@ mod tests {
     #[test]
     fn rows_come_back_from_parquet_as_they_were() {
         let folder = tempfile::tempdir().unwrap();
-        let mut edited = rows();
+        let [mut edited, mut carried] = [rows(), rows()];
         edited[3].edited = Some(2);
-        for rows in [rows(), Vec::new(), edited] {
+        carried[1].carried_from = Some(1);
+        for rows in [rows(), Vec::new(), edited, carried] {
             write_stones(folder.path(), 1, &rows).unwrap();
             assert_eq!(read_stones(&folder.path().join("stones.parquet")).unwrap(), rows);
         }

@@ -151,6 +151,7 @@ fn row(stone_id: u32) -> StoneRow {
         status,
         motion: (status == Status::Ok).then(|| motion(stone_id)),
         edited: None,
+        carried_from: None,
     }
 }
 

@@ -87,6 +87,7 @@ in_both! {
         unmeasured: "not measured", "nicht gemessen";
         loose: "loose", "lose";
         edited: "edited by hand", "von Hand geändert";
+        carried: "carried from another epoch", "aus einer anderen Epoche übernommen";
         intro: "The wall seen from the front, unrolled. Components share one scale; millimetres, second epoch minus first.",
             "Die Mauer von vorn, abgewickelt. Die Komponenten teilen eine Skala; Millimeter, zweite Epoche minus erste.";
         beyond: " {n} components exceed the scale and have its end colours.",
@@ -292,6 +293,8 @@ in_both! {
         share: "share", "Anteil";
         edits: "Edits by hand", "Änderungen von Hand";
         edits_note: "The maps draw the outlines of edited stones dashed.", "Die Karten zeichnen die Umrisse geänderter Steine gestrichelt.";
+        carried: "Stones looked for in epochs whose photos do not show them", "Steine, die in Epochen gesucht wurden, deren Fotos sie nicht zeigen";
+        carried_note: "The maps draw the outlines of stones that were found so dotted.", "Die Karten zeichnen die Umrisse so gefundener Steine gepunktet.";
         no_warnings: "No warnings.", "Keine Warnungen.";
         warnings: "Warnings ({n}; inputs left out: {out})", "Warnungen ({n}; ausgelassene Eingaben: {out})";
         about: "about", "betrifft";

@@ -109,42 +109,53 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
     progress: &dyn Progress,
 ) -> Result<CarryReport, TransferError> {
     let mut near: Vec<Vec<Near>> = vec![Vec::new(); stones.len()];
-    each_tile(tiles, labels, "stones of another epoch", progress, |tile, cloud, labels| {
-        let bounds = tiles.bounds(tile);
-        for (stone, near) in stones.iter().zip(&mut near) {
-            let reach = stone.shape.bounds().moved(&stone.shift).grown(REACH_M);
-            if !reach.intersects(&bounds) {
-                continue;
-            }
-            for (i, &other) in labels.stone.iter().enumerate() {
-                let world = cloud.world(i);
-                if !reach.contains(&world) {
+    each_tile(
+        tiles,
+        labels,
+        "stones of another epoch",
+        progress,
+        |tile, cloud, labels| {
+            let bounds = tiles.bounds(tile);
+            for (stone, near) in stones.iter().zip(&mut near) {
+                let reach = stone.shape.bounds().moved(&stone.shift).grown(REACH_M);
+                if !reach.intersects(&bounds) {
                     continue;
                 }
-                let place = stone.shape.place(&(world - stone.shift));
-                if let Some(place) = place.filter(|p| p.height_m.abs() <= REACH_M) {
-                    near.push(Near {
-                        point: (tile as u32, i as u32),
-                        place,
-                        is_free: other == 0,
-                    });
+                for (i, &other) in labels.stone.iter().enumerate() {
+                    let world = cloud.world(i);
+                    if !reach.contains(&world) {
+                        continue;
+                    }
+                    let place = stone.shape.place(&(world - stone.shift));
+                    if let Some(place) = place.filter(|p| p.height_m.abs() <= REACH_M) {
+                        near.push(Near {
+                            point: (tile as u32, i as u32),
+                            place,
+                            is_free: other == 0,
+                        });
+                    }
                 }
             }
-        }
-    })?;
+        },
+    )?;
     let mut claims: BTreeMap<usize, BTreeMap<u32, u32>> = BTreeMap::new();
     let mut next = first_new;
     let mut outcomes = Vec::new();
     for (stone, near) in stones.iter().zip(&mut near) {
         for n in near.iter_mut() {
             let (tile, index) = n.point;
-            n.is_free &= !claims.get(&(tile as usize)).is_some_and(|c| c.contains_key(&index));
+            n.is_free &= !claims
+                .get(&(tile as usize))
+                .is_some_and(|c| c.contains_key(&index));
         }
         let outcome = judge(stone.shape, near, [next, min_points], params);
         if outcome.is_ok() {
             let tolerance_m = tolerance_m(stone.shape, params);
             for n in near.iter().filter(|n| n.is_on_surface(tolerance_m)) {
-                claims.entry(n.point.0 as usize).or_default().insert(n.point.1, next);
+                claims
+                    .entry(n.point.0 as usize)
+                    .or_default()
+                    .insert(n.point.1, next);
             }
             next += 1;
         }

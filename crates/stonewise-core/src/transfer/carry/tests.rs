@@ -20,7 +20,11 @@ fn stone_at(y: f64, z: f64) -> u32 {
 
 /// Points every 5 mm, in two tiles; `x`: distance of the surface in front of the plane x = 0, by stone.
 /// Returns tiles, true labels and the labels that are in use.
-fn epoch(shift: Vector3<f64>, x: impl Fn(u32) -> f64, known: impl Fn(u32) -> bool) -> (MemoryTiles, Vec<Vec<u32>>, MemoryLabels) {
+fn epoch(
+    shift: Vector3<f64>,
+    x: impl Fn(u32) -> f64,
+    known: impl Fn(u32) -> bool,
+) -> (MemoryTiles, Vec<Vec<u32>>, MemoryLabels) {
     let mut tiles: Vec<Vec<Point3<f64>>> = vec![Vec::new(), Vec::new()];
     let mut truth = vec![Vec::new(), Vec::new()];
     for i in -10..270 {
@@ -28,7 +32,11 @@ fn epoch(shift: Vector3<f64>, x: impl Fn(u32) -> f64, known: impl Fn(u32) -> boo
             // Off the lattice of the cells, and not on borders.
             let (y, z) = (0.005 * f64::from(i) + 0.0012, 0.005 * f64::from(j) + 0.0017);
             let stone = stone_at(y, z);
-            let depth = if stone == 0 { -0.02 } else { x(stone) + 0.01 * (12.0 * y).sin() };
+            let depth = if stone == 0 {
+                -0.02
+            } else {
+                x(stone) + 0.01 * (12.0 * y).sin()
+            };
             let tile = usize::from(y > 0.6);
             tiles[tile].push(Point3::new(depth, y, z) + shift);
             truth[tile].push(stone);
@@ -44,7 +52,9 @@ fn epoch(shift: Vector3<f64>, x: impl Fn(u32) -> f64, known: impl Fn(u32) -> boo
         };
         labels.write(tile, &table).unwrap();
     }
-    let clouds = tiles.into_iter().map(|points| Cloud::from_world(Point3::origin(), points));
+    let clouds = tiles
+        .into_iter()
+        .map(|points| Cloud::from_world(Point3::origin(), points));
     (MemoryTiles::new(clouds), truth, labels)
 }
 
@@ -60,7 +70,10 @@ fn carried(
     (tiles, labels): (&MemoryTiles, &MemoryLabels),
 ) -> (CarryReport, MemoryLabels) {
     let mut target = labels.clone();
-    let stones: Vec<PlacedShape> = shapes.values().map(|shape| PlacedShape { shape, shift }).collect();
+    let stones: Vec<PlacedShape> = shapes
+        .values()
+        .map(|shape| PlacedShape { shape, shift })
+        .collect();
     let params = CarryParams::default();
     let report = carry_labels(tiles, labels, &mut target, &stones, [100, 30], &params, &Silent).unwrap();
     (report, target)
@@ -92,7 +105,10 @@ fn a_missed_stone_gets_its_points_where_its_neighbours_moved_it() {
     }
     assert_eq!(stone.points, right + wrong);
     // 2 mm of the border of a stone of 400 mm x 300 mm.
-    assert!(wrong * 50 < right && missed * 50 < right, "{right} {wrong} {missed}");
+    assert!(
+        wrong * 50 < right && missed * 50 < right,
+        "{right} {wrong} {missed}"
+    );
 }
 
 #[test]
@@ -122,7 +138,10 @@ fn of_two_stones_at_one_place_the_first_is_carried() {
     let (tiles, _, labels) = epoch(Vector3::zeros(), |_| 0.0, |_| false);
     let twice = shapes(&[1, 2]);
     let shape = &twice[&StoneId(2)];
-    let stones = [shape, shape].map(|shape| PlacedShape { shape, shift: Vector3::zeros() });
+    let stones = [shape, shape].map(|shape| PlacedShape {
+        shape,
+        shift: Vector3::zeros(),
+    });
     let mut target = labels.clone();
     let params = CarryParams::default();
     let report = carry_labels(&tiles, &labels, &mut target, &stones, [7, 30], &params, &Silent).unwrap();
@@ -142,7 +161,12 @@ fn photos_from_behind_beside_or_along_the_face_do_not_see_a_place() {
         cam_from_world: Rigid3::from_parts(nalgebra::Translation3::identity(), rotation),
     };
     let sees = |place: [f64; 3], outward: [f64; 3]| {
-        photos_facing(std::slice::from_ref(&view), &Point3::from(place), &Vector3::from(outward), 1.4)
+        photos_facing(
+            std::slice::from_ref(&view),
+            &Point3::from(place),
+            &Vector3::from(outward),
+            1.4,
+        )
     };
     assert_eq!(sees([5.0, 0.0, 0.0], [-1.0, 0.0, 0.0]), 1);
     assert_eq!(sees([5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 0);

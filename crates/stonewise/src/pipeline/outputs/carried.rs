@@ -30,16 +30,37 @@ fn write_rows(csv: &Path, epochs: &[&str], attempts: &[CarryAttempt]) -> Result<
     let counts = |of: &dyn Fn(&CarryAttempt) -> u32| attempts.iter().map(of).collect::<Vec<u32>>();
     let into: Vec<String> = attempts.iter().map(|a| name(a.epoch)).collect();
     let from: Vec<String> = attempts.iter().map(|a| name(a.from)).collect();
-    let stones: Vec<Option<u32>> = attempts.iter().map(|a| a.outcome.as_ref().ok().map(|c| c.stone)).collect();
-    let points: Vec<Option<u64>> = attempts.iter().map(|a| a.outcome.as_ref().ok().map(|c| c.points)).collect();
-    let reason = |a: &CarryAttempt| a.outcome.as_ref().err().map_or(String::new(), NotCarried::to_string);
+    let stones: Vec<Option<u32>> = attempts
+        .iter()
+        .map(|a| a.outcome.as_ref().ok().map(|c| c.stone))
+        .collect();
+    let points: Vec<Option<u64>> = attempts
+        .iter()
+        .map(|a| a.outcome.as_ref().ok().map(|c| c.points))
+        .collect();
+    let reason = |a: &CarryAttempt| {
+        a.outcome
+            .as_ref()
+            .err()
+            .map_or(String::new(), NotCarried::to_string)
+    };
     let mut table = Table::new();
     table.push("epoch", "", "epoch in whose cloud the stone was looked for", into)?;
     let meaning = "number that the stone got there; empty where it was not carried";
     table.push("stone", "", meaning, stones)?;
     table.push("from_epoch", "", "epoch whose photos show the stone", from)?;
-    table.push("from_stone", "", "number of the stone there", counts(&|a| a.stone.0))?;
-    table.push("photos", "", "photos of that epoch that show it", counts(&|a| a.photos))?;
+    table.push(
+        "from_stone",
+        "",
+        "number of the stone there",
+        counts(&|a| a.stone.0),
+    )?;
+    table.push(
+        "photos",
+        "",
+        "photos of that epoch that show it",
+        counts(&|a| a.photos),
+    )?;
     let meaning = "photos of both epochs that face its place and do not show it";
     table.push("missed", "", meaning, counts(&|a| a.missed))?;
     let meaning = "share of its face on which the epoch has points, 0 to 1";
@@ -77,10 +98,18 @@ mod tests {
             same_share: 0.8,
         };
         let outvoted = NotCarried::Outvoted { photos: 1, missed: 9 };
-        write_rows(&csv, &["2024", "2025"], &[attempt(Ok(carried)), attempt(Err(outvoted))]).unwrap();
+        write_rows(
+            &csv,
+            &["2024", "2025"],
+            &[attempt(Ok(carried)), attempt(Err(outvoted))],
+        )
+        .unwrap();
         check_csv_metadata(&csv);
         let text = std::fs::read_to_string(&csv).unwrap();
         assert!(text.contains("2025,81,2024,7,3,5,0.9,0.8,412,"), "{text}");
-        assert!(text.contains("1 photos show it, 9 that see its place do not"), "{text}");
+        assert!(
+            text.contains("1 photos show it, 9 that see its place do not"),
+            "{text}"
+        );
     }
 }

@@ -20,7 +20,7 @@ pub fn stone_rows(
     facade: &Facade,
 ) -> Vec<StoneRow> {
     let [first, second] = epochs.map(|e| &e.stones);
-    let edited = epochs.map(|e| &e.edited);
+    let (edited, carried) = (epochs.map(|e| &e.edited), epochs.map(|e| &e.carried));
     let partners: BTreeMap<_, _> = second.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<_, _> = matched.report.outcomes.iter().copied().collect();
     let motions: BTreeMap<_, _> = registered.results.iter().map(|r| (r.first, r)).collect();
@@ -51,8 +51,11 @@ pub fn stone_rows(
         let place = facade.place(&stone.centroid);
         let row = StoneRow::new(stone, outcome, partner, pair.as_ref(), &reference, &place);
         let of_partner = || edited[1].get(&partner?.id);
+        let from = carried[0].get(&stone.id);
+        let from = from.or_else(|| carried[1].get(&partner?.id));
         Some(StoneRow {
             edited: edited[0].get(&stone.id).or_else(of_partner).copied(),
+            carried_from: from.map(|&epoch| epoch as u32),
             ..row
         })
     };

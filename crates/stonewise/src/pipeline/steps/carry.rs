@@ -95,7 +95,13 @@ struct Wish {
 }
 
 impl Wish {
-    fn new(photos: &[Segmented], stone: &Stone, [from, to]: [usize; 2], shift: Vector3<f64>, steepest: f64) -> Self {
+    fn new(
+        photos: &[Segmented],
+        stone: &Stone,
+        [from, to]: [usize; 2],
+        shift: Vector3<f64>,
+        steepest: f64,
+    ) -> Self {
         let facing = |epoch: usize, shift: Vector3<f64>| {
             let place = stone.centroid + shift;
             photos_facing(&photos[epoch - 1].views, &place, &stone.normal, steepest) as u32
@@ -132,7 +138,9 @@ fn forwards(
         matches!(outcome, MatchOutcome::Unmatched(reason) if *reason != UnmatchedReason::Unseen)
     });
     missing
-        .filter_map(|((id, _), shift)| Some(Wish::new(photos, stones.get(id)?, [1, number], *shift, steepest)))
+        .filter_map(|((id, _), shift)| {
+            Some(Wish::new(photos, stones.get(id)?, [1, number], *shift, steepest))
+        })
         .collect()
 }
 
@@ -148,9 +156,12 @@ fn backwards(
     let (first, later) = (&labelled[0].stones, &labelled[number - 1].stones);
     let is_missing = |s: &&Stone| report.unmatched_second.binary_search(&s.id).is_ok();
     let shift_at = |stone: &Stone| {
-        let apart = |(s, shift): &(&Stone, &Vector3<f64>)| (s.centroid + *shift - stone.centroid).norm_squared();
+        let apart =
+            |(s, shift): &(&Stone, &Vector3<f64>)| (s.centroid + *shift - stone.centroid).norm_squared();
         let places = first.iter().zip(&report.local_shifts);
-        places.min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|(_, shift)| -shift)
+        places
+            .min_by(|a, b| apart(a).total_cmp(&apart(b)))
+            .map(|(_, shift)| -shift)
     };
     let wish = |s: &Stone| Some(Wish::new(photos, s, [number, 1], shift_at(s)?, steepest));
     later.iter().filter(is_missing).filter_map(wish).collect()
@@ -172,7 +183,11 @@ fn carry_into(
     let sources: BTreeSet<usize> = wishes.iter().map(|w| w.from).collect();
     let mut keys = vec![labelled[number - 1].key.as_str()];
     keys.extend(sources.iter().map(|&from| labelled[from - 1].key.as_str()));
-    let params = (&settings.carry, settings.label.missed_weight, settings.label.min_points);
+    let params = (
+        &settings.carry,
+        settings.label.missed_weight,
+        settings.label.min_points,
+    );
     let key = Key::new("carry", &(params, &wishes), &keys);
     let step = context.step(&format!("carry-{number}"), key, |step, _| {
         let mut target = DiskLabels::new(step.path(), &labelled[number - 1].ingested.tiles.surveyed);
@@ -199,7 +214,10 @@ fn carry_into(
         mut carried,
         ..
     } = labelled.remove(number - 1);
-    store.replace(&report.tiles, &DiskLabels::new(step.path(), &ingested.tiles.surveyed));
+    store.replace(
+        &report.tiles,
+        &DiskLabels::new(step.path(), &ingested.tiles.surveyed),
+    );
     for (wish, found) in wishes.iter().zip(&report.outcomes) {
         if let Ok(found) = found {
             let stone = StoneId(found.stone);
@@ -213,7 +231,14 @@ fn carry_into(
         store,
         step,
     };
-    let tabulated = tabulate(context, number, "stones-carried", &photos[number - 1], ingested, labels)?;
+    let tabulated = tabulate(
+        context,
+        number,
+        "stones-carried",
+        &photos[number - 1],
+        ingested,
+        labels,
+    )?;
     labelled.insert(number - 1, Labelled { carried, ..tabulated });
     Ok(true)
 }
@@ -273,7 +298,10 @@ fn shapes<'w>(
 ) -> Result<BTreeMap<(usize, StoneId), StoneShape>> {
     let mut wanted: BTreeMap<usize, BTreeMap<StoneId, Vector3<f64>>> = BTreeMap::new();
     for wish in wishes {
-        wanted.entry(wish.from).or_default().insert(wish.stone, wish.outward);
+        wanted
+            .entry(wish.from)
+            .or_default()
+            .insert(wish.stone, wish.outward);
     }
     let mut shapes = BTreeMap::new();
     for (from, stones) in wanted {

@@ -31,8 +31,8 @@ pub(crate) struct MapLayout<'a> {
     stone_px: f64,
 }
 
-/// Width of the dashed outlines of stones that were edited by hand, tenths of a pixel.
-const EDITED_PX: u32 = 12;
+/// Width of the outlines of stones that were edited by hand or carried from another epoch, tenths of a pixel.
+const MARKED_PX: u32 = 12;
 
 /// What a map shows.
 pub(crate) struct MapPicture<'a> {
@@ -216,21 +216,13 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
             picture.scale.colour(step)
         );
     }
-    let edited: String = layout
-        .results
-        .stones
-        .iter()
-        .zip(&layout.paths)
-        .filter(|(stone, _)| stone.edited.is_some())
-        .map(|(_, path)| path.as_str())
-        .collect();
-    if !edited.is_empty() {
-        let _ = write!(
-            out,
-            r#"<path class="edited" fill="none" stroke="currentColor" stroke-width="{EDITED_PX}" stroke-dasharray="40 30" d="{edited}"><title>{}</title></path>"#,
-            layout.texts.maps.edited
-        );
-    }
+    let maps = &layout.texts.maps;
+    mark(&mut out, layout, "carried", ["10 20", maps.carried], |stone| {
+        stone.carried_from.is_some()
+    });
+    mark(&mut out, layout, "edited", ["40 30", maps.edited], |stone| {
+        stone.edited.is_some()
+    });
     if !loose.is_empty() {
         // Small stones get thin outlines.
         let width = (layout.stone_px * 0.8).clamp(4.0, 18.0);
@@ -247,6 +239,27 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     layout.draw_bar(&mut out, picture.scale, picture.unit);
     out.push_str("</svg>");
     out
+}
+
+/// Draws the outlines of some stones in dashes of this pattern, with a title; `class`: that of the path.
+fn mark(
+    out: &mut String,
+    layout: &MapLayout,
+    class: &str,
+    [dashes, title]: [&str; 2],
+    is_marked: impl Fn(&StoneRow) -> bool,
+) {
+    let stones = layout.results.stones.iter().zip(&layout.paths);
+    let marked: String = stones
+        .filter(|(stone, _)| is_marked(stone))
+        .map(|(_, path)| path.as_str())
+        .collect();
+    if !marked.is_empty() {
+        let _ = write!(
+            out,
+            r#"<path class="{class}" fill="none" stroke="currentColor" stroke-width="{MARKED_PX}" stroke-dasharray="{dashes}" d="{marked}"><title>{title}</title></path>"#
+        );
+    }
 }
 
 /// A closed polygon in tenths of a pixel, relative steps.

@@ -21,7 +21,8 @@ pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
         Some(run) => warnings(&run.warnings, texts),
         None => format!("<p>{}</p>", names.no_run),
     };
-    out.push_str(&edits(&results.edits, names));
+    out.push_str(&listed(&results.edits, names.edits, names.edits_note));
+    out.push_str(&listed(&results.carried, names.carried, names.carried_note));
     out.push_str(&decision_counts(&results.decisions, texts));
     if let Some(run) = &results.run {
         out.push_str(&details(names.steps, &steps(&run.steps, texts)));
@@ -38,8 +39,8 @@ pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
     section("audit", texts.sections.audit, &out)
 }
 
-/// What a person corrected, with who, when and why, and what came of it; the head first.
-fn edits(rows: &[Vec<String>], names: &AuditTexts) -> String {
+/// A table of an audit, such as what a person corrected, with who, when and why; the head first.
+fn listed(rows: &[Vec<String>], title: &str, note: &str) -> String {
     let Some((head, rows)) = rows.split_first() else {
         return String::new();
     };
@@ -48,10 +49,7 @@ fn edits(rows: &[Vec<String>], names: &AuditTexts) -> String {
     let head: Vec<String> = head.iter().map(|h| words(h)).collect();
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let table = table(&head, &rows, head.len());
-    format!(
-        "<h3>{}</h3>{table}<p class=\"note\">{}</p>",
-        names.edits, names.edits_note
-    )
+    format!("<h3>{title}</h3>{table}<p class=\"note\">{note}</p>")
 }
 
 /// What was done, how long it took, and the highest memory up to its end.
