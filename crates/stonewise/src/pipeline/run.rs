@@ -21,7 +21,7 @@ use crate::pipeline::outputs::run_record::write_run_record;
 use crate::pipeline::outputs::series::write_series;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
 use crate::pipeline::outputs::verdict::write_verdict;
-use crate::pipeline::steps::carry::carry;
+use crate::pipeline::steps::carry::{carry, drop_contradictions};
 use crate::pipeline::steps::edit::{Edited, edit};
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
@@ -253,7 +253,8 @@ pub(super) fn measured(
     facade: &Facade,
     number: usize,
 ) -> Result<Measured> {
-    let (registered, datum) = register(context, photos, [first, second], matched, number)?;
+    let (mut registered, datum) = register(context, photos, [first, second], matched, number)?;
+    drop_contradictions(context, [first, second], &mut registered);
     let datum = datum.against(motion_in_common(first, &registered).as_ref());
     let rows = stone_rows([first, second], matched, &registered, &datum, facade);
     Ok(Measured {

@@ -17,6 +17,9 @@ const REACH_M: f64 = 0.15;
 /// A point belongs to a surface within this many times the spread of the surface's own points. 3: nearly all
 /// of them.
 const SPREADS: f64 = 3.0;
+/// Cells of a face, at least. 9: three by three; of smaller faces, parts that reach out of the ground or from
+/// behind a plant, many places on a wall look alike.
+const LEAST_CELLS: usize = 9;
 
 /// A stone where another epoch should have it.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +50,14 @@ pub enum NotCarried {
     /// Its points cover no area.
     #[error("its points cover no area")]
     NoShape,
+    /// Its face is too small to be told from other places.
+    #[error("its face has {cells} cells of 3 cm; {needed} are needed")]
+    Small {
+        /// Its cells.
+        cells: usize,
+        /// Cells needed.
+        needed: usize,
+    },
     /// Most photos of both epochs that see its place do not show it.
     #[error("{photos} photos show it, {missed} that see its place do not")]
     Outvoted {
@@ -222,6 +233,12 @@ fn judge(
     [number, min_points]: [u32; 2],
     params: &CarryParams,
 ) -> Result<CarriedStone, NotCarried> {
+    if shape.cell_count() < LEAST_CELLS {
+        return Err(NotCarried::Small {
+            cells: shape.cell_count(),
+            needed: LEAST_CELLS,
+        });
+    }
     let tolerance_m = tolerance_m(shape, params);
     let mut cells: CellMap<Cell, CellContent> = CellMap::default();
     let mut points = 0;

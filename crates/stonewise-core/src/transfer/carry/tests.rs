@@ -174,3 +174,31 @@ fn photos_from_behind_beside_or_along_the_face_do_not_see_a_place() {
     assert_eq!(sees([-5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 0);
     assert_eq!(sees([5.0, 3.0, 0.0], [-1.0, 0.0, 0.0]), 0);
 }
+
+#[test]
+fn a_face_of_a_few_cells_is_not_carried() {
+    let (tiles, _, labels) = epoch(Vector3::zeros(), |_| 0.0, |_| false);
+    let corner: Vec<Point3<f64>> = (0..64)
+        .map(|i| {
+            Point3::new(
+                0.0,
+                0.1 + 0.006 * f64::from(i % 8),
+                0.1 + 0.006 * f64::from(i / 8),
+            )
+        })
+        .collect();
+    let shape = StoneShape::of(&corner, &Vector3::x()).unwrap();
+    let small = BTreeMap::from([(StoneId(9), shape)]);
+    let (report, target) = carried(&small, Vector3::zeros(), (&tiles, &labels));
+    assert!(
+        matches!(
+            report.outcomes[0],
+            Err(NotCarried::Small {
+                cells: 4..9,
+                needed: 9
+            })
+        ),
+        "{report:?}"
+    );
+    assert_eq!(target, labels);
+}

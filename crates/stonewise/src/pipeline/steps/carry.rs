@@ -7,6 +7,7 @@
 
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
 use super::r#match::match_in;
+use super::register::Registered;
 use super::segment::Segmented;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
@@ -17,7 +18,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
-use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
+use stonewise_core::stone::{MatchOutcome, MotionFailure, Stone, UnmatchedReason};
 use stonewise_core::transfer::{
     CarriedStone, CarryReport, NotCarried, PlacedShape, StoneInstances, StoneShape, carry_labels,
     photos_facing, stone_shapes,
@@ -241,6 +242,25 @@ fn carry_into(
     )?;
     labelled.insert(number - 1, Labelled { carried, ..tabulated });
     Ok(true)
+}
+
+/// Takes the motions off carried stones that moved against their neighbours by more than
+/// [`CarryParams::max_height_m`](stonewise_core::transfer::CarryParams::max_height_m). They were found where
+/// their neighbours moved them; so far from there, their points are not theirs.
+pub fn drop_contradictions(context: &Context, [first, second]: [&Labelled; 2], registered: &mut Registered) {
+    let limit_m = context.project.settings.carry.max_height_m;
+    let mut dropped = BTreeSet::new();
+    for pair in &mut registered.results {
+        let is_carried = first.carried.contains_key(&pair.first) || second.carried.contains_key(&pair.second);
+        if is_carried && pair.motion.as_ref().is_ok_and(|m| m.relative.norm() > limit_m) {
+            pair.motion = Err(MotionFailure::Disagreement);
+            dropped.insert(pair.first);
+        }
+    }
+    let is_measured = |stone: &StoneId| !dropped.contains(stone);
+    registered
+        .neighbours
+        .retain(|pair| pair.stones.iter().all(is_measured));
 }
 
 /// What became of a stone.

@@ -1,0 +1,116 @@
+//! A stone that the photos of one epoch do not show is measured all the same, where its cloud shows it.
+#![allow(clippy::unwrap_used)]
+
+use nalgebra::{Point3, Vector3};
+use std::fs;
+use std::path::{Path, PathBuf};
+use stonewise::results::{Status, StoneRow, read_stones};
+use stonewise::simulate::{SurveyParams, write_survey};
+use stonewise::{OutputFolder, Project, Until, run};
+use stonewise_core::progress::Silent;
+use stonewise_core::simulate::{PhotoParams, SceneParams, TlsParams, WallMotion, WallParams};
+use stonewise_io::cameras::read_cameras;
+use stonewise_io::image_io::{read_rgb, write_jpeg};
+
+/// How the wall moved, metres.
+const MOTION: [f64; 3] = [0.012, 0.02, -0.01];
+
+/// A wall of 1.6 x 0.9 m with masks in the first epoch alone. The photos of the second show its left half
+/// alone.
+fn survey(folder: &Path) -> PathBuf {
+    let params = SurveyParams {
+        scene: SceneParams {
+            wall: WallParams {
+                width_m: 1.6,
+                height_m: 0.9,
+                ..WallParams::default()
+            },
+            motions: vec![WallMotion::Translation { d_m: MOTION }],
+            tls: Some(TlsParams {
+                spacing_m: 0.008,
+                ..TlsParams::default()
+            }),
+            uav: None,
+            ..SceneParams::default()
+        },
+        photos: PhotoParams {
+            columns: 3,
+            rows: 1,
+            width: 400,
+            height: 240,
+            focal_px: 700.0,
+            distance_m: 4.0,
+            last_unaligned: false,
+            ..PhotoParams::default()
+        },
+        ..SurveyParams::default()
+    };
+    let project = write_survey(folder, &params, &Silent).unwrap().project;
+    // The wall stands around the origin; its right half lies at positive y.
+    let middle = Point3::new(0.0, 0.0, 0.45);
+    let cameras = read_cameras(&folder.join("epoch2/cameras_metashape.xml")).unwrap();
+    for view in &cameras.views {
+        let path = folder.join("epoch2/images").join(format!("{}.jpg", view.name));
+        let mut photo = read_rgb(&path).unwrap();
+        let width = photo.width() as usize;
+        let from = view.project(&middle).unwrap().pixel[0].clamp(0.0, width as f64) as usize;
+        for row in photo.data_mut().chunks_mut(width) {
+            row[from..].fill([0; 3]);
+        }
+        write_jpeg(&path, &photo, 92).unwrap();
+    }
+    let text = fs::read_to_string(&project).unwrap();
+    let mut seen = 0;
+    let is_kept = |line: &&str| {
+        seen += usize::from(line.starts_with("masks"));
+        !line.starts_with("masks") || seen == 1
+    };
+    let kept: Vec<&str> = text.lines().filter(is_kept).collect();
+    fs::write(&project, kept.join("\n")).unwrap();
+    project
+}
+
+/// Stones of the first epoch after a run, with or without carrying.
+fn stones(project: &Path, out: &Path, is_enabled: bool) -> Vec<StoneRow> {
+    let text = fs::read_to_string(project).unwrap();
+    let other = project.with_file_name("carry.toml");
+    fs::write(&other, format!("{text}\n[carry]\nenabled = {is_enabled}\n")).unwrap();
+    let project = Project::read(&other).unwrap();
+    let folder = OutputFolder::of_project(out, &project, false).unwrap();
+    run(&project, &folder, Until::Registered, &Silent).unwrap();
+    read_stones(&out.join("stones.parquet")).unwrap()
+}
+
+#[test]
+fn stones_in_the_dark_are_measured_by_their_surface() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = survey(&folder.path().join("survey"));
+    let out = folder.path().join("out");
+    let lost = stones(&project, &out, false);
+    // Relief alone shows the detector some of the stones in the dark.
+    let missed = |s: &&StoneRow| s.centroid.y > 0.15 && s.motion.is_none();
+    let missed: Vec<u32> = lost.iter().filter(missed).map(|s| s.stone_id).collect();
+    assert!(
+        lost.iter().all(|s| s.carried_from.is_none()) && missed.len() >= 3,
+        "{missed:?}"
+    );
+    assert!(!out.join("audit_carried.csv").exists());
+
+    let found = stones(&project, &out, true);
+    let carried: Vec<&StoneRow> = found.iter().filter(|s| s.carried_from.is_some()).collect();
+    let measured: Vec<_> = carried.iter().filter(|s| s.status == Status::Ok).collect();
+    let again = measured.iter().filter(|s| missed.contains(&s.stone_id)).count();
+    assert!(3 * again > 2 * missed.len(), "{again} of {}", missed.len());
+    for stone in measured {
+        let motion = stone.motion.as_ref().unwrap();
+        let error = (motion.displacement - Vector3::from(MOTION)).norm();
+        assert!(error < 0.002, "stone {}: {error}", stone.stone_id);
+        assert_eq!(stone.carried_from, Some(1));
+    }
+    let audit = fs::read_to_string(out.join("audit_carried.csv")).unwrap();
+    let listed = audit
+        .lines()
+        .skip(1)
+        .filter(|line| line.ends_with("\"\"") || line.ends_with(','));
+    assert_eq!(listed.count(), carried.len(), "{audit}");
+}
