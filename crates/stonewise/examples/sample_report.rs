@@ -128,6 +128,7 @@ impl Wall {
             status,
             motion: (status == Status::Ok).then(|| self.row_motion(place, i)),
             edited: None,
+            carried_from: None,
         }
     }
 
