@@ -30,6 +30,15 @@ export interface CropDocument {
   readonly atlases: number;
 }
 
+/** Where the pictures of stones tracked in photos lie: three a stone, as the stones with pictures come. */
+export interface TrackDocument {
+  /** Edge of a picture, pixels, and pictures in a row of an atlas. */
+  readonly side: number;
+  readonly perRow: number;
+  /** Names of the photos. */
+  readonly photos: readonly string[];
+}
+
 /** The JSON document of the page; `page/explorer.rs` writes it. */
 export interface ReportDocument {
   readonly epochs: readonly [string, string];
@@ -55,6 +64,7 @@ export interface ReportDocument {
   readonly blocks: Readonly<Record<string, readonly ColumnEntry[]>>;
   readonly cameras: readonly CameraEntry[];
   readonly crops: readonly [CropDocument | null, CropDocument | null];
+  readonly tracks: TrackDocument | null;
 }
 
 /** Components in the order along, up, out. */

@@ -1,5 +1,7 @@
 // Elements without markup: every text becomes a text node, so that nothing from an input can be read as HTML.
 
+import { fromBase64 } from "./blocks.ts";
+
 type Child = Node | string | null;
 
 /** An HTML element with properties, attributes that are no properties, and children. */
@@ -32,6 +34,18 @@ export function button(text: string, hint: string, press: () => void): HTMLButto
   const element = el("button", { type: "button", ...(hint ? { title: hint } : {}), ...(isWord ? {} : { "aria-label": hint }) }, text);
   element.addEventListener("click", press);
   return element;
+}
+
+/** The JPEG that an element of the page carries as base64, decoded. Its text is not used again: its memory is freed. */
+export async function embedded(id: string): Promise<HTMLImageElement> {
+  const element = document.getElementById(id);
+  const url = URL.createObjectURL(new Blob([fromBase64(element?.textContent ?? "")], { type: "image/jpeg" }));
+  element?.remove();
+  const picture = new Image();
+  picture.src = url;
+  await picture.decode();
+  URL.revokeObjectURL(url);
+  return picture;
 }
 
 /** A value of the style sheet that follows light and dark. */

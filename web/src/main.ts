@@ -15,6 +15,7 @@ import { profile } from "./views/profile.ts";
 import { WallScene } from "./views/scene.ts";
 import { Sections } from "./views/sections.ts";
 import { StonePanel, byMotion } from "./views/stone.ts";
+import { Tracks } from "./views/tracks.ts";
 import { toolbar } from "./views/toolbar.ts";
 import "./style.css";
 
@@ -47,7 +48,7 @@ async function start(): Promise<void> {
   store.on((state, before) => {
     if (state.view !== before.view) showScene();
   });
-  const panel = new StonePanel(report, store, photos, new Sections(report), (stone, upright) =>
+  const panel = new StonePanel(report, store, { photos, tracks: new Tracks(report), sections: new Sections(report) }, (stone, upright) =>
     store.set({ profile: map.lineThrough(stone, upright) }));
   place.append(
     toolbar(report, store, shown, () => (store.get().view === "scene" && scene ? scene : map)),

@@ -171,6 +171,12 @@ test("of a run in doubt neither limits nor intervals are given", async () => {
   await page.waitForSelector(".profile .line");
   await page.click(".stone-list summary");
   await page.waitForSelector(".stone-list tbody tr");
+  await page.fill("#search", "4");
+  await page.waitForSelector(".tracks .note");
+  assert.match(await page.textContent(".tracks"), /do not measure this stone: too few photos/);
+  await page.fill("#search", "42");
+  await page.waitForSelector(".tracks .photo-dot");
+  assert.equal(await page.locator(".tracks .ellipse").count(), 0);
   const text = await page.textContent("#explore");
   for (const claim of ["\u00b1", "LoD", "95 %", "limit"]) assert.ok(!text.includes(claim), claim);
   assert.deepEqual(trouble, []);
@@ -250,6 +256,21 @@ for (const stones of [200, 10_000]) {
       await page.check("#aligned");
       await page.waitForFunction((d) => document.querySelector(".sections .section-dots.b").getAttribute("d") !== d, before);
       await page.uncheck("#aligned");
+    });
+
+    test("a stone shows the faces that were matched, and what clouds and photos say each alone", async () => {
+      await page.fill("#search", "42");
+      await page.waitForFunction(() => document.querySelectorAll(".tracks canvas[data-drawn='41']").length === 3);
+      for (const k of [1, 2]) assert.ok((await colours(page, `.tracks figure:nth-child(${k}) canvas`)) >= 4);
+      assert.equal(await page.locator(".tracks .photo-dot").count(), 12);
+      assert.equal(await page.locator(".tracks .ellipse").count(), 12 + 3);
+      assert.match(await page.textContent(".tracks table"), /clouds alone.*photos alone.*both/s);
+      await page.fill("#search", String(stones - 1));
+      await page.waitForSelector(".tracks table");
+      // A long wall shows pictures of some stones only, and numbers of all.
+      const pictures = await page.locator(".tracks canvas").count();
+      assert.equal(pictures, stones === 200 ? 3 : 0);
+      assert.equal((await page.textContent(".tracks")).includes("most conspicuous"), stones !== 200);
     });
 
     test("the list sorts, filters and leads to a stone", async () => {

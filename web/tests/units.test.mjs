@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { gzipSync } from "node:zlib";
 import { load } from "./load.mjs";
 
-const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, TABLE, movedBack } =
+const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, TABLE, frame, movedBack, readTracks } =
   await load(`
     export { Columns, unpack } from "./src/blocks.ts";
     export * from "./src/geometry.ts";
@@ -12,6 +12,7 @@ const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, m
     export { Store } from "./src/store.ts";
     export { TABLE } from "./src/texts.ts";
     export { movedBack } from "./src/views/sections.ts";
+    export { frame, readTracks } from "./src/views/tracks.ts";
   `);
 
 test("columns come out of base64 of gzip, and missing values are NaN", async () => {
@@ -109,4 +110,30 @@ test("moving back undoes the rotation and displacement of a stone", () => {
   const [, u, m] = moved([0, 0.12, -0.02]);
   const upright = movedBack([u, m], 1, { move, rotation });
   assert.ok(Math.hypot(upright[0] - 0.12, upright[1] + 0.02) < 5e-6);
+});
+
+test("a plot of shifts holds them, no motion and small ellipses, and cuts off a large one of the clouds", () => {
+  const shift = (at, sd) => ({ at, covariance: [sd * sd, 0, sd * sd] });
+  const shifts = [shift([0.004, 0.001], 0.0002), shift([-0.001, 0.002], 0.0002), null];
+  const near = frame(shifts, null, 300, 200, true), far = frame(shifts, shift([0, 0], 0.1), 300, 200, true);
+  for (const view of [near, far]) {
+    assert.ok(view.low[0] < -0.001 - 2.4 * 0.0002 && view.high[0] > 0.004 + 2.4 * 0.0002 && view.low[1] < 0 && view.high[1] > 0.002 + 2.4 * 0.0002);
+    assert.ok(Math.abs((view.high[0] - view.low[0]) * view.scale - 300) < 1e-9 && Math.abs((view.high[1] - view.low[1]) * view.scale - 200) < 1e-9);
+  }
+  assert.ok(far.scale > near.scale / 2.5, "a wide ellipse of the clouds does not make the shifts small");
+});
+
+test("tracked stones are unpacked with the shifts of their photos", () => {
+  const values = {
+    stone: [3, 8], shiftsEnd: [2, 2], edge: [0.3, NaN], photo1: [0, 0], photo2: [1, 0], later: [0, 1], photo: [0, 1], weight: [1, 0.5],
+    along: [0.001, 0.002], up: [0, -0.001], sdAlong: [0.001, 0.001], sdUp: [0.002, 0.002], correlation: [0, 0.5],
+  };
+  for (const stem of ["clouds", "photos", "both"]) {
+    for (const of of ["Along", "Up", "SdAlong", "SdUp", "Correlation"]) values[stem + of] = stem === "clouds" ? [0.5, NaN] : [0.25, 0.5];
+  }
+  const columns = { numbers: (name) => Float64Array.from(values[name]), integers: (name) => values[name] };
+  const tracked = readTracks(columns);
+  assert.deepEqual([tracked(3).place, tracked(8).place, tracked(4)], [0, -1, undefined]);
+  assert.deepEqual([tracked(8).clouds, tracked(8).single.length], [null, 0]);
+  assert.deepEqual(tracked(3).single[1], { at: [0.002, -0.001], covariance: [1e-6, 0.5 * 0.001 * 0.002, 4e-6], later: true, photo: 1, weight: 0.5 });
 });

@@ -1,10 +1,14 @@
 //! Where a run stands in its list of steps.
 
+use std::collections::BTreeSet;
+
 /// A list of steps, and the one at work.
 #[derive(Debug, Default)]
 pub struct Steps {
     names: Vec<String>,
     at: At,
+    /// Places of the steps that have ended.
+    ended: BTreeSet<usize>,
 }
 
 #[derive(Debug, Default)]
@@ -31,7 +35,7 @@ impl Steps {
     pub fn list(&mut self, names: &[String]) {
         *self = Self {
             names: names.to_vec(),
-            at: At::Nothing,
+            ..Self::default()
         };
     }
 
@@ -51,10 +55,12 @@ impl Steps {
         }
     }
 
-    /// A step, or a part of it, was done earlier; the step that this ends.
+    /// A step, or a part of it, was done earlier; the step that this ends. A step that has ended already is
+    /// only read again.
     pub fn take_over(&mut self, step: usize, now: f64) -> Option<Ended> {
         match self.at {
             At::Work(at, _) | At::TakenOver(at) if at == step => None,
+            _ if self.ended.contains(&step) => None,
             _ => {
                 let ended = self.end(now);
                 self.at = At::TakenOver(step);
@@ -70,6 +76,7 @@ impl Steps {
             At::Work(step, since) => (step, Some(now - since)),
             At::TakenOver(step) => (step, None),
         };
+        self.ended.insert(step);
         let step = self.named(step)?;
         Some(Ended { step, seconds })
     }
@@ -209,6 +216,20 @@ mod tests {
         // What was done in this run is not taken over, even if a later part was there.
         assert_eq!(steps.take_over(2, 4.0), None);
         assert_eq!(steps.end(4.0).unwrap().seconds, Some(1.0));
+    }
+
+    #[test]
+    fn a_step_that_is_read_again_by_a_later_one_does_not_end_twice() {
+        let mut steps = steps(&["clouds", "photos", "labels"]);
+        steps.enter(0, 0.0);
+        assert_eq!(steps.enter(1, 2.0).unwrap().seconds, Some(2.0));
+        assert_eq!(steps.take_over(0, 3.0), None);
+        assert_eq!(steps.present().unwrap(), "2/3 photos");
+        assert_eq!(steps.enter(2, 5.0).unwrap().seconds, Some(3.0));
+        // Another list begins anew.
+        steps.list(&["clouds".to_owned(), "photos".to_owned()]);
+        steps.enter(1, 6.0);
+        assert_eq!(steps.take_over(0, 7.0).unwrap().step, "2/2 photos");
     }
 
     #[test]

@@ -40,6 +40,9 @@ fn a_run_writes_every_result_and_resumes_to_the_same_bytes_with_any_number_of_th
         "evidence/crops_1_000.jpg",
         "evidence/sections_2.parquet",
         "evidence/cloud_2.parquet",
+        "evidence/tracks_2.parquet",
+        "evidence/track_shifts_2.parquet",
+        "evidence/tracks_2_000.jpg",
     ];
     for file in files {
         assert!(out.path().join(file).exists(), "{file} is missing");

@@ -75,6 +75,7 @@ fn the_same_verdict_stands_everywhere_and_decides_the_exit_code() {
     );
     assert_eq!(record["parameters"]["thresholds"]["alarm_mm"], 10.0);
     let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
+    let page = page.replace('\u{a0}', " ");
     assert!(page.contains(sentence) && page.contains("Ruhr &lt;River&gt; Authority"));
     let epoch = &verdict["epochs"][0];
     let stones = fs::read_to_string(out.path().join("stones.csv")).unwrap();

@@ -2,7 +2,7 @@
 //! appearance.
 #![allow(clippy::unwrap_used, clippy::panic)] // tests stop where something is missing
 
-use nalgebra::{Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::convert::Infallible;
@@ -12,7 +12,8 @@ use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::progress::Silent;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoParams, PhotoSource, PhotoStatus};
 use stonewise_core::registration::{
-    AdjustmentParams, AdjustmentReport, MemoryPairs, PairPoints, adjust, adjust_with_photos,
+    AdjustmentParams, AdjustmentReport, FaceShift, MemoryPairs, PairPoints, PhotoReport, adjust,
+    adjust_with_photos,
 };
 use stonewise_core::statistics::split_mix;
 
@@ -25,6 +26,8 @@ const JOINT_M: f64 = 0.02;
 /// The stone that slid, and the one whose face changed.
 const SLID: usize = 20;
 const STAINED: usize = 29;
+/// Edge of the pictures of matched faces.
+const PICTURE_PX: usize = 32;
 
 fn centre(k: usize) -> Point3<f64> {
     Point3::new(
@@ -103,6 +106,10 @@ impl PhotoSource<Infallible> for Drawn {
 
     fn params(&self) -> &PhotoParams {
         &self.params
+    }
+
+    fn picture_px(&self) -> usize {
+        PICTURE_PX
     }
 
     fn load(&self, batch: usize) -> Result<Vec<Vec<Chip>>, Infallible> {
@@ -244,6 +251,7 @@ fn photos_find_a_slide_that_noisy_points_do_not_show() {
         .filter(|s| s.status == PhotoStatus::Tracked)
         .count();
     assert!(tracked >= COLUMNS * ROWS - 2, "{tracked}: {part:?}");
+    check_evidence(part, &photos.photos);
     let [before, after] = [&clouds, &both].map(errors);
     assert!(after[SLID].norm() < 0.001, "{:?} {:?}", before[SLID], after[SLID]);
     assert!(
@@ -264,6 +272,55 @@ fn photos_find_a_slide_that_noisy_points_do_not_show() {
     }
 }
 
+/// Length of a shift's error in standard deviations of its covariance.
+fn deviations(shift: &FaceShift, truth: [f64; 2]) -> f64 {
+    let [aa, au, uu] = shift.covariance_m2;
+    let error = Vector2::from(shift.shift_m) - Vector2::from(truth);
+    let inverse = Matrix2::new(aa, au, au, uu).try_inverse().unwrap();
+    error.dot(&(inverse * error)).sqrt()
+}
+
+/// What clouds and each photo say is near the truth, and the pictures are there.
+fn check_evidence(part: &PhotoReport, photos: &[Photo]) {
+    let tracked = part.evidence.iter().enumerate();
+    for (k, evidence) in tracked.filter_map(|(k, e)| Some((k, e.as_ref()?))) {
+        // The wall is seen from +x: along is +y, up is +z. The common part of the photos is the clouds'.
+        let truth = [motion(k).y, motion(k).z];
+        let (clouds, together) = (evidence.clouds.unwrap(), evidence.photos.unwrap());
+        assert!(deviations(&clouds, truth) < 4.5, "{k}: {clouds:?}");
+        let error = Vector2::from(together.shift_m) - Vector2::from(truth);
+        assert!(error.norm() < 0.0015, "{k}: {together:?}");
+        // A pixel is 3 mm; one photo shows a shift to a third of it at worst.
+        for shift in &evidence.shifts {
+            let moved = if shift.epoch == 1 {
+                together.shift_m
+            } else {
+                [0.0; 2]
+            };
+            let apart = Vector2::from(shift.shift.shift_m) - Vector2::from(moved);
+            assert!(apart.norm() < 0.001, "{k}: {shift:?}");
+        }
+        let counts = [0, 1].map(|epoch| evidence.shifts.iter().filter(|s| s.epoch == epoch).count());
+        assert_eq!(counts, part.stones[k].photos);
+        let pictures = evidence.pictures.as_ref().unwrap();
+        assert_eq!(pictures.photos.map(|p| photos[p].epoch), [0, 1]);
+        assert_eq!(
+            pictures.grey.each_ref().map(Vec::len),
+            [PICTURE_PX * PICTURE_PX; 2]
+        );
+    }
+}
+
+/// How much of the local contrast of a stone's face changed between its pictures.
+fn change(part: &PhotoReport, k: usize) -> Option<f64> {
+    let pictures = part.evidence[k].as_ref()?.pictures.as_ref()?;
+    let squares = pictures
+        .difference
+        .iter()
+        .map(|d| (f64::from(*d) - 128.0).powi(2));
+    Some(squares.sum::<f64>().sqrt())
+}
+
 #[test]
 fn a_face_that_changed_is_not_called_loose() {
     let (pairs, params) = (pairs(), AdjustmentParams::default());
@@ -280,6 +337,15 @@ fn a_face_that_changed_is_not_called_loose() {
             error < 0.0015,
             "{stain}: {error} {:?}",
             both.photos.unwrap().stones[STAINED]
+        );
+        // Moss shows in the difference of the face that it grew on, if that was matched, and not in others'.
+        let part = both.photos.unwrap();
+        let mut all: Vec<f64> = (0..COLUMNS * ROWS).filter_map(|k| change(&part, k)).collect();
+        all.sort_by(f64::total_cmp);
+        let of_stained = change(&part, STAINED);
+        assert!(
+            stain > 0.5 || of_stained > Some(1.5 * all[all.len() / 2]),
+            "{of_stained:?} {all:?}"
         );
     }
 }

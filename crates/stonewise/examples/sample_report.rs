@@ -17,11 +17,13 @@ use stonewise::results::records::{
     RegistrationRecord, RunRecord, StepTime, Timestamp,
 };
 use stonewise::results::{
-    Crop, Cut, PosedPhoto, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint, crop_side_px,
-    detection_limit_m, write_cameras, write_crops, write_outlines, write_sections, write_stones,
-    write_thin_cloud,
+    Crop, Cut, PosedPhoto, RowMotion, SectionPoint, Status, StoneOutline, StoneRow, ThinPoint, Tracks,
+    crop_side_px, detection_limit_m, most_pictured, track_side_px, write_cameras, write_crops,
+    write_outlines, write_sections, write_stones, write_thin_cloud, write_tracks,
 };
 use stonewise_core::geometry::FaceFrame;
+use stonewise_core::registration::photos::FacePictures;
+use stonewise_core::registration::{FaceShift, PhotoShift, StoneEvidence};
 
 /// Size of a stone with its joint, metres.
 const PITCH_M: [f64; 2] = [0.42, 0.26];
@@ -212,6 +214,7 @@ impl Wall {
             }
         }
         write_sections(dir, 2, &sections)?;
+        write_tracks(dir, 2, &self.tracks(stones))?;
         for epoch in [1, 2] {
             let (crops, tiles): (Vec<Crop>, Vec<_>) = (0..stones).map(|i| self.crop(i, epoch, side)).unzip();
             write_crops(dir, epoch, side, &crops, &tiles)?;
@@ -219,6 +222,43 @@ impl Wall {
             write_cameras(dir, epoch, &self.cameras())?;
         }
         Ok(())
+    }
+
+    /// What photos show of every stone but each eleventh; pictures of as many as a run would show.
+    fn tracks(&self, stones: usize) -> Tracks {
+        let side = track_side_px(stones);
+        let shift = |at: [f64; 2], sd: f64| FaceShift {
+            shift_m: at,
+            covariance_m2: [sd * sd, 0.3 * sd * sd, 1.5 * sd * sd],
+        };
+        let evidence = |i: usize| {
+            let d = self.motion(self.place(i), i);
+            let photo = |k: usize| {
+                let epoch = k / 6;
+                let at = |axis: usize| d[axis] * epoch as f64 + 2.0 * noise(i * 12 + k, 12 + axis as u64);
+                PhotoShift {
+                    photo: k,
+                    epoch,
+                    shift: shift([at(0), at(1)], 0.0004),
+                    weight: if k == 9 { 0.2 } else { 1.0 },
+                }
+            };
+            StoneEvidence {
+                place: [0.01, -0.01],
+                clouds: Some(shift([d.x + noise(i, 14), d.y + noise(i, 15)], 0.003)),
+                photos: Some(shift([d.x, d.y], 0.0006)),
+                both: Some(shift([d.x, d.y], 0.0005)),
+                shifts: (0..12).map(photo).collect(),
+                pictures: (i < most_pictured(side)).then(|| pictures(i, side as usize)),
+            }
+        };
+        Tracks {
+            photos: (0..12).map(|k| format!("<script>{k}.jpg")).collect(),
+            stones: (0..stones)
+                .filter(|i| i % 11 != 3 && i % 23 != 7)
+                .map(|i| (i as u32 + 1, evidence(i)))
+                .collect(),
+        }
     }
 
     /// A grey stone in dark joints, a little lighter in the second epoch.
@@ -411,7 +451,10 @@ fn unconverged() -> serde_json::Value {
         "estimator": "adjustment", "converged": false, "iterations": 30, "noise_m": [0.002, 0.002], "roughness_m": null,
         "surface_cell_m": null, "correlation_factor": null, "common_motion_m": [0.0, 0.0, 0.0],
         "common_motion_covariance_m2": [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], "loose": 2, "breaks": [],
-        "variance_components": { "drift": [0.0, 0.0], "bending_per_m": 0.0, "error_m": 0.0, "own_m": 0.0, "own_rad": 0.0, "strain": [0.0, 0.0] }
+        "variance_components": { "drift": [0.0, 0.0], "bending_per_m": 0.0, "error_m": 0.0, "own_m": 0.0, "own_rad": 0.0, "strain": [0.0, 0.0] },
+        "photos": { "statuses": { "few_photos": 1 }, "sigma_factor": 1.0, "appearance_m": 0.0, "poses_px": [], "stones": [
+            { "stone_id": 4, "status": "few_photos", "photos": [1, 3], "correlation": 0.7, "shift_m": null, "sd_m": null }
+        ] }
     })
 }
 
@@ -420,5 +463,33 @@ fn input(path: &str) -> InputRecord {
         path: path.into(),
         bytes: 123_456,
         blake3: String::new(),
+    }
+}
+
+/// Rough rock in both epochs, with a spot in the second.
+fn pictures(i: usize, side_px: usize) -> FacePictures {
+    let grey = |epoch: usize| -> Vec<u8> {
+        let value = |k: usize| {
+            let (x, y) = (
+                (k % side_px) as f64 / side_px as f64,
+                (k / side_px) as f64 / side_px as f64,
+            );
+            let spot = if epoch == 1 && (x - 0.6).hypot(y - 0.4) < 0.15 {
+                40.0
+            } else {
+                0.0
+            };
+            (130.0 + noise(k / 2 + i * 13, 16) * 4e4 + spot).clamp(0.0, 255.0) as u8
+        };
+        (0..side_px * side_px).map(value).collect()
+    };
+    let grey = [grey(0), grey(1)];
+    let changed = |(a, b): (&u8, &u8)| (128.0 + 0.5 * (f64::from(*b) - f64::from(*a))) as u8;
+    FacePictures {
+        photos: [1, 8],
+        side_px,
+        edge_m: 0.4,
+        difference: grey[0].iter().zip(&grey[1]).map(changed).collect(),
+        grey,
     }
 }

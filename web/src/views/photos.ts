@@ -1,8 +1,8 @@
 // Photo crops of a stone in both epochs, rectified to its face, with the outline of its mask.
 
-import { fromBase64, type Columns } from "../blocks.ts";
+import type { Columns } from "../blocks.ts";
 import type { CropDocument, Report } from "../data.ts";
-import { el } from "../dom.ts";
+import { el, embedded } from "../dom.ts";
 import { fixed } from "../format.ts";
 import { t } from "../texts.ts";
 
@@ -155,16 +155,7 @@ export class Photos {
 
   /** A picture of crops, decoded once. */
   #picture(crops: Epoch, epoch: 0 | 1, number: number): Promise<HTMLImageElement> {
-    return (crops.pictures[number] ??= (async () => {
-      const element = document.getElementById(`crops-${epoch + 1}-${number}`);
-      const url = URL.createObjectURL(new Blob([fromBase64(element?.textContent ?? "")], { type: "image/jpeg" }));
-      element?.remove();
-      const picture = new Image();
-      picture.src = url;
-      await picture.decode();
-      URL.revokeObjectURL(url);
-      return picture;
-    })());
+    return (crops.pictures[number] ??= embedded(`crops-${epoch + 1}-${number}`));
   }
 }
 

@@ -8,6 +8,7 @@ import type { Store } from "../store.ts";
 import { t } from "../texts.ts";
 import type { Photos } from "./photos.ts";
 import type { Sections } from "./sections.ts";
+import type { Tracks } from "./tracks.ts";
 
 /** 95 % quantile of chi-square with three degrees of freedom: the ellipsoid that the significance test is made of. */
 const CHI2_3_95 = 7.814727903251179;
@@ -16,6 +17,13 @@ const QUANTILE = 1.96;
 const NEIGHBOURS = 8;
 const AXES = [t("along"), t("up"), t("out")] as const;
 
+/** Cards that unpack what they show. */
+export interface Cards {
+  readonly photos: Photos;
+  readonly tracks: Tracks;
+  readonly sections: Sections;
+}
+
 /** The panel of the chosen stone. */
 export class StonePanel {
   readonly element: HTMLElement;
@@ -23,8 +31,7 @@ export class StonePanel {
   readonly announcer = el("p", { class: "announcer", role: "status" });
   readonly #report: Report;
   readonly #store: Store;
-  readonly #photos: Photos;
-  readonly #sections: Sections;
+  readonly #cards: Cards;
   /** Stones in the order of the buttons: those that moved by size, then those above their limit by size, then the rest by id. */
   readonly #order: readonly number[];
   readonly #lineThrough: (stone: number, upright: boolean) => void;
@@ -32,14 +39,12 @@ export class StonePanel {
   constructor(
     report: Report,
     store: Store,
-    photos: Photos,
-    sections: Sections,
+    cards: Cards,
     lineThrough: (stone: number, upright: boolean) => void,
   ) {
     this.#report = report;
     this.#store = store;
-    this.#photos = photos;
-    this.#sections = sections;
+    this.#cards = cards;
     this.#lineThrough = lineThrough;
     this.#order = byMotion(report.stones);
     this.element = el("div", { class: "stone-panel", role: "region", tabindex: 0, "aria-label": t("panelName") });
@@ -59,7 +64,8 @@ export class StonePanel {
     const { stones } = this.#report;
     const parts: (Node | null)[] = [this.#head(stone)];
     const measured = isMeasured(stones, stone);
-    parts.push(measured ? this.#numbers(stone) : this.#failure(stone), this.#photos.of(stone), this.#sections.of(stone));
+    parts.push(measured ? this.#numbers(stone) : this.#failure(stone), this.#cards.photos.of(stone),
+      this.#cards.tracks.of(stone), this.#cards.sections.of(stone));
     if (measured && this.#report.document.sound) parts.push(this.#ellipsoid(stone));
     parts.push(this.#neighbours(stone), this.#quality(stone));
     this.element.replaceChildren(...parts.filter((part) => part !== null));

@@ -11,8 +11,8 @@ pub mod photos;
 pub(crate) mod points;
 
 pub use adjustment::{
-    AdjustError, AdjustmentParams, AdjustmentReport, Break, PhotoReport, StonePhotoReport,
-    VarianceComponents, adjust, adjust_with_photos,
+    AdjustError, AdjustmentParams, AdjustmentReport, Break, FaceShift, PhotoReport, PhotoShift,
+    StoneEvidence, StonePhotoReport, VarianceComponents, adjust, adjust_with_photos,
 };
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;

@@ -8,13 +8,16 @@ use super::column::Values;
 use super::{Column, Table, TableError};
 use crate::atomic::write_atomically;
 
-/// Writes `NAME.csv-metadata.json` beside `NAME.csv`.
+/// Writes `NAME.csv-metadata.json` beside `NAME.csv`, for the columns of `table`; it may have no rows.
+///
+/// `description`: what the file as a whole holds. `primary_key`: the column that identifies a row, if there
+/// is one.
 ///
 /// Source: Tennison & Kellogg 2015, "Metadata Vocabulary for Tabular Data"; units as schema.org's `unitText`.
 ///
 /// # Errors
 /// The file cannot be written.
-pub(super) fn write_csv_metadata(
+pub fn write_csv_metadata(
     csv: &Path,
     table: &Table,
     description: &str,

@@ -10,6 +10,7 @@ mod table_type;
 
 pub use column::{Cell, Column};
 pub use csv::write_csv;
+pub use csv_metadata::write_csv_metadata;
 pub use error::TableError;
 pub use parquet_read::{read_columns, read_metadata, read_parquet};
 pub use parquet_write::write_parquet;

@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stonewise_io::atomic::write_atomically;
+use stonewise_io::table::{Table, write_csv_metadata};
 
 /// A CSV that grows by a row at a time; its first column is the step.
 pub struct Curve {
@@ -14,11 +15,13 @@ pub struct Curve {
 
 impl Curve {
     /// Opens the curve of a training that has come to `steps`: rows of later steps, which will be done again,
-    /// are removed.
+    /// are removed. Units and meanings of the columns go into a file beside it.
+    ///
+    /// `columns`: what the curve holds, without rows. `description`: the same in a sentence.
     ///
     /// # Errors
-    /// The file cannot be read or written.
-    pub fn open(path: &Path, header: &str, steps: u64) -> Result<Self, TrainError> {
+    /// A file cannot be read or written.
+    pub fn open(path: &Path, columns: &Table, description: &str, steps: u64) -> Result<Self, TrainError> {
         let old = match std::fs::read_to_string(path) {
             Ok(text) if steps > 0 => text,
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -26,7 +29,8 @@ impl Curve {
             }
             _ => String::new(),
         };
-        let mut text = format!("{header}\n");
+        let names: Vec<&str> = columns.names().collect();
+        let mut text = format!("{}\n", names.join(","));
         for row in old.lines().skip(1) {
             let step = row.split(',').next().and_then(|s| s.parse::<u64>().ok());
             if step.is_some_and(|step| step <= steps) {
@@ -35,6 +39,7 @@ impl Curve {
         }
         write_atomically(path, |partial| std::fs::write(partial, text))
             .map_err(TrainError::io("writing the curve", path))?;
+        write_csv_metadata(path, columns, description, Some("step"))?;
         let file = OpenOptions::new().append(true).open(path);
         Ok(Self {
             path: path.to_owned(),
@@ -76,12 +81,19 @@ mod tests {
     fn a_resumed_curve_has_no_row_twice() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("loss.csv");
-        let mut curve = Curve::open(&path, "step,loss", 0).unwrap();
+        let mut columns = Table::new();
+        columns.push("step", "", "steps done", Vec::<u64>::new()).unwrap();
+        columns
+            .push("loss", "", "sum of all losses", Vec::<f64>::new())
+            .unwrap();
+        let mut curve = Curve::open(&path, &columns, "losses", 0).unwrap();
         for step in 1..=4 {
             curve.add(step, &[step as f64 / 2.0]).unwrap();
         }
-        let mut curve = Curve::open(&path, "step,loss", 2).unwrap();
+        let mut curve = Curve::open(&path, &columns, "losses", 2).unwrap();
         curve.add(3, &[9.0]).unwrap();
         assert_eq!(read_curve(&path).unwrap(), [[1.0, 0.5], [2.0, 1.0], [3.0, 9.0]]);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("step,loss\n"), "{text}");
     }
 }

@@ -39,6 +39,9 @@ pub enum TrainError {
         /// The system's answer.
         source: std::io::Error,
     },
+    /// A table could not be written.
+    #[error(transparent)]
+    Table(#[from] stonewise_io::table::TableError),
     /// The weights could not be read or written.
     #[error(transparent)]
     Weights(#[from] crate::model::WeightsError),

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod curve;
+mod curve_columns;
 mod error;
 mod optimizer;
 mod parameters;

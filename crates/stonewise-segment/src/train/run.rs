@@ -2,6 +2,7 @@
 
 use super::checkpoint::checkpoint_path;
 use super::curve::Curve;
+use super::curve_columns::{LOSS_DESCRIPTION, VALIDATION_DESCRIPTION, loss_columns, validation_columns};
 use super::error::TrainError;
 use super::plot::draw_curves;
 use super::source::{Prefetch, SampleSource};
@@ -163,12 +164,10 @@ struct Curves {
 
 impl Curves {
     fn open(out: &Path, steps: u64) -> Result<Self, TrainError> {
-        let losses = StepFigures::LOSSES.join(",");
-        let loss = format!("step,seconds,learning_rate,gradient_norm,waited_s,{losses},total");
-        let validation = "step,seconds,precision,recall,f1,mean_iou,ap50,ap";
+        let (loss, validation) = (loss_columns()?, validation_columns()?);
         Ok(Self {
-            loss: Curve::open(&out.join(LOSS), &loss, steps)?,
-            validation: Curve::open(&out.join(VALIDATION), validation, steps)?,
+            loss: Curve::open(&out.join(LOSS), &loss, LOSS_DESCRIPTION, steps)?,
+            validation: Curve::open(&out.join(VALIDATION), &validation, VALIDATION_DESCRIPTION, steps)?,
         })
     }
 

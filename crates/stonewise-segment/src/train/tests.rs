@@ -105,6 +105,21 @@ fn a_training_in_two_runs_is_the_training_in_one() {
     };
     assert_eq!(steps(whole.path()).len(), 6);
     assert_eq!(steps(whole.path()), steps(parts.path()));
+    // Every column has a meaning, and times have a unit.
+    for name in ["loss", "validation"] {
+        let csv = std::fs::read_to_string(parts.path().join(format!("{name}.csv"))).unwrap();
+        let metadata = std::fs::read(parts.path().join(format!("{name}.csv-metadata.json"))).unwrap();
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata).unwrap();
+        let columns = metadata["tableSchema"]["columns"].as_array().unwrap();
+        let names: Vec<&str> = columns.iter().filter_map(|c| c["name"].as_str()).collect();
+        assert_eq!(csv.lines().next(), Some(names.join(",").as_str()));
+        assert!(
+            columns
+                .iter()
+                .all(|c| !c["dc:description"].as_str().unwrap().is_empty())
+        );
+        assert_eq!(columns[1]["schema:unitText"], "s");
+    }
 }
 
 #[test]

@@ -32,7 +32,16 @@ const EXTENSIONS: [&str; 11] = [
     "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png",
 ];
 /// Excerpts of the survey, without the numbers of epochs and pictures.
-const EVIDENCE: [&str; 6] = ["crops", "crop_outlines", "sections", "cloud", "cameras", "logo"];
+const EVIDENCE: [&str; 8] = [
+    "crops",
+    "crop_outlines",
+    "sections",
+    "tracks",
+    "track_shifts",
+    "cloud",
+    "cameras",
+    "logo",
+];
 
 /// Folders in an output folder that a run of the project writes into.
 pub(super) fn result_folders(project: &Project) -> Vec<PathBuf> {

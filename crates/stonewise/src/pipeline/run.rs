@@ -13,7 +13,7 @@ use crate::pipeline::outputs::carried::write_carry_audit;
 use crate::pipeline::outputs::clouds::write_clouds;
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::edits::{tell_steps, write_edits_audit};
-use crate::pipeline::outputs::evidence::write_evidence;
+use crate::pipeline::outputs::evidence::{write_evidence, write_tracked_stones};
 use crate::pipeline::outputs::face_cloud::write_face_cloud;
 use crate::pipeline::outputs::m3c2::write_m3c2;
 use crate::pipeline::outputs::outlines::write_stone_outlines;
@@ -348,6 +348,9 @@ fn measure(
         &rows,
     );
     write_stones(&context.out, pair, &rows)?;
+    if until == Until::Reported {
+        write_tracked_stones(context, number, first, &registered, &datum, &rows)?;
+    }
     let record = RegistrationRecord {
         estimator: registered.estimator,
         datum: datum.clone(),

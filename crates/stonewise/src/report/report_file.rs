@@ -326,7 +326,7 @@ mod tests {
         let html = settled(&[], &crate::ReportParams::default());
         assert!(
             html.contains("<div class=\"verdict fine\"")
-                && html.contains("Fine: no motion is shown; detection limit: 1.4 mm (median)")
+                && html.contains("Fine: no motion is shown; detection limit: 1.4\u{a0}mm (median)")
         );
         assert!(!html.contains("<p class=\"hedge\">"));
         assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)"));

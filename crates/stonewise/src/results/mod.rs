@@ -24,8 +24,8 @@ pub(crate) use columns::column;
 pub use columns::{STONE_COLUMNS, StoneColumn};
 pub(crate) use comparison::{Comparison, compare};
 pub use evidence::{
-    Crop, Cut, Evidence, Logo, PosedPhoto, SectionPoint, ThinPoint, crop_side_px, write_cameras, write_crops,
-    write_logo, write_sections, write_thin_cloud,
+    Crop, Cut, Evidence, Logo, PosedPhoto, SectionPoint, ThinPoint, Tracks, crop_side_px, most_pictured,
+    track_side_px, write_cameras, write_crops, write_logo, write_sections, write_thin_cloud, write_tracks,
 };
 pub use facade::Facade;
 pub use joints::{Joint, JointMotion, joints};

@@ -30,5 +30,5 @@ mod tracking;
 pub use adjust::{adjust, adjust_with_photos};
 pub use error::AdjustError;
 pub use field::VarianceComponents;
-pub use observation::photo::{PhotoReport, StonePhotoReport};
+pub use observation::photo::{FaceShift, PhotoReport, PhotoShift, StoneEvidence, StonePhotoReport};
 pub use params::{AdjustmentParams, AdjustmentReport, Break};

@@ -59,6 +59,7 @@ pub(crate) fn report(
     let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
     AdjustmentReport {
         loose: results.iter().filter(is_loose).count(),
+        photos: adjustment.photo_report(&results),
         results,
         sigma_m: adjustment.surface.noise.sigma_m,
         roughness_m: adjustment.surface.noise.tau_m,
@@ -71,7 +72,6 @@ pub(crate) fn report(
         converged,
         breaks,
         neighbours,
-        photos: adjustment.photo_report(),
     }
 }
 

@@ -1,16 +1,19 @@
 //! Stones tracked in the photos from where the clouds put them.
 
-use super::candidate::Moving;
+use super::candidate::{CandidateMotion, Moving};
 use super::error::AdjustError;
 use super::field::{LEAST_APPEARANCE_M, Prediction, START_APPEARANCE_M, log_odds_of_loose, posterior};
 use super::observation::NormalEquations;
-use super::observation::photo::{CloudMotion, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos};
+use super::observation::photo::{
+    CloudMotion, FaceShift, PhotoModel, PhotoReport, StoneInPhotos, StonePhotos,
+};
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
 use crate::progress::Progress;
 use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
 use crate::registration::points::PairSource;
+use crate::stone::PairResult;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -71,6 +74,7 @@ impl Adjustment {
                         photos: photos.photos(),
                         chips,
                         params: photos.params(),
+                        picture_px: photos.picture_px(),
                     };
                     tracker.track()
                 })
@@ -184,11 +188,20 @@ impl Adjustment {
         })
     }
 
-    /// What photos contributed.
-    pub fn photo_report(&self) -> Option<PhotoReport> {
+    /// What photos contributed; `results`: of all stones, in their order.
+    pub fn photo_report(&self, results: &[PairResult]) -> Option<PhotoReport> {
         let photos = self.photos.as_ref()?;
         let moving: Vec<Moving> = self.stones.iter().map(StoneState::moving).collect();
-        Some(photos.report(self.components.appearance_m(), &moving))
+        let mut report = photos.report(self.components.appearance_m(), &moving);
+        for (i, evidence) in report.evidence.iter_mut().enumerate() {
+            if let Some(evidence) = evidence {
+                evidence.clouds = self.shift_by_clouds(i, evidence.place);
+                let motion = results.get(i).and_then(|r| r.motion.as_ref().ok());
+                let face_from_world = &self.graph.nodes[i].face_from_world;
+                evidence.both = motion.and_then(|m| FaceShift::of_motion(m, face_from_world, evidence.place));
+            }
+        }
+        Some(report)
     }
 
     fn stones_in_photos(&self, place: impl Fn(usize) -> [f64; 2]) -> Vec<StoneInPhotos> {
@@ -200,9 +213,27 @@ impl Adjustment {
         self.graph.nodes.iter().enumerate().map(of_stone).collect()
     }
 
+    /// The displacement in the face by the stone's own points alone, about the motion that it more probably
+    /// made.
+    fn shift_by_clouds(&self, i: usize, place: [f64; 2]) -> Option<FaceShift> {
+        let by_clouds = self.cloud_motion_about(i, self.stones[i].more_probable(), place)?;
+        let covariance = by_clouds.covariance.fixed_view::<2, 2>(0, 0).into_owned();
+        FaceShift::new(&by_clouds.mean.xy(), &covariance)
+    }
+
     /// The displacement of a place on a stone's face by its own points alone; `None` where they show none.
     pub fn cloud_motion(&self, i: usize, place: [f64; 2]) -> Option<CloudMotion> {
-        let equations = self.observed_by_clouds(i, &self.stones[i].with_field, self.components.error_m);
+        self.cloud_motion_about(i, &self.stones[i].with_field, place)
+    }
+
+    /// The same about one of the stone's motions.
+    fn cloud_motion_about(
+        &self,
+        i: usize,
+        candidate: &CandidateMotion,
+        place: [f64; 2],
+    ) -> Option<CloudMotion> {
+        let equations = self.observed_by_clouds(i, candidate, self.components.error_m);
         if equations.information.trace() <= 0.0 {
             return None;
         }

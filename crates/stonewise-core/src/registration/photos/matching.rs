@@ -65,7 +65,7 @@ impl Warp {
         }
     }
 
-    fn at(&self, d: Vector2<f64>) -> Vector2<f64> {
+    pub(super) fn at(&self, d: Vector2<f64>) -> Vector2<f64> {
         self.matrix * d + self.shift
     }
 

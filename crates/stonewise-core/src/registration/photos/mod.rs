@@ -9,6 +9,7 @@ mod matching;
 mod params;
 mod patch;
 mod photo;
+mod pictures;
 mod search;
 mod surface;
 mod template;
@@ -20,6 +21,7 @@ mod verify;
 pub use params::PhotoParams;
 pub(crate) use patch::FaceMotion;
 pub use photo::{Chip, Photo, PhotoCamera};
+pub use pictures::FacePictures;
 pub use track::PhotoStatus;
 pub(crate) use track::{Sight, Track, Tracker};
 
@@ -29,6 +31,10 @@ pub trait PhotoSource<E>: Sync {
     fn photos(&self) -> &[Photo];
     /// How stones are tracked.
     fn params(&self) -> &PhotoParams;
+    /// Edge of the pictures that are kept of each tracked stone, pixels; none are kept where it is zero.
+    fn picture_px(&self) -> usize {
+        0
+    }
     /// The chips of each pair of a batch, in the order of the pairs.
     ///
     /// # Errors

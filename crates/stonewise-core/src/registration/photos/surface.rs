@@ -98,6 +98,14 @@ impl Surface {
         ]
     }
 
+    /// The cell that holds a place; `None` outside.
+    pub fn cell_at(&self, place: [f64; 2]) -> Option<usize> {
+        let [column, row] = [0, 1].map(|axis| ((place[axis] - self.first[axis]) / self.cell_m).round());
+        let is_on = |v: f64, size: usize| v >= 0.0 && v < size as f64;
+        (is_on(column, self.columns) && is_on(row, self.rows))
+            .then(|| row as usize * self.columns + column as usize)
+    }
+
     fn centre(&mut self) -> Option<()> {
         let places: Vec<[f64; 2]> = (0..self.inside.len())
             .filter(|&k| self.inside[k])

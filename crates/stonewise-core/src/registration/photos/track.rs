@@ -4,6 +4,7 @@ use super::matching::{Match, Template, Warp};
 use super::params::{OTHER_WINDOW, PhotoParams};
 use super::patch::{FaceMotion, Patch, Placed, normalised};
 use super::photo::{Chip, Photo};
+use super::pictures::{FacePictures, Shown, pictures};
 use super::surface::Surface;
 use super::template::{Face, Mean, median_shift};
 use super::verify::{Verification, is_beyond_chance};
@@ -59,6 +60,8 @@ pub(crate) struct Track {
     pub apart_m: [f64; 2],
     /// The motion about which patches of the second epoch were taken.
     pub start: FaceMotion,
+    /// What was matched, if pictures are wanted.
+    pub pictures: Option<FacePictures>,
 }
 
 /// A stone to be tracked.
@@ -72,6 +75,8 @@ pub(crate) struct Tracker<'a> {
     pub photos: &'a [Photo],
     pub chips: &'a [Chip],
     pub params: &'a PhotoParams,
+    /// Edge of the pictures to be kept, pixels; zero for none.
+    pub picture_px: usize,
 }
 
 /// The second epoch's photos of a stone.
@@ -92,6 +97,7 @@ impl Tracker<'_> {
             place: [0.0; 2],
             apart_m: [0.0; 2],
             start: self.start,
+            pictures: None,
         };
         if let Err(status) = self.run(&mut track) {
             track.status = status;
@@ -136,7 +142,34 @@ impl Tracker<'_> {
                 );
             }
         }
+        let best = [
+            self.best(&chips[0], &first, &before, &mean.matches),
+            self.best(&chips[1], &second.grey, &second.patches, &second.matches),
+        ];
+        if let [Some(first), Some(second)] = best {
+            let rim_m = self.params.rim_m;
+            track.pictures = pictures(&face.surface, [first, second], self.picture_px, rim_m);
+        }
         Ok(())
+    }
+
+    /// The photo of an epoch that correlates best with the template.
+    fn best<'p>(
+        &self,
+        chips: &[&Chip],
+        grey: &'p [Vec<Option<f32>>],
+        patches: &'p [Patch],
+        matches: &'p [Option<Match>],
+    ) -> Option<Shown<'p>> {
+        let shown = (0..chips.len()).filter_map(|i| {
+            Some(Shown {
+                photo: chips[i].photo as usize,
+                grey: &grey[i],
+                patch: &patches[i],
+                found: matches[i].as_ref()?,
+            })
+        });
+        shown.max_by(|a, b| a.found.correlation.total_cmp(&b.found.correlation))
     }
 
     fn chips_by_epoch(&self) -> Result<[Vec<&Chip>; 2], PhotoStatus> {

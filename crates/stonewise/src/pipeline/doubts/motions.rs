@@ -107,6 +107,7 @@ mod tests {
             epoch_errors: None,
             error_stones: Vec::new(),
             off_wall: Vec::new(),
+            folder: std::path::PathBuf::new(),
         }
     }
 

@@ -7,6 +7,7 @@
 use super::block::Block;
 use super::excerpts;
 use super::pair::{epoch_names, known_translation_mm};
+use super::tracked;
 use crate::error::Error;
 use crate::figure::{colours, nice_above};
 use crate::report::summary::Summary;
@@ -47,8 +48,9 @@ pub(super) fn data(
         ("change", change(results)),
     ];
     blocks.extend(excerpts::blocks(results, &origin(results)));
+    blocks.extend(tracked::block(results).map(|block| ("tracks", block)));
     let mut lists = Map::new();
-    let mut texts = excerpts::pictures(results);
+    let mut texts = excerpts::pictures(results) + &tracked::pictures(results);
     for (name, block) in blocks {
         let (columns, text) = block
             .finish()
@@ -101,6 +103,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         "blocks": blocks,
         "cameras": excerpts::cameras(results, &origin(results)),
         "crops": excerpts::crops(results),
+        "tracks": tracked::layout(results),
     })
 }
 

@@ -1,7 +1,7 @@
 //! The first page: the verdict, who measured what and when, what was not measured, what to look at first, a
 //! place to sign.
 
-use super::html::table;
+use super::html::{table, with_units};
 use super::maps::motion_map;
 use crate::figure::{count, escape};
 use crate::report::summary::Summary;
@@ -44,7 +44,7 @@ pub(super) fn verdict(facts: &Summary) -> String {
     format!(
         "<div class=\"verdict {class}\" role=\"status\"><span class=\"light\" aria-hidden=\"true\">{}</span><p>{}</p></div>",
         lamps.concat(),
-        escape(&facts.verdict.sentence)
+        escape(&with_units(&facts.verdict.sentence))
     )
 }
 

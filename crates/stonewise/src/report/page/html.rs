@@ -60,6 +60,21 @@ pub(super) fn with_decimals(page: String, mark: &str) -> String {
     out
 }
 
+/// A text whose numbers and units stay in one line.
+pub(super) fn with_units(text: &str) -> String {
+    const UNITS: [&str; 5] = ["mm", "cm", "m", "s", "%"];
+    let mut out = String::with_capacity(text.len());
+    for (i, word) in text.split(' ').enumerate() {
+        let bare = word.trim_end_matches(|c: char| !c.is_alphanumeric() && c != '%');
+        let is_unit = UNITS.contains(&bare) && out.ends_with(|c: char| c.is_ascii_digit());
+        if i > 0 {
+            out.push(if is_unit { '\u{a0}' } else { ' ' });
+        }
+        out.push_str(word);
+    }
+    out
+}
+
 /// A section with its heading.
 pub(super) fn section(id: &str, title: &str, body: &str) -> String {
     format!(
@@ -76,6 +91,18 @@ pub(super) fn details(title: &str, body: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_stays_beside_its_unit() {
+        let text = "moved by 30.3 mm (95 % interval 29.4 to 31.1 mm), 5 mm; 2,0 mm (90. Perzentil), 3 m up";
+        let kept = with_units(text);
+        assert_eq!(
+            kept,
+            "moved by 30.3\u{a0}mm (95\u{a0}% interval 29.4 to 31.1\u{a0}mm), 5\u{a0}mm; 2,0\u{a0}mm (90. Perzentil), 3\u{a0}m up"
+        );
+        assert_eq!(kept.replace('\u{a0}', " "), text);
+        assert_eq!(with_units("Fine: no m 5 motions"), "Fine: no m 5 motions");
+    }
 
     #[test]
     fn only_numbers_of_pictures_get_another_mark() {

@@ -14,6 +14,7 @@ mod method;
 mod overview;
 mod pair;
 mod survey;
+mod tracked;
 
 use super::summary::Summary;
 use crate::error::Error;

@@ -1,20 +1,17 @@
 //! Photo crops of stones, rectified to their faces, side by side in a few pictures.
 
-use super::files::{make_dir, path, read_table};
+use super::atlas::{Atlas, per_row};
+use super::files::{make_dir, metadata_number, path, read_table};
 use crate::error::Error;
-use crate::results::names::EVIDENCE_DIR;
-use std::path::{Path, PathBuf};
-use stonewise_core::raster::{Raster, RgbImage};
-use stonewise_io::image_io::write_jpeg;
+use std::path::Path;
 use stonewise_io::table::{Table, write_parquet};
 
 /// Pixels of all crops of an epoch: at JPEG's 0.15 bytes a pixel, 6 MB.
 const BUDGET_PX: f64 = 40e6;
-/// Smallest and largest edge of a crop, pixels. Multiples of 16, so that JPEG's blocks never join two crops.
+/// Smallest and largest edge of a crop, pixels. Multiples of 16, see [`Atlas`].
 const SIDE_PX: [u32; 2] = [64, 208];
-/// Edge of a picture that holds crops, pixels at most.
-const ATLAS_PX: u32 = 2048;
-const QUALITY: u8 = 76;
+/// Stem of the files.
+const STEM: &str = "crops";
 /// Keys of the table's metadata.
 const SIDE: &str = "side_px";
 const PER_ROW: &str = "per_row";
@@ -67,7 +64,13 @@ pub fn write_crops(
     tiles: &[Vec<[u8; 3]>],
 ) -> Result<(), Error> {
     make_dir(dir)?;
-    let per_row = (ATLAS_PX / side_px).clamp(1, (crops.len() as f64).sqrt().ceil().max(1.0) as u32);
+    let atlas = Atlas {
+        dir,
+        stem: STEM,
+        epoch,
+        side_px,
+        per_row: per_row(side_px, crops.len()),
+    };
     let mut table = Table::new();
     let stones: Vec<u32> = crops.iter().map(|c| c.stone_id).collect();
     table.push("stone_id", "", "number of the stone", stones)?;
@@ -80,14 +83,10 @@ pub fn write_crops(
         crops.iter().map(|c| c.half_m).collect::<Vec<f64>>(),
     )?;
     table.set_metadata(SIDE, side_px.to_string());
-    table.set_metadata(PER_ROW, per_row.to_string());
+    table.set_metadata(PER_ROW, atlas.per_row.to_string());
     write_outlines(&path(dir, "crop_outlines", epoch, "parquet"), crops)?;
-    for (number, part) in tiles.chunks((per_row * per_row) as usize).enumerate() {
-        let picture = picture_path(dir, epoch, number);
-        write_jpeg(&picture, &assemble(part, side_px, per_row), QUALITY)
-            .map_err(|e| Error::io("writing photo crops", &picture)(std::io::Error::other(e)))?;
-    }
-    Ok(write_parquet(&path(dir, "crops", epoch, "parquet"), &table)?)
+    atlas.write(tiles)?;
+    Ok(write_parquet(&path(dir, STEM, epoch, "parquet"), &table)?)
 }
 
 fn write_outlines(path: &Path, crops: &[Crop]) -> Result<(), Error> {
@@ -108,44 +107,16 @@ fn write_outlines(path: &Path, crops: &[Crop]) -> Result<(), Error> {
     Ok(write_parquet(path, &table)?)
 }
 
-/// One picture of up to `per_row` squared crops.
-fn assemble(tiles: &[Vec<[u8; 3]>], side_px: u32, per_row: u32) -> RgbImage {
-    let rows = (tiles.len() as u32).div_ceil(per_row);
-    let mut picture = Raster::filled(per_row * side_px, rows * side_px, [128u8; 3]);
-    let width = picture.width() as usize;
-    let side = side_px as usize;
-    for (i, tile) in tiles.iter().enumerate() {
-        let (left, top) = (i % per_row as usize * side, i / per_row as usize * side);
-        for (y, row) in tile.chunks_exact(side).enumerate() {
-            let start = (top + y) * width + left;
-            picture.data_mut()[start..start + side].copy_from_slice(row);
-        }
-    }
-    picture
-}
-
-fn picture_path(dir: &Path, epoch: usize, number: usize) -> PathBuf {
-    dir.join(EVIDENCE_DIR)
-        .join(format!("crops_{epoch}_{number:03}.jpg"))
-}
-
 /// Reads it all back; `None` where there are no crops.
 pub(super) fn read_crops(dir: &Path, epoch: usize) -> Result<Option<StoredCrops>, Error> {
-    let list = path(dir, "crops", epoch, "parquet");
+    let list = path(dir, STEM, epoch, "parquet");
     let Some(table) = read_table(&list)? else {
         return Ok(None);
     };
-    let number = |key: &str| {
-        let value = table
-            .metadata(key)
-            .and_then(|v| v.parse::<u32>().ok())
-            .filter(|v| *v > 0);
-        value.ok_or_else(|| Error::Results {
-            path: list.clone(),
-            message: format!("no {key} in the crops"),
-        })
-    };
-    let (side_px, per_row) = (number(SIDE)?, number(PER_ROW)?);
+    let (side_px, per_row) = (
+        metadata_number(&table, SIDE, &list)?,
+        metadata_number(&table, PER_ROW, &list)?,
+    );
     let (stone, photo, half) = (
         table.required::<u32>("stone_id")?,
         table.required::<String>("photo")?,
@@ -160,13 +131,14 @@ pub(super) fn read_crops(dir: &Path, epoch: usize) -> Result<Option<StoredCrops>
         })
         .collect();
     read_outlines(&path(dir, "crop_outlines", epoch, "parquet"), &mut crops)?;
-    let count = crops.len().div_ceil((per_row * per_row) as usize);
-    let pictures = (0..count)
-        .map(|n| {
-            let picture = picture_path(dir, epoch, n);
-            std::fs::read(&picture).map_err(Error::io("reading photo crops", &picture))
-        })
-        .collect::<Result<_, _>>()?;
+    let atlas = Atlas {
+        dir,
+        stem: STEM,
+        epoch,
+        side_px,
+        per_row,
+    };
+    let pictures = atlas.read(crops.len())?;
     Ok(Some(StoredCrops {
         side_px,
         per_row,
@@ -226,7 +198,8 @@ mod tests {
         let back = read_crops(folder.path(), 1).unwrap().unwrap();
         assert_eq!(back.crops, crops);
         assert_eq!((back.side_px, back.per_row, back.pictures.len()), (64, 3, 1));
-        let picture = stonewise_io::image_io::read_rgb(&picture_path(folder.path(), 1, 0)).unwrap();
+        let picture =
+            stonewise_io::image_io::read_rgb(&folder.path().join("evidence/crops_1_000.jpg")).unwrap();
         assert_eq!((picture.width(), picture.height()), (192, 128));
         // The fifth crop is the second of the second row.
         let middle = picture.get(96, 96).unwrap();

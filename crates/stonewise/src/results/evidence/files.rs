@@ -16,6 +16,18 @@ pub(super) fn make_dir(dir: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))
 }
 
+/// A whole number above zero of a table's metadata.
+pub(super) fn metadata_number(table: &Table, key: &str, path: &Path) -> Result<u32, Error> {
+    let value = table
+        .metadata(key)
+        .and_then(|v| v.parse::<u32>().ok())
+        .filter(|v| *v > 0);
+    value.ok_or_else(|| Error::Results {
+        path: path.into(),
+        message: format!("no {key} in the table's metadata"),
+    })
+}
+
 /// A table, or `None` where the file is missing.
 pub(in crate::results) fn read_table(path: &Path) -> Result<Option<Table>, Error> {
     if !path.exists() {

@@ -1,14 +1,17 @@
-//! What the report shows of the survey itself: photo crops, sections, thinned clouds, cameras.
+//! What the report shows of the survey itself: photo crops, sections, stones tracked in photos,
+//! thinned clouds, cameras.
 //!
 //! A run writes these small excerpts into `DIR/evidence`, so that a report can be made again without the
 //! survey. Files are Parquet tables and JPEG pictures; numbers in their names are those of epochs, from 1.
 
+mod atlas;
 mod cameras;
 mod cloud;
 mod crops;
 mod files;
 mod logo;
 mod sections;
+mod tracks;
 
 pub use cameras::{PosedPhoto, write_cameras};
 pub use cloud::{ThinPoint, write_thin_cloud};
@@ -16,10 +19,12 @@ pub use crops::{Crop, crop_side_px, write_crops};
 pub(super) use files::read_table;
 pub use logo::{Logo, write_logo};
 pub use sections::{Cut, SectionPoint, write_sections};
+pub use tracks::{Tracks, most_pictured, track_side_px, write_tracks};
 
 use crate::error::Error;
 use crops::StoredCrops;
 use std::path::Path;
+use tracks::StoredTracks;
 
 /// The excerpts of one pair of epochs; whatever is missing is empty.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +33,8 @@ pub struct Evidence {
     pub(crate) crops: [Option<StoredCrops>; 2],
     /// Points of both epochs near the middle of each stone.
     pub(crate) sections: Vec<SectionPoint>,
+    /// What was tracked in photos.
+    pub(crate) tracks: Option<StoredTracks>,
     /// Thinned clouds.
     pub(crate) clouds: [Vec<ThinPoint>; 2],
     /// Posed photos.
@@ -49,6 +56,7 @@ impl Evidence {
         Ok(Self {
             crops: [first_crops?, second_crops?],
             sections: sections::read_sections(dir, later)?,
+            tracks: tracks::read_tracks(dir, later)?,
             clouds: [first_cloud?, second_cloud?],
             cameras: [first_cameras?, second_cameras?],
             logo: logo::read_logo(dir)?,

@@ -4,6 +4,7 @@ mod crops;
 mod sections;
 mod simplify;
 mod thin;
+mod tracks;
 mod window;
 
 use crate::error::{Error, Result};
@@ -18,6 +19,7 @@ use crops::{ShownEpoch, write_epoch_crops};
 use sections::sections;
 use std::collections::BTreeMap;
 use thin::thin_cloud;
+pub use tracks::write_tracked_stones;
 use window::windows;
 
 /// Writes `evidence/`. `pairs`: rows of each later epoch against the first.

@@ -7,6 +7,7 @@ mod pairs;
 mod photos;
 mod registered;
 mod sights;
+mod tracked;
 mod windows;
 
 use crate::error::{Error, Result};
@@ -31,6 +32,7 @@ use photos::DiskPhotos;
 pub use registered::Registered;
 use registered::STEP;
 use sights::Sights;
+use std::path::PathBuf;
 use stonewise_core::registration::observers::{self, EpochErrorParams, EpochPair, epoch_errors};
 use stonewise_core::registration::photos::PhotoSource;
 use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
@@ -83,6 +85,7 @@ pub fn register(
                 let photos = photos.as_ref().map(|p| p as &dyn PhotoSource<Error>);
                 let report = adjust_with_photos(&pairs, photos, &params.adjustment, context.progress)?;
                 pairs.remove()?;
+                tracked::write(step, &report)?;
                 of_adjustment(report)
             }
             Estimator::Gicp => {
@@ -134,7 +137,10 @@ pub fn register(
         registered.error_stones = sights.stones;
         write_json(&step.file("motions.json"), &registered)
     })?;
-    let registered: Registered = read_json(&step.file("motions.json"))?;
+    let registered = Registered {
+        folder: step.path().to_path_buf(),
+        ..read_json(&step.file("motions.json"))?
+    };
     let datum = datum(context.project, number, &registered, &first.stones);
     report_mean_motion(context, number, &registered, &datum);
     report_components(context, number, &registered);
@@ -248,6 +254,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
         epoch_errors: None,
         error_stones: Vec::new(),
         off_wall: Vec::new(),
+        folder: PathBuf::new(),
     }
 }
 
@@ -265,5 +272,6 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
         epoch_errors: None,
         error_stones: Vec::new(),
         off_wall: Vec::new(),
+        folder: PathBuf::new(),
     }
 }

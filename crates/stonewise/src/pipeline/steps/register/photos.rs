@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
+use crate::results::track_side_px;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
 use crate::texts::notices::PHOTO_NOT_TRACKED;
@@ -266,6 +267,10 @@ impl PhotoSource<Error> for DiskPhotos {
 
     fn params(&self) -> &PhotoParams {
         &self.params
+    }
+
+    fn picture_px(&self) -> usize {
+        track_side_px(self.counts.iter().sum()) as usize
     }
 
     fn load(&self, batch: usize) -> Result<Vec<Vec<Chip>>> {

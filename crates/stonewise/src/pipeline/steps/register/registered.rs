@@ -1,9 +1,13 @@
 //! Motions of a pair of epochs.
 
+use super::tracked;
+use crate::error::Result;
+use crate::results::Tracks;
 use crate::results::records::EstimatorRecord;
 use nalgebra::{Matrix3, Point3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
 use stonewise_core::statistics::upper_median;
@@ -29,9 +33,17 @@ pub struct Registered {
     /// `auto_stable`.
     #[serde(default)]
     pub off_wall: Vec<[Point3<f64>; 2]>,
+    /// Folder of the step, once it is done.
+    #[serde(skip)]
+    pub folder: PathBuf,
 }
 
 impl Registered {
+    /// The stones that were tracked in photos, with their pictures; `None` where photos took no part.
+    pub fn tracks(&self) -> Result<Option<Tracks>> {
+        tracked::read(&self.folder)
+    }
+
     /// Error of the later epoch against the reference, by stone of the reference.
     pub fn errors(&self) -> BTreeMap<StoneId, &ErrorAt> {
         let errors = self.epoch_errors.iter().flat_map(|e| &e.at);

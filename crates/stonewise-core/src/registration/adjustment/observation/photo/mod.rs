@@ -1,12 +1,14 @@
 //! What photos show of the stones' motions.
 
 mod bias;
+mod evidence;
 mod model;
 mod poses;
 mod stone_photos;
 
 #[cfg(test)]
 pub(crate) use bias::BiasWeights;
+pub use evidence::{FaceShift, PhotoShift, StoneEvidence};
 pub(crate) use model::{PhotoModel, StoneInPhotos};
 pub use model::{PhotoReport, StonePhotoReport};
 pub(crate) use poses::CloudMotion;

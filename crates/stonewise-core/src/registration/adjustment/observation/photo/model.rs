@@ -1,6 +1,7 @@
 //! All stones' photos as one type of observation.
 
 use super::bias::BiasWeights;
+use super::evidence::{FaceShift, PhotoShift, StoneEvidence};
 use super::poses::{CloudMotion, PoseProblem, PoseStone};
 use super::stone_photos::StonePhotos;
 use crate::geometry::Bounds;
@@ -32,6 +33,8 @@ pub(crate) struct PhotoModel {
     scales: Vec<[f64; 2]>,
     tracks: Vec<Track>,
     stones: Vec<Option<StonePhotos>>,
+    /// What each photo shows of each stone, with the poses as they are.
+    shifts: Vec<Vec<PhotoShift>>,
     factor: f64,
     poses_px: Vec<f64>,
     /// Covariance of the poses' errors.
@@ -58,6 +61,10 @@ pub struct PhotoReport {
     pub appearance_m: f64,
     /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
+    /// What clouds and photos say each by itself, per stone in the order of the pairs; `None` where the stone
+    /// is not tracked. Photos are counted as in `poses_px`.
+    #[serde(skip)]
+    pub evidence: Vec<Option<StoneEvidence>>,
 }
 
 /// What the photos say of a stone.
@@ -89,6 +96,7 @@ impl PhotoModel {
             centres,
             scales,
             stones: vec![None; tracks.len()],
+            shifts: vec![Vec::new(); tracks.len()],
             tracks,
             factor: 1.0,
             poses_px: vec![0.0; photos.len()],
@@ -138,6 +146,7 @@ impl PhotoModel {
             return;
         };
         let mut found = vec![None; stones.len()];
+        let mut shifts = vec![Vec::new(); stones.len()];
         for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
             let system = problem.system(stone, &poses.weights[k], poses.factor);
             found[i] = system
@@ -150,6 +159,10 @@ impl PhotoModel {
                     weights: self.stones[i].as_ref().map_or(BiasWeights::USUAL, |s| s.weights),
                     by_poses,
                 });
+            let displacement = found[i].as_ref().and_then(StonePhotos::displacement);
+            shifts[i] = displacement
+                .and_then(|d| problem.shifts(stone, &poses.weights[k], &poses, &d))
+                .unwrap_or_default();
         }
         let px = |i: usize| {
             let correction = poses.corrections.rows(6 * i, 6);
@@ -159,6 +172,7 @@ impl PhotoModel {
         self.factor = poses.factor.sqrt();
         self.of_poses = poses.covariance;
         self.stones = found;
+        self.shifts = shifts;
     }
 
     /// What the photos say of a stone.
@@ -247,13 +261,35 @@ impl PhotoModel {
                     .filter(is_finite),
             }
         };
+        let tracks = 0..self.tracks.len();
         let poses = self.names.iter().cloned().zip(self.poses_px.iter().copied());
         PhotoReport {
             stones: self.tracks.iter().enumerate().map(of_stone).collect(),
             sigma_factor: self.factor,
             appearance_m: bias_m,
             poses_px: poses.collect(),
+            evidence: tracks.map(|i| self.evidence(i, bias_m, moving[i])).collect(),
         }
+    }
+
+    /// What the photos say of a stone by themselves; `None` where it is not tracked.
+    fn evidence(&self, i: usize, bias_m: f64, moving: Moving) -> Option<StoneEvidence> {
+        let track = &self.tracks[i];
+        let photos = self.stones[i].as_ref();
+        (track.status == PhotoStatus::Tracked).then(|| StoneEvidence {
+            place: track.place,
+            clouds: None,
+            both: None,
+            photos: photos.and_then(|s| {
+                let covariance = s.with_bias(bias_m, moving).0.try_inverse()?;
+                FaceShift::new(
+                    &s.displacement()?.xy(),
+                    &covariance.fixed_view::<2, 2>(0, 0).into_owned(),
+                )
+            }),
+            shifts: self.shifts[i].clone(),
+            pictures: track.pictures.clone(),
+        })
     }
 }
 
@@ -300,6 +336,7 @@ mod tests {
             place: [0.0; 2],
             apart_m: [apart_m, 0.0],
             start: FaceMotion::none(),
+            pictures: None,
         };
         PhotoModel {
             params: PhotoParams::default(),
@@ -309,6 +346,7 @@ mod tests {
             scales: vec![[1.0; 2]; 2],
             tracks: stones.iter().map(track).collect(),
             stones: vec![None; stones.len()],
+            shifts: vec![Vec::new(); stones.len()],
             factor: 1.0,
             poses_px: vec![0.0; 2],
             of_poses: DMatrix::zeros(0, 0),

@@ -9,6 +9,7 @@
 //! All photos of the second epoch share a similarity transformation beside that, of any size: photos show
 //! motions relative to each other.
 
+use super::evidence::{FaceShift, PhotoShift};
 use crate::registration::photos::{Sight, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Point3, SMatrix, Vector2, Vector3};
 
@@ -300,6 +301,49 @@ impl PoseProblem<'_> {
         Some(system.own.cholesky()?.solve(&right))
     }
 
+    /// What each photo of a stone shows of its displacement in the face, poses adjusted, given the
+    /// displacement that its photos show together. The height of the face is what fits them best.
+    pub fn shifts(
+        &self,
+        stone: &PoseStone,
+        weights: &[f64],
+        poses: &Poses,
+        displacement: &Vector3<f64>,
+    ) -> Option<Vec<PhotoShift>> {
+        let system = self.system(stone, weights, poses.factor);
+        let right = system.right - &system.cross * system.of(&poses.corrections);
+        let mixed = system.own.fixed_view::<3, 3>(0, 3);
+        let inner = system.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;
+        let face = inner.solve(&(right.fixed_rows::<3>(0) - mixed * displacement));
+        let mut own = SMatrix::<f64, STONE, 1>::zeros();
+        own.fixed_rows_mut::<3>(0).copy_from(&face);
+        own.fixed_rows_mut::<3>(3).copy_from(displacement);
+        let of_sight = |(sight, weight): (&Sight, &f64)| {
+            let epoch = self.epochs[sight.photo];
+            let moved = if epoch == 1 {
+                displacement.xy()
+            } else {
+                Vector2::zeros()
+            };
+            let shift = moved + self.residual(stone, sight, &own, &poses.corrections);
+            Some(PhotoShift {
+                photo: sight.photo,
+                epoch,
+                shift: FaceShift::new(&shift, &self.weight(sight, poses.factor).try_inverse()?)?,
+                weight: *weight,
+            })
+        };
+        Some(
+            stone
+                .track
+                .sights
+                .iter()
+                .zip(weights)
+                .filter_map(of_sight)
+                .collect(),
+        )
+    }
+
     /// What a sight's shift is off by.
     fn residual(
         &self,
@@ -377,6 +421,7 @@ mod tests {
                 place: [0.0; 2],
                 apart_m: [0.0; 2],
                 start: FaceMotion::none(),
+                pictures: None,
             }
         };
         places.iter().map(&mut track).collect()
