@@ -19,6 +19,9 @@ const SHIFT_SD_STEP_M: f64 = 2e-6;
 const CORRELATION_STEP: f64 = 1.0 / 32_767.0;
 const HUNDREDTH: f64 = 0.01;
 
+/// One of the displacements of a stone.
+type ShiftOf = fn(&StoneEvidence) -> Option<FaceShift>;
+
 /// What the photos say of the stones; `None` where they took no part or the folder does not hold it.
 ///
 /// `status`: of every stone, see [`status_number`]. Then one entry for each tracked stone: displacement by
@@ -39,7 +42,7 @@ pub(super) fn block(results: &ResultSet) -> Option<Block> {
     let status = |s: &StoneRow| statuses.get(&s.stone_id).map_or(0, |s| status_number(*s));
     block.u8("status", results.stones.iter().map(status));
     block.u32("stone", stones.iter().map(|(row, _)| *row));
-    let alone: [(&str, fn(&StoneEvidence) -> Option<FaceShift>); 3] = [
+    let alone: [(&str, ShiftOf); 3] = [
         ("clouds", |s| s.clouds),
         ("photos", |s| s.photos),
         ("both", |s| s.both),

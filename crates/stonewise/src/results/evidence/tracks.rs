@@ -93,6 +93,9 @@ fn tiles(pictures: &FacePictures) -> [Vec<[u8; 3]>; PICTURES] {
     [first, later, &pictures.difference].map(|grey| grey.iter().map(|g| [*g; 3]).collect())
 }
 
+/// One of the displacements of a stone.
+type ShiftOf = fn(&StoneEvidence) -> Option<FaceShift>;
+
 /// One row for each stone.
 fn stone_table(tracks: &Tracks) -> Result<Table, TableError> {
     let stones = &tracks.stones;
@@ -104,7 +107,7 @@ fn stone_table(tracks: &Tracks) -> Result<Table, TableError> {
         let meaning = format!("place on the face whose displacement is given, {name}, from the centroid");
         table.push(&format!("place_{name}"), "m", &meaning, place)?;
     }
-    let by: [(&str, &str, fn(&StoneEvidence) -> Option<FaceShift>); 3] = [
+    let by: [(&str, &str, ShiftOf); 3] = [
         ("clouds", "the stone's own points alone", |s| s.clouds),
         (
             "photos",
