@@ -294,7 +294,7 @@ in_both! {
         edits: "Edits by hand", "Änderungen von Hand";
         edits_note: "The maps draw the outlines of edited stones dashed.", "Die Karten zeichnen die Umrisse geänderter Steine gestrichelt.";
         carried: "Stones looked for in epochs whose photos do not show them", "Steine, die in Epochen gesucht wurden, deren Fotos sie nicht zeigen";
-        carried_note: "The maps draw the outlines of stones that were found so dotted.", "Die Karten zeichnen die Umrisse so gefundener Steine gepunktet.";
+        carried_note: "Stones that were found in this way have dotted outlines on the maps.", "Die Karten zeichnen die Umrisse so gefundener Steine gepunktet.";
         no_warnings: "No warnings.", "Keine Warnungen.";
         warnings: "Warnings ({n}; inputs left out: {out})", "Warnungen ({n}; ausgelassene Eingaben: {out})";
         about: "about", "betrifft";

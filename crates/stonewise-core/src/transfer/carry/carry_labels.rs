@@ -58,7 +58,7 @@ pub enum NotCarried {
         /// Cells needed.
         needed: usize,
     },
-    /// Most photos of both epochs that see its place do not show it.
+    /// The photos that show it do not outweigh those of both epochs that face its place and do not show it.
     #[error("{photos} photos show it, {missed} that see its place do not")]
     Outvoted {
         /// Photos that show it.

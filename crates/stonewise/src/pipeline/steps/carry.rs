@@ -1,9 +1,9 @@
 //! Stones that the detector missed in one epoch, from the epochs that show them.
 //!
-//! The detector is no judge of what is gone: it misses one stone in five. A stone of one epoch without a
-//! partner in another is therefore looked for in the other's cloud, where its neighbours say it must be. It
-//! comes after the vote of the photos and before corrections by hand, which have the last word. Epochs with
-//! masks stay as they are.
+//! A stone that is not detected is not necessarily gone: the detector misses one stone in five. A stone of
+//! one epoch without a partner in another is therefore looked for in the other's cloud, where its neighbours
+//! predict it. This step comes after the vote of the photos and before edits by hand, which can overrule it.
+//! Epochs with masks stay as they are.
 
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
 use super::r#match::match_in;
@@ -244,9 +244,9 @@ fn carry_into(
     Ok(true)
 }
 
-/// Takes the motions off carried stones that moved against their neighbours by more than
-/// [`CarryParams::max_height_m`](stonewise_core::transfer::CarryParams::max_height_m). They were found where
-/// their neighbours moved them; so far from there, their points are not theirs.
+/// Removes the motions of carried stones that moved against their neighbours by more than
+/// [`CarryParams::max_height_m`](stonewise_core::transfer::CarryParams::max_height_m). A stone was looked for
+/// where its neighbours predict it; if it seems to be farther away, its points belong to something else.
 pub fn drop_contradictions(context: &Context, [first, second]: [&Labelled; 2], registered: &mut Registered) {
     let limit_m = context.project.settings.carry.max_height_m;
     let mut dropped = BTreeSet::new();

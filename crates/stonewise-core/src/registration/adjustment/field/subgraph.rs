@@ -11,8 +11,8 @@ use std::collections::{BTreeSet, VecDeque};
 const WHOLE: usize = 600;
 /// Connected parts at fixed places. They lie apart, so that one odd corner of the wall does not decide.
 const SPREAD_PARTS: usize = 3;
-/// Parts where neighbours move most unlike each other for what their points tell: components from places at
-/// rest alone would make ties so stiff that a bulge elsewhere ends as loose stones.
+/// Parts where motions of neighbours differ most, relative to their uncertainty. Components estimated only
+/// where nothing moves would make the ties so stiff that stones of a bulge elsewhere would be called loose.
 const STRAINED_PARTS: usize = 2;
 /// Stones in each part: 600 in all determine the components to a tenth.
 const PART_STONES: usize = 120;

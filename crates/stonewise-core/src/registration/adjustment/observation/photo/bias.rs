@@ -3,8 +3,8 @@
 //! What light, moisture and growth shift on a stone between two epochs has heavier tails than a normal law: a
 //! few stones are off by many standard deviations although their photos agree with each other. The bias
 //! follows Student's t with two components, written as a normal law whose variance is divided by a weight of
-//! the stone (Lange, Little & Taylor 1989). A stone has a weight for each way in which it may have moved: a
-//! bias that is improbable where it moved with the field may be none where it moved on its own.
+//! the stone (Lange, Little & Taylor 1989). A stone has a weight for each way in which it may have moved: if
+//! it moved with the field, its photos may imply an improbably large bias; if on its own, perhaps none.
 
 use crate::registration::adjustment::candidate::Moving;
 

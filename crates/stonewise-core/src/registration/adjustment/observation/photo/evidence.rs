@@ -15,8 +15,8 @@ pub struct FaceShift {
 }
 
 impl FaceShift {
-    /// That of a place of a stone in a motion of its centroid, all in the world but the place; `None` where a
-    /// number is not finite. `place`: along, up, metres from the centroid.
+    /// The displacement of a place on a stone's face that follows from the stone's motion; `None` where a
+    /// number is not finite. `motion` is in the world frame. `place`: along, up, metres from the centroid.
     pub(crate) fn of_motion(
         motion: &StoneMotion,
         face_from_world: &Matrix3<f64>,
