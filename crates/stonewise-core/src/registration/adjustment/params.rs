@@ -28,8 +28,8 @@ pub struct AdjustmentParams {
     /// Neighbours in each of the four directions along the face. 2: the field holds where one neighbour is
     /// missing or loose.
     pub neighbours_per_side: usize,
-    /// Expected share of loose stones. 0.03: half and twice change the recall by a
-    /// tenth at most.
+    /// Expected share of loose stones; where fewer are found, the share is estimated. 0.03: half and twice
+    /// change the recall by a tenth at most.
     pub loose_share: f64,
     /// Typical motion of a loose stone, metres. 0.015: about the width of a joint, which is how far it can
     /// go.

@@ -2,8 +2,8 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components, find_crack,
-    posterior, probabilities_with_field, reweight_ties, solve,
+    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components,
+    estimated_share, find_crack, posterior, probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
@@ -139,6 +139,8 @@ impl Adjustment {
             stone.p_with_field = p;
         }
         self.return_to_field(equations, field);
+        let decided = self.stones.iter().filter(|s| !s.is_undecided);
+        self.loose.share = estimated_share(self.params.loose_share, decided.map(|s| 1.0 - s.p_with_field));
     }
 
     /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
@@ -215,5 +217,19 @@ mod tests {
         let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
         assert!(is_parted(moved, moved));
         assert!(!is_parted(still, moved));
+    }
+
+    #[test]
+    fn a_wall_without_loose_stones_lowers_their_share() {
+        let params = AdjustmentParams::default();
+        let source = MemoryPairs::new(wall(10, [0.001; 2], |_| Vector3::zeros()));
+        let mut adjustment = Adjustment::new(survey(&source, &params).unwrap(), &params).unwrap();
+        adjustment.estimate_noise();
+        adjustment.evaluate(&source, &Silent).unwrap();
+        let equations = adjustment.equations();
+        adjustment.solve_and_reweight(&equations).unwrap();
+        // None of 80 stones is loose, and 300 count for what is expected.
+        let share = adjustment.loose.share;
+        assert!((share / 0.03 - 300.0 / 380.0).abs() < 0.02, "{share}");
     }
 }

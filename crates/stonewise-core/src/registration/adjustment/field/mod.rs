@@ -22,7 +22,7 @@ pub(crate) use component_estimate::estimate_components;
 pub(crate) use cracks::{Crack, find_crack};
 pub(crate) use field_vector::{FieldVector, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
-pub(crate) use loose_prior::LoosePrior;
+pub(crate) use loose_prior::{LoosePrior, estimated_share};
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
 pub(crate) use prior::Tie;
