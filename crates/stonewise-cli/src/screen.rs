@@ -32,7 +32,8 @@ impl Screen {
         let target = ProgressDrawTarget::stderr_with_hz(REDRAWS);
         let term = Term::stderr();
         Self {
-            bar: ProgressBar::with_draw_target(None, target),
+            // The style of a bar without a count; the first part sets its own.
+            bar: ProgressBar::with_draw_target(None, target).with_style(ProgressStyle::default_spinner()),
             then: Mutex::default(),
             colours: term.features().colors_supported() && std::env::var_os("NO_COLOR").is_none(),
             term,
@@ -69,8 +70,6 @@ impl Screen {
     /// A part of the work begins, named on a line of its own, of which `done` of `total` units are done; a
     /// total of 0 where it is unknown.
     pub fn part(&self, step: &str, words: &str, total: u64, done: u64) {
-        self.bar.set_style(self.style(words, total > 0));
-        self.bar.set_message(step.to_owned());
         if done == 0 {
             self.bar.reset();
         }
@@ -78,6 +77,8 @@ impl Screen {
             0 => self.bar.unset_length(),
             total => self.bar.set_length(total),
         }
+        self.bar.set_style(self.style(words, total > 0));
+        self.bar.set_message(step.to_owned());
         self.bar.enable_steady_tick(TICK);
     }
 
@@ -142,7 +143,10 @@ impl Screen {
             .tick_chars("|/-\\ ")
             .progress_chars("#>-")
             .with_key("count", |state: &ProgressState, out: &mut dyn Write| {
-                let _ = write!(out, "{}", count(state.pos(), state.len().unwrap_or(0)));
+                // Each change draws; what begins without a count is drawn once in the style of what had one.
+                if let Some(total) = state.len() {
+                    let _ = write!(out, "{}", count(state.pos(), total));
+                }
             })
             .with_key("to_go", |state: &ProgressState, out: &mut dyn Write| {
                 let seconds = [state.elapsed(), state.eta()].map(|t| t.as_secs_f64());
