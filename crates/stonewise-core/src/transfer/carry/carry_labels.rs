@@ -59,11 +59,11 @@ pub enum NotCarried {
         needed: usize,
     },
     /// The photos that show it do not outweigh those of both epochs that face its place and do not show it.
-    #[error("{photos} photos show it, {missed} that see its place do not")]
+    #[error("{}, {}", shown_by(*.photos), missed_by(*.missed))]
     Outvoted {
         /// Photos that show it.
         photos: u32,
-        /// Photos of both epochs that see its place and do not show it.
+        /// Photos of both epochs that face its place and do not show it.
         missed: u32,
     },
     /// The other epoch has too few points at its place.
@@ -86,6 +86,20 @@ pub enum NotCarried {
         /// Points needed.
         needed: u32,
     },
+}
+
+fn shown_by(photos: u32) -> String {
+    match photos {
+        1 => "1 photo shows it".to_owned(),
+        n => format!("{n} photos show it"),
+    }
+}
+
+fn missed_by(photos: u32) -> String {
+    match photos {
+        1 => "1 that faces its place does not".to_owned(),
+        n => format!("{n} that face its place do not"),
+    }
 }
 
 /// What became of stones that were to be carried into an epoch.

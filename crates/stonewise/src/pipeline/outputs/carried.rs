@@ -108,7 +108,7 @@ mod tests {
         let text = std::fs::read_to_string(&csv).unwrap();
         assert!(text.contains("2025,81,2024,7,3,5,0.9,0.8,412,"), "{text}");
         assert!(
-            text.contains("1 photos show it, 9 that see its place do not"),
+            text.contains("1 photo shows it, 9 that face its place do not"),
             "{text}"
         );
     }

@@ -34,7 +34,7 @@ pub struct CarryAttempt {
     pub stone: StoneId,
     /// Photos of the epoch that shows it, which do.
     pub photos: u32,
-    /// Photos of both epochs that see its place and do not show it.
+    /// Photos of both epochs that face its place and do not show it.
     pub missed: u32,
     /// What became of it.
     pub outcome: Outcome,
