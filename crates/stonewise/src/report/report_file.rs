@@ -145,7 +145,7 @@ mod tests {
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
         assert!(html.contains(
-            "Registration error between the surveys: the stable areas show a registration error of 3.2 mm."
+            "Registration error between the surveys: the stable areas show a registration error of 3.2\u{a0}mm."
         ));
         assert!(
             html.contains("finished <b>2026-04-30 12:00 UTC</b>")
@@ -278,7 +278,7 @@ mod tests {
             "95 % limit",
             "class=\"faded\"",
             "elow their limit",
-            "(95 %: ",
+            "(95\u{a0}%: ",
         ] {
             assert!(sound.contains(claim) && !doubtful.contains(claim), "{claim}");
         }
@@ -355,7 +355,7 @@ mod tests {
             "<dt>Reference number</dt><dd>T-17</dd>",
             "River &lt;Authority&gt;",
             "temperature 9.5\u{a0}\u{b0}C",
-            "<a data-stone=\"15\">Stone 15</a>, 0.80 m along, 0.50 m up: moved 20.4 mm",
+            "<a data-stone=\"15\">Stone 15</a>, 0.80\u{a0}m along, 0.50\u{a0}m up: moved 20.4\u{a0}mm",
             "4 of 24 stones were not measured",
             "Detection limit: 1.4 mm (median), 1.4 mm (90th percentile)",
             "<p>Signature</p>",

@@ -41,7 +41,7 @@ in_both! {
         median: "Median of all measured stones: <b>{along}</b> mm along the wall, <b>{up}</b> mm up, <b>{out}</b> mm out of the wall.",
             "Median aller gemessenen Steine: <b>{along}</b> mm längs der Mauer, <b>{up}</b> mm aufwärts, <b>{out}</b> mm aus der Mauer.";
         none_loose: "No stone is loose: none moves unlike its neighbours beyond what the noise explains.",
-            "Kein Stein ist lose: keiner bewegt sich stärker anders als seine Nachbarn, als das Rauschen erklärt.";
+            "Kein Stein ist lose: keiner weicht stärker von seinen Nachbarn ab, als das Rauschen erklärt.";
         one_loose: "<b>One stone is loose</b>: it moves unlike its neighbours; it is listed below.",
             "<b>Ein Stein ist lose</b>: er bewegt sich anders als seine Nachbarn; er ist unten aufgeführt.";
         some_loose: "<b>{n} stones are loose</b>: they move unlike their neighbours; they are listed below.",
@@ -286,6 +286,7 @@ in_both! {
         decisions: "Decisions about mask instances", "Entscheidungen über Maskeninstanzen";
         decision_list: "Merged, split and dropped masks of epoch {e} ({n})", "Verschmolzene, geteilte und verworfene Masken der Epoche {e} ({n})";
         decision_rest: "{shown} of {n}; all are in audit_epoch{e}.csv.", "{shown} von {n}; alle stehen in audit_epoch{e}.csv.";
+        many_records: "{n} records, not listed here", "{n} Einträge, hier nicht aufgezählt";
         decision: "decision", "Entscheidung";
         photo: "photo", "Foto";
         instance: "instance", "Instanz";

@@ -304,7 +304,7 @@ fn at_most_five_percent_of_the_stones_said_to_have_moved_stood_still() {
 fn the_sentence_speaks_german_too() {
     let verdict = assess(&wall(3, 0.015, 4), &usual(), Language::German);
     assert!(
-        verdict.sentence.starts_with("Alarm: 3 Steine haben sich \u{fc}ber die Alarmschwelle von 10 mm hinaus bewegt; die gr\u{f6}\u{df}te Bewegung ist 1"),
+        verdict.sentence.starts_with("Alarm: 3 Steine haben sich \u{fc}ber die Alarmschwelle von 10 mm hinaus bewegt; die gr\u{f6}\u{df}te Bewegung betr\u{e4}gt 1"),
         "{}",
         verdict.sentence
     );

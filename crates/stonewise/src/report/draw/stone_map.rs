@@ -13,9 +13,10 @@ const MARGIN: [f64; 4] = [48.0, 8.0, 66.0, 40.0];
 const MAX_HEIGHT: f64 = 640.0;
 /// Shortest step of an outline, tenths of a pixel.
 const MIN_STEP: i64 = 4;
-/// Length of the longest arrow, and least distance between arrows, pixels.
+/// Length of the longest arrow, and side of the squares that hold one arrow each, pixels: arrows of typical
+/// length do not touch.
 const ARROW_PX: f64 = 34.0;
-const ARROW_SPACING_PX: f64 = 14.0;
+const ARROW_SPACING_PX: f64 = 26.0;
 
 /// Where everything lies in every map of one wall, and the path of every stone.
 pub(crate) struct MapLayout<'a> {

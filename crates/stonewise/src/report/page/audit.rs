@@ -13,6 +13,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Rows of a list of decisions at most.
 const MAX_DECISIONS: usize = 150;
+/// Records in a list of records at most; longer ones are those of single stones.
+const MAX_RECORDS: usize = 40;
 
 /// Decisions about masks, the adjustment, and everything in run.json, warnings first.
 pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
@@ -26,14 +28,14 @@ pub(super) fn audit(results: &ResultSet, texts: &Texts) -> String {
     out.push_str(&decision_counts(&results.decisions, texts));
     if let Some(run) = &results.run {
         out.push_str(&details(names.steps, &steps(&run.steps, texts)));
-        out.push_str(&details(names.epochs, &tree_of(&run.epochs)));
-        out.push_str(&details(names.parameters, &tree_of(&run.parameters)));
+        out.push_str(&details(names.epochs, &tree_of(&run.epochs, names)));
+        out.push_str(&details(names.parameters, &tree_of(&run.parameters, names)));
         if let Some(part) = &run.part {
-            out.push_str(&details(names.part, &tree_of(part)));
+            out.push_str(&details(names.part, &tree_of(part, names)));
         }
     }
     if let Some(registration) = &results.registration {
-        out.push_str(&details(names.adjustment, &tree_of(registration)));
+        out.push_str(&details(names.adjustment, &tree_of(registration, names)));
     }
     out.push_str(&decision_lists(&results.decisions, names));
     section("audit", texts.sections.audit, &out)
@@ -196,23 +198,30 @@ fn warnings(warnings: &[Warning], texts: &Texts) -> String {
 }
 
 /// A record as nested lists, see [`tree`].
-fn tree_of(record: &impl Serialize) -> String {
-    serde_json::to_value(record).map_or_else(|_| String::new(), |value| tree(&value))
+fn tree_of(record: &impl Serialize, names: &AuditTexts) -> String {
+    serde_json::to_value(record).map_or_else(|_| String::new(), |value| tree(&value, names))
 }
 
-/// A document as nested lists; arrays of plain values on one line, arrays of plain objects as a table.
-fn tree(value: &Value) -> String {
+/// A document as nested lists; arrays of plain values on one line, arrays of plain objects as a table, of many
+/// records only their number.
+fn tree(value: &Value, names: &AuditTexts) -> String {
     match value {
         Value::Object(map) => {
             let items: String = map
                 .iter()
-                .map(|(k, v)| format!("<dt>{}</dt><dd>{}</dd>", escape(k), tree(v)))
+                .map(|(k, v)| format!("<dt>{}</dt><dd>{}</dd>", escape(k), tree(v, names)))
                 .collect();
             format!("<dl>{items}</dl>")
         }
         Value::Array(items) if !items.is_empty() && items.iter().all(is_flat_object) => rows(items),
+        Value::Array(items) if items.len() > MAX_RECORDS && items.iter().any(Value::is_object) => {
+            fill(names.many_records, &[("n", &*count(items.len()))])
+        }
         Value::Array(items) if items.iter().any(|v| v.is_object() || v.is_array()) => {
-            let items: String = items.iter().map(|v| format!("<li>{}</li>", tree(v))).collect();
+            let items: String = items
+                .iter()
+                .map(|v| format!("<li>{}</li>", tree(v, names)))
+                .collect();
             format!("<ol>{items}</ol>")
         }
         Value::Array(items) => items.iter().map(scalar).collect::<Vec<_>>().join(", "),

@@ -2,19 +2,16 @@
 //! place to sign.
 
 use super::html::{table, with_units};
+use super::look_first::look_first;
 use super::maps::motion_map;
 use crate::figure::{count, escape};
 use crate::report::summary::Summary;
-use crate::results::records::{Datum, DatumState, EpochRecord, State, StoneVerdict};
-use crate::results::{ResultSet, Status, StoneRow};
+use crate::results::records::{Datum, DatumState, EpochRecord, State};
+use crate::results::{ResultSet, Status};
 use crate::texts::{Texts, counted, fill, message_in};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use std::collections::BTreeMap;
 use std::fmt::Write;
-
-/// Stones that are named as the first to look at.
-const FIRST: usize = 5;
 
 /// Logo and kind of the document.
 pub(super) fn letterhead(results: &ResultSet, texts: &Texts) -> String {
@@ -160,86 +157,6 @@ fn limit(facts: &Summary) -> String {
         .map(|c| c.to_uppercase().to_string())
         .unwrap_or_default();
     format!("<b>{first}{}</b>", letters.as_str())
-}
-
-/// The stones that call for a closer look, the worst first; of a run in doubt none.
-fn look_first(results: &ResultSet, facts: &Summary) -> String {
-    let texts = facts.texts();
-    if !facts.verdict.is_sound() {
-        return format!("<p>{}</p>", texts.page.look_at_doubt);
-    }
-    let rows: BTreeMap<u32, &StoneRow> = results.stones.iter().map(|s| (s.stone_id, s)).collect();
-    let mut worst: Vec<&StoneVerdict> = facts
-        .verdict
-        .stones
-        .iter()
-        .filter(|s| s.moved || s.loose || s.lost)
-        .collect();
-    let size = |s: &StoneVerdict| if s.moved { s.length_mm } else { s.neighbours_mm };
-    worst.sort_by(|a, b| {
-        let (p, q) = (size(a).unwrap_or(f64::INFINITY), size(b).unwrap_or(f64::INFINITY));
-        b.state
-            .cmp(&a.state)
-            .then(q.total_cmp(&p))
-            .then(a.stone_id.cmp(&b.stone_id))
-    });
-    let item = |stone: &&StoneVerdict| {
-        let row = rows.get(&stone.stone_id)?;
-        let place = fill(
-            texts.page.along_up,
-            &[
-                ("along", &*texts.number(row.along_m, 2)),
-                ("up", &*texts.number(row.up_m, 2)),
-            ],
-        );
-        Some(format!(
-            "<li><a data-stone=\"{0}\">{1} {0}</a>, {place}: {2}</li>",
-            stone.stone_id,
-            texts.page.stone,
-            found(stone, facts)
-        ))
-    };
-    let items: String = worst.iter().take(FIRST).filter_map(item).collect();
-    match (items.is_empty(), facts.verdict.state) {
-        (true, State::CannotTell) => format!("<p>{}</p>", texts.page.none_stands_out),
-        (true, _) => format!("<p>{}</p>", texts.page.nothing_first),
-        _ => format!("<ol class=\"look\">{items}</ol>"),
-    }
-}
-
-/// What is the matter with a stone.
-fn found(stone: &StoneVerdict, facts: &Summary) -> String {
-    let texts = facts.texts();
-    let mm = |millimetres: f64| texts.mm(millimetres / 1e3);
-    let said = |text: &str, length: Option<f64>, interval: Option<[f64; 2]>| {
-        let [low, high] = interval.unwrap_or([f64::NAN; 2]);
-        let values = [
-            ("length", &*mm(length.unwrap_or(f64::NAN))),
-            ("low", &*mm(low)),
-            ("high", &*mm(high)),
-        ];
-        fill(text, &values)
-    };
-    let page = &texts.page;
-    let mut all = Vec::new();
-    if stone.lost {
-        all.push(page.lost_stone.to_owned());
-    }
-    if stone.moved {
-        let text = match facts.verdict.has_datum() {
-            true => page.moved_stone,
-            false => page.moved_stone_common,
-        };
-        all.push(said(text, stone.length_mm, stone.interval_mm));
-    }
-    if stone.loose {
-        all.push(said(
-            page.loose_stone,
-            stone.neighbours_mm,
-            stone.neighbours_interval_mm,
-        ));
-    }
-    all.join("; ")
 }
 
 /// How many stones have no motion, and why.

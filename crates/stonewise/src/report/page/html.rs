@@ -60,17 +60,18 @@ pub(super) fn with_decimals(page: String, mark: &str) -> String {
     out
 }
 
-/// A text whose numbers and units stay in one line.
+/// A text whose numbers and units stay in one line, "95-%-" as well.
 pub(super) fn with_units(text: &str) -> String {
     const UNITS: [&str; 5] = ["mm", "cm", "m", "s", "%"];
     let mut out = String::with_capacity(text.len());
     for (i, word) in text.split(' ').enumerate() {
         let bare = word.trim_end_matches(|c: char| !c.is_alphanumeric() && c != '%');
-        let is_unit = UNITS.contains(&bare) && out.ends_with(|c: char| c.is_ascii_digit());
+        let before = out.strip_suffix("</b>").unwrap_or(&out);
+        let is_unit = UNITS.contains(&bare) && before.ends_with(|c: char| c.is_ascii_digit());
         if i > 0 {
             out.push(if is_unit { '\u{a0}' } else { ' ' });
         }
-        out.push_str(word);
+        out.push_str(&word.replace("-%", "-\u{2060}%"));
     }
     out
 }
@@ -102,6 +103,11 @@ mod tests {
         );
         assert_eq!(kept.replace('\u{a0}', " "), text);
         assert_eq!(with_units("Fine: no m 5 motions"), "Fine: no m 5 motions");
+        assert_eq!(
+            with_units("<b>5.0</b> mm, <b>a</b> mm"),
+            "<b>5.0</b>\u{a0}mm, <b>a</b> mm"
+        );
+        assert_eq!(with_units("(95-%-Intervall"), "(95-\u{2060}%-Intervall");
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod excerpts;
 mod explorer;
 mod first_page;
 mod html;
+mod look_first;
 mod maps;
 mod method;
 mod overview;

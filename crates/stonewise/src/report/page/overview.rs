@@ -1,7 +1,7 @@
 //! The summary and the tables of stones.
 
 use super::first_page;
-use super::html::{details, section, table};
+use super::html::{details, section, table, with_units};
 use crate::figure::{count, escape};
 use crate::report::summary::{FALSE_ALARMS, Summary};
 use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow};
@@ -23,7 +23,7 @@ pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     );
     out.push_str("<ul class=\"findings\">");
     for sentence in sentences(results, facts) {
-        let _ = write!(out, "<li>{sentence}</li>");
+        let _ = write!(out, "<li>{}</li>", with_units(&sentence));
     }
     out.push_str("</ul>");
     section("summary", facts.texts().page.summary, &out)
