@@ -9,10 +9,18 @@ use super::csv_metadata::write_csv_metadata;
 use super::{Column, Table, TableError};
 use crate::atomic::write_atomically;
 
+/// Decimals of metres and radians: 0.1 micrometres are below the error of any survey.
+const DECIMALS: i32 = 7;
+/// Significant digits of other numbers, covariances among them.
+const SIGNIFICANT: i32 = 6;
+/// From here on numbers have an exponent.
+const LARGE: f64 = 1e15;
+
 /// Writes a table as CSV: a header line, then one line per row, `\n` at each end.
 ///
-/// An empty cell stays empty; an empty string is written as `""`. Floats have the fewest digits that read
-/// back to the same value; booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break
+/// An empty cell stays empty; an empty string is written as `""`. Floats are rounded to what a reader can use:
+/// metres and radians to seven decimals, all others to six significant digits, of which none before the
+/// decimal point is lost; Parquet files keep every bit. Booleans are 1 and 0. Text is quoted where it holds a comma, a quote, a line break
 /// or spaces at an end (RFC 4180). Text that a spreadsheet would take for a formula, because it begins with
 /// =, +, - or @, gets an apostrophe in front.
 ///
@@ -43,10 +51,12 @@ fn write_rows(out: &mut impl Write, table: &Table) -> io::Result<()> {
         write_text(out, name)?;
     }
     writeln!(out)?;
+    let unit = |name: &str| table.metadata(&format!("{name}.unit")).unwrap_or("").to_owned();
+    let units: Vec<String> = table.names().map(unit).collect();
     for row in 0..table.rows() {
         for (i, (_, column)) in table.columns().enumerate() {
             separate(out, i)?;
-            write_cell(out, column, row)?;
+            write_cell(out, column, row, &units[i])?;
         }
         writeln!(out)?;
     }
@@ -57,15 +67,13 @@ fn separate(out: &mut impl Write, column: usize) -> io::Result<()> {
     if column > 0 { out.write_all(b",") } else { Ok(()) }
 }
 
-fn write_cell(out: &mut impl Write, column: &Column, row: usize) -> io::Result<()> {
+fn write_cell(out: &mut impl Write, column: &Column, row: usize, unit: &str) -> io::Result<()> {
     if !column.is_filled(row) {
         return Ok(());
     }
     match column.raw() {
-        Values::F64(v) if is_plain(v[row]) => write!(out, "{}", v[row]),
-        Values::F64(v) => write!(out, "{:e}", v[row]),
-        Values::F32(v) if is_plain(f64::from(v[row])) => write!(out, "{}", v[row]),
-        Values::F32(v) => write!(out, "{:e}", v[row]),
+        Values::F64(v) => write_float(out, v[row], unit),
+        Values::F32(v) => write_float(out, f64::from(v[row]), unit),
         Values::I64(v) => write!(out, "{}", v[row]),
         Values::U64(v) => write!(out, "{}", v[row]),
         Values::U32(v) => write!(out, "{}", v[row]),
@@ -76,9 +84,31 @@ fn write_cell(out: &mut impl Write, column: &Column, row: usize) -> io::Result<(
     }
 }
 
+fn write_float(out: &mut impl Write, value: f64, unit: &str) -> io::Result<()> {
+    match rounded(value, unit) {
+        value if is_plain(value) => write!(out, "{value}"),
+        value => write!(out, "{value:e}"),
+    }
+}
+
+/// The number with the digits that a reader can use.
+fn rounded(value: f64, unit: &str) -> f64 {
+    let decimals = match unit {
+        _ if value == 0.0 => 0,
+        "m" | "rad" => DECIMALS,
+        _ => SIGNIFICANT - 1 - (value.abs().log10().floor() as i32).clamp(-300, SIGNIFICANT - 1),
+    };
+    let text = match value.abs() < LARGE {
+        true => format!("{value:.*}", decimals.unsigned_abs() as usize),
+        false => format!("{value:.*e}", SIGNIFICANT as usize - 1),
+    };
+    // Without the sign of a zero.
+    text.parse::<f64>().map_or(value, |v| v + 0.0)
+}
+
 /// Whether a number is short without an exponent.
 fn is_plain(value: f64) -> bool {
-    value == 0.0 || !value.is_finite() || (1e-5..1e15).contains(&value.abs())
+    value == 0.0 || !value.is_finite() || (1e-5..LARGE).contains(&value.abs())
 }
 
 fn write_text(out: &mut impl Write, text: &str) -> io::Result<()> {
@@ -110,6 +140,31 @@ mod tests {
         let expected = "photo,number\n'=1+1,-1.5\n'+a,-1.5\n'-b.jpg,-1.5\n'@c,-1.5\n\
                         \"' =HYPERLINK(\"\"x\"\")\",-1.5\na=b,-1.5\n";
         assert_eq!(String::from_utf8(out).unwrap(), expected);
+    }
+
+    #[test]
+    fn numbers_have_digits_that_mean_something() {
+        let written = |value: f64, unit: &str| {
+            let mut out = Vec::new();
+            write_float(&mut out, value, unit).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        for (value, unit, expected) in [
+            (-0.0004947185324852614, "m", "-0.0004947"),
+            (412_345.123_456_789, "m", "412345.1234568"),
+            (-3.2e-9, "m", "0"),
+            (0.0033221665333995583, "rad", "0.0033222"),
+            (3.4727908551270866e-7, "m2", "3.47279e-7"),
+            (-1.5e-12, "rad2", "-1.5e-12"),
+            (0.957626602851628, "", "0.957627"),
+            (24.123456789, "mm", "24.1235"),
+            (1_234_567.891, "", "1234568"),
+            (2.5e17, "", "2.5e17"),
+            (0.0, "m2", "0"),
+            (f64::NAN, "m2", "NaN"),
+        ] {
+            assert_eq!(written(value, unit), expected, "{value} {unit}");
+        }
     }
 
     #[test]
