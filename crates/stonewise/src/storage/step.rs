@@ -130,9 +130,9 @@ impl StepDir {
         }
     }
 
-    /// Files without a stamp are none of ours.
+    /// Files without a stamp and without a record of a finished step are none of ours.
     fn refuse_foreign(&self) -> Result<()> {
-        if self.file(STAMP).exists() || files_of(&self.path, &[])?.is_empty() {
+        if self.file(STAMP).exists() || self.record(DONE).is_some() || files_of(&self.path, &[])?.is_empty() {
             return Ok(());
         }
         Err(Error::Output {
@@ -167,6 +167,10 @@ impl StepDir {
 
     /// Compares the step's files with what `done` says of them.
     pub(super) fn state(&self, published: &[PathBuf], look: Look) -> State {
+        let stamp = self.file(STAMP);
+        if !stamp.exists() && self.file(DONE).exists() {
+            return State::Damaged(format!("{} is missing", stamp.display()));
+        }
         if !self.is_of_key() || !self.file(DONE).exists() {
             return State::Unfinished;
         }
@@ -316,6 +320,24 @@ mod tests {
         let other = open(2);
         assert!(!other.file("unit").exists());
         assert_eq!(other.state(&[], Look::Digests), State::Unfinished);
+    }
+
+    #[test]
+    fn a_finished_step_without_its_stamp_is_damaged_and_done_again() {
+        let work = tempfile::tempdir().unwrap();
+        let key = Key::new("a", &1, &[]);
+        let step = StepDir::open(work.path().join("a"), key.clone()).unwrap();
+        fs::write(step.file("unit"), "x").unwrap();
+        step.finish(&[]).unwrap();
+        fs::remove_file(step.file(STAMP)).unwrap();
+        let State::Damaged(why) = step.state(&[], Look::Digests) else {
+            panic!("a step without its stamp is taken over");
+        };
+        assert!(why.contains("step.json is missing"), "{why}");
+        let again = |dir: &StepDir| Ok(fs::write(dir.file("unit"), "y").unwrap());
+        step.replace(&[], again).unwrap();
+        assert_eq!(step.state(&[], Look::Digests), State::Done);
+        assert_eq!(fs::read_to_string(step.file("unit")).unwrap(), "y");
     }
 
     #[test]
