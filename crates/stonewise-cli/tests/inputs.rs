@@ -166,6 +166,35 @@ fn usual_slips_in_project_files_are_wrong_usage_with_the_fix() {
     );
 }
 
+#[test]
+fn a_project_file_that_is_missing_or_no_text_is_wrong_usage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("stonewise.toml");
+    let run = |given: &Path| {
+        let mut command = stonewise();
+        command.arg("run").arg(given).args(["--out", "unused"]);
+        let output = command.output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    // A folder without a project file, and a file that is not there.
+    for given in [folder.path().to_path_buf(), folder.path().join("none.toml")] {
+        let (code, log) = run(&given);
+        assert_eq!(code, Some(2), "{log}");
+        assert!(
+            log.contains("no project file is there") && log.contains("stonewise init"),
+            "{log}"
+        );
+    }
+    // A name in Latin 1.
+    fs::write(&path, b"[project]\nname = \"Stra\xdfe\"\n").unwrap();
+    let (code, log) = run(&path);
+    assert_eq!(code, Some(2), "{log}");
+    assert!(
+        log.contains("stonewise.toml:2: ") && log.contains("save the project file as UTF-8"),
+        "{log}"
+    );
+}
+
 #[cfg(unix)]
 #[test]
 fn a_read_that_never_ends_is_ended_by_a_signal() {

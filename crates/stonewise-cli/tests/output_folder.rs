@@ -38,6 +38,18 @@ fn inputs_are_never_written_over() {
 }
 
 #[test]
+fn a_results_folder_that_cannot_be_made_is_said() {
+    let survey = copy_of(tiny_survey());
+    let below_a_file = survey.path().join("stonewise.toml/results");
+    let (code, log) = run(survey.path(), &below_a_file, &[]);
+    assert_eq!(code, 1, "{log}");
+    assert!(
+        log.contains("creating the results folder failed") && log.contains("stonewise.toml/results"),
+        "{log}"
+    );
+}
+
+#[test]
 fn other_peoples_folders_are_refused_and_their_files_stay() {
     let out = tempfile::tempdir().unwrap();
     fs::write(out.path().join("stones.csv"), "mine").unwrap();

@@ -22,6 +22,15 @@ pub enum Error {
         /// What is wrong, and the fix.
         message: String,
     },
+    /// There is no project file.
+    #[error(
+        "no project file is there: name one, or the folder that holds stonewise.toml; `stonewise init DIR` writes one: {path}",
+        path = .path.display()
+    )]
+    NoProject {
+        /// Where it was looked for.
+        path: PathBuf,
+    },
     /// Parameters that were given beside the project file cannot be.
     #[error("{0}")]
     Parameters(String),
@@ -213,7 +222,11 @@ impl Error {
     pub fn is_wrong_usage(&self) -> bool {
         matches!(
             self,
-            Self::Project { .. } | Self::Parameters(_) | Self::Output { .. } | Self::Plan { .. }
+            Self::Project { .. }
+                | Self::NoProject { .. }
+                | Self::Parameters(_)
+                | Self::Output { .. }
+                | Self::Plan { .. }
         )
     }
 

@@ -11,6 +11,7 @@ use crate::simulate::SurveyParams;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Name of the marker, in the folder that stonewise keeps for itself.
@@ -97,7 +98,8 @@ pub(super) fn look(folder: &Path, owner: &Owner) -> Result<Found> {
                 None => Found::Other(None),
             });
         }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {}
+        // Below a file there is no folder; making one says so.
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
         Err(e) => return Err(Error::io("reading", &path)(e)),
     }
     if is_empty(folder)? {
@@ -156,7 +158,7 @@ fn is_empty(folder: &Path) -> Result<bool> {
                 .flatten()
                 .map(|e| e.file_name().to_string_lossy().into_owned())
                 .collect()),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+            Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(Vec::new()),
             Err(e) => Err(Error::io("listing the output folder", dir)(e)),
         }
     };

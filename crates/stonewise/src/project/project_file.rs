@@ -136,7 +136,7 @@ impl Project {
 
     fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
         let path = &project_file(path);
-        let text = fs::read_to_string(path).map_err(Error::io("reading the project file", path))?;
+        let text = project_text(path)?;
         let source = Source { path, text: &text };
         let raw: RawProject = toml::from_str(&text).map_err(|e| source.not_toml(&e))?;
         if raw.epochs.len() < least_epochs {
@@ -219,6 +219,24 @@ fn project_file(path: &Path) -> PathBuf {
     } else {
         path.to_path_buf()
     }
+}
+
+/// What the project file holds.
+fn project_text(path: &Path) -> Result<String> {
+    if !path.exists() {
+        return Err(Error::NoProject {
+            path: path.to_path_buf(),
+        });
+    }
+    let bytes = fs::read(path).map_err(Error::io("reading the project file", path))?;
+    String::from_utf8(bytes).map_err(|e| {
+        let (valid, _) = e.as_bytes().split_at(e.utf8_error().valid_up_to());
+        Error::Project {
+            path: path.to_path_buf(),
+            line: valid.iter().filter(|b| **b == b'\n').count() + 1,
+            message: "a character that is not in UTF-8: save the project file as UTF-8".to_owned(),
+        }
+    })
 }
 
 /// The text of a project file, to point into.
