@@ -71,7 +71,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 12] = [
+const CASES: [Case; 13] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -85,6 +85,18 @@ const CASES: [Case; 12] = [
             name_system(&dir.join(CLOUD_2), 25833);
         },
         "EPSG:25832 (epoch 1), EPSG:25833 (epoch 2): transform them to one",
+        true,
+    ),
+    (
+        "a system in feet, by its number alone",
+        |dir| {
+            for cloud in ["epoch1/cloud_tls.laz", CLOUD_2].map(|cloud| dir.join(cloud)) {
+                let points = points(&cloud);
+                fs::remove_file(&cloud).unwrap();
+                write_points_laz(&cloud, Some("EPSG:2263"), &points, &[]).unwrap();
+            }
+        },
+        "coordinate system is in feet",
         true,
     ),
     (

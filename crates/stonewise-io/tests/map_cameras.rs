@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraError, MapFrame, read_cameras_on_map};
-use stonewise_io::crs::{Coordinates, Crs, Geodetic, MapSystem};
+use stonewise_io::crs::{Coordinates, Crs, Geodetic, MapSystem, is_in_feet};
 
 fn expected() -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/expected.json");
@@ -25,6 +25,19 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 fn system(text: &str) -> MapSystem {
     MapSystem::parse(text).unwrap().unwrap()
+}
+
+#[test]
+fn systems_in_feet_are_those_of_proj() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/units.json");
+    let units: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    for (kind, in_feet) in [("feet", true), ("other", false)] {
+        let codes = numbers(&units[kind]);
+        assert!(codes.len() > 500);
+        for code in codes {
+            assert_eq!(is_in_feet(code as u32), in_feet, "EPSG:{code}");
+        }
+    }
 }
 
 #[test]

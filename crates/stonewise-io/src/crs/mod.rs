@@ -2,12 +2,14 @@
 
 mod ellipsoid;
 mod epsg;
+mod feet;
 mod map_system;
 mod projection;
 mod system;
 mod wkt;
 
 pub use ellipsoid::{Ellipsoid, Geodetic};
+pub use feet::is_in_feet;
 pub use map_system::{Coordinates, MapSystem};
 pub use projection::{MapOrigin, Projection};
 pub use system::Crs;

@@ -11,7 +11,7 @@ use crate::texts::findings::{
 };
 use nalgebra::Vector3;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::crs::Crs;
+use stonewise_io::crs::{Crs, is_in_feet};
 
 /// Metres in a unit that somebody may have exported, by its name.
 static UNIT_NAMES: [(&Message, f64); 4] = [
@@ -92,8 +92,15 @@ fn spacing(name: &str, survey: &Sample) -> Finding {
 
 /// A coordinate system whose unit is not the metre.
 fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
-    let crs = survey.crs.iter().flatten().map(|c| c.to_ascii_lowercase());
-    let unit = |text: String| {
+    let unit = |text: &String| {
+        let crs = Crs::parse(text);
+        let code = crs.as_ref().and_then(|crs| u32::try_from(crs.epsg).ok());
+        // A code stands for its definition, where that is known.
+        let text = match crs {
+            Some(crs) if text.starts_with("EPSG:") && !crs.wkt.is_empty() => crs.wkt,
+            _ => text.clone(),
+        };
+        let text = text.to_ascii_lowercase();
         let is_geographic =
             text.starts_with("geogcs") || text.starts_with("geogcrs") || text.starts_with("geodcrs");
         let feet = [
@@ -104,11 +111,11 @@ fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
         ];
         match () {
             () if is_geographic => Some(&DEGREES),
-            () if feet.iter().any(|f| text.contains(f)) => Some(&FEET),
+            () if code.is_some_and(is_in_feet) || feet.iter().any(|f| text.contains(f)) => Some(&FEET),
             () => None,
         }
     };
-    let unit: &Message = crs.filter_map(unit).next()?;
+    let unit: &Message = survey.crs.iter().flatten().filter_map(unit).next()?;
     let text = SYSTEM_UNIT.say(&[("unit", unit.english)]);
     Some(Finding::new(name, UNITS.english, Verdict::Wrong, text))
 }
