@@ -14,7 +14,7 @@ use crate::results::Status;
 use crate::results::records::State;
 pub(crate) use braces::fill;
 pub(crate) use doubts::{
-    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, STRETCHED, TORN,
+    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, STRETCHED, TORN, TURNED,
 };
 pub(crate) use message::Message;
 pub(crate) use report::{

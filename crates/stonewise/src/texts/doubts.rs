@@ -74,5 +74,13 @@ messages! {
             {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
             Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
             den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
+
+        TURNED:
+            "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
+            are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
+            those of the first, with their photos, and run again",
+            "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
+            sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten. Die Punktwolken dieser Epoche \
+            samt ihren Fotos auf die der ersten registrieren und neu rechnen";
     }
 }

@@ -4,6 +4,7 @@ mod labels;
 mod motions;
 mod registration;
 mod scale;
+mod turn;
 
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
@@ -14,6 +15,7 @@ use crate::results::records::Datum;
 use labels::{beside, torn};
 use motions::{blind, few_measured, unsettled};
 use scale::stretched;
+use turn::turned;
 
 /// Warns where the motions of a pair of epochs cannot be relied on.
 pub fn note_doubts(
@@ -36,7 +38,12 @@ pub fn note_doubts(
     for (name, message) in beside(context, number, offsets) {
         context.warnings.doubt("label", name, message);
     }
-    let of_motions = [unsettled(registered), few_measured(rows), blind(registered, rows)];
+    let of_motions = [
+        unsettled(registered),
+        few_measured(rows),
+        blind(registered, rows),
+        turned(rows),
+    ];
     let of_epochs = match is_prescribed(context, number) {
         true => [None, None],
         false => [misregistered(context, registered), stretched(rows, datum)],
