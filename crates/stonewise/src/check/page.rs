@@ -15,8 +15,11 @@ impl Report {
     pub fn write_page(&self, path: &Path, project: &Project) -> Result<()> {
         let mut page = Page::new(&format!("{}: a look at the survey", project.name));
         page.note(match self.verdict() {
-            Verdict::Fine | Verdict::Note => "Nothing speaks against running this project.",
-            Verdict::Doubt => "Some things are doubtful: a run goes on, and ends with exit code 3.",
+            Verdict::Fine => "Nothing speaks against running this project.",
+            Verdict::Note => "Nothing would stop a run: read the notes, and look at the pictures.",
+            Verdict::Doubt => {
+                "Some things are doubtful: a run goes on, and ends with exit code 3 where it finds the same."
+            }
             Verdict::Wrong => "Something cannot be right: a run stops, unless --force is given.",
         });
         let rows: Vec<Vec<String>> = self

@@ -36,7 +36,7 @@ pub(super) fn look(project: &Project, surveys: &[Sample]) -> Vec<Finding> {
             |text: String| found.push(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
         let (step_m, spacing_m) = (step(&survey.points), survey.spacing_m.unwrap_or(0.0));
         if step_m > spacing_m * CHANCE_STEP {
-            if step_m > spacing_m * COARSE_STEP {
+            if survey.spacing_m.is_some() && step_m > spacing_m * COARSE_STEP {
                 let [step, spacing] = [step_m, spacing_m].map(|m| format!("{:.1}", 1e3 * m));
                 doubt(ROUNDED.say(&[("step", &*step), ("spacing", &*spacing)]));
             }
