@@ -26,7 +26,8 @@ static FEET: [u32; 300] = [
 /// Whether eastings and northings of the system with this code are in feet.
 pub fn is_in_feet(code: u32) -> bool {
     let (ranges, _) = FEET.as_chunks::<3>();
-    let holds =
-        |[first, last, step]: &[u32; 3]| (*first..=*last).contains(&code) && (code - first) % step == 0;
+    let holds = |[first, last, step]: &[u32; 3]| {
+        (*first..=*last).contains(&code) && (code - first).is_multiple_of(*step)
+    };
     ranges.iter().any(holds)
 }

@@ -334,7 +334,10 @@ mod tests {
             panic!("a step without its stamp is taken over");
         };
         assert!(why.contains("step.json is missing"), "{why}");
-        let again = |dir: &StepDir| Ok(fs::write(dir.file("unit"), "y").unwrap());
+        let again = |dir: &StepDir| {
+            fs::write(dir.file("unit"), "y").unwrap();
+            Ok(())
+        };
         step.replace(&[], again).unwrap();
         assert_eq!(step.state(&[], Look::Digests), State::Done);
         assert_eq!(fs::read_to_string(step.file("unit")).unwrap(), "y");
