@@ -47,12 +47,14 @@ impl Cloud {
     }
 
     /// Point `i` relative to the origin.
+    #[inline]
     pub fn local(&self, i: usize) -> Point3<f64> {
         let [x, y, z] = self.offsets[i];
         Point3::new(f64::from(x), f64::from(y), f64::from(z))
     }
 
     /// Point `i` in the world frame.
+    #[inline]
     pub fn world(&self, i: usize) -> Point3<f64> {
         self.origin + self.local(i).coords
     }

@@ -64,10 +64,12 @@ fn sample(
 /// The first point of every voxel of a world-aligned grid.
 fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
     let mut taken = CellSet::default();
+    let mut last = None;
     (0..cloud.len() as u32)
         .filter(|&i| {
-            let p = cloud.world(i as usize);
-            taken.insert(cell_of(&p, voxel_m))
+            let voxel = cell_of(&cloud.world(i as usize), voxel_m);
+            // Points mostly follow one in the same voxel.
+            last.replace(voxel) != Some(voxel) && taken.insert(voxel)
         })
         .collect()
 }

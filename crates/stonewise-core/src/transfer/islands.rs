@@ -38,17 +38,32 @@ impl Occupancy {
         }
     }
 
-    pub(super) fn add(&mut self, stone: u32, world: &Point3<f64>) {
-        *self
-            .counts
-            .entry((stone, cell_of(world, self.voxel_m)))
-            .or_insert(0) += 1;
+    /// Points with their stones; those that follow one in the same voxel cost least.
+    pub(super) fn add_all(&mut self, points: impl Iterator<Item = (u32, Point3<f64>)>) {
+        let mut last: Option<((u32, Voxel), u32)> = None;
+        for (stone, world) in points {
+            let key = (stone, cell_of(&world, self.voxel_m));
+            match &mut last {
+                Some((same, count)) if *same == key => *count += 1,
+                _ => {
+                    let before = last.replace((key, 1));
+                    self.add(before);
+                }
+            }
+        }
+        self.add(last);
+    }
+
+    fn add(&mut self, counted: Option<((u32, Voxel), u32)>) {
+        if let Some((key, count)) = counted {
+            *self.counts.entry(key).or_insert(0) += count;
+        }
     }
 
     /// The points of other tiles, too.
     pub fn merge(&mut self, other: Self) {
-        for (voxel, count) in other.counts {
-            *self.counts.entry(voxel).or_insert(0) += count;
+        for counted in other.counts {
+            self.add(Some(counted));
         }
     }
 
@@ -184,7 +199,7 @@ mod tests {
             for i in 0..n {
                 for j in 0..n {
                     let p = Point3::new(x0 + 0.01 * f64::from(i), 0.01 * f64::from(j), 0.0);
-                    occupancy.add(stone, &p);
+                    occupancy.add_all(std::iter::once((stone, p)));
                 }
             }
         };

@@ -5,8 +5,8 @@ use crate::raster::LabelImage;
 /// A label image as runs of equal labels per row.
 ///
 /// A 12 MP photo of masonry takes 2 to 3 MB instead of 48: memory follows the length of the borders. A
-/// look-up starts at the run in which its part of the row begins, and goes on to the run that holds it: one
-/// or two steps.
+/// look-up in a block of one label ends there. Another starts at the run in which its part of the row begins,
+/// and goes on to the run that holds it: one or two steps.
 pub(super) struct RunLabels {
     width: u32,
     /// Start of each row in `runs`; one more entry than rows.
@@ -15,10 +15,16 @@ pub(super) struct RunLabels {
     runs: Vec<(u32, u32)>,
     /// Run of its row, or one before it, in which each part of [`PART_PX`] begins, row by row.
     parts: Vec<u16>,
+    /// The label of all pixels of each block of [`BLOCK_PX`] by as many, row by row; or [`MIXED`].
+    blocks: Vec<u32>,
 }
 
 /// Pixels of a part of a row: stones are about as wide, so that few runs begin in a part.
 const PART_PX: usize = 64;
+/// Edge of a block, pixels: of stones of 100 pixels and their joints, two blocks in three have one label.
+const BLOCK_PX: usize = 16;
+/// In a block: more than one label, or a label that nobody uses.
+const MIXED: u32 = u32::MAX;
 
 impl RunLabels {
     /// Those of a photo that is not read.
@@ -28,6 +34,7 @@ impl RunLabels {
             rows: vec![0],
             runs: Vec::new(),
             parts: Vec::new(),
+            blocks: Vec::new(),
         }
     }
 
@@ -38,11 +45,26 @@ impl RunLabels {
             rows: vec![0],
             runs: Vec::new(),
             parts: Vec::new(),
+            blocks: Vec::new(),
         };
-        for row in image.data().chunks_exact(width.max(1) as usize) {
+        let rows = image.data().chunks_exact(width.max(1) as usize);
+        for (y, row) in rows.enumerate() {
             labels.add_row(row);
+            labels.add_to_blocks(y, row);
         }
         labels
+    }
+
+    fn add_to_blocks(&mut self, y: usize, row: &[u32]) {
+        if y.is_multiple_of(BLOCK_PX) {
+            self.blocks.extend(row.iter().step_by(BLOCK_PX));
+        }
+        let first = self.blocks.len() - row.len().div_ceil(BLOCK_PX);
+        for (block, pixels) in self.blocks[first..].iter_mut().zip(row.chunks(BLOCK_PX)) {
+            if !all_are(pixels, *block) {
+                *block = MIXED;
+            }
+        }
     }
 
     fn add_row(&mut self, row: &[u32]) {
@@ -51,6 +73,9 @@ impl RunLabels {
             let mut previous = (self.runs.len() > start).then(|| self.runs[self.runs.len() - 1].1);
             let open = (self.runs.len() - start).saturating_sub(1);
             self.parts.push(open.min(usize::from(u16::MAX)) as u16);
+            if previous.is_some_and(|label| all_are(pixels, label)) {
+                continue;
+            }
             for (x, &label) in (part * PART_PX..).zip(pixels) {
                 if previous != Some(label) {
                     self.runs.push((x as u32, label));
@@ -68,7 +93,13 @@ impl RunLabels {
         if !(x >= 0.0 && y >= 0.0 && x < f64::from(self.width)) {
             return None;
         }
-        let (x, y) = (x as usize, y as usize);
+        let (x, y) = (x as u32 as usize, y as u32 as usize);
+        let columns = (self.width as usize).div_ceil(BLOCK_PX);
+        // Beyond the last row there may be pixels of the last blocks.
+        let label = *self.blocks.get(y / BLOCK_PX * columns + x / BLOCK_PX)?;
+        if label != MIXED && y + 1 < self.rows.len() {
+            return Some(label);
+        }
         let row = &self.runs[*self.rows.get(y)? as usize..*self.rows.get(y + 1)? as usize];
         let parts = (self.width as usize).div_ceil(PART_PX);
         let mut at = usize::from(*self.parts.get(y * parts + x / PART_PX)?);
@@ -77,6 +108,15 @@ impl RunLabels {
         }
         Some(row.get(at)?.1)
     }
+}
+
+/// Whether all pixels have this label; without a branch for each of them.
+#[inline]
+fn all_are(pixels: &[u32], label: u32) -> bool {
+    pixels
+        .iter()
+        .fold(0, |differing, &pixel| differing | (pixel ^ label))
+        == 0
 }
 
 #[cfg(test)]
@@ -105,6 +145,18 @@ mod tests {
                 Some(label),
                 "{i}"
             );
+        }
+        // Patches that are wider and narrower than a block, cut off by the borders.
+        let patches = (0..70 * 53u32).map(|i| ((i % 70 + 3) / 21) * 10 + (i / 70 + 5) / 19);
+        let image = LabelImage::from_vec(70, 53, patches.collect()).unwrap();
+        let patched = RunLabels::new(&image);
+        for (i, &label) in image.data().iter().enumerate() {
+            let pixel = [(i % 70) as f64 + 0.3, (i / 70) as f64 + 0.6];
+            assert_eq!(patched.at(pixel), Some(label), "{i}");
+        }
+        assert!(patched.blocks.contains(&MIXED) && patched.blocks.iter().any(|b| *b != MIXED));
+        for pixel in [[3.0, 53.0], [3.0, 60.0], [70.0, 3.0]] {
+            assert_eq!(patched.at(pixel), None);
         }
         for pixel in [[-0.1, 2.0], [7.0, 2.0], [3.0, 5.0], [3.0, -0.5], [f64::NAN, 1.0]] {
             assert_eq!(runs.at(pixel), None);

@@ -1,8 +1,9 @@
 //! Local spacing, noise and orientation of a tile's surface.
 
 use super::bytes::{Reader, Writer};
+use super::neighbourhood::{Members, Neighbourhood};
 use super::{TransferError, TransferParams};
-use crate::cloud::{Cloud, GridIndex};
+use crate::cloud::Cloud;
 use crate::geometry::{Bounds, CellMap, cell_of, floor};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -76,15 +77,19 @@ const BLOCK_M: f64 = 4.0;
 const MAX_NEIGHBOUR_M: f64 = 0.5;
 
 impl SurfaceCells {
-    /// Measures the surface of a tile; [`limit_spacings`] comes next. Cost: one neighbour index and a few
-    /// searches per cell.
+    /// Measures the surface of a tile; [`limit_spacings`] comes next. Cost: a few searches per cell, each
+    /// through its points.
     pub(super) fn new(cloud: &Cloud, cell_m: f64) -> Self {
         let points: Vec<Point3<f64>> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
         let members = members(&points, cell_m);
-        let index = GridIndex::new(&points, search_cell(&points, &members, cell_m));
+        let neighbourhood = Neighbourhood {
+            points: &points,
+            members: &members,
+            cell_m,
+        };
         let measured: Vec<LocalSurface> = members
             .par_iter()
-            .map(|(_, ids)| measure(&points, &index, ids, cell_m))
+            .map(|cell| measure(&neighbourhood, cell))
             .collect();
         Self {
             origin: cloud.origin(),
@@ -104,7 +109,7 @@ impl SurfaceCells {
     /// cell are in no group.
     pub(super) fn groups_of(&self, cloud: &Cloud, chosen: &[u32]) -> Vec<SurfaceGroup> {
         let points: Vec<Point3<f64>> = chosen.iter().map(|&i| cloud.local(i as usize)).collect();
-        let group = |(key, points): ([i32; 3], Vec<u32>)| {
+        let group = |(key, points): Members| {
             let at = self.keys.binary_search(&key).ok()?;
             let bounds = Bounds::of(points.iter().map(|&k| cloud.world(chosen[k as usize] as usize)))?;
             Some(SurfaceGroup {
@@ -215,9 +220,9 @@ fn key(p: &Point3<f64>, cell_m: f64) -> [i32; 3] {
 }
 
 /// Indices of the points of each cell; cells and indices ascend.
-fn members(points: &[Point3<f64>], cell_m: f64) -> Vec<([i32; 3], Vec<u32>)> {
+fn members(points: &[Point3<f64>], cell_m: f64) -> Vec<Members> {
     let mut numbers: CellMap<[i32; 3], usize> = CellMap::default();
-    let mut members: Vec<([i32; 3], Vec<u32>)> = Vec::new();
+    let mut members: Vec<Members> = Vec::new();
     let mut last: Option<([i32; 3], usize)> = None;
     for (i, p) in points.iter().enumerate() {
         let key = key(p, cell_m);
@@ -236,19 +241,14 @@ fn members(points: &[Point3<f64>], cell_m: f64) -> Vec<([i32; 3], Vec<u32>)> {
     members
 }
 
-/// A cell for the index that holds a handful of points where the cloud is as dense as usual.
-fn search_cell(points: &[Point3<f64>], members: &[([i32; 3], Vec<u32>)], cell_m: f64) -> f64 {
-    let mean = points.len() as f64 / members.len().max(1) as f64;
-    (3.0 * cell_m / mean.sqrt()).clamp(0.005, MAX_NEIGHBOUR_M)
-}
-
-fn measure(points: &[Point3<f64>], index: &GridIndex, ids: &[u32], cell_m: f64) -> LocalSurface {
+fn measure(around: &Neighbourhood, (cell, ids): &Members) -> LocalSurface {
+    let points = around.points;
     let step = ids.len().div_ceil(SAMPLES).max(1);
     let mut spacings = Vec::new();
     let mut noises = Vec::new();
     for &i in ids.iter().skip(step / 2).step_by(step) {
-        let found = index.nearest_k(&points[i as usize], NEIGHBOURS + 1, MAX_NEIGHBOUR_M);
-        let around: Vec<Point3<f64>> = found.iter().map(|f| points[f.0]).collect();
+        let found = around.nearest_k(cell, &points[i as usize], NEIGHBOURS + 1, MAX_NEIGHBOUR_M);
+        let near: Vec<Point3<f64>> = found.iter().map(|f| points[f.0]).collect();
         let reach2 = found.last().map_or(0.0, |f| f.1);
         spacings.push(if found.len() > 1 {
             (std::f64::consts::PI * reach2 / (found.len() - 1) as f64).sqrt()
@@ -256,21 +256,21 @@ fn measure(points: &[Point3<f64>], index: &GridIndex, ids: &[u32], cell_m: f64) 
             MAX_NEIGHBOUR_M
         });
         // Three parameters of the plane are free: the residuals of k points hold k - 3 degrees of freedom.
-        if around.len() > 4 {
-            let (_, spread) = principal(&around);
-            noises.push(spread * (around.len() as f64 / (around.len() - 3) as f64).sqrt());
+        if near.len() > 4 {
+            let (_, spread) = principal(&near);
+            noises.push(spread * (near.len() as f64 / (near.len() - 3) as f64).sqrt());
         }
     }
     let spacing = upper_median(&mut spacings).unwrap_or(0.0);
-    let cell: Vec<Point3<f64>> = thinned(points, ids);
-    let normal = if cell.len() >= 3 {
-        principal(&cell).0
+    let thinned: Vec<Point3<f64>> = thinned(points, ids);
+    let normal = if thinned.len() >= 3 {
+        principal(&thinned).0
     } else {
         Vector3::zeros()
     };
     LocalSurface {
         normal: normal.cast(),
-        spacing_m: spacing.min(cell_m) as f32,
+        spacing_m: spacing.min(around.cell_m) as f32,
         noise_m: upper_median(&mut noises).unwrap_or(0.0) as f32,
         points: ids.len() as u32,
     }

@@ -256,9 +256,8 @@ impl<'a> PreparedTransfer<'a> {
             let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
             let candidates = self.observer.candidates(&tiles.bounds(tile));
             let labels = label_tile(tile, &cloud, &self.observer, &candidates, &electorate, &names);
-            for (i, &stone) in labels.stone.iter().enumerate().filter(|s| *s.1 != 0) {
-                occupancy.add(stone, &cloud.world(i));
-            }
+            let labelled = labels.stone.iter().enumerate().filter(|s| *s.1 != 0);
+            occupancy.add_all(labelled.map(|(i, &stone)| (stone, cloud.world(i))));
             store
                 .write(tile, &labels)
                 .map_err(|e| TransferError::labels(tile, e))?;

@@ -3,13 +3,15 @@
 use super::TransferError;
 use super::TransferParams;
 use super::depth::{SplatDepth, splat_all};
+use super::depth_bounds::DepthBounds;
 use super::frustum::Cone;
+use super::photo_frame::PhotoFrame;
 use super::run_labels::RunLabels;
 use super::surface_cells::{LocalSurface, SurfaceCells, SurfaceGroup};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::progress::Progress;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// One photo's word on one point.
@@ -32,8 +34,10 @@ pub(super) struct Observer<'a> {
     views: Vec<&'a View>,
     centres: Vec<Point3<f64>>,
     cones: Vec<Cone>,
+    frames: Vec<PhotoFrame<'a>>,
     labels: Vec<RunLabels>,
     depths: Vec<SplatDepth>,
+    bounds: Vec<DepthBounds>,
     /// Of the tiles from `first_tile` on.
     surfaces: Vec<SurfaceCells>,
     first_tile: usize,
@@ -67,6 +71,11 @@ impl<'a> Observer<'a> {
         Self {
             centres: views.iter().map(|v| v.centre()).collect(),
             cones: views.iter().map(|v| Cone::of(v)).collect(),
+            frames: views.iter().map(|v| PhotoFrame::of(v)).collect(),
+            bounds: depths
+                .par_iter()
+                .map(|depth| depth.bounds(params.silhouette_px))
+                .collect(),
             views,
             labels,
             depths,
@@ -124,14 +133,12 @@ impl<'a> Observer<'a> {
             .par_iter()
             .map_init(Vec::new, |found, group| {
                 let may_vote = |p: &u32| self.may_vote(*p as usize, group);
-                let candidates: Vec<u32> = candidates.iter().copied().filter(may_vote).collect();
+                let candidates = candidates.iter().copied().filter(may_vote);
+                let looks: Vec<Look> = candidates.map(|photo| self.look(photo, &group.surface)).collect();
                 let of_point = |&k: &u32| {
                     let world = cloud.world(chosen[k as usize] as usize);
                     found.clear();
-                    let sightings = candidates
-                        .iter()
-                        .map(|&photo| self.sight_in(photo, &group.surface, &world));
-                    found.extend(sightings.flatten());
+                    found.extend(looks.iter().filter_map(|look| self.sight(look, &world)));
                     judge(&found[..])
                 };
                 group.points.iter().map(of_point).collect()
@@ -161,43 +168,76 @@ impl<'a> Observer<'a> {
         incidence - (radius / distance).asin() <= self.params.max_incidence_rad + ANGLE_MARGIN
     }
 
+    fn look<'s>(&self, photo: u32, surface: &'s LocalSurface) -> Look<'s> {
+        let normal = surface.normal.cast::<f64>();
+        Look {
+            photo,
+            surface,
+            normal: (surface.normal != Vector3::zeros())
+                .then(|| self.frames[photo as usize].direction(&normal)),
+            least_tolerance_m: surface.tolerance_m(1.0, self.params),
+        }
+    }
+
     /// What a photo says about a point; what costs least and rules out most comes first.
-    fn sight_in(&self, photo: u32, surface: &LocalSurface, world: &Point3<f64>) -> Option<Sighting> {
-        let p = photo as usize;
-        let view = self.views[p];
-        let seen = view.project(world)?;
-        if !view.is_inside(seen.pixel) {
+    #[inline]
+    fn sight(&self, look: &Look, world: &Point3<f64>) -> Option<Sighting> {
+        let p = look.photo as usize;
+        let frame = &self.frames[p];
+        let point = frame.point(world);
+        let pixel = frame.pixel(&point)?;
+        let (depth, distance) = (point.z, point.coords.norm());
+        // The cosine of the incidence is this over the distance.
+        let across = look.normal.map_or(0.5 * distance, |n| n.dot(&point.coords).abs());
+        if across < self.least_cosine * distance {
             return None;
         }
-        let line = (world - self.centres[p]).normalize();
-        let cosine = surface.cosine(&line);
-        if cosine < self.least_cosine {
-            return None;
-        }
-        let tolerance = surface.tolerance_m(cosine, self.params);
-        let (depth, here) = (seen.depth_m, self.depths[p].at(seen.pixel)?);
-        if depth > f64::from(here) + tolerance {
-            return None;
-        }
-        let instance = self.labels[p].at(seen.pixel)?;
-        let [least, greatest] = self.depths[p].around(seen.pixel, here, self.params.silhouette_px);
-        let step = self.params.silhouette_step_m + tolerance;
-        let beside_an_occluder = depth > f64::from(least) + step;
-        let on_an_edge = f64::from(greatest) > depth + step;
+        // Most points lie on an even surface that fills their block of the depth map.
+        let even = self.depths[p]
+            .bounds_at(&self.bounds[p], pixel)
+            .is_some_and(|[least, greatest]| {
+                depth <= f64::from(least) + look.least_tolerance_m
+                    && f64::from(greatest) <= depth + self.params.silhouette_step_m + look.least_tolerance_m
+            });
+        let at_a_silhouette = !even && self.is_at_a_silhouette(look, pixel, depth, across / distance)?;
+        let instance = self.labels[p].at(pixel)?;
         // Precision of a border on the face: finer and less oblique photos place it more precisely. The
         // root keeps one close photo from outvoting the majority.
-        let precision = (cosine / view.gsd_m(depth)).sqrt();
-        let weight = if beside_an_occluder || on_an_edge {
+        let precision = (across * frame.focal_px / (distance * depth)).sqrt();
+        let weight = if at_a_silhouette {
             precision * self.params.silhouette_weight
         } else {
             precision
         } as f32;
         Some(Sighting {
-            photo,
+            photo: look.photo,
             instance,
             weight,
         })
     }
+
+    /// Whether a point lies beside an occluder or on an edge; `None` where it is hidden.
+    fn is_at_a_silhouette(&self, look: &Look, pixel: [f64; 2], depth: f64, cosine: f64) -> Option<bool> {
+        let map = &self.depths[look.photo as usize];
+        let tolerance = look.surface.tolerance_m(cosine, self.params);
+        let here = map.at(pixel)?;
+        if depth > f64::from(here) + tolerance {
+            return None;
+        }
+        let [least, greatest] = map.around(pixel, here, self.params.silhouette_px);
+        let step = self.params.silhouette_step_m + tolerance;
+        Some(depth > f64::from(least) + step || f64::from(greatest) > depth + step)
+    }
+}
+
+/// A photo that looks at a cell.
+struct Look<'a> {
+    photo: u32,
+    surface: &'a LocalSurface,
+    /// Of the cell, in the frame of the camera; `None` where it has none.
+    normal: Option<Vector3<f64>>,
+    /// That of a point seen at a right angle.
+    least_tolerance_m: f64,
 }
 
 #[cfg(test)]
@@ -208,6 +248,110 @@ mod tests {
     use crate::raster::LabelImage;
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
     use rand::{RngExt, SeedableRng};
+
+    /// What a photo says, from the depth map and the formulas for a single point alone.
+    fn sight_alone(
+        observer: &Observer,
+        photo: usize,
+        surface: &LocalSurface,
+        world: &Point3<f64>,
+    ) -> Option<Sighting> {
+        let (view, params, map) = (observer.views[photo], observer.params, &observer.depths[photo]);
+        let seen = view.project(world).filter(|seen| view.is_inside(seen.pixel))?;
+        let cosine = surface.cosine(&(world - view.centre()).normalize());
+        let (depth, here, tolerance) = (
+            seen.depth_m,
+            map.at(seen.pixel)?,
+            surface.tolerance_m(cosine, params),
+        );
+        if cosine < params.max_incidence_rad.cos() || depth > f64::from(here) + tolerance {
+            return None;
+        }
+        let [least, greatest] = map.around(seen.pixel, here, params.silhouette_px).map(f64::from);
+        let step = params.silhouette_step_m + tolerance;
+        let share = if depth > least + step || greatest > depth + step {
+            params.silhouette_weight
+        } else {
+            1.0
+        };
+        Some(Sighting {
+            photo: photo as u32,
+            instance: observer.labels[photo].at(seen.pixel)?,
+            weight: (share * (cosine / view.gsd_m(depth)).sqrt()) as f32,
+        })
+    }
+
+    /// A wall with recesses, a rail and a board before it, all in the depth maps, which some photos look at
+    /// slantwise; also where maps are smaller than their photos.
+    #[test]
+    fn points_whose_block_is_even_are_judged_as_all_others() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(9);
+        let mut draw = |low: f64, high: f64| rng.random_range(low..high);
+        let wall = (0..30_000).map(|_| {
+            let (x, z) = (draw(0.0, 4.0), draw(0.0, 2.0));
+            let recess = if x % 0.8 < 0.1 { 0.3 } else { 0.0 };
+            Point3::new(x, recess + 0.02 * (9.0 * x).sin() * (7.0 * z).cos(), z)
+        });
+        let wall: Vec<Point3<f64>> = wall.collect();
+        let rail = (0..3000).map(|_| Point3::new(draw(0.0, 4.0), -0.8, draw(0.5, 0.53)));
+        let points: Vec<Point3<f64>> = wall.into_iter().chain(rail).collect();
+        let board =
+            (0..4000).map(|_| Point3::new(draw(2.0, 2.7), -0.4 + draw(-0.002, 0.002), draw(0.8, 1.6)));
+        let board: Vec<Point3<f64>> = board.collect();
+        let cloud = Cloud::from_world(Point3::new(2.0, 0.0, 1.0), points.into_iter().chain(board));
+        let views: Vec<View> = (0..6)
+            .map(|i| {
+                let centre = Vector3::new(draw(-1.0, 5.0), draw(-5.0, -2.0), draw(0.0, 2.0));
+                let to_middle = Vector3::new(2.0, 0.0, 1.0) - centre;
+                let turn = UnitQuaternion::face_towards(&to_middle, &-Vector3::z()).inverse();
+                View {
+                    image: ImageId(i),
+                    name: String::new(),
+                    camera: Camera::pinhole(300, 200, 200.0),
+                    cam_from_world: Rigid3::from_parts(Translation3::from(-(turn * centre)), turn),
+                }
+            })
+            .collect();
+        let masks = || {
+            LabelImage::from_vec(
+                300,
+                200,
+                (0..60_000u32).map(|i| i % 300 / 23 + i / 6000).collect(),
+            )
+        };
+        let tiles = crate::cloud::MemoryTiles::new([cloud.clone()]);
+        for depth_memory_mib in [1024, 1] {
+            let params = TransferParams {
+                depth_memory_mib,
+                ..TransferParams::default()
+            };
+            let masked = views
+                .iter()
+                .map(|v| (v, RunLabels::new(&masks().unwrap())))
+                .collect();
+            let observer = Observer::new(&tiles, masked, &params, &crate::progress::Silent).unwrap();
+            let (mut full, mut at_silhouettes, mut unseen) = (0, 0, 0);
+            for group in observer.surfaces[0].groups(&cloud) {
+                for (photo, &i) in (0..views.len()).flat_map(|p| group.points.iter().map(move |i| (p, i))) {
+                    let world = cloud.world(i as usize);
+                    let expected = sight_alone(&observer, photo, &group.surface, &world);
+                    let look = observer.look(photo as u32, &group.surface);
+                    let found = observer.sight(&look, &world);
+                    let bare = |s: &Sighting| (s.photo, s.instance);
+                    assert_eq!(found.as_ref().map(bare), expected.as_ref().map(bare));
+                    if let (Some(found), Some(expected)) = (&found, &expected) {
+                        assert!((found.weight / expected.weight - 1.0).abs() < 1e-6);
+                        full += usize::from(found.weight > 1.0);
+                        at_silhouettes += usize::from(found.weight <= 1.0);
+                    }
+                    unseen += usize::from(found.is_none());
+                }
+            }
+            let counts = [full, at_silhouettes, unseen];
+            let all: usize = counts.iter().sum();
+            assert!(counts.iter().all(|n| 20 * n > all), "{counts:?}");
+        }
+    }
 
     /// Cells of a rough wall and photos that look anywhere: photos left out for a cell say nothing about any
     /// of its points, and enough are left out.
@@ -249,7 +393,9 @@ mod tests {
             for photo in 0..views.len() {
                 let sees = |&i: &u32| {
                     let world = cloud.world(i as usize);
-                    observer.sight_in(photo as u32, &group.surface, &world).is_some()
+                    observer
+                        .sight(&observer.look(photo as u32, &group.surface), &world)
+                        .is_some()
                 };
                 let some = group.points.iter().any(sees);
                 seen += usize::from(some);
