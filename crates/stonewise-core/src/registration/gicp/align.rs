@@ -2,17 +2,14 @@
 
 use super::block::GicpBlock;
 use super::params::{GicpParams, GicpStart};
+use super::settle::Alignment;
 use super::uncertainty::{Uncertainty, uncertainty};
-use super::window::{Motion, WindowPoint, for_each_pair, window_points};
+use super::window::{Motion, window_points};
 use crate::geometry::Rigid3;
 use crate::id::StoneId;
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
-use nalgebra::{Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 use rayon::prelude::*;
-
-/// Factor by which a damped step grows back in each iteration that does not turn back: slow, as partners on
-/// the edge of a jump would set off the next swing.
-const RECOVERY: f64 = 1.02;
 
 /// A matched stone inside a pair of blocks.
 #[derive(Clone, Debug)]
@@ -78,56 +75,9 @@ fn align_one(
         GicpStart::Identity => Vector3::zeros(),
         GicpStart::Centroids => stone.centroid_second - stone.centroid,
     };
-    let motion = iterate(&mut window, second, &centre, start, params)?;
+    let motion = Alignment::new(&mut window, second, centre, params).iterate(start)?;
     let uncertainty = uncertainty(&mut window, second, &centre, &motion, params)?;
     Ok(stone_motion(stone, &motion, &uncertainty))
-}
-
-/// Moves the window until its steps are within the tolerances. `start`: its first shift.
-fn iterate(
-    window: &mut [WindowPoint],
-    second: &GicpBlock,
-    centre: &Point3<f64>,
-    start: Vector3<f64>,
-    params: &GicpParams,
-) -> Result<Motion, MotionFailure> {
-    let mut motion = Motion {
-        shift: start,
-        turn: UnitQuaternion::identity(),
-    };
-    let needed = (params.min_overlap * window.len() as f64).max(params.min_points as f64);
-    let (mut damping, mut last_step) = (1.0, Vector6::zeros());
-    for _ in 0..params.max_iterations {
-        let (mut h, mut g) = (Matrix6::zeros(), Vector6::zeros());
-        let max_m = params.max_distance_m;
-        let count = for_each_pair(window, second, centre, &motion, max_m, |pair| {
-            let weight = pair.weight(params.plane_epsilon);
-            h += pair.information(&weight);
-            g += pair.lever(&(weight * pair.residual));
-        });
-        if (count as f64) < needed {
-            return Err(MotionFailure::Disagreement);
-        }
-        // Partners change in jumps, so the balance may jump across zero without ever being zero. Steps that
-        // turn back are halved: they close in on the place of the jump.
-        damping = if g.dot(&last_step) < 0.0 {
-            0.5 * damping
-        } else {
-            f64::min(RECOVERY * damping, 1.0)
-        };
-        let step = h.cholesky().ok_or(MotionFailure::NotConverged)?.solve(&g) * damping;
-        last_step = step;
-        let (shift, turn) = (
-            step.fixed_rows::<3>(0).into_owned(),
-            step.fixed_rows::<3>(3).into_owned(),
-        );
-        motion.shift += shift;
-        motion.turn = UnitQuaternion::from_scaled_axis(turn) * motion.turn;
-        if shift.norm() < params.tolerance_m && turn.norm() < params.tolerance_rad {
-            return Ok(motion);
-        }
-    }
-    Err(MotionFailure::NotConverged)
 }
 
 fn stone_motion(stone: &GicpStone, motion: &Motion, uncertainty: &Uncertainty) -> StoneMotion {

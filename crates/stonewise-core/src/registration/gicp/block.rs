@@ -1,11 +1,12 @@
 //! A region of an epoch, prepared once for all stones inside.
 
+use super::normal::{FAR_M, PlaneFit};
 use super::params::GicpParams;
 use crate::cloud::{Cloud, GridIndex};
 use crate::geometry::{CellMap, cell_of};
 use crate::statistics::{split_mix, upper_median};
-use nalgebra::{Matrix3, Point3, Vector3};
-use rayon::prelude::*;
+use nalgebra::{Point3, Vector3};
+use std::sync::OnceLock;
 
 /// Points of a region with their search index and planes.
 ///
@@ -15,8 +16,9 @@ pub struct GicpBlock {
     pub(super) origin: Point3<f64>,
     /// Relative to the origin.
     pub(super) points: Vec<Point3<f64>>,
-    /// Unit normals; their sign is of no meaning.
-    pub(super) normals: Vec<Vector3<f64>>,
+    /// Of the points that were asked for.
+    normals: Vec<OnceLock<Vector3<f64>>>,
+    planes: PlaneFit,
     pub(super) index: GridIndex,
     /// The point that stands for each point of the cloud, where the cloud is thinned.
     merged: Option<Vec<u32>>,
@@ -26,13 +28,12 @@ pub struct GicpBlock {
 
 /// Points whose distance to their neighbour gives the spacing: its median is then known to some percent.
 const SPACING_SAMPLE: usize = 500;
-/// Neighbours are sought no farther than this, metres: no survey of stones has its points that far apart.
-const FAR_M: f64 = 1.0;
 
 impl GicpBlock {
-    /// Prepares the points of a region, thinned to [`GicpParams::voxel_m`]: one index, one plane a point.
+    /// Prepares the points of a region, thinned to [`GicpParams::voxel_m`].
     ///
-    /// Cost: one search for `plane_neighbours` neighbours a point; about 100 bytes a point.
+    /// Cost: one index, and later one search for `plane_neighbours` neighbours of each point that takes part;
+    /// about 110 bytes a point.
     pub fn new(cloud: &Cloud, params: &GicpParams) -> Self {
         let (points, merged) = if params.voxel_m > 0.0 {
             let (points, merged) = thinned(cloud, params.voxel_m);
@@ -42,15 +43,22 @@ impl GicpBlock {
         };
         let spacing_m = spacing(&points);
         let index = GridIndex::new(&points, 2.0 * spacing_m);
-        let normals = points.par_iter().map(|p| normal(&index, p, params)).collect();
         Self {
             origin: cloud.origin(),
+            normals: vec![OnceLock::new(); points.len()],
             points,
-            normals,
+            planes: PlaneFit::new(spacing_m, params),
             index,
             merged,
             spacing_m,
         }
+    }
+
+    /// Unit normal of the plane that a point stands for; its sign is of no meaning.
+    #[inline]
+    pub(super) fn normal(&self, point: usize) -> Vector3<f64> {
+        let fit = || self.planes.normal(&self.index, &self.points[point]);
+        *self.normals[point].get_or_init(fit)
     }
 
     /// The points that stand for some points of the cloud, which indices name; each once.
@@ -119,21 +127,4 @@ fn spacing(points: &[Point3<f64>]) -> f64 {
         .filter_map(|p| index.nearest_k(p, 2, FAR_M).get(1).map(|n| n.1.sqrt()))
         .collect();
     upper_median(&mut nearest).map_or(FAR_M, |d| (2.0 * d).max(1e-4))
-}
-
-/// Normal of the plane through the neighbours of a point.
-fn normal(index: &GridIndex, p: &Point3<f64>, params: &GicpParams) -> Vector3<f64> {
-    let nearest = index.nearest_k(p, params.plane_neighbours, FAR_M);
-    let reach = nearest.last().map_or(0.0, |n| n.1.sqrt());
-    let (mut n, mut sum, mut square) = (0.0, Vector3::zeros(), Matrix3::zeros());
-    index.positions_within(p, reach.max(params.plane_radius_m), |_, q| {
-        let d = q - p;
-        n += 1.0;
-        sum += d;
-        square += d * d.transpose();
-    });
-    let spread = (square - sum * sum.transpose() / n) / n;
-    let eigen = spread.symmetric_eigen();
-    let least = eigen.eigenvalues.imin();
-    eigen.eigenvectors.column(least).into_owned()
 }

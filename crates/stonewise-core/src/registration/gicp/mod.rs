@@ -12,8 +12,10 @@
 mod align;
 mod block;
 mod neighbours;
+mod normal;
 mod pairing;
 mod params;
+mod settle;
 mod uncertainty;
 mod window;
 

@@ -284,6 +284,27 @@ fn one_stone_among_still_ones_is_loose() {
 }
 
 #[test]
+fn a_window_holds_all_points_within_the_buffer_of_any_of_the_stone() {
+    let points = scan(relief, 0.6, 0.012, 0.001, 4);
+    let centre = Point3::new(0.1, -0.05, 0.0);
+    let own = stone(&points, 1, centre).points;
+    let block = block(&points, &narrow());
+    for buffer_m in [0.05, 0.2, 0.35] {
+        let window = window::window_points(&block, &centre, &own, buffer_m);
+        let place = |&i: &u32| block.points[i as usize];
+        let is_near = |p: &&Point3<f64>| own.iter().any(|i| (place(i) - *p).norm() <= buffer_m);
+        let expected: Vec<Vector3<f64>> = block.points.iter().filter(is_near).map(|p| p - centre).collect();
+        let found: Vec<Vector3<f64>> = window.iter().map(|p| p.arm).collect();
+        assert!(
+            own.len() < found.len() && found.len() < points.len(),
+            "{}",
+            found.len()
+        );
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
 fn parameters_name_themselves() {
     let text = serde_json::to_string(&GicpParams::default()).unwrap();
     assert_eq!(

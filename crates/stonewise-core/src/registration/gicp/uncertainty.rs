@@ -11,7 +11,8 @@
 
 use super::block::GicpBlock;
 use super::params::GicpParams;
-use super::window::{Motion, Pair, WindowPoint, for_each_pair};
+use super::window::{Information, Motion, Pair, WindowPoint, for_each_pair};
+use crate::geometry::floor;
 use crate::statistics::upper_median;
 use crate::stone::MotionFailure;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
@@ -38,32 +39,64 @@ pub(super) fn uncertainty(
 ) -> Result<Uncertainty, MotionFailure> {
     let max = params.max_distance_m;
     let mut leans = Vec::with_capacity(window.len());
-    let count = for_each_pair(window, second, centre, motion, max, |pair| {
+    let count = for_each_pair(&mut *window, second, centre, motion, max, |pair| {
         leans.push(lean(pair).norm_squared());
     });
     let lean_variance = feigned_slope_variance(&mut leans);
 
-    let (mut gain, mut scatter, mut squares) = (Matrix6::zeros(), Matrix6::zeros(), 0.0);
-    let mut cells: BTreeMap<[i32; 3], Vector6<f64>> = BTreeMap::new();
+    let (mut gain, mut scatter, mut squares) = (Information::default(), Matrix6::zeros(), 0.0);
+    let mut cells = CellSums::default();
     for_each_pair(window, second, centre, motion, max, |pair| {
         let weight = pair.weight(params.plane_epsilon);
         let normal = mean_normal(pair);
-        gain += pair.information(&shape_weight(&weight, &normal, lean_variance));
+        gain.add(&pair.arm, &shape_weight(&weight, &normal, lean_variance));
         let score = pair.lever(&(weight * pair.residual));
         scatter += score * score.transpose();
         squares += normal.dot(&pair.residual).powi(2);
-        let cell = [0, 1, 2].map(|a| (pair.arm[a] / params.correlation_cell_m).floor() as i32);
-        *cells.entry(cell).or_insert_with(Vector6::zeros) += score;
+        let cell = [0, 1, 2].map(|a| floor(pair.arm[a] / params.correlation_cell_m));
+        cells.add(cell, &score);
     });
+    let gain = gain.matrix();
     let observability = observability(&gain, params.min_observability)?;
     let inverse = gain.try_inverse().ok_or(MotionFailure::NotConverged)?;
-    let excess = correlation(&scatter, cells.values());
+    let excess = correlation(&scatter, &cells.finish());
     let covariance = inverse * scatter * inverse * excess;
     Ok(Uncertainty {
         covariance: (covariance + covariance.transpose()) * 0.5,
         observability,
         rmse_m: (squares / count as f64).sqrt(),
     })
+}
+
+/// Sums over cells; points that follow one in the same cell cost least.
+#[derive(Default)]
+struct CellSums {
+    sums: BTreeMap<[i64; 3], Vector6<f64>>,
+    last: Option<([i64; 3], Vector6<f64>)>,
+}
+
+impl CellSums {
+    fn add(&mut self, cell: [i64; 3], score: &Vector6<f64>) {
+        match &mut self.last {
+            Some((same, sum)) if *same == cell => *sum += score,
+            _ => {
+                let before = self.last.replace((cell, *score));
+                self.enter(before);
+            }
+        }
+    }
+
+    fn enter(&mut self, summed: Option<([i64; 3], Vector6<f64>)>) {
+        if let Some((cell, sum)) = summed {
+            *self.sums.entry(cell).or_default() += sum;
+        }
+    }
+
+    fn finish(mut self) -> BTreeMap<[i64; 3], Vector6<f64>> {
+        let last = self.last.take();
+        self.enter(last);
+        self.sums
+    }
 }
 
 /// Difference of partners' normals, signs made equal.
@@ -121,12 +154,12 @@ fn observability(gain: &Matrix6<f64>, least: f64) -> Result<f64, MotionFailure> 
 }
 
 /// How much more the sums over cells scatter than independent points would: 1 or more.
-fn correlation<'a>(single: &Matrix6<f64>, cells: impl Iterator<Item = &'a Vector6<f64>>) -> f64 {
+fn correlation(single: &Matrix6<f64>, cells: &BTreeMap<[i64; 3], Vector6<f64>>) -> f64 {
     let Some(factor) = single.cholesky() else {
         return 1.0;
     };
     let (mut sum, mut count) = (0.0, 0.0);
-    for score in cells {
+    for score in cells.values() {
         sum += score.dot(&factor.solve(score));
         count += 1.0;
     }
