@@ -68,7 +68,7 @@ fn thin(cloud: &Cloud, voxel_m: f64) -> Vec<u32> {
     (0..cloud.len() as u32)
         .filter(|&i| {
             let voxel = cell_of(&cloud.world(i as usize), voxel_m);
-            // Points mostly follow one in the same voxel.
+            // Successive points mostly lie in the same voxel.
             last.replace(voxel) != Some(voxel) && taken.insert(voxel)
         })
         .collect()

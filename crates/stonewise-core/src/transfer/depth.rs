@@ -16,10 +16,10 @@ use std::array::from_fn;
 /// Splats are never wider than this many map pixels to each side: keeps a lone near point from covering a
 /// photo.
 const MAX_SPLAT_PX: i64 = 24;
-/// Points are splatted one in so many, in as many rounds: a splat that overlaps the one just made waits until
-/// the processor has stored that.
+/// Splats are drawn in this many interleaved rounds: a splat that overlaps the previous one has to wait until
+/// the processor has stored it.
 const LEAP: usize = 16;
-/// Pixels of a row that are covered at once; those beyond the splat by infinity, which changes nothing.
+/// Pixels of a row that are covered at once. Those beyond the splat get infinity, which changes nothing.
 const LANES: usize = 8;
 
 /// The nearest surface of each pixel of a photo, possibly at reduced resolution.
@@ -86,7 +86,7 @@ impl SplatDepth {
             let lanes: [f32; LANES] = from_fn(|i| if x + i as i64 <= x1 { depth } else { f32::INFINITY });
             for y in y0..=y1 {
                 let pixels = &mut self.map.data_mut()[(y * width + x) as usize..];
-                // A number of pixels that the compiler knows goes without a loop.
+                // A constant number of pixels compiles to code without a loop.
                 match pixels.first_chunk_mut::<LANES>() {
                     Some(pixels) => cover(pixels, &lanes),
                     None => cover(pixels, &lanes),
@@ -95,7 +95,7 @@ impl SplatDepth {
         }
     }
 
-    /// What depths lie around each pixel, [`Self::around`] with this radius included.
+    /// Bounds of the depths around each pixel, as far as [`Self::around`] reads with this radius.
     pub(super) fn bounds(&self, radius_px: f64) -> DepthBounds {
         DepthBounds::new(&self.map, self.radius(radius_px).ceil() as usize)
     }

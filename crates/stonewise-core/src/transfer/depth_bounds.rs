@@ -1,13 +1,14 @@
-//! Which depths lie around the pixels of a depth map, block by block.
+//! Bounds of the depths around the pixels of a depth map, block by block.
 
 use crate::raster::DepthMap;
 
-/// Edge of a block, map pixels: small enough that the depths of an oblique face are alike in it.
+/// Edge of a block, map pixels: small enough that the depths of an oblique face differ little within it.
 const EDGE: usize = 8;
 
 /// The least and the greatest finite depth of each block of a depth map and of the pixels around it.
 ///
-/// Blocks take an eighth of the map's memory, so that neighbouring points find theirs in the processor's cache.
+/// Blocks take a thirty-second of the map's memory, so that those of neighbouring points stay in the
+/// processor's cache.
 pub(super) struct DepthBounds {
     columns: usize,
     /// Row by row; infinity and 0 where no depth is finite.
@@ -55,7 +56,7 @@ impl DepthBounds {
     }
 }
 
-/// Without the care for NaN of `f32::min`: one instruction, for several numbers at once.
+/// Unlike `f32::min`, does not handle NaN, and compiles to one vector instruction.
 #[inline]
 fn least_of(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }

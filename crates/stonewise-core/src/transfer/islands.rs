@@ -38,7 +38,7 @@ impl Occupancy {
         }
     }
 
-    /// Points with their stones; those that follow one in the same voxel cost least.
+    /// Adds points with their stones. Runs of points in the same voxel take one look-up.
     pub(super) fn add_all(&mut self, points: impl Iterator<Item = (u32, Point3<f64>)>) {
         let mut last: Option<((u32, Voxel), u32)> = None;
         for (stone, world) in points {

@@ -8,8 +8,8 @@ pub(super) type Members = ([i32; 3], Vec<u32>);
 
 /// The points of a tile by cell.
 ///
-/// For a handful of searches in a cell: each looks at all points of the cell, which takes a fraction of the
-/// time of an index.
+/// For a few searches per cell: each goes through all points of the cell, which is faster than building an
+/// index.
 pub(super) struct Neighbourhood<'a> {
     pub points: &'a [Point3<f64>],
     /// Ascending by cell.
@@ -17,7 +17,7 @@ pub(super) struct Neighbourhood<'a> {
     pub cell_m: f64,
 }
 
-/// Rounding must not decide whether a cell is too far away, metres.
+/// Margin for rounding when a cell is left out as too far away, metres.
 const MARGIN_M: f64 = 1e-9;
 
 impl Neighbourhood<'_> {
@@ -40,7 +40,7 @@ impl Neighbourhood<'_> {
         for shell in 0.. {
             self.add_shell(cell, shell, centre, max_m, &mut found);
             keep_nearest(&mut found, k);
-            // All points nearer than this have been looked at.
+            // All points nearer than this have been visited.
             let known = to_border + f64::from(shell) * self.cell_m - MARGIN_M;
             let enough = found.len() >= k && found.last().is_none_or(|l| l.1.sqrt() <= known);
             if enough || known >= max_m {
@@ -50,7 +50,8 @@ impl Neighbourhood<'_> {
         found
     }
 
-    /// Adds the points of all cells that are `shell` cells away along one axis and no farther along the others.
+    /// Adds the points of all cells that are `shell` cells away along one axis and no farther along the
+    /// others.
     fn add_shell(
         &self,
         cell: &[i32; 3],

@@ -1,14 +1,14 @@
-//! A photo, ready to show many points.
+//! A photo prepared for the projection of many points.
 
 use crate::geometry::{Camera, View};
 use nalgebra::{Matrix3, Point3, Vector3};
 
-/// A view with everything worked out that is the same for all points.
+/// A view with all quantities that do not depend on the point.
 pub(super) struct PhotoFrame<'a> {
     camera: &'a Camera,
     rotation: Matrix3<f64>,
     translation: Vector3<f64>,
-    /// Geometric mean of the focal lengths, pixels: over a depth, the pixels of a metre there.
+    /// Geometric mean of the focal lengths, pixels. Divided by a depth it gives pixels per metre there.
     pub focal_px: f64,
 }
 

@@ -23,7 +23,7 @@ pub(super) struct RunLabels {
 const PART_PX: usize = 64;
 /// Edge of a block, pixels: of stones of 100 pixels and their joints, two blocks in three have one label.
 const BLOCK_PX: usize = 16;
-/// In a block: more than one label, or a label that nobody uses.
+/// Stands for a block with more than one label; no label image uses this number.
 const MIXED: u32 = u32::MAX;
 
 impl RunLabels {

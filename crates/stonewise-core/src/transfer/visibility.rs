@@ -187,7 +187,7 @@ impl<'a> Observer<'a> {
         let point = frame.point(world);
         let pixel = frame.pixel(&point)?;
         let (depth, distance) = (point.z, point.coords.norm());
-        // The cosine of the incidence is this over the distance.
+        // Divided by the distance, this is the cosine of the incidence.
         let across = look.normal.map_or(0.5 * distance, |n| n.dot(&point.coords).abs());
         if across < self.least_cosine * distance {
             return None;
@@ -230,7 +230,7 @@ impl<'a> Observer<'a> {
     }
 }
 
-/// A photo that looks at a cell.
+/// A photo and a cell of the surface, with all quantities that do not depend on the point.
 struct Look<'a> {
     photo: u32,
     surface: &'a LocalSurface,

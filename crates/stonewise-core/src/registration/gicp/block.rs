@@ -16,7 +16,7 @@ pub struct GicpBlock {
     pub(super) origin: Point3<f64>,
     /// Relative to the origin.
     pub(super) points: Vec<Point3<f64>>,
-    /// Of the points that were asked for.
+    /// Filled for the points that take part.
     normals: Vec<OnceLock<Vector3<f64>>>,
     planes: PlaneFit,
     pub(super) index: GridIndex,
@@ -54,7 +54,7 @@ impl GicpBlock {
         }
     }
 
-    /// Unit normal of the plane that a point stands for; its sign is of no meaning.
+    /// Unit normal of the plane at a point; its sign is arbitrary. Fitted at the first call.
     #[inline]
     pub(super) fn normal(&self, point: usize) -> Vector3<f64> {
         let fit = || self.planes.normal(&self.index, &self.points[point]);

@@ -1,4 +1,4 @@
-//! The plane that a point stands for.
+//! Planes fitted to the neighbours of points.
 
 use super::params::GicpParams;
 use crate::cloud::GridIndex;
@@ -7,10 +7,11 @@ use nalgebra::{Matrix3, Point3, Vector3};
 
 /// Neighbours are sought no farther than this, metres: no survey of stones has its points that far apart.
 pub(super) const FAR_M: f64 = 1.0;
-/// Points that the first search should find for each neighbour that is needed: one in fifty then finds too few.
+/// Points that the first search should find for each neighbour that is needed. One search in fifty then finds
+/// too few.
 const FIRST_SHARE: f64 = 1.5;
 
-/// Room for the points of a first search.
+/// Capacity for the points of a first search.
 const FOUND: usize = 64;
 
 /// Fits planes to the neighbours of points.
@@ -35,8 +36,8 @@ impl PlaneFit {
         }
     }
 
-    /// Unit normal of the plane through the nearest points of `p` and all within the plane's radius; its sign is
-    /// of no meaning.
+    /// Unit normal of the plane through the nearest points of `p` and all within the plane's radius; its sign
+    /// is of no meaning.
     pub(super) fn normal(&self, index: &GridIndex, p: &Point3<f64>) -> Vector3<f64> {
         let mut found: Vec<(f64, Vector3<f64>)> = Vec::with_capacity(FOUND);
         let mut radius = self.first_m;
@@ -65,8 +66,9 @@ impl PlaneFit {
 
 /// Unit vector along which a symmetric matrix is smallest.
 ///
-/// The eigenvalue in closed form (Smith 1961), the vector as the cross product of the two rows of `m - value I`
-/// that are least parallel. Where all rows are nearly parallel, as two eigenvalues are the smallest, by iteration.
+/// The eigenvalue in closed form (Smith 1961), the vector as the cross product of the two rows of `m - value
+/// I` that are least parallel. Where all rows are nearly parallel, as two eigenvalues are the smallest, by
+/// iteration.
 fn least_axis(m: &Matrix3<f64>) -> Vector3<f64> {
     let mean = m.trace() / 3.0;
     let deviation = m - Matrix3::identity() * mean;

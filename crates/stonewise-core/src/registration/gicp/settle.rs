@@ -1,4 +1,4 @@
-//! The motion at which the pulls of all pairs balance.
+//! Iteration to the motion at which the weighted residuals of all pairs balance.
 
 use super::block::GicpBlock;
 use super::params::GicpParams;
@@ -6,18 +6,21 @@ use super::window::{Information, Motion, Pair, WindowPoint, for_each_pair};
 use crate::stone::MotionFailure;
 use nalgebra::{Cholesky, Const, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
-/// Before all points, one in so many covers most of the way.
+/// Strides of the subsets of points that are aligned first: they cover most of the way at a fraction of the
+/// cost.
 const WARM_STRIDES: [usize; 2] = [16, 4];
-/// Fewest points of such a share.
+/// Fewest points of such a subset.
 const WARM_POINTS: usize = 1000;
-/// Shares end with steps of this many tolerances: their motions differ by more from that of all points.
+/// Subsets stop at steps of this many tolerances: their motions differ by more than that from the motion of
+/// all points.
 const WARM_TOLERANCES: f64 = 20.0;
 /// Factor by which a damped step grows back in each iteration that does not turn back: slow, as partners on
 /// the edge of a jump would set off the next swing.
 const RECOVERY: f64 = 1.02;
-/// Steps shrink by a third or so each: within this many times a step lies the end of the way.
+/// Each step is about a third shorter than the one before, so that all further steps together stay within
+/// this many times a step.
 const REACH_STEPS: f64 = 4.0;
-/// A way is short below this share of the point spacing: few points can then get another partner.
+/// Share of the point spacing below which the remaining steps are short: few points can then change partners.
 const SHORT_WAY: f64 = 0.05;
 
 /// A window to be moved onto the second epoch.
@@ -31,29 +34,29 @@ pub(super) struct Alignment<'a> {
     radius_m: f64,
 }
 
-/// With how many points to iterate, and to which end.
+/// A subset of the points, and the step at which its iteration stops.
 struct Share {
     /// One point in so many takes part.
     stride: usize,
-    /// Steps end within so many times the tolerances.
+    /// Steps below this many times the tolerances end the iteration.
     tolerances: f64,
 }
 
-/// Pairs under a motion: their information on a step, and their pull.
+/// Normal equations of all pairs under a motion: their information on a step, and the right-hand side.
 struct Equations {
     motion: Motion,
     information: Matrix6<f64>,
     pull: Vector6<f64>,
 }
 
-/// A point whose partner may change on a short way.
+/// A point whose partner may change during the short steps.
 struct Wavering {
     /// In the window.
     index: usize,
-    /// Turned arm and place at the start of the way.
+    /// Rotated arm and position before the short steps.
     arm: Vector3<f64>,
     place: Point3<f64>,
-    /// Partner at the start.
+    /// Partner before the short steps.
     partner: Option<usize>,
 }
 
@@ -77,7 +80,8 @@ impl<'a> Alignment<'a> {
 
     /// Moves the window until its steps are within the tolerances. `start`: its first shift.
     ///
-    /// Most of the way is covered with some of the points; where these fail, the next start where they did.
+    /// Subsets of the points cover most of the way. Where a subset does not converge, the next starts where
+    /// it did.
     pub(super) fn iterate(&mut self, start: Vector3<f64>) -> Result<Motion, MotionFailure> {
         let mut motion = Motion {
             shift: start,
@@ -118,10 +122,10 @@ impl<'a> Alignment<'a> {
         Err(MotionFailure::NotConverged)
     }
 
-    /// Goes on from a first step as far as the equations hold, without going through all points.
+    /// Continues from a first step without visiting all points, as long as the equations remain valid.
     ///
-    /// For a pair that stays, the pull is linear in the way: only that of points whose partner changes is taken
-    /// anew. Weights stay as they are, which all points' equations put right afterwards.
+    /// The right-hand side of a pair that stays is linear in the step, so that only points whose partner
+    /// changes are computed again. Weights are held; the next equations of all points correct them.
     fn short_way(
         &mut self,
         equations: &Equations,
@@ -188,7 +192,7 @@ impl<'a> Alignment<'a> {
         wavering.collect()
     }
 
-    /// What a way changes of the pull of a point by giving it another partner.
+    /// Change of a point's right-hand side where these steps give it another partner.
     fn change(&mut self, point: &Wavering, start: &Motion, way: &Vector6<f64>) -> Vector6<f64> {
         let moved = way.fixed_rows::<3>(0) + way.fixed_rows::<3>(3).cross(&point.arm);
         let place = point.place + moved;
@@ -222,7 +226,7 @@ impl<'a> Alignment<'a> {
     }
 }
 
-/// Steps towards the balance, and how many are left.
+/// Damped steps, and how many are left.
 struct Steps {
     left: usize,
     damping: f64,

@@ -68,7 +68,7 @@ pub(super) fn uncertainty(
     })
 }
 
-/// Sums over cells; points that follow one in the same cell cost least.
+/// Sums over cells. Runs of points in the same cell take one look-up.
 #[derive(Default)]
 struct CellSums {
     sums: BTreeMap<[i64; 3], Vector6<f64>>,

@@ -5,7 +5,7 @@ use super::pairing::Partner;
 use crate::cloud::GridIndex;
 use nalgebra::{Matrix3, Matrix6, Point3, UnitQuaternion, Vector3, Vector6};
 
-/// Points of a stone that are tried before all others.
+/// Points of a stone that are compared first.
 const FEW: usize = 64;
 
 /// A point of the window: its arm from the centroid and its normal, both in the first epoch.
@@ -150,7 +150,7 @@ pub(super) fn window_points(
     let own: Vec<Point3<f64>> = stone.iter().map(|&i| first.points[i as usize]).collect();
     let radius = own.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
     let shape = GridIndex::new(&own, 0.25 * buffer_m);
-    // A few points of the stone decide about most: a search may go through all of them.
+    // For most points one of a few points of the stone is near enough; only the others need a search.
     let few: Vec<Point3<f64>> = own
         .iter()
         .step_by(own.len().div_ceil(FEW).max(1))
