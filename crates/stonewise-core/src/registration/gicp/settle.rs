@@ -81,12 +81,13 @@ impl<'a> Alignment<'a> {
     /// Moves the window until its steps are within the tolerances. `start`: its first shift.
     ///
     /// Subsets of the points cover most of the way. Where a subset does not converge, the next starts where
-    /// it did.
+    /// it did. Where all points do not converge from there, they start anew from `start`.
     pub(super) fn iterate(&mut self, start: Vector3<f64>) -> Result<Motion, MotionFailure> {
-        let mut motion = Motion {
+        let first = Motion {
             shift: start,
             turn: UnitQuaternion::identity(),
         };
+        let mut motion = first;
         let shares = WARM_STRIDES.into_iter().map(|stride| Share {
             stride,
             tolerances: WARM_TOLERANCES,
@@ -100,7 +101,7 @@ impl<'a> Alignment<'a> {
             stride: 1,
             tolerances: 1.0,
         };
-        self.settle(motion, &all)
+        self.settle(motion, &all).or_else(|_| self.settle(first, &all))
     }
 
     fn settle(&mut self, mut motion: Motion, share: &Share) -> Result<Motion, MotionFailure> {
