@@ -71,7 +71,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 13] = [
+const CASES: [Case; 14] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -156,6 +156,12 @@ const CASES: [Case; 13] = [
         false,
     ),
     (
+        "a photo that is missing",
+        |dir| fs::remove_file(first_photo(dir)).unwrap(),
+        ".jpg (1 of",
+        false,
+    ),
+    (
         "an empty photo",
         |dir| fs::write(first_photo(dir), "").unwrap(),
         "cannot be read or are cut off",
@@ -222,6 +228,22 @@ fn a_sound_survey_passes() {
     fs::write(survey.path().join("stonewise.check.html"), "mine").unwrap();
     let (code, _, log) = check(survey.path());
     assert!(code == 1 && log.contains("no page of this command"), "{log}");
+}
+
+#[test]
+fn photos_of_cameras_that_epochs_share_are_not_missing() {
+    let survey = copy_of(sharp_survey());
+    let halves = survey.path().join("halves");
+    let mut split = stonewise();
+    split.arg("split").arg(survey.path().join("stonewise.toml"));
+    let (code, log) = outcome(split.arg("--seed").arg("1").arg("--out").arg(&halves));
+    assert_eq!(code, 0, "{log}");
+    let (code, table, log) = check(&halves);
+    assert_eq!(code, 0, "{table}{log}");
+    assert!(
+        table.contains("1 of the 2 posed photos are there, the others in another epoch"),
+        "{table}"
+    );
 }
 
 #[test]

@@ -36,7 +36,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     for epoch in &project.epochs {
         progress.check()?;
         let survey = sample::sample(epoch, depth)?;
-        report.findings.extend(photos::look(epoch)?);
+        report.findings.extend(photos::look(project, epoch)?);
         let (findings, picture) = cameras::look(epoch, &survey, depth)?;
         report.findings.extend(findings);
         report.pictures.extend(picture);

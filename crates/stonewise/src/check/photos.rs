@@ -2,12 +2,13 @@
 
 use super::finding::{Finding, Verdict};
 use crate::error::{Error, Result};
-use crate::project::Epoch;
-use crate::texts::findings::{BROKEN_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
+use crate::project::{Epoch, Project};
+use crate::texts::findings::{BROKEN_PHOTOS, MISSING_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
-use stonewise_io::cameras::find_photos;
+use stonewise_core::geometry::View;
+use stonewise_io::cameras::{CameraFile, Photos, find_photos};
 use stonewise_io::image_io::image_size;
 
 /// Bytes at the end of a JPEG among which its end marker must be; some cameras append previews.
@@ -16,13 +17,12 @@ const TAIL: u64 = 64 << 10;
 const NAMES: usize = 4;
 
 /// Looks at the header and the end of every photo that a camera names.
-pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
-    let cameras = epoch.read_cameras()?;
-    let photos = find_photos(&epoch.images, &cameras)?;
-    let (mut broken, mut sizes, mut found) = (Vec::new(), Vec::new(), 0);
+pub(super) fn look(project: &Project, epoch: &Epoch) -> Result<Vec<Finding>> {
+    let cameras = &epoch.read_cameras()?;
+    let photos = find_photos(&epoch.images, cameras)?;
+    let (mut broken, mut sizes) = (Vec::new(), Vec::new());
     for (view, path) in cameras.views.iter().zip(&photos.paths) {
         let Some(path) = path else { continue };
-        found += 1;
         let name = path
             .file_name()
             .unwrap_or_default()
@@ -43,22 +43,8 @@ pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
     let mut out = Vec::new();
     let mut add =
         |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, PHOTOS.english, verdict, text));
-    let total = cameras.views.len();
-    match found {
-        0 => add(
-            Verdict::Wrong,
-            NO_PHOTOS.say(&[
-                ("total", &*total.to_string()),
-                ("file", &*epoch.cameras.to_string_lossy()),
-                ("folder", &*epoch.images.to_string_lossy()),
-            ]),
-        ),
-        n if n < total => add(
-            Verdict::Note,
-            format!("{n} of the {total} posed photos are there"),
-        ),
-        _ => add(Verdict::Fine, format!("all {total} posed photos are there")),
-    }
+    let (verdict, text) = presence(project, epoch, cameras, &photos);
+    add(verdict, text);
     if !photos.without_camera.is_empty() {
         let names = photos.without_camera.iter();
         let names: Vec<String> = names
@@ -76,6 +62,57 @@ pub(super) fn look(epoch: &Epoch) -> Result<Vec<Finding>> {
         add(Verdict::Doubt, PHOTO_SIZES.say(&[("photos", &*some(&sizes))]));
     }
     Ok(out)
+}
+
+/// Which of the photos that the camera file names are there. Cameras that were oriented together may be in the
+/// files of several epochs, whose photos lie in a folder each.
+fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Photos) -> (Verdict, String) {
+    let mut found: Vec<bool> = photos.paths.iter().map(Option::is_some).collect();
+    let here = found.iter().filter(|found| **found).count();
+    let total = found.len().to_string();
+    let folder = epoch.images.to_string_lossy();
+    if here == 0 {
+        let file = epoch.cameras.to_string_lossy();
+        let values = [("total", &*total), ("file", &*file), ("folder", &*folder)];
+        return (Verdict::Wrong, NO_PHOTOS.say(&values));
+    }
+    if here == found.len() {
+        return (Verdict::Fine, format!("all {total} posed photos are there"));
+    }
+    for other in project.epochs.iter().filter(|e| e.name != epoch.name) {
+        // One that cannot be read is named where its own epoch is looked at.
+        let theirs = posed_photos(other).unwrap_or_default();
+        for (view, found) in cameras.views.iter().zip(&mut found) {
+            *found |= theirs.iter().any(|other| is_same(view, other));
+        }
+    }
+    let missing = cameras.views.iter().zip(found).filter(|(_, found)| !found);
+    let missing: Vec<String> = missing.map(|(view, _)| view.name.clone()).collect();
+    if missing.is_empty() {
+        let text = format!("{here} of the {total} posed photos are there, the others in another epoch");
+        return (Verdict::Fine, text);
+    }
+    let (number, names) = (missing.len().to_string(), some(&missing));
+    let values = [
+        ("missing", &*number),
+        ("total", &*total),
+        ("folder", &*folder),
+        ("photos", &*names),
+    ];
+    (Verdict::Doubt, MISSING_PHOTOS.say(&values))
+}
+
+/// Views whose photos are there.
+fn posed_photos(epoch: &Epoch) -> Result<Vec<View>> {
+    let cameras = epoch.read_cameras()?;
+    let paths = find_photos(&epoch.images, &cameras)?.paths;
+    let views = cameras.views.into_iter().zip(paths);
+    Ok(views.filter_map(|(view, path)| path.map(|_| view)).collect())
+}
+
+/// Whether two camera files give one and the same photo.
+fn is_same(one: &View, other: &View) -> bool {
+    one.name == other.name && one.camera == other.camera && one.cam_from_world == other.cam_from_world
 }
 
 /// The first of many, and how many more.

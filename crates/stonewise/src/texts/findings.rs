@@ -40,6 +40,8 @@ messages! {
             "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: die \
              Koordinaten mit mehr Stellen ausgeben";
         NO_PHOTOS: "none of the {total} photos that {file} names is in {folder}", "keines der {total} Fotos, die {file} nennt, liegt in {folder}";
+        MISSING_PHOTOS: "missing in {folder}: {photos} ({missing} of {total} posed photos); copy them there, or take their cameras out of the camera file",
+            "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren, oder ihre Kameras aus der Kameradatei nehmen";
         BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
         PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
