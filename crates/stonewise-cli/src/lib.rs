@@ -44,6 +44,7 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(commands::Outcome::Done) => DONE,
         Ok(commands::Outcome::InDoubt) => IN_DOUBT,
         Ok(commands::Outcome::Verdict) => VERDICT,
+        Ok(commands::Outcome::Failed) => FAILED,
         Err(error) => {
             note::note(&format!("error: {}", explain(&error)));
             if is_wrong_usage(&error) {

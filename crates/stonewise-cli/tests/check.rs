@@ -268,6 +268,37 @@ fn broken_surveys_are_named_and_a_run_stops_where_they_cannot_be_right() {
 }
 
 #[test]
+fn everything_is_looked_at_where_inputs_cannot_be_read() {
+    let survey = copy_of(sharp_survey());
+    let (cloud, dir) = (fs::read(survey.path().join(CLOUD_2)).unwrap(), survey.path());
+    fs::write(dir.join("epoch1/cloud_tls.laz"), "").unwrap();
+    fs::write(dir.join(CLOUD_2), &cloud[..cloud.len() / 2]).unwrap();
+    fs::remove_file(first_photo(dir)).unwrap();
+    let (code, table, log) = check(dir);
+    assert_eq!(code, 1, "{table}{log}");
+    let lines: Vec<&str> = table.lines().filter(|l| l.contains(" ERROR ")).collect();
+    assert_eq!(lines.len(), 2, "{table}");
+    for (line, epoch) in lines.iter().zip(["1", "2"]) {
+        let place = format!("epoch{epoch}/cloud_tls.laz");
+        assert!(
+            line.starts_with(&format!("epoch {epoch}")) && line.contains(&place),
+            "{table}"
+        );
+    }
+    assert!(
+        table.contains("all 2 posed photos") && table.contains("DOUBT  missing in"),
+        "{table}"
+    );
+    let page = fs::read_to_string(dir.join("stonewise.check.html")).unwrap();
+    assert!(page.contains("An input cannot be read"));
+    // One that can be read is looked at in full.
+    fs::write(dir.join(CLOUD_2), &cloud).unwrap();
+    let (code, table, log) = check(dir);
+    assert_eq!(code, 1, "{table}{log}");
+    assert!(table.contains("epoch 2  point spacing"), "{table}");
+}
+
+#[test]
 fn a_doubtful_survey_runs_with_exit_code_3_and_says_so_first() {
     let survey = copy_of(sharp_survey());
     fs::write(first_photo(survey.path()), "").unwrap();

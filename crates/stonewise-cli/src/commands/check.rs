@@ -28,6 +28,7 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
     Ok(match report.verdict() {
         Verdict::Fine | Verdict::Note => Outcome::Done,
         Verdict::Doubt | Verdict::Wrong => Outcome::InDoubt,
+        Verdict::Unreadable => Outcome::Failed,
     })
 }
 

@@ -9,4 +9,6 @@ pub enum Outcome {
     InDoubt,
     /// The verdict on the wall is at or above the state of `--exit-on`.
     Verdict,
+    /// Something failed, and the command's output says what.
+    Failed,
 }

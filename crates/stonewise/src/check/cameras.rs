@@ -12,7 +12,7 @@ use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
-use stonewise_io::cameras::find_photos;
+use stonewise_io::cameras::{CameraFile, find_photos};
 use stonewise_io::image_io::{image_size, read_rgb};
 
 /// Photos that are decoded.
@@ -50,9 +50,14 @@ struct Across {
 }
 
 /// Checks that photos see the cloud; at full depth, compares some photos of an epoch with its cloud, too.
-pub(super) fn look(epoch: &Epoch, survey: &Sample, depth: Depth) -> Result<(Vec<Finding>, Option<Picture>)> {
+pub(super) fn look(
+    epoch: &Epoch,
+    cameras: &CameraFile,
+    survey: &Sample,
+    depth: Depth,
+) -> Result<(Vec<Finding>, Option<Picture>)> {
     let finding = |verdict, text: String| vec![Finding::new(&epoch.name, CAMERAS.english, verdict, text)];
-    let candidates = candidates(epoch, survey)?;
+    let candidates = candidates(epoch, cameras, survey)?;
     if candidates.is_empty() {
         // Points that were not read may be seen.
         let verdict = match (survey.is_whole(), depth) {
@@ -82,20 +87,19 @@ pub(super) fn look(epoch: &Epoch, survey: &Sample, depth: Depth) -> Result<(Vec<
 }
 
 /// The photos that see most of the cloud, with a size that fits their cameras.
-fn candidates(epoch: &Epoch, survey: &Sample) -> Result<Vec<(View, PathBuf)>> {
-    let cameras = epoch.read_cameras()?;
-    let paths = find_photos(&epoch.images, &cameras)?.paths;
+fn candidates(epoch: &Epoch, cameras: &CameraFile, survey: &Sample) -> Result<Vec<(View, PathBuf)>> {
+    let paths = find_photos(&epoch.images, cameras)?.paths;
     let step = (survey.points.len() / CHOOSERS).max(1);
     let some: Vec<&Point3<f64>> = survey.points.iter().step_by(step).collect();
     let sees = |view: &View| {
         let inside = |p: &&&Point3<f64>| view.project(p).is_some_and(|seen| view.is_inside(seen.pixel));
         some.iter().filter(inside).count()
     };
-    let mut seen: Vec<(usize, View, PathBuf)> = cameras
+    let mut seen: Vec<(usize, &View, PathBuf)> = cameras
         .views
-        .into_iter()
+        .iter()
         .zip(paths)
-        .filter_map(|(view, path)| Some((sees(&view), view, path?)))
+        .filter_map(|(view, path)| Some((sees(view), view, path?)))
         .filter(|(n, _, _)| *n > 0)
         .collect();
     seen.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.name.cmp(&b.1.name)));
@@ -108,7 +112,7 @@ fn candidates(epoch: &Epoch, survey: &Sample) -> Result<Vec<(View, PathBuf)>> {
     Ok(seen
         .into_iter()
         .take(PHOTOS)
-        .map(|(_, view, path)| (view, path))
+        .map(|(_, view, path)| (view.clone(), path))
         .collect())
 }
 

@@ -2,7 +2,7 @@
 
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
-use crate::project::Project;
+use crate::project::{Epoch, Project};
 use crate::texts::Message;
 use crate::texts::findings::{
     CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
@@ -31,15 +31,17 @@ const LEAST_OVERLAP: f64 = 0.5;
 /// A spacing beyond this shows no stone's relief, metres.
 const WIDEST_SPACING_M: f64 = 0.05;
 
-pub(super) fn look(project: &Project, surveys: &[Sample]) -> Vec<Finding> {
+pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
-    for (epoch, survey) in project.epochs.iter().zip(surveys) {
+    for (epoch, survey) in read(project, surveys) {
         found.push(extent(&epoch.name, survey));
         found.push(spacing(&epoch.name, survey));
         found.extend(unit_of_system(&epoch.name, survey));
     }
-    found.push(systems(project, surveys));
-    let boxes: Vec<Option<Bounds>> = surveys.iter().map(|s| s.bounds).collect();
+    if surveys.iter().any(Option::is_some) {
+        found.push(systems(project, surveys));
+    }
+    let boxes: Vec<Option<Bounds>> = surveys.iter().map(|s| s.as_ref()?.bounds).collect();
     let Some(first) = boxes.first().copied().flatten() else {
         return found;
     };
@@ -53,6 +55,15 @@ pub(super) fn look(project: &Project, surveys: &[Sample]) -> Vec<Finding> {
     }
     found.extend(same_file(project));
     found
+}
+
+/// Epochs whose clouds were read.
+pub(super) fn read<'a>(
+    project: &'a Project,
+    surveys: &'a [Option<Sample>],
+) -> impl Iterator<Item = (&'a Epoch, &'a Sample)> {
+    let epochs = project.epochs.iter().zip(surveys);
+    epochs.filter_map(|(epoch, survey)| Some((epoch, survey.as_ref()?)))
 }
 
 fn size(bounds: &Bounds) -> Vector3<f64> {
@@ -121,10 +132,10 @@ fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
 }
 
 /// One system for all clouds.
-fn systems(project: &Project, surveys: &[Sample]) -> Finding {
+fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
     let mut codes: Vec<(i32, &str)> = Vec::new();
     let (mut named, mut all) = (0, 0);
-    for (epoch, survey) in project.epochs.iter().zip(surveys) {
+    for (epoch, survey) in read(project, surveys) {
         for crs in &survey.crs {
             all += 1;
             if let Some(crs) = crs.as_deref().and_then(Crs::parse) {

@@ -16,6 +16,8 @@ pub enum Verdict {
     Doubt,
     /// The results would be wrong: a run stops, unless it is forced.
     Wrong,
+    /// An input cannot be read: a run ends.
+    Unreadable,
 }
 
 impl Verdict {
@@ -26,6 +28,7 @@ impl Verdict {
             Self::Note => "note",
             Self::Doubt => "DOUBT",
             Self::Wrong => "WRONG",
+            Self::Unreadable => "ERROR",
         }
     }
 }

@@ -21,6 +21,7 @@ impl Report {
                 "Some things are doubtful: a run goes on, and ends with exit code 3 where it finds the same."
             }
             Verdict::Wrong => "Something cannot be right: a run stops, unless --force is given.",
+            Verdict::Unreadable => "An input cannot be read: a run ends with exit code 1.",
         });
         let rows: Vec<Vec<String>> = self
             .findings

@@ -17,8 +17,7 @@ const TAIL: u64 = 64 << 10;
 const NAMES: usize = 4;
 
 /// Looks at the header and the end of every photo that a camera names.
-pub(super) fn look(project: &Project, epoch: &Epoch) -> Result<Vec<Finding>> {
-    let cameras = &epoch.read_cameras()?;
+pub(super) fn look(project: &Project, epoch: &Epoch, cameras: &CameraFile) -> Result<Vec<Finding>> {
     let photos = find_photos(&epoch.images, cameras)?;
     let (mut broken, mut sizes) = (Vec::new(), Vec::new());
     for (view, path) in cameras.views.iter().zip(&photos.paths) {

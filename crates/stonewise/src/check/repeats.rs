@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use super::clouds::read;
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::project::Project;
@@ -28,10 +29,10 @@ const CHANCE_STEP: f64 = 0.25;
 const COARSE_STEP: f64 = 2.0;
 
 /// Looks for repeated points and for coarse steps of the coordinates.
-pub(super) fn look(project: &Project, surveys: &[Sample]) -> Vec<Finding> {
+pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut earlier: Vec<(&str, Cells)> = Vec::new();
-    for (epoch, survey) in project.epochs.iter().zip(surveys) {
+    for (epoch, survey) in read(project, surveys) {
         let mut doubt =
             |text: String| found.push(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
         let (step_m, spacing_m) = (step(&survey.points), survey.spacing_m.unwrap_or(0.0));

@@ -21,8 +21,8 @@ const MEMORY_PER_POINT: u64 = 45;
 const SECONDS_PER_POINT: f64 = 2e-5;
 const GIB: f64 = (1u64 << 30) as f64;
 
-pub(super) fn look(project: &Project, surveys: &[Sample], out: &Path) -> Vec<Finding> {
-    let points: u64 = surveys.iter().map(|s| s.records).sum();
+pub(super) fn look(project: &Project, surveys: &[Option<Sample>], out: &Path) -> Vec<Finding> {
+    let points: u64 = surveys.iter().flatten().map(|s| s.records).sum();
     let cores = rayon::current_num_threads().max(1);
     let minutes = 0.1 + SECONDS_PER_POINT * points as f64 / cores as f64 / 60.0;
     let without_masks = project.epochs.iter().filter(|e| e.masks.is_none()).count();

@@ -1,10 +1,13 @@
 //! The clouds of an epoch, as far as a look needs them.
 
 use super::Depth;
+use super::unreadable::Unreadable;
 use crate::error::Result;
 use crate::project::Epoch;
+use crate::texts::findings::CLOUDS;
 use nalgebra::Point3;
 use std::collections::HashMap;
+use std::path::Path;
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_io::cloud::{CloudError, cloud_info, read_cloud};
 
@@ -34,10 +37,33 @@ impl Sample {
     pub fn is_whole(&self) -> bool {
         self.points.len() as u64 >= self.records
     }
+
+    /// Adds a cloud, of whose points the first `left`.
+    fn add(&mut self, path: &Path, mut left: usize) -> Result<()> {
+        let info = cloud_info(path)?;
+        self.records += info.records;
+        self.crs.push(info.crs);
+        if let Some(bounds) = info.bounds {
+            self.bounds = Some(self.bounds.map_or(bounds, |b| b.union(&bounds)));
+        }
+        let read = read_cloud(path, CHUNK, |chunk| {
+            let taken = left.min(chunk.positions.len());
+            self.points.extend_from_slice(&chunk.positions[..taken]);
+            left -= taken;
+            if left == 0 { Err(Stop::Enough) } else { Ok(()) }
+        });
+        match read {
+            Ok(_) | Err(Stop::Enough) => Ok(()),
+            Err(Stop::Failed(error)) => Err(error.into()),
+        }
+    }
 }
 
-/// Reads what is needed of an epoch's clouds.
-pub(super) fn sample(epoch: &Epoch, depth: Depth) -> Result<Sample> {
+/// Reads what is needed of an epoch's clouds; `None` where one of them cannot be read.
+///
+/// # Errors
+/// A cloud cannot be read, and the look ends at that.
+pub(super) fn sample(epoch: &Epoch, depth: Depth, unreadable: &mut Unreadable) -> Result<Option<Sample>> {
     let mut sample = Sample {
         bounds: None,
         records: 0,
@@ -47,27 +73,13 @@ pub(super) fn sample(epoch: &Epoch, depth: Depth) -> Result<Sample> {
     };
     let points = POINTS[usize::from(depth == Depth::Full)];
     let share = points / epoch.clouds.len().max(1) as u64;
+    let mut is_whole = true;
     for path in &epoch.clouds {
-        let info = cloud_info(path)?;
-        sample.records += info.records;
-        sample.crs.push(info.crs);
-        if let Some(bounds) = info.bounds {
-            sample.bounds = Some(sample.bounds.map_or(bounds, |b| b.union(&bounds)));
-        }
-        let mut left = share as usize;
-        let read = read_cloud(path, CHUNK, |chunk| {
-            let taken = left.min(chunk.positions.len());
-            sample.points.extend_from_slice(&chunk.positions[..taken]);
-            left -= taken;
-            if left == 0 { Err(Stop::Enough) } else { Ok(()) }
-        });
-        match read {
-            Ok(_) | Err(Stop::Enough) => {}
-            Err(Stop::Failed(error)) => return Err(error.into()),
-        }
+        let read = sample.add(path, share as usize);
+        is_whole &= unreadable.keep(epoch, &CLOUDS, read)?.is_some();
     }
     sample.spacing_m = spacing(&sample.points);
-    Ok(sample)
+    Ok(is_whole.then_some(sample))
 }
 
 /// Why reading ends before the end of the file.
