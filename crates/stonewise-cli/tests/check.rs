@@ -6,8 +6,10 @@ mod support;
 use nalgebra::Point3;
 use std::fs;
 use std::path::Path;
+use stonewise_core::raster::LabelImage;
 use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
+use stonewise_io::masks::write_label_png;
 use support::{copy_of, outcome, run, sharp_survey, stonewise, tiny_survey};
 
 /// Runs `check`; exit code, table, log.
@@ -296,6 +298,48 @@ fn everything_is_looked_at_where_inputs_cannot_be_read() {
     let (code, table, log) = check(dir);
     assert_eq!(code, 1, "{table}{log}");
     assert!(table.contains("epoch 2  point spacing"), "{table}");
+}
+
+#[test]
+fn masks_that_a_run_cannot_use_are_found() {
+    let survey = copy_of(sharp_survey());
+    let dir = survey.path();
+    let json = dir.join("masks/epoch2.json");
+    fs::write(&json, "").unwrap();
+    let (code, table, log) = check(dir);
+    assert!(
+        code == 1 && table.contains("not a COCO instances file"),
+        "{table}{log}"
+    );
+    // Label images for both photos, one of them cut off, then one of them gone.
+    fs::remove_file(json).unwrap();
+    let masks = dir.join("masks/epoch2");
+    let project = dir.join("stonewise.toml");
+    let text = fs::read_to_string(&project).unwrap();
+    fs::write(project, text.replace("masks/epoch2.json", "masks/epoch2")).unwrap();
+    fs::create_dir(&masks).unwrap();
+    let of = |photo: &Path| masks.join(photo.file_name().unwrap()).with_extension("png");
+    let labels = LabelImage::filled(1200, 900, 7);
+    let photos = fs::read_dir(dir.join("epoch2/images")).unwrap();
+    for photo in photos.map(|p| p.unwrap().path()) {
+        write_label_png(&of(&photo), &labels).unwrap();
+    }
+    let (code, table, log) = check(dir);
+    assert!(
+        code == 0 && table.contains("there for all 2 photos"),
+        "{table}{log}"
+    );
+    let first = of(&first_photo(dir));
+    let bytes = fs::read(&first).unwrap();
+    fs::write(&first, &bytes[..bytes.len() / 2]).unwrap();
+    let (code, table, log) = check(dir);
+    assert!(
+        code == 3 && table.contains("DOUBT  cannot be used for"),
+        "{table}{log}"
+    );
+    fs::remove_file(&first).unwrap();
+    let (code, table, log) = check(dir);
+    assert!(code == 3 && table.contains("DOUBT  none in"), "{table}{log}");
 }
 
 #[test]

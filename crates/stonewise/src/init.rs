@@ -5,8 +5,8 @@ mod listing;
 
 use crate::error::{Error, Result};
 use crate::files::write_text;
-use epoch::{CLOUDS, Found, look};
-use listing::{folders, is_made_by_stonewise, name};
+use epoch::{CLOUDS, Found, MASKS, look};
+use listing::{files, folders, is_made_by_stonewise, name};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -20,16 +20,18 @@ pub struct Initialised {
 }
 
 /// Names of folders that hold no survey.
-const NO_EPOCHS: [&str; 8] = [
+const NO_EPOCHS: [&str; 7] = [
     "truth",
     "results",
     "report",
     "evidence",
     "work",
     "previous",
-    "masks",
     "unfinished",
 ];
+
+/// Names of masks in a line at most.
+const NAMES: usize = 4;
 
 /// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in
 /// order of name.
@@ -63,6 +65,9 @@ pub fn init(dir: &Path) -> Result<Initialised> {
     let mut epochs = Vec::new();
     for folder in folders(dir)? {
         let folder_name = name(&folder);
+        if folder_name == MASKS {
+            continue;
+        }
         if NO_EPOCHS.contains(&folder_name.as_str()) {
             lines.push(format!("left out: {folder_name}/ (by its name no epoch)"));
         } else if is_made_by_stonewise(&folder) {
@@ -89,8 +94,26 @@ pub fn init(dir: &Path) -> Result<Initialised> {
     for epoch in &epochs {
         lines.extend(epoch.lines());
     }
+    lines.extend(unused_masks(dir, &epochs)?);
     write_text(&path, &project_text(dir, &epochs))?;
     Ok(Initialised { path, lines })
+}
+
+/// Says which masks beside the epochs were not taken; those of an epoch's name are named with the epoch.
+fn unused_masks(dir: &Path, epochs: &[Found]) -> Result<Option<String>> {
+    let folder = dir.join(MASKS);
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let mut unused = [files(&folder)?, folders(&folder)?].concat();
+    unused.retain(|path| !epochs.iter().any(|epoch| epoch.is_mask(path)));
+    let names: Vec<String> = unused.iter().take(NAMES).map(|p| name(p)).collect();
+    let more = match unused.len().saturating_sub(NAMES) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let why = "masks/EPOCH.json or masks/EPOCH/ would be taken, with the name of an epoch's folder";
+    Ok((!names.is_empty()).then(|| format!("left out: {}{more} in {MASKS}/ ({why})", names.join(", "))))
 }
 
 fn project_text(dir: &Path, epochs: &[Found]) -> String {
@@ -237,5 +260,14 @@ mod tests {
             text.contains("masks = \"masks/a.json\"") && text.contains("masks = \"masks/b\""),
             "{text}"
         );
+    }
+
+    #[test]
+    fn masks_are_left_out_only_where_no_epoch_took_them() {
+        let (_, lines) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/b/1.png"]);
+        assert!(!lines.contains("left out"), "{lines}");
+        let (text, lines) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/wall_b.json"]);
+        assert!(text.contains("masks = \"masks/a.json\""), "{text}");
+        assert!(lines.contains("left out: wall_b.json in masks/ ("), "{lines}");
     }
 }

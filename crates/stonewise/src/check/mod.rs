@@ -6,6 +6,7 @@ mod clouds;
 mod depth;
 mod edges;
 mod finding;
+mod masks;
 mod page;
 mod photos;
 mod repeats;
@@ -20,7 +21,7 @@ pub(crate) use resources::{is_about_this_machine, require_memory_of_run};
 
 use crate::error::Result;
 use crate::project::{Epoch, Project};
-use crate::texts::findings::{CAMERAS, PHOTOS};
+use crate::texts::findings::{CAMERAS, MASKS, PHOTOS};
 use std::path::Path;
 use stonewise_core::progress::Progress;
 use stonewise_io::cameras::{CameraError, CameraFile, read_cameras};
@@ -48,6 +49,11 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
             let photos = unreadable.keep(epoch, &PHOTOS, photos::look(project, epoch, &cameras))?;
             let are_listed = photos.is_some();
             report.findings.extend(photos.unwrap_or_default());
+            // A run finds out while it reads them.
+            if depth == Depth::Full && are_listed {
+                let found = unreadable.keep(epoch, &MASKS, masks::look(epoch, &cameras, progress))?;
+                report.findings.extend(found.unwrap_or_default());
+            }
             if let Some(survey) = survey.as_ref().filter(|_| are_listed) {
                 let found = cameras::look(epoch, &cameras, survey, depth);
                 let (findings, picture) = unreadable.keep(epoch, &CAMERAS, found)?.unwrap_or_default();

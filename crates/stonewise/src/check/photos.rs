@@ -115,7 +115,7 @@ fn is_same(one: &View, other: &View) -> bool {
 }
 
 /// The first of many, and how many more.
-fn some(all: &[String]) -> String {
+pub(super) fn some(all: &[String]) -> String {
     let first = all.iter().take(NAMES).cloned().collect::<Vec<_>>().join(", ");
     match all.len().saturating_sub(NAMES) {
         0 => first,

@@ -7,6 +7,8 @@ use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
 
 /// Extensions of point clouds.
 pub(super) const CLOUDS: [&str; 8] = ["laz", "las", "e57", "ply", "xyz", "txt", "csv", "asc"];
+/// Folder of the masks beside those of the epochs.
+pub(super) const MASKS: &str = "masks";
 /// Extensions of photos.
 const PHOTOS: [&str; 3] = ["jpg", "jpeg", "png"];
 /// Names of the files that make a folder a COLMAP model.
@@ -32,6 +34,11 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// Whether a file or folder of masks bears the epoch's name.
+    pub fn is_mask(&self, path: &Path) -> bool {
+        masks_of(&self.name).iter().any(|mask| path.ends_with(mask))
+    }
+
     /// What was chosen and what was left out.
     pub fn lines(&self) -> Vec<String> {
         let join = |paths: &[PathBuf]| {
@@ -82,7 +89,7 @@ pub(super) fn look(root: &Path, folder: &Path) -> Result<Found> {
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    found.masks.extend(masks_beside(root, &own_name)?);
+    found.masks.extend(masks_beside(root, &own_name));
     let relative = |path: &Path| path.strip_prefix(root).unwrap_or(path).to_path_buf();
     let mut epoch = Found {
         name: own_name,
@@ -92,15 +99,16 @@ pub(super) fn look(root: &Path, folder: &Path) -> Result<Found> {
     let images = photo_choices(folder, &found);
     let (cameras, photos) = best(&found.cameras, &images);
     for camera in found.cameras.iter().filter(|c| Some(*c) != cameras.as_ref()) {
-        epoch
-            .left_out
-            .push((relative(camera), "another camera file has more of the photos"));
+        epoch.left_out.push((
+            relative(camera),
+            "another camera file has as many of the photos, or more",
+        ));
     }
     for other in &found.photo_folders {
         if photos.as_ref().is_some_and(|chosen| !other.starts_with(chosen)) {
             epoch
                 .left_out
-                .push((relative(other), "photos of which the camera file has fewer"));
+                .push((relative(other), "the camera file has fewer of these photos"));
         }
     }
     for other in found.masks.iter().skip(1) {
@@ -145,11 +153,16 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
     Ok(())
 }
 
-/// `masks/EPOCH.json` or `masks/EPOCH/` beside the folders of the epochs.
-fn masks_beside(root: &Path, epoch: &str) -> Result<Vec<PathBuf>> {
-    let folder = root.join("masks");
-    let choices = [folder.join(format!("{epoch}.json")), folder.join(epoch)];
-    Ok(choices.into_iter().filter(|p| p.exists()).collect())
+/// Masks of an epoch beside the folders of the epochs.
+fn masks_beside(root: &Path, epoch: &str) -> Vec<PathBuf> {
+    let choices = masks_of(epoch).into_iter().map(|p| root.join(p));
+    choices.filter(|p| p.exists()).collect()
+}
+
+/// `masks/EPOCH.json` and `masks/EPOCH`.
+fn masks_of(epoch: &str) -> [PathBuf; 2] {
+    let folder = Path::new(MASKS);
+    [folder.join(format!("{epoch}.json")), folder.join(epoch)]
 }
 
 /// Folders that may be the epoch's photos: the folder above all photos, if no masks lie in it, then each.

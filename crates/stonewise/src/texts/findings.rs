@@ -46,6 +46,13 @@ messages! {
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
         PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
             "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
+        BROKEN_MASKS: "cannot be used for {photos}, and a run leaves these photos out: {reason}",
+            "nicht zu verwenden für {photos}, ein Lauf lässt diese Fotos weg: {reason}";
+        WITHOUT_MASKS: "none in {file} for {photos}; a run leaves these photos out",
+            "keine in {file} für {photos}; ein Lauf lässt diese Fotos weg";
+        NO_MASK_FITS: "none in {file} for any of the photos: masks are found by the names of the photos",
+            "keine in {file} für irgendein Foto: Masken werden nach den Namen der Fotos gefunden";
+        MASKS: "masks", "Masken";
         CAMERAS: "cameras against cloud", "Kameras gegen Punktwolke";
         EXTENT: "extent", "Ausdehnung";
         SPACING: "point spacing", "Punktabstand";
