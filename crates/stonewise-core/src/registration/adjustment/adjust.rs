@@ -91,7 +91,7 @@ pub fn adjust_with_photos<S: PairSource>(
     params: &AdjustmentParams,
     progress: &dyn Progress,
 ) -> Result<AdjustmentReport, AdjustError<S::Error>> {
-    let survey = survey(source, params)?;
+    let survey = survey(source, params, progress)?;
     let stones = survey.stones.len();
     let adjustment = Adjustment::new(survey, params).ok_or(AdjustError::Unsolvable { stones })?;
     let mut run = Run {
@@ -147,7 +147,7 @@ impl<S: PairSource> Run<'_, S> {
                 self.adjustment.estimate_noise();
             }
             self.adjustment.evaluate(self.source, self.progress)?;
-            self.adjustment.estimate_components();
+            self.adjustment.estimate_components(self.progress)?;
             self.solve_and_reweight()?;
         }
         Ok(())
@@ -173,7 +173,7 @@ impl<S: PairSource> Run<'_, S> {
             self.adjustment.evaluate(self.source, self.progress)?;
             self.adjustment.update_photos(self.last.as_ref());
             if COMPONENTS_IN.contains(&round) {
-                self.adjustment.estimate_components();
+                self.adjustment.estimate_components(self.progress)?;
             }
             self.solve_and_reweight()?;
         }
@@ -220,6 +220,7 @@ impl<S: PairSource> Run<'_, S> {
     }
 
     fn solve_and_reweight(&mut self) -> Result<(), AdjustError<S::Error>> {
+        self.progress.check()?;
         let equations = self.adjustment.equations();
         let field = self.adjustment.solve_and_reweight(&equations);
         let field = field.ok_or_else(|| self.unsolvable())?;

@@ -67,6 +67,7 @@ mod tests {
     use super::super::survey::survey;
     use super::super::testing::{COLUMNS, wall};
     use super::*;
+    use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
 
     /// Motion of the stones right of the middle against the others.
@@ -75,7 +76,7 @@ mod tests {
     fn adjustment() -> Adjustment {
         let params = AdjustmentParams::default();
         let pairs = MemoryPairs::new(wall(4, [0.001; 2], |_| Vector3::zeros()));
-        Adjustment::new(survey(&pairs, &params).unwrap(), &params).unwrap()
+        Adjustment::new(survey(&pairs, &params, &Silent).unwrap(), &params).unwrap()
     }
 
     fn is_right(stone: usize) -> bool {

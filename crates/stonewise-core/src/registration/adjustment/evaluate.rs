@@ -6,7 +6,7 @@ use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{Correlation, Equations, LocalPair, estimate_noise};
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
-use crate::progress::Progress;
+use crate::progress::{Interrupted, Progress};
 use crate::registration::points::{PairPoints, PairSource};
 use rayon::prelude::*;
 
@@ -123,15 +123,17 @@ impl Adjustment {
         progress: &dyn Progress,
     ) -> Result<(), AdjustError<S::Error>> {
         for (batch, range) in self.batches.clone().into_iter().enumerate() {
-            progress.check()?;
             if self.stones[range.clone()].iter().any(|s| self.is_open(s)) {
                 let pairs = source.load(batch).map_err(AdjustError::Source)?;
                 let found: Vec<(usize, Option<StoneVector>)> = pairs
                     .par_iter()
                     .zip(range)
                     .filter(|(_, i)| self.is_open(&self.stones[*i]))
-                    .map(|(pair, i)| (i, self.probe_one(i, pair)))
-                    .collect();
+                    .map(|(pair, i)| {
+                        progress.check()?;
+                        Ok((i, self.probe_one(i, pair)))
+                    })
+                    .collect::<Result<_, Interrupted>>()?;
                 for (i, place) in found {
                     self.stones[i].on_own = place.map(CandidateMotion::new);
                 }
@@ -222,7 +224,7 @@ mod tests {
 
     fn adjustment(pairs: &MemoryPairs) -> Adjustment {
         let params = AdjustmentParams::default();
-        Adjustment::new(survey(pairs, &params).unwrap(), &params).unwrap()
+        Adjustment::new(survey(pairs, &params, &Silent).unwrap(), &params).unwrap()
     }
 
     /// The true motion of a stone in its frame.

@@ -7,6 +7,7 @@ use super::field::{
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
+use crate::progress::{Interrupted, Progress};
 use nalgebra::Matrix3;
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
@@ -26,7 +27,10 @@ pub(crate) struct Solution {
 
 impl Adjustment {
     /// Estimates the variance components from the stones' equations; from parts of large walls.
-    pub fn estimate_components(&mut self) {
+    ///
+    /// # Errors
+    /// The caller stopped the work.
+    pub fn estimate_components(&mut self, progress: &dyn Progress) -> Result<(), Interrupted> {
         let equations = match &self.photos {
             None => self.equations_with_field(0.0),
             Some(_) => self.cloud_equations(0.0),
@@ -41,9 +45,10 @@ impl Adjustment {
                 .collect(),
         });
         self.components = match Subgraph::new(&self.graph, &self.displacements()) {
-            None => estimate_components(&problem),
-            Some(part) => estimate_components(&part.restrict(&problem)),
+            None => estimate_components(&problem, progress)?,
+            Some(part) => estimate_components(&part.restrict(&problem), progress)?,
         };
+        Ok(())
     }
 
     /// Where the stones are so far. Stones that seem loose count where they went: many of them together are a
@@ -185,7 +190,7 @@ mod tests {
         let params = AdjustmentParams::default();
         let moved = |k: u32| by_points * f64::from(u8::from(is_right(k as usize)));
         let source = MemoryPairs::new(wall(10, [0.001; 2], moved));
-        let mut adjustment = Adjustment::new(survey(&source, &params).unwrap(), &params).unwrap();
+        let mut adjustment = Adjustment::new(survey(&source, &params, &Silent).unwrap(), &params).unwrap();
         adjustment.estimate_noise();
         for _ in 0..3 {
             adjustment.evaluate(&source, &Silent).unwrap();
@@ -223,7 +228,7 @@ mod tests {
     fn a_wall_without_loose_stones_lowers_their_share() {
         let params = AdjustmentParams::default();
         let source = MemoryPairs::new(wall(10, [0.001; 2], |_| Vector3::zeros()));
-        let mut adjustment = Adjustment::new(survey(&source, &params).unwrap(), &params).unwrap();
+        let mut adjustment = Adjustment::new(survey(&source, &params, &Silent).unwrap(), &params).unwrap();
         adjustment.estimate_noise();
         adjustment.evaluate(&source, &Silent).unwrap();
         let equations = adjustment.equations();

@@ -4,6 +4,7 @@ use super::error::AdjustError;
 use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
 use crate::id::StoneId;
+use crate::progress::Progress;
 use crate::registration::points::{PairPoints, PairSource, face_spacing};
 use crate::statistics::{component_median, upper_median};
 use nalgebra::Vector3;
@@ -48,6 +49,7 @@ const USUAL_SPACING_M: f64 = 0.005;
 pub(crate) fn survey<S: PairSource>(
     source: &S,
     params: &AdjustmentParams,
+    progress: &dyn Progress,
 ) -> Result<Survey, AdjustError<S::Error>> {
     let mut stones = Vec::new();
     let mut batches = Vec::new();
@@ -55,6 +57,7 @@ pub(crate) fn survey<S: PairSource>(
     let mut sample: Vec<(usize, PairPoints)> = Vec::new();
     let mut stride = 1;
     for batch in 0..source.batch_count() {
+        progress.check()?;
         let pairs = source.load(batch).map_err(AdjustError::Source)?;
         batches.push(stones.len()..stones.len() + pairs.len());
         spacings.extend(pairs.par_iter().filter_map(spacing).collect::<Vec<f64>>());
@@ -134,6 +137,7 @@ fn spacing(pair: &PairPoints) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::cloud::Cloud;
+    use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
     use nalgebra::Point3;
 
@@ -162,7 +166,7 @@ mod tests {
     #[test]
     fn one_pass_finds_spacing_batches_and_a_sample_from_everywhere() {
         let pairs: Vec<PairPoints> = (0..400).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
-        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default()).unwrap();
+        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default(), &Silent).unwrap();
         assert_eq!(found.stones.len(), 400);
         assert!(found.stones.iter().all(|s| s.usable && s.counts == [400, 400]));
         assert!((found.spacing_m / 0.01 - 1.0).abs() < 0.15, "{}", found.spacing_m);
@@ -177,7 +181,7 @@ mod tests {
     fn stones_with_few_points_are_kept_but_not_used() {
         let mut pairs: Vec<PairPoints> = (0..12).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
         pairs[4] = pair(4, 0.05, Vector3::zeros());
-        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default()).unwrap();
+        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default(), &Silent).unwrap();
         let usable: Vec<bool> = found.stones.iter().map(|s| s.usable).collect();
         assert_eq!(usable.iter().filter(|u| !**u).count(), 1);
         assert!(!usable[4] && !found.sample.iter().any(|s| s.0 == 4));
@@ -188,7 +192,12 @@ mod tests {
         let shift = Vector3::new(0.001, 0.02, -0.01);
         let wrong = Vector3::new(0.0, 0.3, 0.1);
         let pairs = (0..60).map(|k| pair(k, 0.02, if k == 27 { wrong } else { shift }));
-        let found = survey(&MemoryPairs::new(pairs.collect()), &AdjustmentParams::default()).unwrap();
+        let found = survey(
+            &MemoryPairs::new(pairs.collect()),
+            &AdjustmentParams::default(),
+            &Silent,
+        )
+        .unwrap();
         let places: Vec<Place> = found.stones.iter().map(|s| s.place.clone()).collect();
         let smoothed = found.smoothed_shifts(&Graph::new(&places, 2).unwrap());
         assert!(

@@ -10,7 +10,7 @@ use super::observation::photo::{
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
-use crate::progress::Progress;
+use crate::progress::{Interrupted, Progress};
 use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
 use crate::registration::points::PairSource;
 use crate::stone::PairResult;
@@ -58,7 +58,6 @@ impl Adjustment {
         let mut tracks: Vec<Track> = Vec::with_capacity(self.stones.len());
         progress.begin("track stones in photos", self.stones.len() as u64);
         for (batch, range) in self.batches.clone().into_iter().enumerate() {
-            progress.check()?;
             let pairs = source.load(batch).map_err(AdjustError::Source)?;
             let chips = photos.load(batch).map_err(AdjustError::Source)?;
             let found: Vec<Track> = pairs
@@ -66,6 +65,7 @@ impl Adjustment {
                 .zip(&chips)
                 .zip(range.clone())
                 .map(|((pair, chips), i)| {
+                    progress.check()?;
                     let tracker = Tracker {
                         pair,
                         face_from_world: &self.graph.nodes[i].face_from_world,
@@ -76,9 +76,9 @@ impl Adjustment {
                         params: photos.params(),
                         picture_px: photos.picture_px(),
                     };
-                    tracker.track()
+                    Ok(tracker.track())
                 })
-                .collect();
+                .collect::<Result<_, Interrupted>>()?;
             tracks.extend(found);
             progress.advance(range.len() as u64);
         }

@@ -6,6 +6,7 @@ use super::prior::prior;
 use super::problem::FieldProblem;
 use super::solve::assemble;
 use super::variance_components::{BOUNDS, COUNT, VarianceComponents};
+use crate::progress::{Interrupted, Progress};
 use rayon::prelude::*;
 
 /// Most steps. The search starts from the last estimate, and six steps of at most [`LARGEST_STEP`] cross the
@@ -31,7 +32,13 @@ const UNSOLVABLE: f64 = f64::MAX / 1e6;
 ///
 /// A Newton step in the logarithms from parabolas along each, then a search along it. Cost: at most 6 x 21
 /// factorisations.
-pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents {
+///
+/// # Errors
+/// The caller stopped the work.
+pub(crate) fn estimate_components(
+    problem: &FieldProblem,
+    progress: &dyn Progress,
+) -> Result<VarianceComponents, Interrupted> {
     let count = problem.components.count();
     let value = |log: &[f64; COUNT]| {
         let components = VarianceComponents::from_log(*log, count);
@@ -39,6 +46,7 @@ pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents 
     };
     let mut log = clamp(problem.components.to_log());
     for _ in 0..STEPS {
+        progress.check()?;
         let mut probes = vec![log];
         for k in 0..count {
             for sign in [-1.0, 1.0] {
@@ -59,7 +67,7 @@ pub(crate) fn estimate_components(problem: &FieldProblem) -> VarianceComponents 
         }
         log = candidates[best];
     }
-    VarianceComponents::from_log(log, count)
+    Ok(VarianceComponents::from_log(log, count))
 }
 
 /// `values`: here, then below and above in each logarithm that counts.
@@ -126,6 +134,7 @@ pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) 
 mod tests {
     use super::*;
     use crate::linalg::BlockMatrix;
+    use crate::progress::Silent;
     use crate::registration::adjustment::field::PhotoTerms;
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::observation::NormalEquations;
@@ -321,7 +330,7 @@ mod tests {
         let mut problem = wall.problem(1.0);
         // As in the adjustment: some calls, each from where the last ended.
         for _ in 0..3 {
-            problem.components = estimate_components(&problem);
+            problem.components = estimate_components(&problem, &Silent).unwrap();
         }
         let found = problem.components;
         let ratios = [
@@ -331,5 +340,22 @@ mod tests {
             found.own_rad / truth.own_rad,
         ];
         assert!(ratios.iter().all(|r| r.ln().abs() < 0.4), "{ratios:?}");
+    }
+
+    struct Stopped;
+
+    impl Progress for Stopped {
+        fn begin(&self, _what: &str, _total: u64) {}
+        fn advance(&self, _units: u64) {}
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn the_estimate_ends_once_the_caller_stops_it() {
+        let wall = SmallWall::new(4, 3, 1);
+        let stopped = estimate_components(&wall.problem(1.0), &Stopped);
+        assert_eq!(stopped.err(), Some(Interrupted));
     }
 }
