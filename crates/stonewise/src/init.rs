@@ -65,7 +65,7 @@ pub fn init(dir: &Path) -> Result<Initialised> {
     let mut epochs = Vec::new();
     for folder in folders(dir)? {
         let folder_name = name(&folder);
-        if folder_name == MASKS {
+        if folder.ends_with(MASKS) {
             continue;
         }
         if NO_EPOCHS.contains(&folder_name.as_str()) {

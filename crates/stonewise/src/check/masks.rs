@@ -36,6 +36,10 @@ pub(super) fn look(epoch: &Epoch, cameras: &CameraFile, progress: &dyn Progress)
         .zip(paths)
         .filter_map(|(view, path)| Some((view, path?)))
         .collect();
+    // That no photo is there is said elsewhere.
+    if photos.is_empty() {
+        return Ok(Vec::new());
+    }
     let of_photo = |(view, path): &(&View, PathBuf)| {
         progress.check()?;
         let size = (view.camera.width, view.camera.height);
