@@ -49,7 +49,7 @@ pub enum Command {
     /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and
     /// disk space.
     #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
-        The table goes to stdout; a page with pictures is written beside the project file. Exit code 3 if anything is doubtful or wrong.")]
+        The table goes to stdout; a page with pictures is written beside the project file. Exit code 3 if anything is doubtful or wrong, 1 if an input cannot be read.")]
     Check(CheckArgs),
     /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of
     /// edits.
