@@ -5,8 +5,8 @@ mod support;
 
 use nalgebra::Point3;
 use std::fs;
-use std::path::Path;
-use stonewise_core::raster::LabelImage;
+use std::path::{Path, PathBuf};
+use stonewise_core::raster::{LabelImage, Raster};
 use stonewise_io::cloud::{CloudError, read_cloud, write_coloured_laz, write_points_laz};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
 use stonewise_io::masks::write_label_png;
@@ -59,13 +59,18 @@ fn name_system(cloud: &Path, epsg: u32) {
     .unwrap();
 }
 
-fn first_photo(survey: &Path) -> std::path::PathBuf {
+/// Photos of the second epoch.
+fn photos(survey: &Path) -> Vec<PathBuf> {
     let mut photos: Vec<_> = fs::read_dir(survey.join("epoch2/images"))
         .unwrap()
         .map(|e| e.unwrap().path())
         .collect();
     photos.sort();
-    photos.swap_remove(0)
+    photos
+}
+
+fn first_photo(survey: &Path) -> PathBuf {
+    photos(survey).swap_remove(0)
 }
 
 /// What is wrong; how the survey is spoilt; a word of the table; whether a run stops.
@@ -73,7 +78,7 @@ type Case = (&'static str, fn(&Path), &'static str, bool);
 
 const CLOUD_2: &str = "epoch2/cloud_tls.laz";
 
-const CASES: [Case; 14] = [
+const CASES: [Case; 16] = [
     (
         "feet",
         |dir| map_cloud(&dir.join(CLOUD_2), |p| p / 0.3048),
@@ -164,6 +169,27 @@ const CASES: [Case; 14] = [
         false,
     ),
     (
+        "exchanged photos",
+        |dir| {
+            let [one, other] = photos(dir).try_into().unwrap();
+            let (first, second) = (fs::read(&one).unwrap(), fs::read(&other).unwrap());
+            fs::write(one, second).unwrap();
+            fs::write(other, first).unwrap();
+        },
+        "no two photos show the same",
+        false,
+    ),
+    (
+        "a photo of one colour",
+        |dir| {
+            let photo = first_photo(dir);
+            fs::remove_file(&photo).unwrap();
+            write_jpeg(&photo, &Raster::filled(1200, 900, [118; 3]), 90).unwrap();
+        },
+        "of one colour: IMG_2001",
+        false,
+    ),
+    (
         "an empty photo",
         |dir| fs::write(first_photo(dir), "").unwrap(),
         "cannot be read or are cut off",
@@ -190,7 +216,7 @@ const CASES: [Case; 14] = [
         |dir| {
             let photo = first_photo(dir);
             let whole = read_rgb(&photo).unwrap();
-            let half = stonewise_core::raster::Raster::from_vec(
+            let half = Raster::from_vec(
                 whole.width(),
                 whole.height() / 2,
                 whole.data()[..(whole.width() * (whole.height() / 2)) as usize].to_vec(),
@@ -320,8 +346,7 @@ fn masks_that_a_run_cannot_use_are_found() {
     fs::create_dir(&masks).unwrap();
     let of = |photo: &Path| masks.join(photo.file_name().unwrap()).with_extension("png");
     let labels = LabelImage::filled(1200, 900, 7);
-    let photos = fs::read_dir(dir.join("epoch2/images")).unwrap();
-    for photo in photos.map(|p| p.unwrap().path()) {
+    for photo in photos(dir) {
         write_label_png(&of(&photo), &labels).unwrap();
     }
     let (code, table, log) = check(dir);

@@ -75,7 +75,7 @@ impl Overlay {
         let reduction = f64::from(1 << halvings);
         (edges.len() >= LEAST_EDGES).then(|| Self {
             reduction,
-            grey: reduced(photo, &depth, 1 << halvings),
+            grey: reduced(photo, [depth.width, depth.height], 1 << halvings),
             edges,
         })
     }
@@ -174,8 +174,8 @@ fn spread(map: &Map) -> Map {
     }
 }
 
-/// The photo's grey values, means of squares of pixels, as large as the depth map.
-fn reduced(photo: &RgbImage, depth: &Map, by: u32) -> Map {
+/// The photo's grey values, means of squares of pixels, in a map of this width and height.
+pub(super) fn reduced(photo: &RgbImage, [width, height]: [usize; 2], by: u32) -> Map {
     let grey = |x: usize, y: usize| {
         let (mut sum, mut n) = (0.0f32, 0.0f32);
         for yy in y as u32 * by..(y as u32 + 1) * by {
@@ -188,11 +188,10 @@ fn reduced(photo: &RgbImage, depth: &Map, by: u32) -> Map {
         }
         if n > 0.0 { sum / n } else { f32::NAN }
     };
-    let pixels = 0..depth.width * depth.height;
     Map {
-        width: depth.width,
-        height: depth.height,
-        values: pixels.map(|i| grey(i % depth.width, i / depth.width)).collect(),
+        width,
+        height,
+        values: (0..width * height).map(|i| grey(i % width, i / width)).collect(),
     }
 }
 

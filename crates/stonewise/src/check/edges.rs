@@ -116,7 +116,7 @@ fn smooth(values: &[f32], width: usize, height: usize) -> Vec<f32> {
 }
 
 /// Mean over a square of half width `r`, zero beyond the border.
-fn box_mean(values: &[f32], width: usize, height: usize, r: usize) -> Vec<f32> {
+pub(super) fn box_mean(values: &[f32], width: usize, height: usize, r: usize) -> Vec<f32> {
     let along = running(values, height, width, 1, width, r);
     running(&along, width, height, width, 1, r)
 }

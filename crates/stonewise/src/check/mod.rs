@@ -6,6 +6,7 @@ mod clouds;
 mod depth;
 mod edges;
 mod finding;
+mod likeness;
 mod masks;
 mod page;
 mod photos;
@@ -55,6 +56,11 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
                 report.findings.extend(found.unwrap_or_default());
             }
             if let Some(survey) = survey.as_ref().filter(|_| are_listed) {
+                if depth == Depth::Full {
+                    report
+                        .findings
+                        .extend(likeness::look(epoch, &cameras, survey, progress)?);
+                }
                 let found = cameras::look(epoch, &cameras, survey, depth);
                 let (findings, picture) = unreadable.keep(epoch, &CAMERAS, found)?.unwrap_or_default();
                 report.findings.extend(findings);

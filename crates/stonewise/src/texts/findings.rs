@@ -46,6 +46,14 @@ messages! {
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
         PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
             "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
+        FLAT_PHOTOS: "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
+            "einfarbig: {photos}; sie noch einmal kopieren, oder ihre Kameras aus der Kameradatei nehmen";
+        UNLIKE_PHOTOS: "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \
+                        name, or turned?",
+            "zeigen etwas anderes als die übrigen Fotos an denselben Punkten: {photos} (Korrelation höchstens {most}); trägt das Foto den Namen eines anderen, oder ist es gedreht?";
+        UNLIKE_ALL: "no two photos show the same where they see the same points: are these the photos of these cameras, and are cameras and \
+                     clouds in one frame?",
+            "keine zwei Fotos zeigen dasselbe an denselben Punkten: sind dies die Fotos dieser Kameras, und liegen Kameras und Punktwolken in einem System?";
         BROKEN_MASKS: "cannot be used for {photos}, and a run leaves these photos out: {reason}",
             "nicht zu verwenden für {photos}, ein Lauf lässt diese Fotos weg: {reason}";
         WITHOUT_MASKS: "none in {file} for {photos}; a run leaves these photos out",
