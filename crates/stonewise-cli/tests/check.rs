@@ -165,7 +165,7 @@ const CASES: [Case; 16] = [
     (
         "a photo that is missing",
         |dir| fs::remove_file(first_photo(dir)).unwrap(),
-        ".jpg (1 of",
+        "IMG_2001 (1 of 2 posed photos)",
         false,
     ),
     (
@@ -351,7 +351,7 @@ fn masks_that_a_run_cannot_use_are_found() {
     }
     let (code, table, log) = check(dir);
     assert!(
-        code == 0 && table.contains("there for all 2 photos"),
+        code == 0 && table.contains("there for every photo (2)"),
         "{table}{log}"
     );
     let first = of(&first_photo(dir));

@@ -80,7 +80,7 @@ pub(super) fn look(epoch: &Epoch, cameras: &CameraFile, progress: &dyn Progress)
         found.push(finding(Verdict::Doubt, text));
     }
     if found.is_empty() {
-        found.push(finding(Verdict::Fine, format!("there for all {there} photos")));
+        found.push(finding(Verdict::Fine, format!("there for every photo ({there})")));
     }
     Ok(found)
 }
