@@ -79,10 +79,18 @@ pub(crate) struct Clauses {
     pub datum_unknown: &'static str,
     pub none_against_common: &'static str,
     pub reaches: Number,
+    pub joints_reach: Number,
+    pub stones_or_joints_reach: Number,
     pub below: Number,
+    pub below_with_joints: Number,
     pub none_shown: &'static str,
-    pub limit: &'static str,
+    limit: &'static str,
+    limit_common: &'static str,
     pub or: &'static str,
+    /// Motion, motion against neighbours, joint opening.
+    pub quantities: [&'static str; 3],
+    /// Outside the zones.
+    pub elsewhere: &'static str,
 }
 
 /// The report's first page.
@@ -126,6 +134,7 @@ pub(crate) struct PageTexts {
     pub tile_above: &'static str,
     pub tile_loose: &'static str,
     pub tile_limit: &'static str,
+    pub tile_limit_common: &'static str,
     pub tile_largest: &'static str,
     pub tile_largest_common: &'static str,
     pub tile_no_motion: &'static str,
@@ -166,28 +175,28 @@ static ENGLISH: Texts = Texts {
             "as computed, {n} stones would lie beyond the alarm threshold",
         ],
         moved_alarm: [
-            "{n} stone moved beyond the alarm threshold of {t} mm",
-            "{n} stones moved beyond the alarm threshold of {t} mm",
+            "{n} stone moved beyond the alarm threshold of {t}",
+            "{n} stones moved beyond the alarm threshold of {t}",
         ],
         moved_attention: [
-            "{n} stone moved beyond the attention threshold of {t} mm",
-            "{n} stones moved beyond the attention threshold of {t} mm",
+            "{n} stone moved beyond the attention threshold of {t}",
+            "{n} stones moved beyond the attention threshold of {t}",
         ],
         neighbours_alarm: [
-            "{n} stone moved against its neighbours beyond the alarm threshold of {t} mm",
-            "{n} stones moved against their neighbours beyond the alarm threshold of {t} mm",
+            "{n} stone moved against its neighbours beyond the alarm threshold of {t}",
+            "{n} stones moved against their neighbours beyond the alarm threshold of {t}",
         ],
         neighbours_attention: [
-            "{n} stone moved against its neighbours beyond the attention threshold of {t} mm",
-            "{n} stones moved against their neighbours beyond the attention threshold of {t} mm",
+            "{n} stone moved against its neighbours beyond the attention threshold of {t}",
+            "{n} stones moved against their neighbours beyond the attention threshold of {t}",
         ],
         joints_alarm: [
-            "{n} joint opened beyond the alarm threshold of {t} mm",
-            "{n} joints opened beyond the alarm threshold of {t} mm",
+            "{n} joint opened beyond the alarm threshold of {t}",
+            "{n} joints opened beyond the alarm threshold of {t}",
         ],
         joints_attention: [
-            "{n} joint opened beyond the attention threshold of {t} mm",
-            "{n} joints opened beyond the attention threshold of {t} mm",
+            "{n} joint opened beyond the attention threshold of {t}",
+            "{n} joints opened beyond the attention threshold of {t}",
         ],
         moved: [
             "{n} of {m} measured stones moved",
@@ -216,16 +225,31 @@ static ENGLISH: Texts = Texts {
         datum_unknown: "the registration error between the surveys is unknown, so a motion of the wall as a whole would not show",
         none_against_common: "no stone moved against the common motion of the wall",
         reaches: [
-            "{n} stone or joint may have reached the attention threshold of {t} mm: its interval extends to it",
-            "{n} stones or joints may have reached the attention threshold of {t} mm: their intervals extend to it",
+            "{n} stone may have reached the attention threshold of {t}: its interval extends to it",
+            "{n} stones may have reached the attention threshold of {t}: their intervals extend to it",
+        ],
+        joints_reach: [
+            "{n} joint may have reached the attention threshold of {t}: its interval extends to it",
+            "{n} joints may have reached the attention threshold of {t}: their intervals extend to it",
+        ],
+        stones_or_joints_reach: [
+            "{n} stone or joint may have reached the attention threshold of {t}: its interval extends to it",
+            "{n} stones or joints may have reached the attention threshold of {t}: their intervals extend to it",
         ],
         below: [
-            "the {n} measured stone did not reach the attention threshold of {t} mm",
-            "none of the {n} measured stones reaches the attention threshold of {t} mm",
+            "the {n} measured stone did not reach the attention threshold of {t}",
+            "none of the {n} measured stones reaches the attention threshold of {t}",
+        ],
+        below_with_joints: [
+            "neither the {n} measured stone nor a joint reaches the attention threshold of {t}",
+            "none of the {n} measured stones and no joint reaches the attention threshold of {t}",
         ],
         none_shown: "no motion is shown",
         limit: "detection limit: {median} mm (median), {high} mm (90th percentile)",
+        limit_common: "detection limit against the common motion: {median} mm (median), {high} mm (90th percentile)",
         or: "or",
+        quantities: ["motion", "against neighbours", "joint opening"],
+        elsewhere: "elsewhere",
     },
     page: PageTexts {
         kind: "Deformation report, stone by stone",
@@ -269,6 +293,7 @@ static ENGLISH: Texts = Texts {
         tile_above: "above their own 95\u{a0}% limit",
         tile_loose: "loose: move unlike their neighbours",
         tile_limit: "detection limit (95\u{a0}%, median)",
+        tile_limit_common: "detection limit against the common motion (95\u{a0}%, median)",
         tile_largest: "largest motion of a stone that moved",
         tile_largest_common: "largest motion against the common motion",
         tile_no_motion: "no motion is shown",
@@ -333,28 +358,28 @@ static GERMAN: Texts = Texts {
             "wie berechnet l\u{e4}gen {n} Steine \u{fc}ber der Alarmschwelle",
         ],
         moved_alarm: [
-            "{n} Stein hat sich \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
-            "{n} Steine haben sich \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+            "{n} Stein hat sich \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
+            "{n} Steine haben sich \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
         ],
         moved_attention: [
-            "{n} Stein hat sich \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
-            "{n} Steine haben sich \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+            "{n} Stein hat sich \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
+            "{n} Steine haben sich \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
         ],
         neighbours_alarm: [
-            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
-            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Alarmschwelle von {t} mm hinaus bewegt",
+            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
+            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Alarmschwelle von {t} hinaus bewegt",
         ],
         neighbours_attention: [
-            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
-            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Warnschwelle von {t} mm hinaus bewegt",
+            "{n} Stein hat sich gegen seine Nachbarn \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
+            "{n} Steine haben sich gegen ihre Nachbarn \u{fc}ber die Warnschwelle von {t} hinaus bewegt",
         ],
         joints_alarm: [
-            "{n} Fuge hat sich \u{fc}ber die Alarmschwelle von {t} mm hinaus ge\u{f6}ffnet",
-            "{n} Fugen haben sich \u{fc}ber die Alarmschwelle von {t} mm hinaus ge\u{f6}ffnet",
+            "{n} Fuge hat sich \u{fc}ber die Alarmschwelle von {t} hinaus ge\u{f6}ffnet",
+            "{n} Fugen haben sich \u{fc}ber die Alarmschwelle von {t} hinaus ge\u{f6}ffnet",
         ],
         joints_attention: [
-            "{n} Fuge hat sich \u{fc}ber die Warnschwelle von {t} mm hinaus ge\u{f6}ffnet",
-            "{n} Fugen haben sich \u{fc}ber die Warnschwelle von {t} mm hinaus ge\u{f6}ffnet",
+            "{n} Fuge hat sich \u{fc}ber die Warnschwelle von {t} hinaus ge\u{f6}ffnet",
+            "{n} Fugen haben sich \u{fc}ber die Warnschwelle von {t} hinaus ge\u{f6}ffnet",
         ],
         moved: [
             "{n} von {m} gemessenen Steinen hat sich bewegt",
@@ -383,16 +408,31 @@ static GERMAN: Texts = Texts {
         datum_unknown: "der Registrierungsfehler zwischen den Aufnahmen ist unbekannt, eine Bewegung der Mauer als Ganzes w\u{e4}re nicht zu sehen",
         none_against_common: "kein Stein hat sich gegen die gemeinsame Bewegung der Mauer bewegt",
         reaches: [
-            "{n} Stein oder Fuge kann die Warnschwelle von {t} mm erreicht haben: das Intervall reicht bis zu ihr",
-            "{n} Steine oder Fugen k\u{f6}nnen die Warnschwelle von {t} mm erreicht haben: ihre Intervalle reichen bis zu ihr",
+            "{n} Stein kann die Warnschwelle von {t} erreicht haben: sein Intervall reicht bis zu ihr",
+            "{n} Steine k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
+        ],
+        joints_reach: [
+            "{n} Fuge kann die Warnschwelle von {t} erreicht haben: ihr Intervall reicht bis zu ihr",
+            "{n} Fugen k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
+        ],
+        stones_or_joints_reach: [
+            "{n} Stein oder Fuge kann die Warnschwelle von {t} erreicht haben: das Intervall reicht bis zu ihr",
+            "{n} Steine oder Fugen k\u{f6}nnen die Warnschwelle von {t} erreicht haben: ihre Intervalle reichen bis zu ihr",
         ],
         below: [
-            "der {n} gemessene Stein erreicht die Warnschwelle von {t} mm nicht",
-            "keiner der {n} gemessenen Steine erreicht die Warnschwelle von {t} mm",
+            "der {n} gemessene Stein erreicht die Warnschwelle von {t} nicht",
+            "keiner der {n} gemessenen Steine erreicht die Warnschwelle von {t}",
+        ],
+        below_with_joints: [
+            "weder der {n} gemessene Stein noch eine Fuge erreicht die Warnschwelle von {t}",
+            "keiner der {n} gemessenen Steine und keine Fuge erreicht die Warnschwelle von {t}",
         ],
         none_shown: "keine Bewegung ist nachweisbar",
         limit: "Nachweisgrenze: {median} mm (Median), {high} mm (90. Perzentil)",
+        limit_common: "Nachweisgrenze gegen die gemeinsame Bewegung: {median} mm (Median), {high} mm (90. Perzentil)",
         or: "oder",
+        quantities: ["Bewegung", "gegen Nachbarn", "Fugen\u{f6}ffnung"],
+        elsewhere: "sonst",
     },
     page: PageTexts {
         kind: "Verformungsbericht, Stein f\u{fc}r Stein",
@@ -436,6 +476,7 @@ static GERMAN: Texts = Texts {
         tile_above: "\u{fc}ber ihrer eigenen 95-%-Grenze",
         tile_loose: "lose: bewegen sich anders als ihre Nachbarn",
         tile_limit: "Nachweisgrenze (95\u{a0}%, Median)",
+        tile_limit_common: "Nachweisgrenze gegen die gemeinsame Bewegung (95\u{a0}%, Median)",
         tile_largest: "gr\u{f6}\u{df}te Bewegung eines bewegten Steins",
         tile_largest_common: "gr\u{f6}\u{df}te Bewegung gegen die gemeinsame Bewegung",
         tile_no_motion: "keine Bewegung ist nachweisbar",
@@ -509,6 +550,13 @@ impl Language {
             Self::English => &ENGLISH,
             Self::German => &GERMAN,
         }
+    }
+}
+
+impl Clauses {
+    /// The detection limit: of absolute motions, or of those against the common motion of the wall.
+    pub(crate) fn detection_limit(&self, has_datum: bool) -> &'static str {
+        if has_datum { self.limit } else { self.limit_common }
     }
 }
 
@@ -630,7 +678,7 @@ mod tests {
     fn one_and_many_are_told_apart() {
         let clauses = &Language::English.texts().clauses;
         assert_eq!(
-            counted(clauses.joints_alarm, 1, &[("t", "5")]),
+            counted(clauses.joints_alarm, 1, &[("t", "5 mm")]),
             "1 joint opened beyond the alarm threshold of 5 mm"
         );
         assert!(counted(clauses.lost, 2, &[]).starts_with("2 stones are lost"));

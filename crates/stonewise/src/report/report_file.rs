@@ -256,6 +256,7 @@ mod tests {
         );
         let header = html.split("</header>").next().unwrap();
         assert!(header.contains("<p class=\"datum\">Registration error between the surveys is unknown"));
+        assert!(html.contains("<b>Detection limit against the common motion: "));
     }
 
     #[test]

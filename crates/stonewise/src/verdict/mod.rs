@@ -10,6 +10,7 @@ mod case;
 mod evidence;
 mod interval;
 mod judged;
+mod limits;
 mod sentence;
 #[cfg(test)]
 pub(crate) mod testing;

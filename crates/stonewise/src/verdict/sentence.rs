@@ -1,12 +1,13 @@
 //! The verdict in words.
 
 use super::case::Case;
-use super::judged::{Judged, Level};
+use super::judged::{Judged, JudgedStone, Level};
+use super::limits::{Compared, Quantity, in_words};
 use crate::figure::count;
 use crate::report_params::Language;
 use crate::results::records::{Area, Largest, Reason, ReasonCode, State};
 use crate::texts::{Texts, counted, fill};
-use crate::thresholds::{Levels, Measures, Thresholds};
+use crate::thresholds::{Levels, Thresholds};
 
 /// What the clauses are made from.
 struct Speaker<'a> {
@@ -101,12 +102,14 @@ impl Speaker<'_> {
         match reason {
             R::NotConverged => c.not_converged.to_owned(),
             R::InDoubt => c.in_doubt.to_owned(),
-            R::LengthAlarm => self.length(c.moved_alarm, Level::Alarm),
-            R::LengthAttention => self.length(c.moved_attention, Level::Attention),
-            R::NeighboursAlarm => self.neighbours(c.neighbours_alarm, Level::Alarm),
-            R::NeighboursAttention => self.neighbours(c.neighbours_attention, Level::Attention),
-            R::JointsAlarm => self.joints(c.joints_alarm, Level::Alarm),
-            R::JointsAttention => self.joints(c.joints_attention, Level::Attention),
+            R::LengthAlarm => self.beyond(c.moved_alarm, Quantity::Length, Level::Alarm),
+            R::LengthAttention => self.beyond(c.moved_attention, Quantity::Length, Level::Attention),
+            R::NeighboursAlarm => self.beyond(c.neighbours_alarm, Quantity::Neighbours, Level::Alarm),
+            R::NeighboursAttention => {
+                self.beyond(c.neighbours_attention, Quantity::Neighbours, Level::Attention)
+            }
+            R::JointsAlarm => self.beyond(c.joints_alarm, Quantity::Joints, Level::Alarm),
+            R::JointsAttention => self.beyond(c.joints_attention, Quantity::Joints, Level::Attention),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
             R::MotionShown if wall.moved > 0 => {
                 let text = if self.case.has_datum() {
@@ -121,80 +124,66 @@ impl Speaker<'_> {
             R::FewMeasured => counted(c.few_measured, wall.measured, &[("m", &count(wall.stones))]),
             R::DatumUnknown => c.datum_unknown.to_owned(),
             R::IntervalReachesThreshold => self.reaching(),
-            R::BelowThresholds => {
-                let t = self.limits(|m| [m.length, m.neighbours, m.joints], Levels::attention_m, None);
-                counted(c.below, wall.measured, &[("t", &t)])
-            }
+            R::BelowThresholds => self.below(),
             R::NoMotionShown => c.none_shown.to_owned(),
         }
     }
 
-    fn length(&self, text: [&'static str; 2], level: Level) -> String {
-        let beyond = self.judged.stones.iter().filter(|s| s.length == level);
-        let zones: Vec<Option<usize>> = beyond.map(|s| s.zone).collect();
-        self.beyond(text, level, &zones, |m| m.length)
+    fn stones(&self, keep: impl Fn(&JudgedStone) -> bool) -> Vec<Option<usize>> {
+        let kept = self.judged.stones.iter().filter(|s| keep(s));
+        kept.map(|s| s.zone).collect()
     }
 
-    fn neighbours(&self, text: [&'static str; 2], level: Level) -> String {
-        let beyond = self.judged.stones.iter().filter(|s| s.neighbours == level);
-        let zones: Vec<Option<usize>> = beyond.map(|s| s.zone).collect();
-        self.beyond(text, level, &zones, |m| m.neighbours)
+    /// Zones of the stones or joints of which a quantity lies at this level.
+    fn at(&self, quantity: Quantity, level: Level) -> Compared {
+        let zones = match quantity {
+            Quantity::Length => self.stones(|s| s.length == level),
+            Quantity::Neighbours => self.stones(|s| s.neighbours == level),
+            Quantity::Joints => {
+                let joints = self.judged.joints.iter().filter(|j| j.opening == level);
+                joints.map(|j| j.zone).collect()
+            }
+        };
+        Compared { quantity, zones }
     }
 
-    fn joints(&self, text: [&'static str; 2], level: Level) -> String {
-        let beyond = self.judged.joints.iter().filter(|j| j.opening == level);
-        let zones: Vec<Option<usize>> = beyond.map(|j| j.zone).collect();
-        self.beyond(text, level, &zones, |m| m.joints)
-    }
-
-    fn beyond(
-        &self,
-        text: [&'static str; 2],
-        level: Level,
-        zones: &[Option<usize>],
-        of: fn(&Measures) -> Levels,
-    ) -> String {
+    fn beyond(&self, text: [&'static str; 2], quantity: Quantity, level: Level) -> String {
         let threshold = match level {
             Level::Alarm => Levels::alarm_m,
             _ => Levels::attention_m,
         };
-        let pick = |m: &Measures| [of(m), Levels::default(), Levels::default()];
-        let t = self.limits(pick, threshold, Some(zones));
-        counted(text, zones.len(), &[("t", &t)])
+        let compared = self.at(quantity, level);
+        let n = compared.zones.len();
+        let t = in_words(self.thresholds, &[compared], threshold, self.texts);
+        counted(text, n, &[("t", &t)])
     }
 
     fn reaching(&self) -> String {
+        let c = &self.texts.clauses;
+        let compared = Quantity::ALL.map(|quantity| self.at(quantity, Level::Reaches));
         let reaches = |level: Level| level == Level::Reaches;
-        let stones = self
-            .judged
-            .stones
-            .iter()
-            .filter(|s| reaches(s.length) || reaches(s.neighbours));
-        let joints = self.judged.joints.iter().filter(|j| reaches(j.opening));
-        let zones: Vec<Option<usize>> = stones.map(|s| s.zone).chain(joints.map(|j| j.zone)).collect();
-        let t = self.limits(
-            |m| [m.length, m.neighbours, m.joints],
-            Levels::attention_m,
-            Some(&zones),
-        );
-        counted(self.texts.clauses.reaches, zones.len(), &[("t", &t)])
+        let stones = self.stones(|s| reaches(s.length) || reaches(s.neighbours)).len();
+        let joints = compared[2].zones.len();
+        let text = match (stones, joints) {
+            (_, 0) => c.reaches,
+            (0, _) => c.joints_reach,
+            _ => c.stones_or_joints_reach,
+        };
+        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
+        counted(text, stones + joints, &[("t", &t)])
     }
 
-    /// The thresholds of these zones as "3 or 5", ascending; of all zones where none are named.
-    fn limits(
-        &self,
-        of: impl Fn(&Measures) -> [Levels; 3],
-        threshold: fn(&Levels) -> Option<f64>,
-        zones: Option<&[Option<usize>]>,
-    ) -> String {
-        let everywhere: Vec<Option<usize>> = self.judged.stones.iter().map(|s| s.zone).collect();
-        let zones = zones.unwrap_or(&everywhere);
-        let levels = zones.iter().flat_map(|zone| of(&self.thresholds.measures(*zone)));
-        let mut all: Vec<f64> = levels.filter_map(|l| threshold(&l)).map(|m| m * 1e3).collect();
-        all.sort_by(f64::total_cmp);
-        all.dedup();
-        let words: Vec<String> = all.iter().map(|mm| self.texts.threshold(*mm)).collect();
-        words.join(&format!(" {} ", self.texts.clauses.or))
+    fn below(&self) -> String {
+        let c = &self.texts.clauses;
+        let everywhere = self.stones(|_| true);
+        let compared = Quantity::ALL.map(|quantity| Compared {
+            quantity,
+            zones: everywhere.clone(),
+        });
+        let asked = self.judged.joints.iter().any(|j| j.opening > Level::NotAsked);
+        let text = if asked { c.below_with_joints } else { c.below };
+        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
+        counted(text, self.wall.measured, &[("t", &t)])
     }
 
     /// Clauses with numbers that belong to the state.
@@ -202,7 +191,12 @@ impl Speaker<'_> {
         let c = &self.texts.clauses;
         let mut out = Vec::new();
         match self.wall.state {
-            State::Alarm | State::Attention => out.extend(self.largest()),
+            State::Alarm | State::Attention => {
+                out.extend(self.largest());
+                if self.wall.reasons.contains(&ReasonCode::DatumUnknown) {
+                    out.push(c.datum_unknown.to_owned());
+                }
+            }
             State::CannotTell if self.case.not_converged || self.case.in_doubt => {
                 if apparent > 0 {
                     out.push(counted(c.apparent, apparent, &[]));
@@ -254,6 +248,9 @@ impl Speaker<'_> {
             ("median", &*mm(limit.median_mm)),
             ("high", &*mm(limit.percentile_90_mm)),
         ];
-        Some(fill(self.texts.clauses.limit, &values))
+        Some(fill(
+            self.texts.clauses.detection_limit(self.case.has_datum()),
+            &values,
+        ))
     }
 }

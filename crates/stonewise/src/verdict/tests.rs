@@ -152,7 +152,7 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
         assert!(
             verdict
                 .sentence
-                .contains("no stone moved against the common motion"),
+                .contains("no stone moved against the common motion of the wall; detection limit against the common motion: "),
             "{}",
             verdict.sentence
         );
@@ -179,6 +179,13 @@ fn without_a_datum_nothing_is_fine_but_a_motion_against_the_rest_is_an_alarm() {
             verdict
                 .sentence
                 .contains("against the common motion of the wall is")
+        );
+        let whole = "; the registration error between the surveys is unknown, so a motion of the wall as a whole would not show.";
+        assert_eq!(
+            verdict.sentence.ends_with(whole),
+            !thresholds.wall.length.is_empty(),
+            "{}",
+            verdict.sentence
         );
     }
 }
@@ -243,7 +250,7 @@ fn zones_are_judged_by_their_own_thresholds() {
     assert!(
         verdict
             .sentence
-            .contains("2 stones moved beyond the alarm threshold of 4 mm")
+            .contains("2 stones moved beyond the alarm threshold of 4 mm (crest)")
     );
     assert_eq!(verdict.stones[0].zone.as_deref(), Some("crest"));
     assert_eq!(
@@ -255,7 +262,11 @@ fn zones_are_judged_by_their_own_thresholds() {
     case.stones[50] = stone(51, [0.0, 5.0], Vector3::x() * 0.006, &mut Normal::new(1));
     let verdict = judge(&case, &thresholds(zone));
     assert_eq!(verdict.state, State::Fine);
-    assert!(verdict.sentence.contains("of 3 or 20 mm"), "{}", verdict.sentence);
+    assert!(
+        verdict.sentence.contains("of 3 mm (crest) or 20 mm (elsewhere)"),
+        "{}",
+        verdict.sentence
+    );
 }
 
 #[test]

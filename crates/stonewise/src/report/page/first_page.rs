@@ -148,7 +148,7 @@ fn limit(facts: &Summary) -> String {
         return String::new();
     };
     let text = fill(
-        texts.clauses.limit,
+        texts.clauses.detection_limit(facts.verdict.has_datum()),
         &[("median", &*texts.mm(median)), ("high", &*texts.mm(high))],
     );
     let mut letters = text.chars();
