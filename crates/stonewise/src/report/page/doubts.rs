@@ -49,5 +49,6 @@ mod tests {
         );
         let html = doubts(&warnings.sorted(), german);
         assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));
+        assert!(html.contains("<code>stonewise check</code> auf das Projekt") && !html.contains('`'));
     }
 }

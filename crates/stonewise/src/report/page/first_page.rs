@@ -156,7 +156,7 @@ fn limit(facts: &Summary) -> String {
         .next()
         .map(|c| c.to_uppercase().to_string())
         .unwrap_or_default();
-    format!("<b>{first}{}</b>", letters.as_str())
+    format!("<b>{}</b>", with_units(&format!("{first}{}", letters.as_str())))
 }
 
 /// How many stones have no motion, and why.
@@ -238,12 +238,25 @@ pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
     }
 }
 
-/// What a run said, as HTML in the language of the report, or marked as English.
+/// What a run said, as HTML in the language of the report, or marked as English; commands between backticks
+/// as code.
 pub(super) fn said(message: &str, texts: &Texts) -> String {
     match message_in(texts.language(), message) {
-        Some(message) => escape(&message),
-        None => format!("<span lang=\"en\">{}</span>", escape(message)),
+        Some(message) => with_code(&message),
+        None => format!("<span lang=\"en\">{}</span>", with_code(message)),
     }
+}
+
+fn with_code(message: &str) -> String {
+    let escaped = escape(message);
+    if escaped.matches('`').count() % 2 == 1 {
+        return escaped;
+    }
+    let part = |(i, part): (usize, &str)| match i % 2 {
+        0 => part.to_owned(),
+        _ => format!("<code>{part}</code>"),
+    };
+    escaped.split('`').enumerate().map(part).collect()
 }
 
 /// The warning that limits do not hold the registration error, where it is unknown.
