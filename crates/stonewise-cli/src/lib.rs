@@ -4,6 +4,7 @@
 
 mod args;
 mod commands;
+mod counted;
 mod note;
 mod printer;
 mod screen;

@@ -7,7 +7,7 @@ mod module_graph;
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 4] = [
-    &["args", "note", "steps"],
+    &["args", "counted", "note", "steps"],
     &["screen"],
     &["printer"],
     &["commands"],

@@ -33,7 +33,7 @@ pub fn split(
     let photos = shuffled_photos(epoch, seed)?;
     if photos.len() < 2 {
         let message = format!(
-            "{} posed photo in it; two at least are needed to split an epoch",
+            "posed photos in it: {}; two at least are needed to split an epoch",
             photos.len()
         );
         return Err(Error::Input {

@@ -290,8 +290,8 @@ static ENGLISH: Texts = Texts {
         tile_measured: "of {m} stones measured",
         tile_moved: "moved (false discovery rate 5\u{a0}%)",
         tile_moved_common: "moved against the common motion (false discovery rate 5\u{a0}%)",
-        tile_above: "above their own 95\u{a0}% limit",
-        tile_loose: "loose: move unlike their neighbours",
+        tile_above: "above the stone's own 95\u{a0}% limit",
+        tile_loose: "loose: motion unlike the neighbours'",
         tile_limit: "detection limit (95\u{a0}%, median)",
         tile_limit_common: "detection limit against the common motion (95\u{a0}%, median)",
         tile_largest: "largest motion of a stone that moved",
@@ -306,7 +306,7 @@ static ENGLISH: Texts = Texts {
             as a whole cannot be told from an error of the registration; stable areas outside the wall would show it.",
         registration_unknown_in_doubt: "Registration error between the surveys is unknown, too: a motion of the wall as a whole cannot be told \
             from it; stable areas outside the wall would show it.",
-        chance: "{above} stones are above their own 95 % limit; on a still wall chance alone gives about {chance}. Moved is said only of stones \
+        chance: "Stones above their own 95 % limit: {above}; on a still wall chance alone gives about {chance}. Moved is said only of stones \
             that remain when the false discovery rate over all stones is held at 5 %: {n}.",
         doubts: "These results must not be relied on as they stand.",
         in_numbers: "In numbers",
@@ -471,10 +471,10 @@ static GERMAN: Texts = Texts {
         signature: "Unterschrift",
         place_date: "Ort und Datum",
         tile_measured: "von {m} Steinen gemessen",
-        tile_moved: "haben sich bewegt (Falscherkennungsrate 5\u{a0}%)",
-        tile_moved_common: "haben sich gegen die gemeinsame Bewegung bewegt (Falscherkennungsrate 5\u{a0}%)",
-        tile_above: "\u{fc}ber ihrer eigenen 95-%-Grenze",
-        tile_loose: "lose: bewegen sich anders als ihre Nachbarn",
+        tile_moved: "bewegt (Falscherkennungsrate 5\u{a0}%)",
+        tile_moved_common: "gegen die gemeinsame Bewegung bewegt (Falscherkennungsrate 5\u{a0}%)",
+        tile_above: "\u{fc}ber der eigenen 95-%-Grenze des Steins",
+        tile_loose: "lose: Bewegung anders als die der Nachbarn",
         tile_limit: "Nachweisgrenze (95\u{a0}%, Median)",
         tile_limit_common: "Nachweisgrenze gegen die gemeinsame Bewegung (95\u{a0}%, Median)",
         tile_largest: "gr\u{f6}\u{df}te Bewegung eines bewegten Steins",
@@ -489,7 +489,7 @@ static GERMAN: Texts = Texts {
             der Mauer als Ganzes ist von einem Registrierungsfehler nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
         registration_unknown_in_doubt: "Auch der Registrierungsfehler zwischen den Aufnahmen ist unbekannt: eine Bewegung der Mauer als Ganzes ist \
             von ihm nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
-        chance: "{above} Steine liegen \u{fc}ber ihrer eigenen 95-%-Grenze; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Als bewegt \
+        chance: "Steine \u{fc}ber ihrer eigenen 95-%-Grenze: {above}; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Als bewegt \
             gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
         in_numbers: "In Zahlen",

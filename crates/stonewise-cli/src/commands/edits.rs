@@ -2,6 +2,7 @@
 
 use crate::args::{EditsCheckArgs, EditsCommand, EditsImportArgs};
 use crate::commands::Outcome;
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
@@ -46,8 +47,8 @@ fn read_edits(args: &EditsImportArgs, printer: &Printer) -> Result<Outcome> {
         printer.log(&format!("{} {}", edit.action.word(), shape(edit.shape())));
     }
     printer.log(&format!(
-        "{} edits written to {}",
-        imported.new,
+        "{} written to {}",
+        counted(imported.new, "edit"),
         args.out.display()
     ));
     Ok(Outcome::Done)

@@ -2,6 +2,7 @@
 
 use crate::args::{ExperimentCommand, PaperArgs, SensitivityArgs};
 use crate::commands::{Outcome, part::part, simulate};
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
@@ -58,8 +59,8 @@ fn sensitivity(args: &SensitivityArgs, force: bool, printer: &Printer) -> Result
     let folder = OutputFolder::of_inputs(&args.out, &owner, &[], &[], force)?;
     let points = run_sensitivity(&options, folder.path(), printer)?;
     printer.log(&format!(
-        "{} points of curves: open {}",
-        points.len(),
+        "{} of curves: open {}",
+        counted(points.len(), "point"),
         args.out.join("index.html").display()
     ));
     Ok(Outcome::Done)

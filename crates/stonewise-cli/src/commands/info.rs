@@ -2,6 +2,7 @@
 
 use crate::args::InfoArgs;
 use crate::commands::Outcome;
+use crate::counted::counted;
 use crate::note::note;
 use anyhow::{Result, bail};
 use std::collections::BTreeMap;
@@ -83,7 +84,7 @@ fn project(path: &Path) -> Result<String> {
 
 fn cloud(path: &Path) -> Result<String> {
     let info = cloud_info(path)?;
-    let mut text = format!("  {:?}, {} points\n", info.format, info.records);
+    let mut text = format!("  {:?}, {}\n", info.format, counted(info.records, "point"));
     let bounds = match info.format {
         CloudFormat::Las => {
             let (summary, bounds) = measure_cloud(path)?;
@@ -106,7 +107,7 @@ fn cloud(path: &Path) -> Result<String> {
         text += &format!("  its header is wrong: it says {}\n", extent(&claimed));
     }
     for scan in &info.scans {
-        text += &format!("  scan {}: {} points\n", scan.name, scan.records);
+        text += &format!("  scan {}: {}\n", scan.name, counted(scan.records, "point"));
     }
     if let Some(crs) = &info.crs {
         text += &format!("  CRS {crs}\n");
@@ -125,7 +126,7 @@ fn extent(bounds: &Bounds) -> String {
 
 fn cameras(path: &Path) -> Result<String> {
     let file = read_cameras(path)?;
-    let mut text = format!("  {} posed photos\n", file.views.len());
+    let mut text = format!("  {}\n", counted(file.views.len(), "posed photo"));
     for view in &file.views {
         let (camera, c) = (&view.camera, view.centre());
         text += &format!(
@@ -150,11 +151,14 @@ fn json(path: &Path) -> Result<String> {
         return cameras(path);
     }
     let masks = CocoMasks::open(path)?;
-    let mut text = format!("  masks (COCO) of {} photos\n", masks.photos().count());
+    let mut text = format!("  masks (COCO) of {}\n", counted(masks.photos().count(), "photo"));
     for photo in masks.photos() {
         text += &format!(
-            "  {}: {} x {} px, {} masks\n",
-            photo.file_name, photo.width, photo.height, photo.masks
+            "  {}: {} x {} px, {}\n",
+            photo.file_name,
+            photo.width,
+            photo.height,
+            counted(photo.masks, "mask")
         );
     }
     Ok(text)
@@ -179,8 +183,8 @@ fn pictures(folder: &Path) -> Result<String> {
     }
     let mut text = String::new();
     for ((is_label, width, height), count) in sizes {
-        let what = if is_label { "label images" } else { "photos" };
-        text += &format!("  {count} {what} of {width} x {height} px\n");
+        let what = counted(count, if is_label { "label image" } else { "photo" });
+        text += &format!("  {what} of {width} x {height} px\n");
     }
     Ok(text + &broken)
 }
@@ -196,5 +200,8 @@ fn picture(path: &Path) -> Result<String> {
     values.sort_unstable();
     values.dedup();
     let instances = values.iter().filter(|&&value| value != 0).count();
-    Ok(format!("  label image, {size}, {instances} instances\n"))
+    Ok(format!(
+        "  label image, {size}, {}\n",
+        counted(instances, "instance")
+    ))
 }

@@ -2,6 +2,7 @@
 
 use crate::args::{ExitOn, ProjectArgs, RunArgs};
 use crate::commands::Outcome;
+use crate::counted::counted;
 use crate::note::note;
 use crate::printer::Printer;
 use anyhow::{Context, Result};
@@ -133,14 +134,14 @@ fn counts(rows: &[StoneRow], verdict: Option<&EpochVerdict>) -> String {
     let above = motions().filter(|m| m.significant).count();
     if verdict.is_some_and(|v| !v.is_sound()) {
         return format!(
-            "{} stones, {matched} matched, {measured} measured; which of them moved or are loose cannot be told",
-            rows.len()
+            "{}, {matched} matched, {measured} measured; which of them moved or are loose cannot be told",
+            counted(rows.len(), "stone")
         );
     }
     let loose = motions().filter(|m| m.loose).count();
     let moved = verdict.map_or(String::new(), |v| format!("{} moved, ", v.wall.moved));
     format!(
-        "{} stones, {matched} matched, {measured} measured, {above} above their limit, {moved}{loose} loose",
-        rows.len()
+        "{}, {matched} matched, {measured} measured, {above} above their limit, {moved}{loose} loose",
+        counted(rows.len(), "stone")
     )
 }

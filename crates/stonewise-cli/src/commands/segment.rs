@@ -2,6 +2,7 @@
 
 use crate::args::{ProjectArgs, SegmentArgs};
 use crate::commands::{Outcome, run};
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Result, bail};
 use std::io::Write;
@@ -62,10 +63,9 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         printer.log(&format!("skipped: {}: {}", warning.subject, warning.message));
     }
     printer.log(&format!(
-        "{} stones in {} photo{}; look at {}",
-        summary.stones,
-        summary.photos,
-        if summary.photos == 1 { "" } else { "s" },
+        "{} in {}; look at {}",
+        counted(summary.stones, "stone"),
+        counted(summary.photos, "photo"),
         args.out.join("overlays").display()
     ));
     if let Some(evaluation) = &summary.evaluation {

@@ -2,6 +2,7 @@
 
 use crate::args::{DemoArgs, Preset, SimulateArgs};
 use crate::commands::{Outcome, run};
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
@@ -74,10 +75,10 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
     let folder = claim(&args.out, &params, force)?;
     let summary = write_survey(folder.path(), &params, printer)?;
     printer.log(&format!(
-        "{} stones, {} points, {} photos: {}",
-        summary.stones,
-        summary.points,
-        summary.photos,
+        "{}, {}, {}: {}",
+        counted(summary.stones, "stone"),
+        counted(summary.points, "point"),
+        counted(summary.photos, "photo"),
         summary.project.display()
     ));
     Ok(Outcome::Done)

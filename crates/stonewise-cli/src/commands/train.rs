@@ -2,6 +2,7 @@
 
 use crate::args::TrainArgs;
 use crate::commands::Outcome;
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::{Context, Result, bail};
 use serde::Deserialize;
@@ -55,8 +56,8 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
     if elapsed.steps > 0 {
         let minutes = elapsed.seconds / 60.0;
         printer.log(&format!(
-            "going on after {} steps, {minutes:.1} minutes",
-            elapsed.steps
+            "going on after {}, {minutes:.1} minutes",
+            counted(elapsed.steps, "step")
         ));
     }
     let training = session.config().training.clone();
@@ -87,8 +88,8 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
     let stop = session.train(&run)?;
     let elapsed = session.elapsed();
     printer.log(&format!(
-        "{} steps, {:.1} minutes; the detector: {}",
-        elapsed.steps,
+        "{}, {:.1} minutes; the detector: {}",
+        counted(elapsed.steps, "step"),
         elapsed.seconds / 60.0,
         model_path(&args.out).display()
     ));
@@ -101,10 +102,10 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
 }
 
 fn tell(photos: &LabelledPhotos, printer: &Printer) {
-    printer.log(&format!("{} photos with masks", photos.photos().len()));
+    printer.log(&format!("{} with masks", counted(photos.photos().len(), "photo")));
     if !photos.unlabelled().is_empty() {
         printer.log(&format!(
-            "note: {} photos have no masks and are left out",
+            "note: photos without masks, left out: {}",
             photos.unlabelled().len()
         ));
     }

@@ -3,6 +3,7 @@
 use crate::args::{PlanArgs, UnitArgs};
 use crate::commands::Outcome;
 use crate::commands::run::conclude;
+use crate::counted::counted;
 use crate::printer::Printer;
 use anyhow::Result;
 use serde_json::Map;
@@ -29,7 +30,10 @@ pub fn plan(args: &PlanArgs, force: bool, printer: &Printer) -> Result<Outcome> 
         }
     };
     let done = plan.units.iter().filter(|u| u.done).count();
-    printer.log(&format!("{} units, {done} of them done", plan.units.len()));
+    printer.log(&format!(
+        "{}, {done} of them done",
+        counted(plan.units.len(), "unit")
+    ));
     if !text.is_empty() {
         writeln!(std::io::stdout(), "{text}")?;
     }

@@ -38,7 +38,7 @@ pub enum TransferError {
         camera: [u32; 2],
     },
     /// No photo has a mask, so nothing can be labelled.
-    #[error("none of the {photos} photos has a mask")]
+    #[error("none of the photos ({photos}) has a mask")]
     NoMasks {
         /// Number of photos.
         photos: usize,

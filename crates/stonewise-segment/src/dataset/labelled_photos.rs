@@ -32,7 +32,7 @@ pub enum DatasetError {
     #[error(transparent)]
     Masks(#[from] MaskError),
     /// No photo of the folder has masks.
-    #[error("none of the {photos} photos in {} has masks in {}: the file names must be the same", folder.display(), masks.display())]
+    #[error("none of the photos ({photos}) in {} has masks in {}: the file names must be the same", folder.display(), masks.display())]
     NoneLabelled {
         /// Number of photos in the folder.
         photos: usize,

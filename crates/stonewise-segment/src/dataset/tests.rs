@@ -124,7 +124,7 @@ fn a_folder_without_labelled_photos_is_an_error_that_says_so() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("none of the 1 photos") && error.contains("masks.json"),
+        error.contains("none of the photos (1)") && error.contains("masks.json"),
         "{error}"
     );
     std::fs::remove_dir_all(dir.path()).unwrap();

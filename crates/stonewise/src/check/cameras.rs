@@ -68,7 +68,10 @@ pub(super) fn look(
         return Ok((finding(verdict, NOT_SEEN.say(&[])), None));
     }
     if depth == Depth::Quick {
-        let text = format!("{} photos see the cloud", candidates.len());
+        let text = match candidates.len() {
+            1 => "1 photo sees the cloud".to_owned(),
+            n => format!("{n} photos see the cloud"),
+        };
         return Ok((finding(Verdict::Fine, text), None));
     }
     let compared: Vec<Compared> = candidates
@@ -142,7 +145,7 @@ fn judge(compared: &[Compared], best: &Compared) -> (Verdict, String) {
     let clear: Vec<&Compared> = compared.iter().filter(|c| c.shift.is_clear()).collect();
     if clear.is_empty() {
         let text = format!(
-            "the edges of the cloud are not found in {} photos (a clear fit stands out 5 times, here {:.1}): either the wall has \
+            "the edges of the cloud are not found in the photos ({} tried; a clear fit stands out 5 times, here {:.1}): either the wall has \
              little relief, or cameras and clouds are of different surveys; look at the picture",
             compared.len(),
             best.shift.clearness

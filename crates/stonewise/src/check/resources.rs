@@ -28,6 +28,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>], out: &Path) ->
     let without_masks = project.epochs.iter().filter(|e| e.masks.is_none()).count();
     let search = match without_masks {
         0 => String::new(),
+        1 => "; the search for stones in the photos of 1 epoch comes on top".to_owned(),
         n => format!("; the search for stones in the photos of {n} epochs comes on top"),
     };
     vec![

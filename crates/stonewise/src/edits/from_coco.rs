@@ -92,6 +92,6 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
             });
         }
     }
-    let note = format!("{others} annotations of other categories are no edits");
+    let note = format!("annotations of other categories, which are no edits: {others}");
     Ok((edits, (others > 0).then_some(note).into_iter().collect()))
 }

@@ -39,7 +39,7 @@ messages! {
                   more digits",
             "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: die \
              Koordinaten mit mehr Stellen ausgeben";
-        NO_PHOTOS: "none of the {total} photos that {file} names is in {folder}", "keines der {total} Fotos, die {file} nennt, liegt in {folder}";
+        NO_PHOTOS: "none of the photos that {file} names ({total}) is in {folder}", "keines der Fotos, die {file} nennt ({total}), liegt in {folder}";
         MISSING_PHOTOS: "missing in {folder}: {photos} ({missing} of {total} posed photos); copy them there, or take their cameras out of the camera file",
             "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren, oder ihre Kameras aus der Kameradatei nehmen";
         BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",

@@ -5,12 +5,12 @@ use super::message::{Message, messages};
 messages! {
     NOTICES {
         INVALID_POINTS:
-            "{n} points without finite coordinates are left out",
-            "{n} Punkte ohne endliche Koordinaten sind weggelassen";
+            "points without finite coordinates, left out: {n}",
+            "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
         AUTO_STABLE:
-            "auto_stable: {count} areas off the wall are taken for stable, as far as they agree with each other",
-            "auto_stable: {count} Flächen neben der Mauer gelten als stabil, soweit sie miteinander übereinstimmen";
+            "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
+            "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";
 
         COMPONENT_AT_BOUND:
             "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
@@ -19,9 +19,9 @@ messages! {
             zu erwarten sind. Meist passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Fotos";
 
         COULD_BE_STABLE:
-            "{count} areas off the wall are seen in both epochs and could show their registration: auto_stable = true uses them all, \
+            "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \
             [[registration.stable]] those that you know did not move, such as corners = {corners}",
-            "{count} Flächen neben der Mauer sind in beiden Epochen zu sehen und könnten deren Registrierung zeigen: auto_stable = true \
+            "Flächen neben der Mauer sind in beiden Epochen zu sehen und könnten deren Registrierung zeigen ({count} gefunden): auto_stable = true \
             verwendet alle, [[registration.stable]] die, von denen Sie wissen, dass sie sich nicht bewegt haben, zum Beispiel \
             corners = {corners}";
 
@@ -46,16 +46,16 @@ messages! {
             "auto_stable: die Fläche neben der Mauer um ({place}) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
 
         STABLE_TOO_FEW:
-            "[[registration.stable]] does not show the epochs' registration: {cells} plane cells seen in both epochs are too few; it is \
+            "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
             taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m",
-            "[[registration.stable]] zeigt die Registrierung der Epochen nicht: {cells} ebene Zellen, die in beiden Epochen zu sehen sind, \
-            sind zu wenige; sie gilt als unbekannt. Flächen mit Punkten in beiden Epochen und mit Seiten in drei Richtungen nennen, oder \
+            "[[registration.stable]] zeigt die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in beiden Epochen zu \
+            sehen; sie gilt als unbekannt. Flächen mit Punkten in beiden Epochen und mit Seiten in drei Richtungen nennen, oder \
             epoch_error_m angeben";
 
         OFF_WALL_TOO_FEW:
-            "auto_stable: surfaces off the wall do not show the epochs' registration: {cells} plane cells seen in both epochs are too few",
-            "auto_stable: Flächen neben der Mauer zeigen die Registrierung der Epochen nicht: {cells} ebene Zellen, die in beiden Epochen zu \
-            sehen sind, sind zu wenige";
+            "auto_stable: surfaces off the wall do not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs",
+            "auto_stable: Flächen neben der Mauer zeigen die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in \
+            beiden Epochen zu sehen";
 
         REGISTRATION_UNKNOWN:
             "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \

@@ -131,11 +131,11 @@ in_both! {
         axis_up: "up (mm)", "auf (mm)";
         axis_out: "stone, out (mm)", "Stein, heraus (mm)";
         stones_title: "In-plane motion of the stones", "Bewegung der Steine in der Ebene";
-        stones: "{n} stones.", "{n} Steine.";
+        stones: "Stones: {n}.", "Steine: {n}.";
         m3c2_title: "In-plane part of M3C2", "Anteil von M3C2 in der Ebene";
-        m3c2: "{n} core points; vector = distance times normal.", "{n} Kernpunkte; Vektor = Abstand mal Normale.";
+        m3c2: "Core points: {n}; vector = distance times normal.", "Kernpunkte: {n}; Vektor = Abstand mal Normale.";
         out_title: "Out of plane: stones against M3C2", "Aus der Ebene: Steine gegen M3C2";
-        out_note: "{n} stones; median difference {median} mm, NMAD {nmad} mm.", "{n} Steine; Median der Unterschiede {median} mm, NMAD {nmad} mm.";
+        out_note: "Stones: {n}; median difference {median} mm, NMAD {nmad} mm.", "Steine: {n}; Median der Unterschiede {median} mm, NMAD {nmad} mm.";
         direction: "direction", "Richtung";
         all_median: "all: median mm", "alle: Median mm";
         all_nmad: "all: NMAD mm", "alle: NMAD mm";
@@ -146,8 +146,8 @@ in_both! {
             "Verschiebungen beziehen sich auf die Registrierung der Epochen. Eine Bewegung, die alle Steine teilen, kann eine Bewegung der Mauer sein \
             oder ein Fehler dieser Registrierung; nur stabile Punkte neben der Mauer können das zeigen.";
         datum_below: " Stones below their own limit should scatter around zero.", " Steine unter ihrer eigenen Grenze sollten um null streuen.";
-        nmad: "NMAD: 1.4826 times the median distance from the median, the standard deviation of normally distributed values. {n} stones in all.",
-            "NMAD: das 1,4826-Fache des mittleren Abstands (Median) vom Median, bei normalverteilten Werten die Standardabweichung. {n} Steine insgesamt.";
+        nmad: "NMAD: 1.4826 times the median distance from the median, the standard deviation of normally distributed values. Stones in all: {n}.",
+            "NMAD: das 1,4826-Fache des mittleren Abstands (Median) vom Median, bei normalverteilten Werten die Standardabweichung. Steine insgesamt: {n}.";
         nmad_below: " Below their limit: {below}.", " Unter ihrer Grenze: {below}.";
         estimated: "Datum: {note}. Error of the later epoch in the middle of the wall: {parts} (one standard deviation, world axes; {cells} plane cells in stable \
             areas, sources compared on {compared} stones).",

@@ -14,7 +14,7 @@ pub enum AdjustError<E: std::error::Error + 'static> {
     Interrupted(#[from] Interrupted),
     /// The equations could not be factored.
     #[error(
-        "the equations of {stones} stones could not be solved: not enough memory, or coordinates that are not finite"
+        "the equations of the stones ({stones}) could not be solved: not enough memory, or coordinates that are not finite"
     )]
     Unsolvable {
         /// Stones in the adjustment.

@@ -51,7 +51,7 @@ pub enum NotCarried {
     #[error("its points cover no area")]
     NoShape,
     /// Its face is too small to be told from other places.
-    #[error("its face has {cells} cells of 3 cm; {needed} are needed")]
+    #[error("its face has too few cells of 3 cm: {cells}, {needed} are needed")]
     Small {
         /// Its cells.
         cells: usize,
@@ -79,7 +79,7 @@ pub enum NotCarried {
         share: f64,
     },
     /// Too few points.
-    #[error("{points} points; {needed} are needed")]
+    #[error("too few points: {points}, {needed} are needed")]
     FewPoints {
         /// Points.
         points: u64,

@@ -34,7 +34,7 @@ pub enum NoEffect {
     #[error("the line crosses no stone from border to border")]
     NotCrossed,
     /// A part of a stone would have too few points.
-    #[error("a part of stone {stone} would have {points} points; {needed} are needed")]
+    #[error("a part of stone {stone} would have too few points: {points}, {needed} are needed")]
     SmallPart {
         /// The stone.
         stone: u32,
@@ -44,7 +44,7 @@ pub enum NoEffect {
         needed: u32,
     },
     /// There are too few points inside the outline that belong to no stone.
-    #[error("{points} points inside the outline belong to no stone; {needed} are needed")]
+    #[error("too few points inside the outline belong to no stone: {points}, {needed} are needed")]
     FewPoints {
         /// Points inside.
         points: u64,
