@@ -89,7 +89,7 @@ pub(crate) struct Clauses {
     pub or: &'static str,
     /// Motion, motion against neighbours, joint opening.
     pub quantities: [&'static str; 3],
-    /// Outside the zones.
+    /// Outside the zones, and in zones that have no threshold of their own.
     pub elsewhere: &'static str,
 }
 
@@ -249,7 +249,7 @@ static ENGLISH: Texts = Texts {
         limit_common: "detection limit against the common motion: {median} mm (median), {high} mm (90th percentile)",
         or: "or",
         quantities: ["motion", "against neighbours", "joint opening"],
-        elsewhere: "elsewhere",
+        elsewhere: "rest of the wall",
     },
     page: PageTexts {
         kind: "Deformation report, stone by stone",
@@ -432,7 +432,7 @@ static GERMAN: Texts = Texts {
         limit_common: "Nachweisgrenze gegen die gemeinsame Bewegung: {median} mm (Median), {high} mm (90. Perzentil)",
         or: "oder",
         quantities: ["Bewegung", "gegen Nachbarn", "Fugen\u{f6}ffnung"],
-        elsewhere: "sonst",
+        elsewhere: "\u{fc}brige Mauer",
     },
     page: PageTexts {
         kind: "Verformungsbericht, Stein f\u{fc}r Stein",

@@ -43,9 +43,9 @@ impl Quantity {
     }
 }
 
-/// The thresholds that are compared with, such as "5 mm" or "6 mm (crest) or 20 mm (elsewhere)"; the quantity
-/// is named where thresholds of several quantities differ, the zones where a quantity's thresholds differ on
-/// the wall.
+/// The thresholds that are compared with, such as "5 mm" or "6 mm (crest) or 20 mm (rest of the wall)"; the
+/// quantity is named where thresholds of several quantities differ, the zones where a quantity's thresholds
+/// differ on the wall.
 pub(super) fn in_words(
     thresholds: &Thresholds,
     compared: &[Compared],
@@ -152,7 +152,11 @@ mod tests {
         let every: [(Quantity, &[Option<usize>]); 3] = [(Length, all), (Neighbours, all), (Joints, all)];
         for (text, compared, expected) in [
             ("attention_mm = 5", &every[..1], "5 mm"),
-            (&zones, &every[..1], "3 mm (crest, pier) or 5 mm (elsewhere)"),
+            (
+                &zones,
+                &every[..1],
+                "3 mm (crest, pier) or 5 mm (rest of the wall)",
+            ),
             (&zones, &[(Length, &all[1..2])], "3 mm (pier)"),
             (&zones, &[(Length, &all[..1])], "5 mm (foot)"),
             (
@@ -165,7 +169,7 @@ mod tests {
             (
                 &zones.replacen('\n', "\njoints = { attention_mm = 2 }\n", 1),
                 &every,
-                "3 mm (motion, crest, pier), 5 mm (motion, elsewhere) or 2 mm (joint opening)",
+                "3 mm (motion, crest, pier), 5 mm (motion, rest of the wall) or 2 mm (joint opening)",
             ),
         ] {
             assert_eq!(said(text, compared, Language::English), expected, "{text}");

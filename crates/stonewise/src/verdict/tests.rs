@@ -263,7 +263,9 @@ fn zones_are_judged_by_their_own_thresholds() {
     let verdict = judge(&case, &thresholds(zone));
     assert_eq!(verdict.state, State::Fine);
     assert!(
-        verdict.sentence.contains("of 3 mm (crest) or 20 mm (elsewhere)"),
+        verdict
+            .sentence
+            .contains("of 3 mm (crest) or 20 mm (rest of the wall)"),
         "{}",
         verdict.sentence
     );
