@@ -145,9 +145,11 @@ mod tests {
     #[test]
     fn numbers_have_digits_that_mean_something() {
         let written = |value: f64, unit: &str| {
-            let mut out = Vec::new();
-            write_float(&mut out, value, unit).unwrap();
-            String::from_utf8(out).unwrap()
+            let (mut table, mut out) = (Table::new(), Vec::new());
+            table.push("x", unit, "x", vec![value]).unwrap();
+            write_rows(&mut out, &table).unwrap();
+            let text = String::from_utf8(out).unwrap();
+            text.strip_prefix("x\n").unwrap().trim_end().to_owned()
         };
         for (value, unit, expected) in [
             (-0.0004947185324852614, "m", "-0.0004947"),
@@ -159,7 +161,7 @@ mod tests {
             (0.957626602851628, "", "0.957627"),
             (24.123456789, "mm", "24.1235"),
             (1_234_567.891, "", "1234568"),
-            (2.5e17, "", "2.5e17"),
+            (2.512_345_678e17, "", "2.51235e17"),
             (0.0, "m2", "0"),
             (f64::NAN, "m2", "NaN"),
         ] {
