@@ -236,7 +236,7 @@ struct Look<'a> {
     surface: &'a LocalSurface,
     /// Of the cell, in the frame of the camera; `None` where it has none.
     normal: Option<Vector3<f64>>,
-    /// That of a point seen at a right angle.
+    /// Depth tolerance of a point seen at a right angle, metres.
     least_tolerance_m: f64,
 }
 

@@ -38,7 +38,7 @@ impl Sample {
         self.points.len() as u64 >= self.records
     }
 
-    /// Adds a cloud, of whose points the first `left`.
+    /// Adds a cloud and the first `left` of its points.
     fn add(&mut self, path: &Path, mut left: usize) -> Result<()> {
         let info = cloud_info(path)?;
         self.records += info.records;
@@ -62,7 +62,7 @@ impl Sample {
 /// Reads what is needed of an epoch's clouds; `None` where one of them cannot be read.
 ///
 /// # Errors
-/// A cloud cannot be read, and the look ends at that.
+/// At quick depth, a cloud cannot be read.
 pub(super) fn sample(epoch: &Epoch, depth: Depth, unreadable: &mut Unreadable) -> Result<Option<Sample>> {
     let mut sample = Sample {
         bounds: None,

@@ -41,13 +41,13 @@ messages! {
              Koordinaten mit mehr Stellen ausgeben";
         NO_PHOTOS: "none of the photos that {file} names ({total}) is in {folder}", "keines der Fotos, die {file} nennt ({total}), liegt in {folder}";
         MISSING_PHOTOS: "missing in {folder}: {photos} ({missing} of {total} posed photos); copy them there, or take their cameras out of the camera file",
-            "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren, oder ihre Kameras aus der Kameradatei nehmen";
+            "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren oder ihre Kameras aus der Kameradatei nehmen";
         BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
         PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
             "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
         FLAT_PHOTOS: "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
-            "einfarbig: {photos}; sie noch einmal kopieren, oder ihre Kameras aus der Kameradatei nehmen";
+            "einfarbig: {photos}; sie noch einmal kopieren oder ihre Kameras aus der Kameradatei nehmen";
         UNLIKE_PHOTOS: "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \
                         name, or turned?",
             "zeigen etwas anderes als die übrigen Fotos an denselben Punkten: {photos} (Korrelation höchstens {most}); trägt das Foto den Namen eines anderen, oder ist es gedreht?";

@@ -64,11 +64,11 @@ impl PlaneFit {
     }
 }
 
-/// Unit vector along which a symmetric matrix is smallest.
+/// Unit eigenvector of the smallest eigenvalue of a symmetric matrix.
 ///
 /// The eigenvalue in closed form (Smith 1961), the vector as the cross product of the two rows of `m - value
-/// I` that are least parallel. Where all rows are nearly parallel, as two eigenvalues are the smallest, by
-/// iteration.
+/// I` that are least parallel. Where all rows are nearly parallel, because the two smallest
+/// eigenvalues are nearly equal, it is found by iteration.
 fn least_axis(m: &Matrix3<f64>) -> Vector3<f64> {
     let mean = m.trace() / 3.0;
     let deviation = m - Matrix3::identity() * mean;

@@ -40,8 +40,8 @@ impl Partner {
         (way.norm_squared() <= max_m * max_m).then_some((nearest, way))
     }
 
-    /// Whether what was [found](Self::find) at a place stays the partner, or none does, wherever the point goes
-    /// within `reach_m`.
+    /// Whether the result of [`find`](Self::find) at a place (a partner or none) stays the same wherever the
+    /// point moves within `reach_m`.
     pub(super) fn stays(
         &self,
         found: Option<(usize, Vector3<f64>)>,

@@ -11,16 +11,17 @@ use nalgebra::{Cholesky, Const, Matrix6, Point3, UnitQuaternion, Vector3, Vector
 const WARM_STRIDES: [usize; 2] = [16, 4];
 /// Fewest points of such a subset.
 const WARM_POINTS: usize = 1000;
-/// Subsets stop at steps of this many tolerances: their motions differ by more than that from the motion of
-/// all points.
+/// A subset stops at steps of this many tolerances: its motion differs by more than that from the motion of
+/// all points anyway.
 const WARM_TOLERANCES: f64 = 20.0;
 /// Factor by which a damped step grows back in each iteration that does not turn back: slow, as partners on
 /// the edge of a jump would set off the next swing.
 const RECOVERY: f64 = 1.02;
-/// Each step is about a third shorter than the one before, so that all further steps together stay within
-/// this many times a step.
+/// Each step is about a third shorter than the one before, so that the sum of all later steps stays below
+/// this many times the current step.
 const REACH_STEPS: f64 = 4.0;
-/// Share of the point spacing below which the remaining steps are short: few points can then change partners.
+/// The remaining steps are short if they sum to less than this share of the point spacing: few points can
+/// then change partners.
 const SHORT_WAY: f64 = 0.05;
 
 /// A window to be moved onto the second epoch.
@@ -80,8 +81,8 @@ impl<'a> Alignment<'a> {
 
     /// Moves the window until its steps are within the tolerances. `start`: its first shift.
     ///
-    /// Subsets of the points cover most of the way. Where a subset does not converge, the next starts where
-    /// it did. Where all points do not converge from there, they start anew from `start`.
+    /// Subsets of the points cover most of the way. If a subset does not converge, the next one starts from the
+    /// same motion as it did. If the iteration with all points does not converge, it is repeated from `start`.
     pub(super) fn iterate(&mut self, start: Vector3<f64>) -> Result<Motion, MotionFailure> {
         let first = Motion {
             shift: start,
