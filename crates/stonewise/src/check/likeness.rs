@@ -35,14 +35,15 @@ const FLAT: f64 = 2.0;
 /// Fewer common points show nothing.
 const COMMON: usize = 500;
 /// Photos that show the same have a correlation above the first, photos that do not have one below the second.
-/// In sound surveys every photo reached 0.77 or more with at least one other; exchanged and turned photos 0.02 at
-/// most.
+/// In sound surveys every photo reached 0.77 or more with at least one other; exchanged and turned photos 0.02
+/// at most.
 const ALIKE: f64 = 0.4;
 const UNLIKE: f64 = 0.2;
 
 /// A photo as the points of the cloud see it.
 struct Seen {
-    name: String,    /// Whether its grey values hardly differ.
+    name: String,
+    /// Whether its grey values hardly differ.
     is_flat: bool,
     /// Normalised grey value at every point, NaN where the photo does not see it.
     values: Vec<f32>,

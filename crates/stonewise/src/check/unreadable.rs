@@ -24,7 +24,8 @@ impl Unreadable {
 
     /// What was read; `None` where it could not be, which is then among the findings.
     ///
-    /// # Errors    /// At quick depth, what could not be read; the caller stopped it.
+    /// # Errors
+    /// At quick depth, what could not be read; the caller stopped it.
     pub fn keep<T>(&mut self, epoch: &Epoch, topic: &Message, read: Result<T>) -> Result<Option<T>> {
         let error = match read {
             Ok(read) => return Ok(Some(read)),

@@ -81,8 +81,9 @@ impl<'a> Alignment<'a> {
 
     /// Moves the window until its steps are within the tolerances. `start`: its first shift.
     ///
-    /// Subsets of the points cover most of the way. If a subset does not converge, the next one starts from the
-    /// same motion as it did. If the iteration with all points does not converge, it is repeated from `start`.
+    /// Subsets of the points cover most of the way. If a subset does not converge, the next one starts from
+    /// the same motion as it did. If the iteration with all points does not converge, it is repeated from
+    /// `start`.
     pub(super) fn iterate(&mut self, start: Vector3<f64>) -> Result<Motion, MotionFailure> {
         let first = Motion {
             shift: start,

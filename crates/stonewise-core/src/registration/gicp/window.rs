@@ -80,8 +80,8 @@ pub(super) struct Information {
 }
 
 impl Information {
-    /// Adds the information of a symmetric weight at the end of an arm: `[I, A]' W [I, A]` with `A` the transposed cross
-    /// matrix of the arm.
+    /// Adds the information of a symmetric weight at the end of an arm: `[I, A]' W [I, A]` with `A` the
+    /// transposed cross matrix of the arm.
     pub fn add(&mut self, arm: &Vector3<f64>, weight: &Matrix3<f64>) {
         let cross = Matrix3::from_columns(&[0, 1, 2].map(|i| arm.cross(&weight.column(i))));
         self.shift += weight;
