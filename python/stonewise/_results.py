@@ -63,7 +63,7 @@ class Pair:
     def __repr__(self) -> str:
         epochs = self._results.epochs
         names = f"{epochs[self.number]!r} against {epochs[0]!r}" if self.number < len(epochs) else str(self.number)
-        return f"Pair({names}: {self.stones_arrow.num_rows} stones)"
+        return f"Pair({names}: {_counted(self.stones_arrow.num_rows, 'stone')})"
 
     @property
     def stones(self) -> Any:
@@ -201,7 +201,8 @@ class Results(Pair):
         """The folder."""
 
     def __repr__(self) -> str:
-        return f"Results({str(self.path)!r}: {self.stones_arrow.num_rows} stones, {len(self.pairs) + 1} epochs)"
+        stones = _counted(self.stones_arrow.num_rows, "stone")
+        return f"Results({str(self.path)!r}: {stones}, {_counted(len(self.pairs) + 1, 'epoch')})"
 
     @functools.cached_property
     def record(self) -> dict[str, Any]:
@@ -265,6 +266,10 @@ class Results(Pair):
     def report(self) -> Path:
         """The report: one file for a browser."""
         return self.path / "report" / "index.html"
+
+
+def _counted(n: int, noun: str) -> str:
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
 def _read_parquet(path: Path) -> pa.Table:

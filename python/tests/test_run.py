@@ -61,7 +61,7 @@ def test_errors_have_the_words_of_the_command(command, survey, tmp_path):
     (foreign / "thesis.tex").write_text("mine")
     for project, out, code in [
         (wrong, tmp_path / "a", 2),
-        (survey / "missing.toml", tmp_path / "a", 1),
+        (survey / "missing.toml", tmp_path / "a", 2),
         (survey / "stonewise.toml", foreign, 2),
     ]:
         said = command("run", project, "--out", out, expect=code).stderr.strip().splitlines()[-1]
