@@ -227,7 +227,7 @@ impl GridIndex {
 }
 
 /// Leaves the `k` nearest, nearest first; the lower index first among equals.
-fn sort_nearest(found: &mut Vec<(usize, f64)>, k: usize) {
+pub(crate) fn sort_nearest(found: &mut Vec<(usize, f64)>, k: usize) {
     let order = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
     if k > 0 && found.len() > k {
         found.select_nth_unstable_by(k - 1, order);

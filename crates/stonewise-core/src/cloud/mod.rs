@@ -11,4 +11,5 @@ pub use cell_moments::CellMoments;
 pub use cloud_type::Cloud;
 pub use cylinder::Cylinder;
 pub use grid_index::GridIndex;
+pub(crate) use grid_index::sort_nearest;
 pub use tiles::{MemoryTiles, TileSource};

@@ -1,5 +1,6 @@
 //! Nearest neighbours of a few points of a tile whose points are sorted into cells.
 
+use crate::cloud::sort_nearest;
 use crate::geometry::cells_between;
 use nalgebra::Point3;
 
@@ -39,7 +40,7 @@ impl Neighbourhood<'_> {
         let mut found = Vec::new();
         for shell in 0.. {
             self.add_shell(cell, shell, centre, max_m, &mut found);
-            keep_nearest(&mut found, k);
+            sort_nearest(&mut found, k);
             // All points nearer than this have been visited.
             let known = to_border + f64::from(shell) * self.cell_m - MARGIN_M;
             let enough = found.len() >= k && found.last().is_none_or(|l| l.1.sqrt() <= known);
@@ -76,16 +77,6 @@ impl Neighbourhood<'_> {
             }
         }
     }
-}
-
-/// Leaves the `k` nearest, nearest first; the lower index first among equals.
-fn keep_nearest(found: &mut Vec<(usize, f64)>, k: usize) {
-    let order = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0));
-    if k > 0 && found.len() > k {
-        found.select_nth_unstable_by(k - 1, order);
-    }
-    found.truncate(k);
-    found.sort_unstable_by(order);
 }
 
 #[cfg(test)]

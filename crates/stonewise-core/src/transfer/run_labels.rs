@@ -42,10 +42,7 @@ impl RunLabels {
         let width = image.width();
         let mut labels = Self {
             width,
-            rows: vec![0],
-            runs: Vec::new(),
-            parts: Vec::new(),
-            blocks: Vec::new(),
+            ..Self::none()
         };
         let rows = image.data().chunks_exact(width.max(1) as usize);
         for (y, row) in rows.enumerate() {

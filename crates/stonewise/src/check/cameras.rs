@@ -3,6 +3,7 @@
 use super::Depth;
 use super::alignment::{Overlay, Shift};
 use super::finding::{Finding, Picture, Verdict};
+use super::photos::PosedPhoto;
 use super::sample::Sample;
 use crate::error::Result;
 use crate::project::Epoch;
@@ -10,9 +11,8 @@ use crate::texts::findings::{CAMERAS, NOT_SEEN};
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point3, Rotation3, Vector3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use stonewise_core::geometry::View;
-use stonewise_io::cameras::{CameraFile, find_photos};
 use stonewise_io::image_io::{image_size, read_rgb};
 
 /// Photos that are decoded.
@@ -52,12 +52,12 @@ struct Across {
 /// Checks that photos see the cloud; at full depth, compares some photos of an epoch with its cloud, too.
 pub(super) fn look(
     epoch: &Epoch,
-    cameras: &CameraFile,
+    photos: &[PosedPhoto],
     survey: &Sample,
     depth: Depth,
 ) -> Result<(Vec<Finding>, Option<Picture>)> {
     let finding = |verdict, text: String| vec![Finding::new(&epoch.name, CAMERAS.english, verdict, text)];
-    let candidates = candidates(epoch, cameras, survey)?;
+    let candidates = candidates(photos, survey);
     if candidates.is_empty() {
         // Points that were not read may be seen.
         let verdict = match (survey.is_whole(), depth) {
@@ -76,7 +76,7 @@ pub(super) fn look(
     }
     let compared: Vec<Compared> = candidates
         .into_iter()
-        .filter_map(|(view, path)| compare(view, &path, survey))
+        .filter_map(|(view, path)| compare(view.clone(), &path, survey))
         .collect();
     let Some(best) = compared
         .iter()
@@ -90,33 +90,27 @@ pub(super) fn look(
 }
 
 /// The photos that see most of the cloud, with a size that fits their cameras.
-fn candidates(epoch: &Epoch, cameras: &CameraFile, survey: &Sample) -> Result<Vec<(View, PathBuf)>> {
-    let paths = find_photos(&epoch.images, cameras)?.paths;
+fn candidates<'a>(photos: &[PosedPhoto<'a>], survey: &Sample) -> Vec<PosedPhoto<'a>> {
     let step = (survey.points.len() / CHOOSERS).max(1);
     let some: Vec<&Point3<f64>> = survey.points.iter().step_by(step).collect();
     let sees = |view: &View| {
         let inside = |p: &&&Point3<f64>| view.project(p).is_some_and(|seen| view.is_inside(seen.pixel));
         some.iter().filter(inside).count()
     };
-    let mut seen: Vec<(usize, &View, PathBuf)> = cameras
-        .views
+    let mut seen: Vec<(usize, &PosedPhoto)> = photos
         .iter()
-        .zip(paths)
-        .filter_map(|(view, path)| Some((sees(view), view, path?)))
-        .filter(|(n, _, _)| *n > 0)
+        .map(|photo| (sees(photo.0), photo))
+        .filter(|(n, _)| *n > 0)
         .collect();
-    seen.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.name.cmp(&b.1.name)));
-    let fits = |view: &View, path: &Path| {
+    seen.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.0.name.cmp(&b.1.0.name)));
+    let fits = |(view, path): &PosedPhoto| {
         image_size(path).is_ok_and(|size| size == (view.camera.width, view.camera.height))
     };
     // A photo that cannot be read is named elsewhere; others that see the cloud remain.
-    let any_fits = seen.iter().any(|(_, view, path)| fits(view, path));
-    seen.retain(|(_, view, path)| !any_fits || fits(view, path));
-    Ok(seen
-        .into_iter()
-        .take(PHOTOS)
-        .map(|(_, view, path)| (view.clone(), path))
-        .collect())
+    let any_fits = seen.iter().any(|(_, photo)| fits(photo));
+    seen.retain(|(_, photo)| !any_fits || fits(photo));
+    let best = seen.into_iter().take(PHOTOS);
+    best.map(|(_, photo)| photo.clone()).collect()
 }
 
 fn compare(view: View, path: &Path, survey: &Sample) -> Option<Compared> {

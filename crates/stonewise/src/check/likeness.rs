@@ -6,19 +6,17 @@
 use super::alignment::reduced;
 use super::edges::{Map, box_mean};
 use super::finding::{Finding, Verdict};
-use super::photos::some;
+use super::photos::{PosedPhoto, some};
 use super::sample::Sample;
 use crate::error::Result;
 use crate::project::Epoch;
 use crate::texts::findings::{FLAT_PHOTOS, PHOTOS, UNLIKE_ALL, UNLIKE_PHOTOS};
 use nalgebra::Point3;
 use rayon::prelude::*;
-use std::path::PathBuf;
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 use stonewise_core::raster::RgbImage;
 use stonewise_core::statistics::upper_median;
-use stonewise_io::cameras::{CameraFile, find_photos};
 use stonewise_io::image_io::read_rgb;
 
 /// Points at which photos are compared.
@@ -61,23 +59,16 @@ struct Scale {
 /// Compares the photos of an epoch that have the size of their cameras with each other.
 ///
 /// # Errors
-/// The folder of photos cannot be read; the caller stopped it.
+/// The caller stopped it.
 pub(super) fn look(
     epoch: &Epoch,
-    cameras: &CameraFile,
+    photos: &[PosedPhoto],
     survey: &Sample,
     progress: &dyn Progress,
 ) -> Result<Vec<Finding>> {
-    let paths = find_photos(&epoch.images, cameras)?.paths;
-    let posed: Vec<(&View, PathBuf)> = cameras
-        .views
-        .iter()
-        .zip(paths)
-        .filter_map(|(view, path)| Some((view, path?)))
-        .collect();
     let step = (survey.points.len() / POINTS).max(1);
     let points: Vec<Point3<f64>> = survey.points.iter().step_by(step).copied().collect();
-    let views: Vec<&View> = posed.iter().map(|(view, _)| *view).collect();
+    let views: Vec<&View> = photos.iter().map(|(view, _)| *view).collect();
     let Some(pixel_m) = pixel(&points, &views) else {
         return Ok(Vec::new());
     };
@@ -86,7 +77,7 @@ pub(super) fn look(
         pixel_m,
         cell_m: (3.0 * pixel_m).max(2.0 * spacing_m),
     };
-    let photos = posed
+    let photos = photos
         .par_iter()
         .map(|(view, path)| {
             progress.check()?;

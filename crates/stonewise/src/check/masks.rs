@@ -1,15 +1,12 @@
 //! Can the masks be read, and are there some for every photo?
 
 use super::finding::{Finding, Verdict};
-use super::photos::some;
+use super::photos::{PosedPhoto, some};
 use crate::error::{Error, Result};
 use crate::project::Epoch;
 use crate::texts::findings::{BROKEN_MASKS, MASKS, NO_MASK_FITS, WITHOUT_MASKS};
 use rayon::prelude::*;
-use std::path::PathBuf;
-use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_io::cameras::{CameraFile, find_photos};
 use stonewise_io::masks::MaskSource;
 
 /// What a photo's masks are like.
@@ -24,23 +21,16 @@ enum Masks {
 ///
 /// # Errors
 /// The file or folder of masks cannot be read; the caller stopped it.
-pub(super) fn look(epoch: &Epoch, cameras: &CameraFile, progress: &dyn Progress) -> Result<Vec<Finding>> {
+pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress) -> Result<Vec<Finding>> {
     let Some(file) = &epoch.masks else {
         return Ok(Vec::new());
     };
     let source = MaskSource::open(file)?;
-    let paths = find_photos(&epoch.images, cameras)?.paths;
-    let photos: Vec<(&View, PathBuf)> = cameras
-        .views
-        .iter()
-        .zip(paths)
-        .filter_map(|(view, path)| Some((view, path?)))
-        .collect();
     // That no photo is there is said elsewhere.
     if photos.is_empty() {
         return Ok(Vec::new());
     }
-    let of_photo = |(view, path): &(&View, PathBuf)| {
+    let of_photo = |(view, path): &PosedPhoto| {
         progress.check()?;
         let size = (view.camera.width, view.camera.height);
         let masks = match source.labels_for(&path.to_string_lossy(), size.0, size.1) {

@@ -49,19 +49,20 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         if let Some(cameras) = cameras.flatten() {
             let photos = unreadable.keep(epoch, &PHOTOS, photos::look(project, epoch, &cameras))?;
             let are_listed = photos.is_some();
-            report.findings.extend(photos.unwrap_or_default());
+            let (findings, photos) = photos.unwrap_or_default();
+            report.findings.extend(findings);
             // A run finds out while it reads them.
             if depth == Depth::Full && are_listed {
-                let found = unreadable.keep(epoch, &MASKS, masks::look(epoch, &cameras, progress))?;
+                let found = unreadable.keep(epoch, &MASKS, masks::look(epoch, &photos, progress))?;
                 report.findings.extend(found.unwrap_or_default());
             }
             if let Some(survey) = survey.as_ref().filter(|_| are_listed) {
                 if depth == Depth::Full {
                     report
                         .findings
-                        .extend(likeness::look(epoch, &cameras, survey, progress)?);
+                        .extend(likeness::look(epoch, &photos, survey, progress)?);
                 }
-                let found = cameras::look(epoch, &cameras, survey, depth);
+                let found = cameras::look(epoch, &photos, survey, depth);
                 let (findings, picture) = unreadable.keep(epoch, &CAMERAS, found)?.unwrap_or_default();
                 report.findings.extend(findings);
                 report.pictures.extend(picture);

@@ -6,7 +6,7 @@ use crate::project::{Epoch, Project};
 use crate::texts::findings::{BROKEN_PHOTOS, MISSING_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraFile, Photos, find_photos};
 use stonewise_io::image_io::image_size;
@@ -16,12 +16,19 @@ const TAIL: u64 = 64 << 10;
 /// Names in a message at most.
 const NAMES: usize = 4;
 
-/// Looks at the header and the end of every photo that a camera names.
-pub(super) fn look(project: &Project, epoch: &Epoch, cameras: &CameraFile) -> Result<Vec<Finding>> {
+/// A photo that is there, with its view.
+pub(super) type PosedPhoto<'a> = (&'a View, PathBuf);
+
+/// Looks at the header and the end of every photo that a camera names; the photos that are there.
+pub(super) fn look<'a>(
+    project: &Project,
+    epoch: &Epoch,
+    cameras: &'a CameraFile,
+) -> Result<(Vec<Finding>, Vec<PosedPhoto<'a>>)> {
     let photos = find_photos(&epoch.images, cameras)?;
+    let posed = posed(cameras, &photos);
     let (mut broken, mut sizes) = (Vec::new(), Vec::new());
-    for (view, path) in cameras.views.iter().zip(&photos.paths) {
-        let Some(path) = path else { continue };
+    for (view, path) in &posed {
         let name = path
             .file_name()
             .unwrap_or_default()
@@ -60,7 +67,7 @@ pub(super) fn look(project: &Project, epoch: &Epoch, cameras: &CameraFile) -> Re
     if !sizes.is_empty() {
         add(Verdict::Doubt, PHOTO_SIZES.say(&[("photos", &*some(&sizes))]));
     }
-    Ok(out)
+    Ok((out, posed))
 }
 
 /// Which of the photos that the camera file names are there. Cameras that were oriented together may be in the
@@ -80,7 +87,7 @@ fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Pho
     }
     for other in project.epochs.iter().filter(|e| e.name != epoch.name) {
         // One that cannot be read is named where its own epoch is looked at.
-        let theirs = posed_photos(other).unwrap_or_default();
+        let theirs = posed_views(other).unwrap_or_default();
         for (view, found) in cameras.views.iter().zip(&mut found) {
             *found |= theirs.iter().any(|other| is_same(view, other));
         }
@@ -101,12 +108,18 @@ fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Pho
     (Verdict::Doubt, MISSING_PHOTOS.say(&values))
 }
 
+fn posed<'a>(cameras: &'a CameraFile, photos: &Photos) -> Vec<PosedPhoto<'a>> {
+    let views = cameras.views.iter().zip(&photos.paths);
+    views
+        .filter_map(|(view, path)| Some((view, path.clone()?)))
+        .collect()
+}
+
 /// Views whose photos are there.
-fn posed_photos(epoch: &Epoch) -> Result<Vec<View>> {
+fn posed_views(epoch: &Epoch) -> Result<Vec<View>> {
     let cameras = epoch.read_cameras()?;
-    let paths = find_photos(&epoch.images, &cameras)?.paths;
-    let views = cameras.views.into_iter().zip(paths);
-    Ok(views.filter_map(|(view, path)| path.map(|_| view)).collect())
+    let photos = posed(&cameras, &find_photos(&epoch.images, &cameras)?);
+    Ok(photos.into_iter().map(|(view, _)| view.clone()).collect())
 }
 
 /// Whether two camera files give one and the same photo.
