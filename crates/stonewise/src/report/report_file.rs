@@ -103,6 +103,18 @@ mod tests {
     }
 
     #[test]
+    fn where_no_stone_is_measured_the_scale_is_that_of_the_m3c2_distances() {
+        let mut rows = rows();
+        for row in &mut rows {
+            row.status = Status::UnmatchedLost;
+            row.motion = None;
+        }
+        // The one distance is 4 mm.
+        let html = report(&rows, Some(&run_record("Test wall", &["A", "B"])));
+        assert!(html.contains("\"component\":5.0"));
+    }
+
+    #[test]
     fn it_says_what_moved_and_shows_it() {
         let html = report(&rows(), Some(&run_record("Test wall", &["A", "B"])));
         check_nesting(&html);

@@ -2,7 +2,7 @@
 
 use crate::report_params::{Language, ReportParams};
 use crate::results::records::{EpochVerdict, StoneVerdict};
-use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m};
+use crate::results::{ResultSet, RowMotion, Sorted, Status, StoneRow, component_limit_m, nice_scale_m};
 use crate::texts::Texts;
 use crate::verdict::{is_doubted, verdict_on};
 use nalgebra::Point2;
@@ -32,6 +32,8 @@ pub(crate) struct Summary<'a> {
     pub limits: Sorted,
     /// Components along, up, out of the measured stones, metres.
     pub components: [Sorted; 3],
+    /// End of the colour scale that these components and the M3C2 distances share, metres.
+    pub component_limit_m: f64,
     /// Where nine tenths of the stones that moved lie: (along, up) from and to, metres.
     pub region: Option<[Point2<f64>; 2]>,
     /// The least of the largest tenth of their motions, metres, and where nine tenths of those lie; `None`
@@ -75,6 +77,7 @@ impl<'a> Summary<'a> {
             loose,
             limits: Sorted::new(measured.iter().map(|(_, m)| m.detection_limit_m)),
             components: [0, 1, 2].map(|k| Sorted::new(measured.iter().map(|(_, m)| m.face[k]))),
+            component_limit_m: shared_scale_m(results, &measured),
             above_limit: measured.iter().filter(|(_, m)| m.significant).count(),
             cover: results
                 .run
@@ -106,14 +109,18 @@ impl<'a> Summary<'a> {
         self.texts().number(metres * 1e3, self.decimals())
     }
 
-    /// End of the colour scale that the components share, metres.
-    pub(crate) fn component_limit_m(&self) -> f64 {
-        component_limit_m(self.measured.iter().map(|(_, m)| *m))
-    }
-
     /// Number of stones without a motion.
     pub(crate) fn not_measured(&self) -> usize {
         self.stones - self.measured.len()
+    }
+}
+
+/// Stones determine the scale; M3C2 distances do where no stone is measured.
+fn shared_scale_m(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> f64 {
+    if measured.is_empty() {
+        nice_scale_m(results.distances.iter().map(|d| d.distance_m.abs()))
+    } else {
+        component_limit_m(measured.iter().map(|(_, m)| *m))
     }
 }
 

@@ -75,7 +75,7 @@ fn document(results: &ResultSet, facts: &Summary, joints: &[Joint], blocks: Map<
         nice_above(values.quantile(0.98).unwrap_or(0.0) * 1e3)
     };
     let openings = joints.iter().filter_map(|j| j.motion).map(|m| m.opening_m.abs());
-    let component = facts.component_limit_m() * 1e3;
+    let component = facts.component_limit_m * 1e3;
     let names = results
         .run
         .as_ref()

@@ -30,7 +30,7 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
     let texts = facts.texts();
     let names = &texts.maps;
     let layout = MapLayout::new(results, texts);
-    let shared = Scale::Diverging(facts.component_limit_m());
+    let shared = Scale::Diverging(facts.component_limit_m);
     let beyond = facts
         .components
         .iter()
