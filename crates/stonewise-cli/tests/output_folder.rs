@@ -50,6 +50,26 @@ fn a_results_folder_that_cannot_be_made_is_said() {
 }
 
 #[test]
+fn an_experiment_writes_nothing_before_its_projects_are_read_and_never_over_their_inputs() {
+    let survey = copy_of(tiny_survey());
+    let experiment = |project: &Path, out: &Path| {
+        let mut command = stonewise();
+        command.args(["experiment", "paper", "--force", "--out"]).arg(out);
+        outcome(command.arg(project))
+    };
+    let (project, out) = (survey.path().join("stonewise.toml"), survey.path().join("paper"));
+    fs::write(survey.path().join("wrong.toml"), "[[epochs]]\nname = \"A\"\n").unwrap();
+    let (code, log) = experiment(&survey.path().join("wrong.toml"), &out);
+    assert!(code == 2 && log.contains("missing field"), "{log}");
+    assert!(!out.exists());
+
+    let before = contents(survey.path(), &[]);
+    let (code, log) = experiment(&project, &survey.path().join("epoch1/images/paper"));
+    assert!(code == 2 && log.contains("inside the folder of inputs"), "{log}");
+    assert!(contents(survey.path(), &[]) == before, "something was written");
+}
+
+#[test]
 fn other_peoples_folders_are_refused_and_their_files_stay() {
     let out = tempfile::tempdir().unwrap();
     fs::write(out.path().join("stones.csv"), "mine").unwrap();

@@ -29,11 +29,15 @@ fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
         .iter()
         .map(|s| PathBuf::from(s.rsplit('=').next().unwrap_or(s)));
     let files: Vec<PathBuf> = files.collect();
+    // Read first, so that a project with a mistake claims no folder.
+    let given: Vec<PaperSurvey> = args.surveys.iter().map(|s| survey(s)).collect::<Result<_>>()?;
+    let inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
     let owner = Owner::inputs("experiment paper", &files);
-    let folder = OutputFolder::of_inputs(&args.out, &owner, &files, &["work"], force)?;
-    let mut surveys: Vec<PaperSurvey> = match args.surveys.as_slice() {
-        [] => simulated(args, printer)?,
-        given => given.iter().map(|s| survey(s)).collect::<Result<_>>()?,
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &["work"], force)?;
+    let mut surveys = if given.is_empty() {
+        simulated(args, printer)?
+    } else {
+        given
     };
     for survey in &mut surveys {
         if let Some(text) = &args.paper_part {

@@ -153,9 +153,13 @@ pub(super) fn tabulate(
     })?;
     let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
     if stones.is_empty() {
+        let why = match context.project.part {
+            Some(_) => "does the part of the wall that the run is limited to show any?",
+            None => "do its cameras and clouds share one frame?",
+        };
+        let name = &context.project.epochs[number - 1].name;
         return Err(Error::Survey(format!(
-            "no stone of epoch {:?} got any points: do its cameras and clouds share one frame?",
-            context.project.epochs[number - 1].name
+            "no stone of epoch {name:?} got any points: {why}"
         )));
     }
     Ok(Labelled {
