@@ -6,7 +6,8 @@
 Reads `evidence/tracks_2.parquet` and `stones.csv` of a results folder. Prints a table in Markdown, millimetres in the face,
 along / up: the errors of the stones that photos measured, less the rigid motion in the face that fits them best, by the
 stone's own points alone, by its photos alone, and by the adjustment. Coverage is the share of the errors within 1.96
-standard deviations. A stone counts where its true counterpart lies within 10 cm, is not cut by the edge of the section
+standard deviations. A second table does the same for the rotation about the normal, milliradians, of stones that are truly loose
+and of the others, less the median error of the others. A stone counts where its true counterpart lies within 10 cm, is not cut by the edge of the section
 and has 35 % of its face measured in both epochs.
 """
 
@@ -33,6 +34,11 @@ def main():
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for source, name in [("clouds", "points of the stone"), ("photos", "photos of the stone"), ("both", "the adjustment")]:
         print(f"| {name} | {len(both)} | {figures(both, source)} |")
+    print("\n| rotation about the normal | stones | RMSE | median error | mean sd | coverage |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    error = stones["error_turn"] - stones["error_turn"][~stones["truly_loose"]].median()
+    for name, chosen in [("loose stones", stones["truly_loose"]), ("the others", ~stones["truly_loose"])]:
+        print(f"| {name} | {chosen.sum()} | {turns(error[chosen], stones['sd_turn'][chosen])} |")
 
 
 def counted(stones, truth):
@@ -45,6 +51,12 @@ def counted(stones, truth):
     true = own[["dx", "dy", "dz"]].to_numpy() @ axes
     for k, axis in enumerate(FACE):
         stones[f"error_{axis}"] = stones[f"d_{axis}"] - true[:, k]
+    normal = own[["nx", "ny", "nz"]].to_numpy()
+    turn = [(table[["rx", "ry", "rz"]].to_numpy() * normal).sum(axis=1) for table in (stones, own)]
+    stones["error_turn"] = turn[0] - turn[1]
+    covariance = np.array([[stones["cov_rot_" + min(a, b) + max(a, b)] for a in "xyz"] for b in "xyz"])
+    stones["sd_turn"] = np.sqrt(np.einsum("ki,ijk,kj->k", normal, covariance, normal))
+    stones["truly_loose"] = own["loose"] == 1
     seen = own.filter(like="vis_").max(axis=1)
     return stones[(distance < NEAR_M) & (own["edge"] == 0) & (seen >= COUNTABLE_SHARE)]
 
@@ -63,6 +75,13 @@ def figures(stones, source):
 
     largest = 1e3 * np.linalg.norm(left, axis=1).max()
     return " | ".join([pair(nmad), pair(rmse), f"{largest:.1f}", pair(np.median(sd, axis=0)), pair(covered, 1)])
+
+
+def turns(errors, sd):
+    """The row of some stones' rotations."""
+    size = abs(errors)
+    values = [1e3 * np.sqrt((size**2).mean()), 1e3 * size.median(), 1e3 * sd.mean(), (size < 1.96 * sd).mean()]
+    return " | ".join(f"{v:.2f}" for v in values)
 
 
 def without_rigid_motion(errors, places):

@@ -206,6 +206,7 @@ mod tests {
                 * (adjustment.graph.nodes[i].face_from_world * by_photos * f64::from(u8::from(is_right(i)))),
             place: [0.0; 2],
             bias_factor: 1.0,
+            turn: None,
             weights: BiasWeights::USUAL,
             by_poses: PoseInfluence::none(),
         };

@@ -104,24 +104,21 @@ impl Adjustment {
         if let Some(solution) = last {
             let shared = self.shared_variances(1.0);
             photos.weigh(|i, stone, moving| {
-                let (expected, covariance) =
-                    self.displacement_without_photos(i, moving, solution, &shared, stone.place);
+                let (expected, covariance) = self.motion_without_photos(i, moving, solution, &shared);
                 stone.bias_square(self.components.appearance_m(), moving, &expected, &covariance)
             });
         }
         self.photos = Some(photos);
     }
 
-    /// The displacement of a place on a stone's face as its points and the other stones make it, and its
-    /// covariance.
-    fn displacement_without_photos(
+    /// A stone's motion as its points and the other stones make it, and its covariance.
+    fn motion_without_photos(
         &self,
         i: usize,
         moving: Moving,
         solution: &Solution,
         shared: &[f64; 9],
-        place: [f64; 2],
-    ) -> (Vector3<f64>, Matrix3<f64>) {
+    ) -> (StoneVector, Matrix9) {
         let stone = &self.stones[i];
         let (candidate, own) = match moving {
             Moving::WithField => (&stone.with_field, self.components.own_variances()),
@@ -133,12 +130,7 @@ impl Adjustment {
         let own = std::array::from_fn(|k| own[k] + shared[k]);
         let equations = self.observed_by_clouds(i, candidate, self.components.error_m);
         let known = posterior(&equations, &solution.field.from_others[i], &own);
-        let lever = StonePhotos::lever(place);
-        let motion = known.mean + self.common_in(i);
-        (
-            lever * motion.unknowns(),
-            lever * known.covariance * lever.transpose(),
-        )
+        (known.mean + self.common_in(i), known.covariance)
     }
 
     /// What the stones' own points say, moving with the field.

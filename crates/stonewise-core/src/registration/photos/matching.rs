@@ -65,6 +65,13 @@ impl Warp {
         }
     }
 
+    /// Angle of its rotation, from the first axis to the second, radians: of the rotation nearest to the
+    /// matrix.
+    pub fn turn(&self) -> f64 {
+        let m = &self.matrix;
+        (m[(1, 0)] - m[(0, 1)]).atan2(m[(0, 0)] + m[(1, 1)])
+    }
+
     pub(super) fn at(&self, d: Vector2<f64>) -> Vector2<f64> {
         self.matrix * d + self.shift
     }
@@ -92,6 +99,8 @@ impl Warp {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Match {
     pub warp: Warp,
+    /// Whether the warp is affine: otherwise it is a shift, or its matrix is that of the start.
+    pub is_affine: bool,
     /// Covariance of the shift, cells squared, of residuals taken as independent.
     pub covariance: Matrix2<f64>,
     pub correlation: f64,
@@ -116,6 +125,12 @@ impl FaceCells {
 
     pub fn count(&self) -> usize {
         self.cells.len()
+    }
+
+    /// Root mean square distance of the cells from the middle, cells.
+    pub fn radius(&self) -> f64 {
+        let square: f64 = self.cells.iter().map(|(_, d)| d.norm_squared()).sum();
+        (square / self.count().max(1) as f64).sqrt()
     }
 
     /// A photo's values at the warped cells, on the grid.
@@ -193,6 +208,7 @@ impl FaceCells {
             if step.shift.norm() < SETTLED {
                 return Some(Match {
                     warp,
+                    is_affine,
                     covariance,
                     correlation: correlation(&pairs),
                 });
@@ -308,6 +324,7 @@ fn least_squares<const N: usize>(
 mod tests {
     use super::super::search::Search;
     use super::*;
+    use nalgebra::Rotation2;
 
     /// Grain of two to six cells, everywhere.
     fn texture(x: f64, y: f64) -> f64 {
@@ -354,7 +371,21 @@ mod tests {
         let m = found(50, &warp, |_, _| 0.0).unwrap();
         assert!((m.warp.shift - warp.shift).norm() < 0.01, "{:?}", m.warp);
         assert!((m.warp.matrix - warp.matrix).norm() < 2e-3, "{:?}", m.warp);
+        assert!(
+            m.is_affine && (m.warp.turn() - 0.025).abs() < 1e-3,
+            "{:?}",
+            m.warp
+        );
         assert!(m.correlation > 0.99, "{}", m.correlation);
+    }
+
+    #[test]
+    fn a_stretch_does_not_change_the_angle_of_a_rotation() {
+        let warp = Warp {
+            shift: Vector2::zeros(),
+            matrix: Rotation2::new(0.4).into_inner() * Matrix2::new(1.1, 0.05, 0.05, 0.9),
+        };
+        assert!((warp.turn() - 0.4).abs() < 1e-12);
     }
 
     #[test]
@@ -363,6 +394,7 @@ mod tests {
         let m = found(28, &warp, |_, _| 0.0).unwrap();
         assert!((m.warp.shift - warp.shift).norm() < 0.02, "{:?}", m.warp);
         assert_eq!(m.warp.matrix, Matrix2::identity());
+        assert!(!m.is_affine);
     }
 
     #[test]

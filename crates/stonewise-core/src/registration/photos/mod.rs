@@ -16,6 +16,7 @@ mod template;
 #[cfg(test)]
 mod testing;
 mod track;
+mod turn;
 mod verify;
 
 pub use params::PhotoParams;
@@ -24,6 +25,7 @@ pub use photo::{Chip, Photo, PhotoCamera};
 pub use pictures::FacePictures;
 pub use track::PhotoStatus;
 pub(crate) use track::{Sight, Track, Tracker};
+pub(crate) use turn::turn_by_rotation;
 
 /// Photos of both epochs, and the parts of them that show each pair of stones, batch by batch.
 pub trait PhotoSource<E>: Sync {

@@ -175,6 +175,7 @@ mod tests {
 
     fn found(shift: [f64; 2]) -> Match {
         Match {
+            is_affine: true,
             warp: Warp::shift(Vector2::from(shift)),
             covariance: Matrix2::identity(),
             correlation: 0.9,

@@ -7,6 +7,7 @@ use super::photo::{Chip, Photo};
 use super::pictures::{FacePictures, Shown, pictures};
 use super::surface::Surface;
 use super::template::{Face, Mean, median_shift};
+use super::turn::turn_by_rotation;
 use super::verify::{Verification, is_beyond_chance};
 use crate::registration::points::PairPoints;
 use nalgebra::{Matrix2, Matrix3, Vector2};
@@ -26,6 +27,9 @@ pub(crate) struct Sight {
     pub shift: Vector2<f64>,
     /// Covariance of the shift, m^2, formal.
     pub covariance: Matrix2<f64>,
+    /// Turn of the picture in the face against the template, from the axis along to the axis up, as if the
+    /// stone had not moved, radians; `None` where only a shift was matched.
+    pub turn: Option<f64>,
     /// Shift per height above the face.
     pub parallax: [f64; 2],
     pub correlation: f64,
@@ -56,6 +60,8 @@ pub(crate) struct Track {
     pub sights: Vec<Sight>,
     /// Place on the face that shifts are those of, metres: along, up.
     pub place: [f64; 2],
+    /// Root mean square distance of the face from that place, metres.
+    pub radius_m: f64,
     /// What another normalisation of contrast changes about the shift between the epochs, metres.
     pub apart_m: [f64; 2],
     /// The motion about which patches of the second epoch were taken.
@@ -95,6 +101,7 @@ impl Tracker<'_> {
             status: PhotoStatus::Tracked,
             sights: Vec::new(),
             place: [0.0; 2],
+            radius_m: 0.0,
             apart_m: [0.0; 2],
             start: self.start,
             pictures: None,
@@ -114,6 +121,7 @@ impl Tracker<'_> {
             .ok_or(PhotoStatus::SmallFace)?;
         let face = Face::new(surface, pixel_m, self.params);
         track.place = face.surface.middle;
+        track.radius_m = face.cells.radius() * face.surface.cell_m;
         let first = self.grey(&face.surface, &chips[0], &FaceMotion::none());
         let before = self.normalised(&first, &face.surface, 1.0);
         let mean = self.agreeing(face.template(&before))?;
@@ -285,10 +293,11 @@ impl Tracker<'_> {
         found: &Match,
     ) -> Option<Sight> {
         let cell = surface.cell_m;
-        let moved = match epoch {
-            0 => nalgebra::Vector3::zeros(),
-            _ => start.at(surface.middle),
+        let taken = match epoch {
+            0 => FaceMotion::none(),
+            _ => *start,
         };
+        let moved = taken.at(surface.middle);
         let local = nalgebra::Vector3::new(surface.middle[0], surface.middle[1], 0.0) + moved;
         let at = self.pair.centroid + self.face_from_world.transpose() * local;
         let parallax = self.photos[photo].parallax(&at, self.face_from_world)?;
@@ -298,6 +307,9 @@ impl Tracker<'_> {
             photo,
             shift,
             covariance: found.covariance * (cell * cell),
+            turn: found
+                .is_affine
+                .then(|| found.warp.turn() + (turn_by_rotation(parallax) * taken.rotation).x),
             parallax,
             correlation: found.correlation,
         })

@@ -131,6 +131,7 @@ mod tests {
 
     fn matched(correlation: f64) -> Option<Match> {
         Some(Match {
+            is_affine: true,
             warp: Warp::shift(Vector2::zeros()),
             covariance: Matrix2::identity(),
             correlation,

@@ -234,6 +234,7 @@ mod tests {
                     vector: information * Vector3::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
                     place: [0.01 * f64::from(k), -0.02],
                     bias_factor: 1.0 + 0.2 * f64::from(k),
+                    turn: None,
                     weights: BiasWeights::USUAL,
                     by_poses: PoseInfluence::none(),
                 }

@@ -13,8 +13,6 @@ use crate::registration::adjustment::candidate::Moving;
 /// is 66 above that at eight and 88 at three. With five, moves of many standard deviations that photos show
 /// clearly are taken for a bias: of 43 loose stones one more is missed.
 const FREEDOM: f64 = 8.0;
-/// Components of a bias: along and up the face.
-const COMPONENTS: f64 = 2.0;
 
 /// Factors on the inverse variance of a stone's appearance bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +28,9 @@ impl BiasWeights {
         on_own: 1.0,
     };
 
-    /// From the expected squared bias over its variance, for each way of moving.
-    pub fn from_squares(square: impl Fn(Moving) -> f64) -> Self {
-        let weight = |moving| (FREEDOM + COMPONENTS) / (FREEDOM + square(moving));
+    /// From the expected squared bias over its variance, for each way of moving; `components`: of the bias.
+    pub fn from_squares(components: f64, square: impl Fn(Moving) -> f64) -> Self {
+        let weight = |moving| (FREEDOM + components) / (FREEDOM + square(moving));
         Self {
             with_field: weight(Moving::WithField),
             on_own: weight(Moving::OnOwn),
@@ -64,14 +62,14 @@ mod tests {
     fn a_normal_law_with_the_weight_is_students_t() {
         // Density of the t law with two components (Kotz & Nadarajah 2004, eq. 1.1), scale one.
         let t = |square: f64| {
-            let half = 0.5 * (FREEDOM + COMPONENTS);
+            let half = 0.5 * (FREEDOM + 2.0);
             ln_gamma(half)
                 - ln_gamma(0.5 * FREEDOM)
                 - (FREEDOM * PI).ln()
                 - half * (1.0 + square / FREEDOM).ln()
         };
         let weighted = |square: f64| {
-            let weights = BiasWeights::from_squares(|_| square);
+            let weights = BiasWeights::from_squares(2.0, |_| square);
             let w = weights.of(Moving::OnOwn);
             (w / (2.0 * PI)).ln() - 0.5 * w * square + weights.log_density(Moving::OnOwn)
         };
@@ -84,7 +82,7 @@ mod tests {
 
     #[test]
     fn each_way_of_moving_has_its_weight() {
-        let weights = BiasWeights::from_squares(|moving| match moving {
+        let weights = BiasWeights::from_squares(2.0, |moving| match moving {
             Moving::WithField => 52.0,
             Moving::OnOwn => 2.0,
         });

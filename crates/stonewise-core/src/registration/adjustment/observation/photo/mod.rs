@@ -5,6 +5,7 @@ mod evidence;
 mod model;
 mod poses;
 mod stone_photos;
+mod stone_turn;
 
 #[cfg(test)]
 pub(crate) use bias::BiasWeights;

@@ -80,6 +80,11 @@ pub struct StonePhotoReport {
     pub shift_m: Option<[f64; 2]>,
     /// Its standard deviations, appearance bias included, errors of the poses not.
     pub sd_m: Option<[f64; 2]>,
+    /// Turn in the face, from the axis along to the axis up, by the photos alone, radians; absent where they
+    /// were matched by a shift alone.
+    pub turn_rad: Option<f64>,
+    /// Its standard deviation, appearance bias included.
+    pub turn_sd_rad: Option<f64>,
 }
 
 impl PhotoModel {
@@ -157,6 +162,7 @@ impl PhotoModel {
                     place: self.tracks[i].place,
                     bias_factor: factors[i],
                     weights: self.stones[i].as_ref().map_or(BiasWeights::USUAL, |s| s.weights),
+                    turn: problem.turn(stone, &poses.weights[k], &poses),
                     by_poses,
                 });
             let displacement = found[i].as_ref().and_then(StonePhotos::displacement);
@@ -185,7 +191,8 @@ impl PhotoModel {
     pub fn weigh(&mut self, square: impl Fn(usize, &StonePhotos, Moving) -> f64) {
         for (i, stone) in self.stones.iter_mut().enumerate() {
             if let Some(stone) = stone {
-                stone.weights = BiasWeights::from_squares(|moving| square(i, stone, moving));
+                stone.weights =
+                    BiasWeights::from_squares(stone.bias_components(), |moving| square(i, stone, moving));
             }
         }
     }
@@ -247,6 +254,8 @@ impl PhotoModel {
             };
             let correlations = track.sights.iter().map(|s| s.correlation);
             let found = self.stones[i].as_ref();
+            let turn = found.and_then(|s| s.turn.as_ref());
+            let turn_sd_rad = |s: &StonePhotos| Some(s.turn.as_ref()?.sd(s.bias_sd_m(bias_m, moving[i])));
             let variance = found.and_then(|s| s.with_bias(bias_m, moving[i]).0.try_inverse());
             StonePhotoReport {
                 status: track.status,
@@ -259,6 +268,8 @@ impl PhotoModel {
                 sd_m: variance
                     .map(|c| [c[(0, 0)].max(0.0).sqrt(), c[(1, 1)].max(0.0).sqrt()])
                     .filter(is_finite),
+                turn_rad: turn.map(|t| t.angle).filter(|v| v.is_finite()),
+                turn_sd_rad: found.and_then(turn_sd_rad).filter(|v| v.is_finite()),
             }
         };
         let tracks = 0..self.tracks.len();
@@ -329,11 +340,13 @@ mod tests {
                     photo,
                     shift: Vector2::zeros(),
                     covariance: Matrix2::identity() * (if photo == 0 { 1.0 } else { sd_m * sd_m }),
+                    turn: None,
                     parallax: [0.0; 2],
                     correlation: 0.9,
                 })
                 .to_vec(),
             place: [0.0; 2],
+            radius_m: 0.1,
             apart_m: [apart_m, 0.0],
             start: FaceMotion::none(),
             pictures: None,

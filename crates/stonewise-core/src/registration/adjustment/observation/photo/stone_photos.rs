@@ -2,13 +2,16 @@
 
 use super::bias::BiasWeights;
 use super::poses::PoseInfluence;
+use super::stone_turn::StoneTurn;
 use crate::registration::adjustment::candidate::Moving;
 use crate::registration::adjustment::observation::normal_equations::NormalEquations;
-use crate::registration::adjustment::stone_vector::{StoneVector, Vector9};
+use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
 use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 /// Relative ridge that makes a direction solvable which no photo shows.
 const RIDGE: f64 = 1e-9;
+/// Components of a shift: along and up the face.
+const SHIFT_COMPONENTS: f64 = 2.0;
 
 /// The displacement of a place on a stone's face, as its photos show it.
 #[derive(Clone, Debug)]
@@ -22,6 +25,8 @@ pub(crate) struct StonePhotos {
     /// Factor on the variance of the stone's appearance bias: faces that seem strained, which stones cannot
     /// be, have more.
     pub bias_factor: f64,
+    /// The turn in the face, where photos show one.
+    pub turn: Option<StoneTurn>,
     /// Weights of that bias.
     pub weights: BiasWeights,
     /// How errors of the poses change the displacement; other stones share these errors.
@@ -72,35 +77,56 @@ impl StonePhotos {
         Some((self.information + ridge).cholesky()?.solve(&self.vector))
     }
 
-    /// Expected square of the bias over its variance, before it is weighted, for a displacement that all else
-    /// makes `expected`, with this covariance.
+    /// Components of the bias: along and up the face, and the turn where photos show one.
+    pub fn bias_components(&self) -> f64 {
+        SHIFT_COMPONENTS + f64::from(u8::from(self.turn.is_some()))
+    }
+
+    /// Expected square of the bias over its variance, before it is weighted, for a motion that all else makes
+    /// `expected`, with this covariance.
     ///
-    /// The photos show displacement and bias, with errors of their own: the bias is estimated from what they
-    /// show beyond the displacement, and its uncertainty adds to the square.
+    /// The photos show displacement, turn and bias, with errors of their own: the bias is estimated from what
+    /// they show beyond the motion, and its uncertainty adds to the square.
     pub fn bias_square(
         &self,
         bias_m: f64,
         moving: Moving,
-        expected: &Vector3<f64>,
-        covariance: &Matrix3<f64>,
+        expected: &StoneVector,
+        covariance: &Matrix9,
     ) -> f64 {
+        let lever = Self::lever(self.place);
+        let weight = self.weights.of(moving);
+        let variance = bias_m * bias_m * self.bias_factor;
+        let of_turn = self.turn.as_ref().map_or(0.0, |turn| {
+            turn.bias_square(variance.sqrt(), weight, expected, covariance)
+        });
+        let covariance: Matrix3<f64> = lever * covariance * lever.transpose();
         let Some(inverse) = (Matrix3::identity() + self.information * covariance).try_inverse() else {
-            return 0.0;
+            return of_turn;
         };
         let reduced = inverse * self.information;
-        let shown = inverse * (self.vector - self.information * expected);
-        let variance = bias_m * bias_m * self.bias_factor;
-        let prior = Matrix2::identity() * (self.weights.of(moving) / variance);
+        let at_expected: Vector3<f64> = lever * expected.unknowns();
+        let shown = inverse * (self.vector - self.information * at_expected);
+        let prior = Matrix2::identity() * (weight / variance);
         let Some(spread) = (reduced.fixed_view::<2, 2>(0, 0) + prior).try_inverse() else {
-            return 0.0;
+            return of_turn;
         };
         let bias = spread * shown.fixed_rows::<2>(0);
-        (bias.norm_squared() + spread.trace()) / variance
+        of_turn + (bias.norm_squared() + spread.trace()) / variance
     }
 
     /// Log likelihood as a quadratic about the motion `origin`. The constant holds what depends on the bias
     /// and its weight.
     pub fn normal_equations(&self, origin: &StoneVector, bias_m: f64, moving: Moving) -> NormalEquations {
+        let mut sum = self.of_displacement(origin, bias_m, moving);
+        if let Some(turn) = &self.turn {
+            sum += turn.normal_equations(origin, self.bias_sd_m(bias_m, moving));
+        }
+        sum.constant += self.weights.log_density(moving);
+        sum
+    }
+
+    fn of_displacement(&self, origin: &StoneVector, bias_m: f64, moving: Moving) -> NormalEquations {
         let (information, vector, log_det) = self.with_bias(bias_m, moving);
         let lever = Self::lever(self.place);
         let at_origin: Vector3<f64> = lever * origin.unknowns();
@@ -111,7 +137,7 @@ impl StonePhotos {
         NormalEquations {
             information: lever.transpose() * information * lever,
             vector,
-            constant: self.weights.log_density(moving) - 0.5 * (log_det + apart.dot(&(information * apart))),
+            constant: -0.5 * (log_det + apart.dot(&(information * apart))),
         }
     }
 }
@@ -119,6 +145,7 @@ impl StonePhotos {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Matrix4, RowVector3, Vector4};
 
     fn stone() -> StonePhotos {
         let m = Matrix3::new(2.0, 0.3, 0.1, 0.3, 1.5, -0.2, 0.1, -0.2, 0.1) * 1e6;
@@ -127,9 +154,39 @@ mod tests {
             vector: m * Vector3::new(0.003, -0.001, 0.004),
             place: [0.02, -0.03],
             bias_factor: 1.7,
+            turn: Some(StoneTurn {
+                angle: 0.02,
+                variance: 1e-6,
+                by_rotation: RowVector3::new(-0.1, 0.2, 1.0),
+                radius_m: 0.08,
+            }),
             weights: BiasWeights::USUAL,
             by_poses: PoseInfluence::none(),
         }
+    }
+
+    /// What the photos show, side by side: how it follows from the motion, its value, its covariance without
+    /// the bias, and the covariance of a bias with variance one.
+    fn observed(stone: &StonePhotos) -> (SMatrix<f64, 4, 9>, Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
+        let turn = stone.turn.as_ref().unwrap();
+        let mut lever = SMatrix::<f64, 4, 9>::zeros();
+        lever
+            .fixed_view_mut::<3, 9>(0, 0)
+            .copy_from(&StonePhotos::lever(stone.place));
+        lever.fixed_view_mut::<1, 3>(3, 3).copy_from(&turn.by_rotation);
+        let shown = stone.displacement().unwrap();
+        let mut noise = Matrix4::zeros();
+        noise
+            .fixed_view_mut::<3, 3>(0, 0)
+            .copy_from(&stone.information.try_inverse().unwrap());
+        noise[(3, 3)] = turn.variance;
+        let of_bias = Vector4::new(1.0, 1.0, 0.0, (2.0 / turn.radius_m).powi(2));
+        (
+            lever,
+            Vector4::new(shown.x, shown.y, shown.z, turn.angle),
+            noise,
+            Matrix4::from_diagonal(&of_bias),
+        )
     }
 
     #[test]
@@ -147,48 +204,60 @@ mod tests {
     #[test]
     fn the_squared_bias_is_its_expectation_in_the_joint_law() {
         let (stone, bias_m) = (stone(), 8e-4);
-        let expected = Vector3::new(0.001, 0.0005, 0.003);
-        let root = Matrix3::new(4e-4, 0.0, 0.0, 1e-4, 6e-4, 0.0, 2e-4, -1e-4, 5e-4);
-        let covariance = root * root.transpose();
-        // The shown displacement is the true one plus bias and error: all three jointly normal.
+        let expected = StoneVector::from(Vector9::from([
+            0.001, 0.0005, 0.003, 0.01, 0.0, 0.016, 0.0, 0.0, 0.0,
+        ]));
+        let sds = Vector9::from([4e-4, 6e-4, 2e-4, 5e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0]);
+        let covariance = Matrix9::from_diagonal(&sds.component_mul(&sds));
+        // What is shown is the true motion's part plus bias and error, all jointly normal; turn and
+        // displacement depend on each other by the place's distance from the centroid alone.
+        let (lever, shown, noise, of_bias) = observed(&stone);
         let variance = bias_m * bias_m * 1.7;
-        let of_bias = Matrix3::from_diagonal(&Vector3::new(variance, variance, 0.0));
-        let of_shown = covariance + of_bias + stone.information.try_inverse().unwrap();
-        let gain = of_bias * of_shown.try_inverse().unwrap();
-        let mean = gain * (stone.displacement().unwrap() - expected);
-        let spread = of_bias - gain * of_bias;
-        let by_definition = (mean.norm_squared() + spread.trace()) / variance;
+        let apart = shown - lever * expected.unknowns();
+        let together = lever * covariance * lever.transpose();
+        let mut by_definition = 0.0;
+        for (first, count) in [(0, 3), (3, 1)] {
+            let part = |m: &Matrix4<f64>| m.view((first, first), (count, count)).into_owned();
+            let of_bias = part(&of_bias) * variance;
+            let gain = &of_bias * (part(&together) + &of_bias + part(&noise)).try_inverse().unwrap();
+            let mean = &gain * apart.rows(first, count);
+            let second = &mean * mean.transpose() + &of_bias - &gain * &of_bias;
+            for k in 0..count {
+                if of_bias[(k, k)] > 0.0 {
+                    by_definition += second[(k, k)] / of_bias[(k, k)];
+                }
+            }
+        }
         let found = stone.bias_square(bias_m, Moving::WithField, &expected, &covariance);
         assert!(
             (found - by_definition).abs() < 1e-6 * by_definition,
             "{found} {by_definition}"
         );
+        assert_eq!(stone.bias_components(), 3.0);
     }
 
     #[test]
-    fn equations_are_the_log_density_of_the_displacement() {
+    fn equations_are_the_log_density_of_displacement_and_turn() {
         let stone = stone();
         let x = Vector9::from([0.004, -0.002, 0.001, 0.01, -0.02, 0.03, 0.0, 0.0, 0.0]);
         let origin = StoneVector::from_translation(Vector3::new(0.002, 0.001, -0.003));
-        let density = |bias_m: f64| {
-            let variance = bias_m * bias_m * 1.7;
-            let covariance = stone.information.try_inverse().unwrap()
-                + Matrix3::from_diagonal(&Vector3::new(variance, variance, 0.0));
-            let motion: Vector9 = x + origin.unknowns();
-            let turn = Vector3::new(motion[3], motion[4], motion[5]);
-            let place = Vector3::new(0.02, -0.03, 0.0);
-            let apart = motion.fixed_rows::<3>(0) + turn.cross(&place) - Vector3::new(0.003, -0.001, 0.004);
+        let (lever, shown, noise, of_bias) = observed(&stone);
+        let density = |x: &Vector9, bias_m: f64| {
+            let covariance = noise + of_bias * (bias_m * bias_m * 1.7);
+            let apart = shown - lever * (x + origin.unknowns());
             -0.5 * (covariance.determinant().ln() + apart.dot(&(covariance.try_inverse().unwrap() * apart)))
         };
-        let value = |bias_m: f64| {
+        let value = |x: &Vector9, bias_m: f64| {
             let e = stone.normal_equations(&origin, bias_m, Moving::WithField);
-            e.constant + e.vector.dot(&x) - 0.5 * x.dot(&(e.information * x))
+            e.constant + e.vector.dot(x) - 0.5 * x.dot(&(e.information * x))
         };
-        let difference = value(1e-3) - value(3e-4);
-        let expected = density(1e-3) - density(3e-4);
-        assert!(
-            (difference - expected).abs() < 1e-5 * expected.abs().max(1.0),
-            "{difference} {expected}"
-        );
+        for (other, bias_m) in [(x, 3e-4), (Vector9::zeros(), 1e-3)] {
+            let difference = value(&x, 1e-3) - value(&other, bias_m);
+            let expected = density(&x, 1e-3) - density(&other, bias_m);
+            assert!(
+                (difference - expected).abs() < 1e-5 * expected.abs().max(1.0),
+                "{difference} {expected}"
+            );
+        }
     }
 }

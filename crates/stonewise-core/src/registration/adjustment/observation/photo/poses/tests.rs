@@ -1,0 +1,139 @@
+//! Tests of the poses' adjustment.
+
+use super::*;
+use crate::geometry::FaceFrame;
+use crate::registration::photos::{FaceMotion, PhotoStatus};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn tracks(centres: &[Point3<f64>], places: &[Point3<f64>], turn: &Matrix3<f64>) -> Vec<Track> {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut track = |at: &Point3<f64>| {
+        let sights = centres.iter().enumerate().map(|(photo, centre)| {
+            let ray = turn * (at - centre);
+            Sight {
+                photo,
+                shift: Vector2::from_fn(|_, _| rng.random_range(-2e-3..2e-3)),
+                covariance: Matrix2::new(2.0, 0.4, 0.4, 1.0) * 1e-8,
+                turn: None,
+                parallax: [-ray.x / ray.z, -ray.y / ray.z],
+                correlation: 0.9,
+            }
+        });
+        Track {
+            status: PhotoStatus::Tracked,
+            sights: sights.collect(),
+            place: [0.0; 2],
+            radius_m: 0.1,
+            apart_m: [0.0; 2],
+            start: FaceMotion::none(),
+            pictures: None,
+        }
+    };
+    places.iter().map(&mut track).collect()
+}
+
+#[test]
+fn poses_and_displacements_are_those_of_dense_least_squares() {
+    let turn = FaceFrame::from_normal(&Vector3::x()).face_from_world();
+    let centres: Vec<Point3<f64>> = (0..5)
+        .map(|i| Point3::new(6.0, f64::from(i) - 2.0, 0.5 * f64::from(i % 3)))
+        .collect();
+    let places: Vec<Point3<f64>> = (0..9)
+        .map(|i| Point3::new(0.0, f64::from(i % 3) - 1.0, f64::from(i / 3)))
+        .collect();
+    let tracks = tracks(&centres, &places, &turn);
+    let clouds = CloudMotion {
+        mean: Vector3::new(1e-3, 2e-3, -1e-3),
+        covariance: Matrix3::from_diagonal(&Vector3::new(9e-6, 4e-6, 1e-6)),
+    };
+    let problem = PoseProblem {
+        centres: &centres,
+        epochs: &[0, 1, 0, 1, 1],
+        scales: &[[0.003, 6.0]; 5],
+        pose_error_px: 0.5,
+        stones: tracks
+            .iter()
+            .zip(&places)
+            .map(|(track, at)| PoseStone {
+                track,
+                centroid: *at,
+                face_from_world: &turn,
+                clouds,
+            })
+            .collect(),
+        middle: Point3::new(0.0, 0.0, 1.0),
+        extent_m: 2.0,
+    };
+    let weights: Vec<Vec<f64>> = vec![vec![1.0, 0.5, 1.0, 0.8, 1.0]; 9];
+    let (bias_m, factor) = (5e-4, 3.0);
+    let (corrections, covariance) = problem
+        .solve_weighted(&weights, &[1.0; 9], factor, bias_m, &[1.0; 9])
+        .unwrap();
+    // All unknowns side by side.
+    let count = problem.unknowns();
+    let all = count + STONE * 9;
+    let mut normal = DMatrix::<f64>::zeros(all, all);
+    let mut right = DVector::<f64>::zeros(all);
+    (0..count).for_each(|k| normal[(k, k)] = 1.0);
+    for (k, stone) in problem.stones.iter().enumerate() {
+        let at = count + STONE * k;
+        normal[(at + 2, at + 2)] += HEIGHT_M.powi(-2);
+        for a in 0..3 {
+            let bias = if a < 2 { bias_m * bias_m } else { 0.0 };
+            let w = 1.0 / (clouds.covariance[(a, a)] + bias);
+            normal[(at + 3 + a, at + 3 + a)] += w;
+            right[at + 3 + a] += w * clouds.mean[a];
+        }
+        for (sight, w) in stone.track.sights.iter().zip(&weights[k]) {
+            let (own, pose, whole) = problem.rows(stone, sight);
+            let mut row = DMatrix::<f64>::zeros(2, all);
+            row.view_mut((0, at), (2, STONE)).copy_from(&own);
+            row.view_mut((0, POSE * sight.photo), (2, POSE)).copy_from(&pose);
+            row.view_mut((0, POSE * 5), (2, WHOLE)).copy_from(&whole);
+            let weight = problem.weight(sight, factor) * *w;
+            normal += row.transpose() * weight * &row;
+            right += row.transpose() * (weight * sight.shift);
+        }
+    }
+    let inverse = normal.clone().try_inverse().unwrap();
+    let solution = &inverse * &right;
+    assert!((&corrections - solution.rows(0, count)).norm() < 1e-7 * corrections.norm());
+    assert!((&covariance - inverse.view((0, 0), (count, count))).norm() < 1e-6 * covariance.norm());
+    // A stone's displacement with the poses as they are.
+    let poses = Poses {
+        corrections,
+        covariance,
+        factor,
+        weights: weights.clone(),
+    };
+    let system = problem.system(&problem.stones[4], &weights[4], factor);
+    let (information, vector, by_poses) = system.displacement(&poses).unwrap();
+    let bias = Matrix3::from_diagonal(&Vector3::new(bias_m * bias_m, bias_m * bias_m, 0.0));
+    let prior = (clouds.covariance + bias).try_inverse().unwrap();
+    let joined = (information + prior).try_inverse().unwrap() * (vector + prior * clouds.mean);
+    let expected = solution.fixed_rows::<3>(count + STONE * 4 + 3);
+    assert!(
+        (joined - expected).norm() < 1e-6 * expected.norm(),
+        "{joined} {expected}"
+    );
+    // Derivatives by differences: each unknown of the poses is changed by one.
+    let other = problem.system(&problem.stones[5], &weights[5], factor);
+    let changes = |system: &StoneSystem| -> DMatrix<f64> {
+        let displacement = |step: Option<usize>| {
+            let mut poses = poses.clone();
+            step.into_iter().for_each(|k| poses.corrections[k] += 1.0);
+            let (information, vector, _) = system.displacement(&poses).unwrap();
+            information.try_inverse().unwrap() * vector
+        };
+        let columns = (0..count).map(|k| displacement(Some(k)) - displacement(None));
+        DMatrix::from_fn(3, count, |r, k| columns.clone().nth(k).unwrap()[r])
+    };
+    let expected = changes(&system) * &poses.covariance * changes(&other).transpose();
+    let (_, _, other) = other.displacement(&poses).unwrap();
+    let found = by_poses.covariance_with(&other, &poses.covariance);
+    assert!(
+        (found - &expected).norm() < 1e-6 * expected.norm(),
+        "{found} {expected}"
+    );
+}
