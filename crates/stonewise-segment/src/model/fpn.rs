@@ -27,6 +27,11 @@ impl<B: ModelBackend> Fpn<B> {
         }
     }
 
+    /// Makes it faster as long as the weights stay as they are.
+    pub fn prepare(&mut self) {
+        self.layer_blocks.iter_mut().for_each(ConvBlock::prepare);
+    }
+
     /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32.
     pub fn forward(&self, features: [Tensor<B, 4>; 4]) -> Vec<Tensor<B, 4>> {
         let mut levels = Vec::with_capacity(5);

@@ -3,7 +3,7 @@
 use super::config::MaskRcnnConfig;
 use super::init::Init;
 use super::kernels::ModelBackend;
-use super::layers::{Conv, ConvBlock, Doubling, Linear, Spread};
+use super::layers::{Conv, ConvBlock, Doubling, Linear, Spread, assembled};
 use burn::module::Module;
 use burn::tensor::Tensor;
 use burn::tensor::activation::relu;
@@ -98,6 +98,11 @@ impl<B: ModelBackend> RoiHeads<B> {
             .iter()
             .fold(regions, |x, block| relu(block.forward(x)));
         let x = relu(self.mask_predictor.conv5_mask.forward(x));
-        self.mask_predictor.mask_fcn_logits.forward(x)
+        assembled(self.mask_predictor.mask_fcn_logits.forward(x))
+    }
+
+    /// Makes them faster as long as the weights stay as they are.
+    pub fn prepare(&mut self) {
+        self.mask_head.iter_mut().for_each(ConvBlock::prepare);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::config::Norm as NormConfig;
 use super::init::Init;
-use super::kernels::{ModelBackend, float, primitive};
+use super::kernels::{Filters, ModelBackend, float, primitive};
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
 use burn::tensor::backend::Backend;
@@ -28,6 +28,9 @@ pub struct Conv<B: Backend> {
     pub weight: Param<Tensor<B, 4>>,
     pub bias: Option<Param<Tensor<B, 1>>>,
     stride: usize,
+    /// The weights in the form that is fastest in use.
+    #[module(skip)]
+    filters: Option<Filters>,
 }
 
 impl<B: ModelBackend> Conv<B> {
@@ -55,18 +58,23 @@ impl<B: ModelBackend> Conv<B> {
             weight,
             bias: bias.then(|| init.constant([outputs], 0.0)),
             stride,
+            filters: None,
         }
     }
 
     /// [batch, in, rows, columns] to [batch, out, rows / stride, columns / stride], rounded up.
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let bias = self.bias.as_ref().map(|bias| primitive(bias.val()));
-        float(B::convolve(
-            primitive(x),
-            primitive(self.weight.val()),
-            bias,
-            self.stride,
-        ))
+        let (x, weight) = (primitive(x), primitive(self.weight.val()));
+        float(match &self.filters {
+            Some(filters) => B::convolve_filtered(x, (weight, filters), bias),
+            None => B::convolve(x, weight, bias, self.stride),
+        })
+    }
+
+    /// Makes it faster as long as the weights stay as they are.
+    pub fn prepare(&mut self) {
+        self.filters = B::filters(primitive(self.weight.val()), self.stride);
     }
 }
 
@@ -85,18 +93,19 @@ impl<B: ModelBackend> Doubling<B> {
         }
     }
 
-    /// [batch, in, rows, columns] to [batch, out, 2 rows, 2 columns].
+    /// [batch, in, rows, columns] to the four pixels that each becomes: [4 batch, out, rows, columns], those
+    /// of an image one after another, row by row. Nothing overlaps: what looks at one pixel at a time may
+    /// come before [`assembled`].
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let [inputs, outputs, ..] = self.weight.dims();
         let [batch, _, rows, columns] = x.dims();
-        // Nothing overlaps: each pixel makes its own four.
-        let weight = self.weight.val().reshape([inputs, 4 * outputs]).transpose();
+        let weight = self.weight.val().permute([2, 3, 1, 0]);
         let weight = weight.reshape([4 * outputs, inputs, 1, 1]);
         let bias = self
             .bias
             .val()
-            .unsqueeze_dim::<2>(1)
-            .repeat_dim(1, 4)
+            .unsqueeze_dim::<2>(0)
+            .repeat_dim(0, 4)
             .flatten::<1>(0, 1);
         let x = float::<B, 4>(B::convolve(
             primitive(x),
@@ -104,10 +113,18 @@ impl<B: ModelBackend> Doubling<B> {
             Some(primitive(bias)),
             1,
         ));
-        x.reshape([batch, outputs, 2, 2, rows, columns])
-            .permute([0, 1, 4, 2, 5, 3])
-            .reshape([batch, outputs, 2 * rows, 2 * columns])
+        x.reshape([4 * batch, outputs, rows, columns])
     }
+}
+
+/// Doubled images [batch, channels, 2 rows, 2 columns] of their pixels' fours [4 batch, channels, rows,
+/// columns].
+pub fn assembled<B: Backend>(x: Tensor<B, 4>) -> Tensor<B, 4> {
+    let [fours, channels, rows, columns] = x.dims();
+    let batch = fours / 4;
+    x.reshape([batch, 2, 2, channels, rows, columns])
+        .permute([0, 3, 4, 1, 5, 2])
+        .reshape([batch, channels, 2 * rows, 2 * columns])
 }
 
 /// Fully connected layer: weight [out, in].
@@ -238,6 +255,11 @@ impl<B: ModelBackend> ConvBlock<B> {
 
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         normalised(&self.conv, &self.norm, x)
+    }
+
+    /// Makes it faster as long as the weights stay as they are.
+    pub fn prepare(&mut self) {
+        self.conv.prepare();
     }
 }
 

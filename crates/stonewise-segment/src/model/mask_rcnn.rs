@@ -106,10 +106,13 @@ impl<B: ModelBackend> MaskRcnn<B> {
         &self.config
     }
 
-    /// The same model, faster: stored statistics are moved into the convolutions. It cannot be saved under
-    /// torchvision's names.
+    /// The same model, faster: stored statistics are moved into the convolutions, and their weights are kept
+    /// in the form that is fastest in use. It can neither be trained nor saved under torchvision's names.
     pub fn for_inference(mut self) -> Self {
-        self.backbone.body.fold();
+        self.backbone.body.prepare();
+        self.backbone.fpn.prepare();
+        self.rpn.prepare();
+        self.roi_heads.prepare();
         self
     }
 
@@ -159,12 +162,11 @@ impl<B: ModelBackend> MaskRcnn<B> {
             return found;
         }
         let regions: Vec<_> = found.iter().map(|instance| (0, instance.bounds)).collect();
-        let masks = sigmoid(
-            self.roi_heads
-                .masks(sight.rows.cut(&regions, &self.align(self.config.roi.mask_cells))),
-        );
+        let masks = self
+            .roi_heads
+            .masks(sight.rows.cut(&regions, &self.align(self.config.roi.mask_cells)));
         let classes = found.iter().map(|instance| instance.class).enumerate();
-        let masks = floats(pick_classes(masks, classes));
+        let masks = floats(sigmoid(pick_classes(masks, classes)));
         let cells = masks.len() / found.len();
         let [sx, sy] = seen.scale;
         for (instance, mask) in found.iter_mut().zip(masks.chunks(cells)) {

@@ -3,13 +3,12 @@
 
 use super::config::{BackboneConfig, ResnetDepth};
 use super::init::Init;
-use super::kernels::ModelBackend;
+use super::kernels::{ModelBackend, float, primitive};
 use super::layers::{Conv, ConvBlock, Norm, Spread, fold, normalised};
 use burn::module::Module;
 use burn::tensor::Tensor;
 use burn::tensor::activation::relu;
 use burn::tensor::backend::Backend;
-use burn::tensor::module::max_pool2d;
 
 /// Two 3 x 3 convolutions, or a 3 x 3 between two 1 x 1, around which the input is passed.
 #[derive(Module, Debug)]
@@ -80,6 +79,14 @@ impl<B: ModelBackend> Block<B> {
             fold(&mut downsample.conv, &mut downsample.norm);
         }
     }
+
+    fn prepare(&mut self) {
+        self.conv1.prepare();
+        self.conv2.prepare();
+        if let Some(conv3) = &mut self.conv3 {
+            conv3.prepare();
+        }
+    }
 }
 
 /// A residual network without its classifier.
@@ -144,7 +151,7 @@ impl<B: ModelBackend> Resnet<B> {
             Some(norm) => norm.forward(x),
             None => x,
         });
-        let mut x = max_pool2d(x, [3; 2], [2; 2], [1; 2], [1; 2], false);
+        let mut x = float(B::halved(primitive(x)));
         [&self.layer1, &self.layer2, &self.layer3, &self.layer4].map(|layer| {
             for block in layer {
                 x = block.forward(x.clone());
@@ -153,8 +160,9 @@ impl<B: ModelBackend> Resnet<B> {
         })
     }
 
-    /// Moves stored statistics into the convolutions.
-    pub fn fold(&mut self) {
+    /// Moves stored statistics into the convolutions and makes these faster as long as the weights stay as
+    /// they are.
+    pub fn prepare(&mut self) {
         fold(&mut self.conv1, &mut self.bn1);
         for layer in [
             &mut self.layer1,
@@ -162,7 +170,10 @@ impl<B: ModelBackend> Resnet<B> {
             &mut self.layer3,
             &mut self.layer4,
         ] {
-            layer.iter_mut().for_each(Block::fold);
+            for block in layer {
+                block.fold();
+                block.prepare();
+            }
         }
     }
 }

@@ -70,9 +70,14 @@ impl<B: ModelBackend> FeatureRows<B> {
         let matrix = Arc::new(sampling_matrix(&self.shape, regions, align));
         let channels = self.rows.dims()[1];
         let product = B::sparse_product(&matrix, primitive(self.rows.clone()));
-        float::<B, 2>(product)
-            .reshape([regions.len(), align.cells, align.cells, channels])
-            .permute([0, 3, 1, 2])
+        let cells = align.cells * align.cells;
+        let product = float::<B, 2>(product).reshape([regions.len(), cells, channels]);
+        float::<B, 3>(B::exchanged(primitive(product))).reshape([
+            regions.len(),
+            channels,
+            align.cells,
+            align.cells,
+        ])
     }
 }
 

@@ -7,6 +7,8 @@ use std::ops::Range;
 
 /// Values of a block of patches: half of a usual second-level cache.
 const BLOCK: usize = 1 << 17;
+/// Least columns of a block, where the result has so many: fewer make slow products.
+const LEAST_COLUMNS: usize = 96;
 
 /// Sizes of a convolution padded by half its odd size.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +86,8 @@ pub fn forward(x: &[f32], weight: &[f32], bias: Option<&[f32]>, geometry: &Geome
         let planes = y.par_chunks_mut(pixels.max(1)).enumerate();
         planes.for_each(|(plane, values)| values.fill(bias[plane % geometry.outputs]));
     }
-    let rows_at_once = (BLOCK / (depth * columns).max(1)).clamp(1, rows.max(1));
+    let least = LEAST_COLUMNS.div_ceil(columns.max(1));
+    let rows_at_once = (BLOCK / (depth * columns).max(1)).clamp(least.min(rows.max(1)), rows.max(1));
     let image_size = geometry.inputs * geometry.rows * geometry.columns;
     let mut blocks = Vec::new();
     for (image, y) in y.chunks_mut((geometry.outputs * pixels).max(1)).enumerate() {
@@ -290,17 +293,26 @@ fn gather(x: &[f32], geometry: &Geometry, range: Range<usize>, patches: &mut Vec
                     let from = (first_row + (row - rows.start) * geometry.stride) * geometry.columns + first;
                     let to = (row - range.start) * out_columns;
                     let target = &mut line[to + columns.start..to + columns.end];
-                    if geometry.stride == 1 {
-                        target.copy_from_slice(&plane[from..from + columns.len()]);
-                    } else {
-                        let source = plane[from..].iter().step_by(geometry.stride);
-                        target
-                            .iter_mut()
-                            .zip(source)
-                            .for_each(|(target, source)| *target = *source);
-                    }
+                    take_every(geometry.stride, &plane[from..], target);
                 }
             }
+        }
+    }
+}
+
+/// Fills a row with every value, every second, ... of another.
+fn take_every(stride: usize, source: &[f32], target: &mut [f32]) {
+    match stride {
+        1 => target.copy_from_slice(&source[..target.len()]),
+        2 => {
+            let (pairs, last) = source.as_chunks::<2>();
+            let (whole, rest) = target.split_at_mut(target.len().min(pairs.len()));
+            whole.iter_mut().zip(pairs).for_each(|(to, pair)| *to = pair[0]);
+            rest.iter_mut().zip(last).for_each(|(to, from)| *to = *from);
+        }
+        _ => {
+            let source = source.iter().step_by(stride);
+            target.iter_mut().zip(source).for_each(|(to, from)| *to = *from);
         }
     }
 }

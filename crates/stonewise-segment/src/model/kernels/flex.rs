@@ -1,7 +1,7 @@
 //! The operations on burn's pure-Rust backend, and how they are differentiated there.
 
 use super::convolution::{Geometry, backward, channel_sums, forward};
-use super::{ModelBackend, SparseMatrix, group_norm, sparse_product};
+use super::{Filters, ModelBackend, SparseMatrix, group_norm, pool, sparse_product, winograd};
 use burn::backend::autodiff::NodeId;
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -12,11 +12,14 @@ use burn::tensor::backend::AutodiffBackend;
 use burn::tensor::ops::FloatTensor;
 use burn::tensor::{Shape, TensorData};
 use burn_flex::FlexTensor;
+use pulp::Arch;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Rows of a sparse product that one thread takes at a time.
 const ROWS_AT_ONCE: usize = 64;
+/// Side of the blocks in which a matrix is transposed: what lies in it stays in the first-level cache.
+const BLOCK_SIDE: usize = 16;
 
 impl ModelBackend for Flex {
     fn sparse_product(matrix: &Arc<SparseMatrix>, dense: FlexTensor) -> FlexTensor {
@@ -28,13 +31,19 @@ impl ModelBackend for Flex {
             .par_chunks_mut(channels.max(1))
             .with_min_len(ROWS_AT_ONCE)
             .enumerate();
+        let arch = Arch::new();
         rows.for_each(|(row, sums)| {
-            for &(column, weight) in matrix.row(row) {
-                let source = &values[column as usize * channels..][..channels];
-                for (sum, value) in sums.iter_mut().zip(source) {
-                    *sum += weight * value;
-                }
-            }
+            arch.dispatch(
+                #[inline(always)]
+                || {
+                    for &(column, weight) in matrix.row(row) {
+                        let source = &values[column as usize * channels..][..channels];
+                        for (sum, value) in sums.iter_mut().zip(source) {
+                            *sum += weight * value;
+                        }
+                    }
+                },
+            );
         });
         tensor(product, [matrix.rows(), channels])
     }
@@ -48,6 +57,45 @@ impl ModelBackend for Flex {
             forward(x.storage(), weight.storage(), bias, &geometry),
             geometry.output_shape(),
         )
+    }
+
+    fn filters(weight: FlexTensor, stride: usize) -> Option<Filters> {
+        let weight = weight.to_contiguous();
+        let is_fast = stride == 1 && weight.layout().shape()[2] == 3;
+        is_fast.then(|| Filters::new(weight.storage()))
+    }
+
+    fn convolve_filtered(
+        x: FlexTensor,
+        (weight, filters): (FlexTensor, &Filters),
+        bias: Option<FlexTensor>,
+    ) -> FlexTensor {
+        let geometry = geometry(&x, &weight, 1);
+        let x = x.to_contiguous();
+        let bias = bias.map(|bias| bias.to_contiguous());
+        let bias = bias.as_ref().map(FlexTensor::storage);
+        let y = winograd::forward(x.storage(), filters, bias, &geometry);
+        tensor(y, geometry.output_shape())
+    }
+
+    fn halved(x: FlexTensor) -> FlexTensor {
+        let x = x.to_contiguous();
+        let shape = x.layout().shape();
+        let [rows, columns] = [shape[2], shape[3]];
+        let y = pool::halve(x.storage(), [rows, columns]);
+        tensor(y, [shape[0], shape[1], rows.div_ceil(2), columns.div_ceil(2)])
+    }
+
+    fn exchanged(x: FlexTensor) -> FlexTensor {
+        let x = x.to_contiguous();
+        let shape = x.layout().shape();
+        let [batch, rows, columns] = [shape[0], shape[1], shape[2]];
+        let values: &[f32] = x.storage();
+        let mut y = vec![0.0f32; values.len()];
+        let size = (rows * columns).max(1);
+        let images = y.par_chunks_mut(size).zip(values.par_chunks(size));
+        images.for_each(|(y, x)| exchange(x, y, [rows, columns]));
+        tensor(y, [batch, columns, rows])
     }
 
     fn group_norm(
@@ -177,6 +225,21 @@ impl Backward<Flex, 3> for GroupNorm {
     }
 }
 
+/// Writes the transpose of a matrix of rows x columns.
+fn exchange(x: &[f32], y: &mut [f32], [rows, columns]: [usize; 2]) {
+    for first_row in (0..rows).step_by(BLOCK_SIDE) {
+        let some_rows = BLOCK_SIDE.min(rows - first_row);
+        for first_column in (0..columns).step_by(BLOCK_SIDE) {
+            let some_columns = BLOCK_SIDE.min(columns - first_column);
+            for column in first_column..first_column + some_columns {
+                let target = &mut y[column * rows + first_row..][..some_rows];
+                let source = x[first_row * columns + column..].iter().step_by(columns);
+                target.iter_mut().zip(source).for_each(|(to, from)| *to = *from);
+            }
+        }
+    }
+}
+
 fn normalise(
     x: &FlexTensor,
     scale: &FlexTensor,
@@ -206,4 +269,41 @@ fn geometry(x: &FlexTensor, weight: &FlexTensor, stride: usize) -> Geometry {
 
 fn tensor(values: Vec<f32>, shape: impl Into<Shape>) -> FlexTensor {
     FlexTensor::from_data(TensorData::new(values, shape.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{float, primitive};
+    use super::*;
+    use burn::tensor::Tensor;
+    use burn::tensor::module::max_pool2d;
+
+    #[test]
+    fn the_largest_neighbours_are_those_of_burn() {
+        for [batch, channels, rows, columns] in [[1, 1, 1, 1], [2, 3, 6, 8], [1, 2, 7, 33], [1, 1, 2, 5]] {
+            let count = batch * channels * rows * columns;
+            let values: Vec<f32> = (0..count).map(|i| (i as f32 * 1.7).sin()).collect();
+            let x = Tensor::<Flex, 4>::from_data(
+                TensorData::new(values, [batch, channels, rows, columns]),
+                &Default::default(),
+            );
+            let own = float::<Flex, 4>(Flex::halved(primitive(x.clone())));
+            let theirs = max_pool2d(x, [3; 2], [2; 2], [1; 2], [1; 2], false);
+            assert_eq!(own.into_data(), theirs.into_data());
+        }
+    }
+
+    #[test]
+    fn exchanging_rows_and_columns_agrees_with_burn() {
+        for [batch, rows, columns] in [[1, 1, 1], [2, 16, 33], [3, 49, 20]] {
+            let count = batch * rows * columns;
+            let values: Vec<f32> = (0..count).map(|i| i as f32).collect();
+            let x = Tensor::<Flex, 3>::from_data(
+                TensorData::new(values, [batch, rows, columns]),
+                &Default::default(),
+            );
+            let own = float::<Flex, 3>(Flex::exchanged(primitive(x.clone())));
+            assert_eq!(own.into_data(), x.swap_dims(1, 2).into_data());
+        }
+    }
 }

@@ -1,5 +1,6 @@
 //! Group normalisation (Wu & He 2018) on slices: batch, channel, pixel.
 
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Partial sums that are kept side by side, so that they can be added at once.
@@ -26,15 +27,23 @@ pub fn forward(
     let group_size = x.len() / (batch * groups).max(1);
     let pixels = group_size / per_group.max(1);
     let mut y = vec![0.0f32; x.len()];
+    let arch = Arch::new();
     let normalise = |(place, (x, y)): (usize, (&[f32], &mut [f32]))| {
-        let moments = moments(x, epsilon);
-        let first = place % groups * per_group;
-        for (channel, (x, y)) in x.chunks(pixels).zip(y.chunks_mut(pixels)).enumerate() {
-            let scale = scale[first + channel] * moments.inverse_std;
-            let shift = shift[first + channel] - moments.mean * scale;
-            y.iter_mut().zip(x).for_each(|(y, x)| *y = x * scale + shift);
-        }
-        moments
+        arch.dispatch(
+            #[inline(always)]
+            || {
+                let moments = moments(x, epsilon);
+                let first = place % groups * per_group;
+                for (channel, (x, y)) in x.chunks(pixels).zip(y.chunks_mut(pixels)).enumerate() {
+                    let scale = scale[first + channel] * moments.inverse_std;
+                    let shift = shift[first + channel] - moments.mean * scale;
+                    for (y, x) in y.iter_mut().zip(x) {
+                        *y = x * scale + shift;
+                    }
+                }
+                moments
+            },
+        )
     };
     let parts = x
         .par_chunks(group_size.max(1))
@@ -92,6 +101,7 @@ pub fn backward(x: &[f32], scale: &[f32], grad: &[f32], moments: &[Moments], bat
     [x_grad, scale_grad, shift_grad]
 }
 
+#[inline(always)]
 fn moments(x: &[f32], epsilon: f32) -> Moments {
     let count = x.len() as f32;
     let mean = sum_with_product(x, &[])[0] / count;
@@ -111,6 +121,7 @@ fn moments(x: &[f32], epsilon: f32) -> Moments {
 }
 
 /// Sum of values, and of their products with others.
+#[inline(always)]
 fn sum_with_product(values: &[f32], others: &[f32]) -> [f32; 2] {
     let (mut sums, mut products) = ([0.0f32; LANES], [0.0f32; LANES]);
     let (blocks, rest) = values.as_chunks::<LANES>();

@@ -8,8 +8,14 @@ mod convolution;
 mod flex;
 #[cfg(feature = "flex")]
 mod group_norm;
+#[cfg(feature = "flex")]
+mod pool;
 #[cfg(feature = "tch")]
 mod tch;
+#[cfg(feature = "flex")]
+mod winograd;
+
+mod filters;
 
 use super::sparse::SparseMatrix;
 use burn::tensor::backend::{AutodiffBackend, Backend};
@@ -17,10 +23,40 @@ use burn::tensor::ops::{ConvOptions, FloatTensor};
 use burn::tensor::{Tensor, TensorPrimitive};
 use std::sync::Arc;
 
+pub use filters::Filters;
+
 /// A backend that can run the model.
 pub trait ModelBackend: Backend {
     /// The product of a sparse matrix, rows x columns, and a dense one, columns x channels.
     fn sparse_product(matrix: &Arc<SparseMatrix>, dense: FloatTensor<Self>) -> FloatTensor<Self>;
+
+    /// The weights of a convolution in the form that is fastest in use, where the backend has one.
+    fn filters(_weight: FloatTensor<Self>, _stride: usize) -> Option<Filters> {
+        None
+    }
+
+    /// The convolution with weights in both forms.
+    fn convolve_filtered(
+        x: FloatTensor<Self>,
+        (weight, _filters): (FloatTensor<Self>, &Filters),
+        bias: Option<FloatTensor<Self>>,
+    ) -> FloatTensor<Self> {
+        Self::convolve(x, weight, bias, 1)
+    }
+
+    /// The largest value of 3 x 3 pixels around every second one: [batch, channels, rows, columns] to
+    /// [batch, channels, rows / 2, columns / 2], rounded up.
+    fn halved(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let x = float::<Self, 4>(x);
+        primitive(burn::tensor::module::max_pool2d(
+            x, [3; 2], [2; 2], [1; 2], [1; 2], false,
+        ))
+    }
+
+    /// Rows and columns exchanged: [batch, rows, columns] to [batch, columns, rows].
+    fn exchanged(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        primitive(float::<Self, 3>(x).swap_dims(1, 2))
+    }
 
     /// Convolution of [batch, in, rows, columns] with [out, in, size, size], odd size, padded by half of it
     /// with zeros, plus a bias for each output.
