@@ -524,7 +524,7 @@ fn too_little_address_space_is_said_before_the_work() {
     let (code, log) = outcome(&mut segment);
     assert_eq!(code, 1, "{log}");
     assert!(
-        log.contains("the search for stones in photos takes about 0.9 GB"),
+        log.contains("the search for stones in photos takes about 1.1 GB"),
         "{log}"
     );
 }

@@ -10,8 +10,8 @@ pub use overlay::outlined;
 
 /// Address space that the search for stones takes beyond the program and its threads, which is more than the
 /// memory it uses: 0.40 GB with one thread, 0.51 with two, 0.97 with four (docs/src/performance.md), rounded
-/// up.
-const DETECTOR_BASE: u64 = 240 << 20;
+/// up, and 0.16 GB for the weights transformed for use.
+const DETECTOR_BASE: u64 = 400 << 20;
 const DETECTOR_PER_THREAD: u64 = 190 << 20;
 
 /// Memory that the search for stones takes with the threads of now, bytes.
