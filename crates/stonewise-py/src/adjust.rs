@@ -236,12 +236,7 @@ fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairRes
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
-        let reference = common
-            .as_ref()
-            .map_or_else(Reference::default, |common| Reference {
-                motion: common.at(&stone.centroid),
-                covariance: common.covariance_at(&stone.centroid),
-            });
+        let reference = Reference::against(common.as_ref(), stone);
         let pair = motions.get(&stone.id).copied();
         Some(StoneRow::new(
             stone,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::fmt;
 use std::str::FromStr;
-use stonewise_core::geometry::FaceFrame;
+use stonewise_core::geometry::{FaceFrame, SmallMotion};
 use stonewise_core::stone::{MatchOutcome, MotionFailure, PairResult, Stone, StoneMotion, UnmatchedReason};
 
 /// 95 % quantile of chi-square with 3 degrees of freedom.
@@ -74,15 +74,34 @@ pub struct RowMotion {
     pub observability: f64,
 }
 
-/// What the motion of a stone is tested against.
+/// What the registration of the epochs takes off the motion of a stone, and what that is tested against.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
+    /// Estimated error of the later epoch at the stone, metres, world: taken off the displacement.
+    pub error: Vector3<f64>,
+    /// Rotation vector of that error, radians, world: taken off the rotation.
+    pub turn: Vector3<f64>,
     /// Motion of the reference at the stone, metres, world: zero where the registration of the epochs is
     /// known, else the common rigid motion of the measured stones.
     pub motion: Vector3<f64>,
     /// Covariance that the reference adds to the stone's own, m^2: error of the registration, or of the
     /// common motion.
     pub covariance: Matrix3<f64>,
+    /// The same for the rotation, rad^2.
+    pub rotation_covariance: Matrix3<f64>,
+}
+
+impl Reference {
+    /// The common motion at a stone with the error of its estimate: what a stone is tested against where
+    /// nothing is known about the registration.
+    pub fn against(common: Option<&SmallMotion>, stone: &Stone) -> Self {
+        common.map_or_else(Self::default, |common| Self {
+            motion: common.at(&stone.centroid),
+            covariance: common.covariance_at(&stone.centroid),
+            rotation_covariance: common.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
+            ..Self::default()
+        })
+    }
 }
 
 /// The word in column `status`.
@@ -224,17 +243,19 @@ impl RowMotion {
 
     fn new(motion: &StoneMotion, normal: &Vector3<f64>, reference: &Reference) -> Self {
         let covariance = motion.covariance.fixed_view::<3, 3>(0, 0) + reference.covariance;
-        let tested = motion.displacement - reference.motion;
+        let rotation_covariance = motion.covariance.fixed_view::<3, 3>(3, 3) + reference.rotation_covariance;
+        let displacement = motion.displacement - reference.error;
+        let tested = displacement - reference.motion;
         let detection_limit_m = detection_limit_m(&tested, &covariance);
         let face_from_world = FaceFrame::from_normal(normal).face_from_world();
         let in_face = face_from_world * covariance * face_from_world.transpose();
         Self {
-            displacement: motion.displacement,
-            face: face_from_world * motion.displacement,
-            rotation: motion.rotation,
+            displacement,
+            face: face_from_world * displacement,
+            rotation: motion.rotation - reference.turn,
             covariance: symmetric(&covariance),
             face_sd: in_face.diagonal().map(|v| v.max(0.0).sqrt()),
-            rotation_covariance: symmetric(&motion.covariance.fixed_view::<3, 3>(3, 3).into_owned()),
+            rotation_covariance: symmetric(&rotation_covariance),
             relative: motion.relative,
             relative_covariance: symmetric(&motion.relative_covariance),
             detection_limit_m,
@@ -332,8 +353,8 @@ mod tests {
         let pair = pair(Vector3::new(0.03, 0.01, -0.02), 0.003);
         let outcome = MatchOutcome::Matched { second: StoneId(9) };
         let reference = Reference {
-            motion: Vector3::zeros(),
             covariance: Matrix3::identity() * (0.004 * 0.004),
+            ..Reference::default()
         };
         let place = Point2::new(3.0, 1.5);
         let row = StoneRow::new(
@@ -360,12 +381,42 @@ mod tests {
     }
 
     #[test]
+    fn the_error_of_the_epoch_is_taken_off_and_its_uncertainty_added() {
+        let error = Vector3::new(0.002, -0.001, 0.0005);
+        let turn = Vector3::new(3e-4, -2e-4, 1e-4);
+        let moved = pair(Vector3::new(0.03, 0.01, -0.02), 0.003);
+        let reference = Reference {
+            error,
+            turn,
+            covariance: Matrix3::identity() * 16e-6,
+            rotation_covariance: Matrix3::from_diagonal(&Vector3::new(1e-8, 4e-8, 9e-8)),
+            ..Reference::default()
+        };
+        let outcome = MatchOutcome::Matched { second: StoneId(9) };
+        let row = StoneRow::new(
+            &stone(),
+            &outcome,
+            None,
+            Some(&moved),
+            &reference,
+            &Point2::origin(),
+        );
+        let motion = row.motion.unwrap();
+        assert!((motion.displacement - Vector3::new(0.028, 0.011, -0.0205)).norm() < 1e-15);
+        assert!((motion.face - Vector3::new(0.011, -0.0205, 0.028)).norm() < 1e-12);
+        assert_eq!(motion.rotation, -turn);
+        let alone = 0.003 * 0.003;
+        let variances = Vector3::new(alone + 1e-8, alone + 4e-8, alone + 9e-8);
+        assert!((motion.rotation_covariance - Matrix3::from_diagonal(&variances)).norm() < 1e-18);
+    }
+
+    #[test]
     fn a_motion_that_the_reference_shares_is_not_significant() {
         let moved = Vector3::new(0.03, 0.01, -0.02);
         let outcome = MatchOutcome::Matched { second: StoneId(9) };
         let reference = Reference {
             motion: moved,
-            covariance: Matrix3::zeros(),
+            ..Reference::default()
         };
         let pair = pair(moved, 0.003);
         let row = StoneRow::new(

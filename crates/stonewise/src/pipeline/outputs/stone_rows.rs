@@ -8,8 +8,7 @@ use crate::results::{Facade, Reference, StoneRow};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use stonewise_core::geometry::SmallMotion;
-use stonewise_core::registration::observers::ErrorAt;
-use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
+use stonewise_core::stone::{MatchOutcome, Stone, common_motion};
 
 /// One row for each stone of the first epoch.
 pub fn stone_rows(
@@ -29,27 +28,32 @@ pub fn stone_rows(
         true => registered.errors(),
         false => BTreeMap::new(),
     };
+    // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
+    let turn = registered.epoch_errors.as_ref();
+    let turn: Vector3<f64> =
+        turn.map_or_else(Vector3::zeros, |e| e.rigid.error.fixed_rows::<3>(3).into_owned());
     let row = |stone: &Stone| {
         let outcome = outcomes.get(&stone.id)?;
         let partner = match outcome {
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
-        let error = errors.get(&stone.id).copied();
-        let reference = match (error, datum.covariance_at(&stone.centroid)) {
-            (Some(error), Some(_)) => Reference {
-                motion: Vector3::zeros(),
-                covariance: error.covariance,
-            },
-            (None, Some(covariance)) => Reference {
-                motion: Vector3::zeros(),
-                covariance,
-            },
-            (_, None) => against(common.as_ref(), stone),
+        let reference = match (datum.covariance_at(&stone.centroid), datum.rotation_covariance()) {
+            (Some(covariance), Some(rotation_covariance)) => {
+                let error = errors.get(&stone.id);
+                Reference {
+                    error: error.map_or_else(Vector3::zeros, |e| e.mean),
+                    turn: error.map_or_else(Vector3::zeros, |_| turn),
+                    motion: Vector3::zeros(),
+                    covariance: error.map_or(covariance, |e| e.covariance),
+                    rotation_covariance,
+                }
+            }
+            _ => Reference::against(common.as_ref(), stone),
         };
-        let pair = motions.get(&stone.id).map(|pair| corrected(pair, error));
+        let pair = motions.get(&stone.id).copied();
         let place = facade.place(&stone.centroid);
-        let row = StoneRow::new(stone, outcome, partner, pair.as_ref(), &reference, &place);
+        let row = StoneRow::new(stone, outcome, partner, pair, &reference, &place);
         let of_partner = || edited[1].get(&partner?.id);
         let from = carried[0].get(&stone.id);
         let from = from.or_else(|| carried[1].get(&partner?.id));
@@ -69,22 +73,4 @@ pub fn motion_in_common(first: &Labelled, registered: &Registered) -> Option<Sma
         &first.stones,
         &registered.results.iter().map(|r| (r.first, r)).collect(),
     )
-}
-
-/// The motion less the error of the later epoch there.
-fn corrected(pair: &PairResult, error: Option<&ErrorAt>) -> PairResult {
-    let mut pair = pair.clone();
-    if let (Ok(motion), Some(error)) = (&mut pair.motion, error) {
-        motion.displacement -= error.mean;
-        motion.second_from_first.translation.vector -= error.mean;
-    }
-    pair
-}
-
-/// The common motion at a stone with the error of its estimate.
-fn against(common: Option<&SmallMotion>, stone: &Stone) -> Reference {
-    common.map_or_else(Reference::default, |common| Reference {
-        motion: common.at(&stone.centroid),
-        covariance: common.covariance_at(&stone.centroid),
-    })
 }
