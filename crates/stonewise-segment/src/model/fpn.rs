@@ -27,7 +27,7 @@ impl<B: ModelBackend> Fpn<B> {
         }
     }
 
-    /// Makes it faster as long as the weights stay as they are.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
         self.layer_blocks.iter_mut().for_each(ConvBlock::prepare);
     }

@@ -101,7 +101,7 @@ impl<B: ModelBackend> RoiHeads<B> {
         assembled(self.mask_predictor.mask_fcn_logits.forward(x))
     }
 
-    /// Makes them faster as long as the weights stay as they are.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
         self.mask_head.iter_mut().for_each(ConvBlock::prepare);
     }

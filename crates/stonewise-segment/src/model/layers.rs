@@ -72,7 +72,7 @@ impl<B: ModelBackend> Conv<B> {
         })
     }
 
-    /// Makes it faster as long as the weights stay as they are.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
         self.filters = B::filters(primitive(self.weight.val()), self.stride);
     }
@@ -94,7 +94,7 @@ impl<B: ModelBackend> Doubling<B> {
     }
 
     /// [batch, in, rows, columns] to the four pixels that each becomes: [4 batch, out, rows, columns], those
-    /// of an image one after another, row by row. Nothing overlaps: what looks at one pixel at a time may
+    /// of an image one after another, row by row. Nothing overlaps: operations on single pixels may
     /// come before [`assembled`].
     pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
         let [inputs, outputs, ..] = self.weight.dims();
@@ -117,7 +117,7 @@ impl<B: ModelBackend> Doubling<B> {
     }
 }
 
-/// Doubled images [batch, channels, 2 rows, 2 columns] of their pixels' fours [4 batch, channels, rows,
+/// Assembles images [batch, channels, 2 rows, 2 columns] from the four pixels of each [4 batch, channels, rows,
 /// columns].
 pub fn assembled<B: Backend>(x: Tensor<B, 4>) -> Tensor<B, 4> {
     let [fours, channels, rows, columns] = x.dims();
@@ -257,7 +257,7 @@ impl<B: ModelBackend> ConvBlock<B> {
         normalised(&self.conv, &self.norm, x)
     }
 
-    /// Makes it faster as long as the weights stay as they are.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
         self.conv.prepare();
     }

@@ -51,7 +51,7 @@ impl<B: ModelBackend> Rpn<B> {
         }
     }
 
-    /// Makes it faster as long as the weights stay as they are.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
         self.head.hidden.iter_mut().for_each(ConvBlock::prepare);
     }

@@ -74,7 +74,8 @@ pub struct RowMotion {
     pub observability: f64,
 }
 
-/// What the registration of the epochs takes off the motion of a stone, and what that is tested against.
+/// The registration error subtracted from a stone's motion, and the reference motion that the result is
+/// tested against.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reference {
     /// Estimated error of the later epoch at the stone, metres, world: taken off the displacement.

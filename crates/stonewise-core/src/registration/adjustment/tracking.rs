@@ -111,7 +111,7 @@ impl Adjustment {
         self.photos = Some(photos);
     }
 
-    /// A stone's motion as its points and the other stones make it, and its covariance.
+    /// A stone's motion from its points and the other stones, and its covariance.
     fn motion_without_photos(
         &self,
         i: usize,

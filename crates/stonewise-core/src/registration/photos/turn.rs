@@ -19,7 +19,7 @@ mod tests {
     use nalgebra::{Matrix2, Rotation3, Vector2, Vector3};
 
     #[test]
-    fn the_picture_turns_as_rays_through_the_turned_face_say() {
+    fn the_turn_of_the_picture_agrees_with_rays_through_the_turned_face() {
         // The camera stands obliquely before the face; a ray meets the plane of the face that did not turn.
         let camera = Vector3::new(3.0, -2.0, 6.0);
         let rotation = Vector3::new(2e-4, -3e-4, 1.5e-4);

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 /// Values of a block of patches: half of a usual second-level cache.
 const BLOCK: usize = 1 << 17;
-/// Least columns of a block, where the result has so many: fewer make slow products.
+/// Minimum number of columns of a block, if the result has that many: products with fewer are slow.
 const LEAST_COLUMNS: usize = 96;
 
 /// Sizes of a convolution padded by half its odd size.
@@ -300,7 +300,7 @@ fn gather(x: &[f32], geometry: &Geometry, range: Range<usize>, patches: &mut Vec
     }
 }
 
-/// Fills a row with every value, every second, ... of another.
+/// Fills a row with every `stride`-th value of another.
 fn take_every(stride: usize, source: &[f32], target: &mut [f32]) {
     match stride {
         1 => target.copy_from_slice(&source[..target.len()]),

@@ -44,7 +44,7 @@ pub trait ModelBackend: Backend {
         Self::convolve(x, weight, bias, 1)
     }
 
-    /// The largest value of 3 x 3 pixels around every second one: [batch, channels, rows, columns] to
+    /// Max pooling over 3 x 3 pixels with stride 2 and a border of 1: [batch, channels, rows, columns] to
     /// [batch, channels, rows / 2, columns / 2], rounded up.
     fn halved(x: FloatTensor<Self>) -> FloatTensor<Self> {
         let x = float::<Self, 4>(x);

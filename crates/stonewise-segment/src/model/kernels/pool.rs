@@ -3,7 +3,7 @@
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// The largest value of 3 x 3 pixels around every second one of planes of `rows` x `columns`.
+/// Max pooling over 3 x 3 pixels with stride 2 and a border of 1, of planes of `rows` x `columns`.
 pub fn halve(x: &[f32], [rows, columns]: [usize; 2]) -> Vec<f32> {
     let size = [rows, columns].map(|side| side.div_ceil(2));
     let planes = x.len() / (rows * columns).max(1);

@@ -1,4 +1,4 @@
-//! Convolution of 3 x 3 weights and stride 1 with a quarter of the products: F(4 x 4, 3 x 3) of Winograd's
+//! Convolution of 3 x 3 weights and stride 1 with a quarter of the multiplications: F(4 x 4, 3 x 3) of Winograd's
 //! minimal filtering (Lavin & Gray 2016, section 4), on slices: batch, channel, row, column.
 //!
 //! Each 4 x 4 pixels of the result are made of 6 x 6 of the image. Both are transformed along columns and
@@ -14,10 +14,10 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Cells that are computed at once, about: fewer make slow products, and what belongs to many does not stay
-/// in the cache.
+/// Approximate number of cells computed at once: matrix products of fewer are slow, and the data of more do
+/// not fit in the cache.
 const CELLS: usize = 128;
-/// Cells are filled up to multiples of this: values that the widest instructions take at once.
+/// The number of cells is padded to a multiple of this, the number of values in the widest SIMD register.
 const LANES: usize = 16;
 
 /// The convolution of a batch, of stride 1.
@@ -353,7 +353,7 @@ fn parts_mut<const COUNT: usize>(values: &mut [f32], length: usize) -> [&mut [f3
 mod tests {
     use super::*;
 
-    /// Values between -1 and 1 that look like chance.
+    /// Pseudo-random values between -1 and 1.
     fn noise(count: usize, seed: u32) -> Vec<f32> {
         let mut state = seed;
         let mut next = || {

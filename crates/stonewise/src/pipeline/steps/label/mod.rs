@@ -154,7 +154,7 @@ pub(super) fn tabulate(
     let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
     if stones.is_empty() {
         let why = match context.project.part {
-            Some(_) => "does the part of the wall that the run is limited to show any?",
+            Some(_) => "are there stones in the part of the wall that the run is limited to?",
             None => "do its cameras and clouds share one frame?",
         };
         let name = &context.project.epochs[number - 1].name;

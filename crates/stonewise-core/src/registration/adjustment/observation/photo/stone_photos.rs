@@ -82,8 +82,8 @@ impl StonePhotos {
         SHIFT_COMPONENTS + f64::from(u8::from(self.turn.is_some()))
     }
 
-    /// Expected square of the bias over its variance, before it is weighted, for a motion that all else makes
-    /// `expected`, with this covariance.
+    /// Expected square of the bias over its variance, before it is weighted, given the motion
+    /// `expected` from all other observations, with this covariance.
     ///
     /// The photos show displacement, turn and bias, with errors of their own: the bias is estimated from what
     /// they show beyond the motion, and its uncertainty adds to the square.
@@ -210,7 +210,7 @@ mod tests {
         let sds = Vector9::from([4e-4, 6e-4, 2e-4, 5e-3, 2e-3, 3e-3, 0.0, 0.0, 0.0]);
         let covariance = Matrix9::from_diagonal(&sds.component_mul(&sds));
         // What is shown is the true motion's part plus bias and error, all jointly normal; turn and
-        // displacement depend on each other by the place's distance from the centroid alone.
+        // displacement are correlated only through the offset of the place from the centroid.
         let (lever, shown, noise, of_bias) = observed(&stone);
         let variance = bias_m * bias_m * 1.7;
         let apart = shown - lever * expected.unknowns();

@@ -6,8 +6,8 @@ use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector};
 use crate::registration::photos::turn_by_rotation;
 use nalgebra::{RowSVector, RowVector3};
 
-/// Bias of a turn over that of the shift and the radius of the face. Parts of a face that are biased
-/// independently of each other would make it one; what changed on a stone has longer waves. With two, 96 to 98
+/// Ratio of the bias of a turn to (bias of the shift / radius of the face). Parts of a face that are biased
+/// independently of each other would make it one; changes on a stone are correlated over longer distances. With two, 96 to 98
 /// of 100 turns of stones that were not loose lie within 1.96 standard deviations on `dam_small` and on each of
 /// three simulated walls (521 stones); with one 82 to 87.
 const BIAS_OF_TURN: f64 = 2.0;
@@ -98,8 +98,8 @@ impl StoneTurn {
         }
     }
 
-    /// Expected square of the bias over its variance before it is weighted, for a motion that all else makes
-    /// `expected`, with this covariance; `bias_sd_m`: standard deviation of the bias before it is weighted,
+    /// Expected square of the bias over its variance before it is weighted, given the motion
+    /// `expected` from all other observations, with this covariance; `bias_sd_m`: standard deviation of the bias before it is weighted,
     /// metres.
     pub fn bias_square(
         &self,
@@ -191,7 +191,7 @@ mod tests {
         }
     }
 
-    /// By how much the turn of a stone is wrong that turned by 4 mrad, and the turn of the last photo.
+    /// Error of the turn of a stone that turned by 4 mrad, and the turn of the last photo.
     fn error(poses: &Poses) -> [f64; 2] {
         let turn_to_face = FaceFrame::from_normal(&Vector3::new(0.9, 0.1, 0.3)).face_from_world();
         let centres = CENTRES.map(Point3::from);
