@@ -23,15 +23,10 @@ pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> 
 
 /// The paper's experiment; its tables go to stdout.
 fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    // A survey is given as NAME=FILE or FILE.
-    let files = args
-        .surveys
-        .iter()
-        .map(|s| PathBuf::from(s.rsplit('=').next().unwrap_or(s)));
-    let files: Vec<PathBuf> = files.collect();
     // Read first, so that a project with a mistake claims no folder.
     let given: Vec<PaperSurvey> = args.surveys.iter().map(|s| survey(s)).collect::<Result<_>>()?;
     let inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
+    let files: Vec<PathBuf> = given.iter().map(|s| s.project.path.clone()).collect();
     let owner = Owner::inputs("experiment paper", &files);
     let folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &["work"], force)?;
     let mut surveys = if given.is_empty() {

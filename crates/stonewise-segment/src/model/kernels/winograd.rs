@@ -1,5 +1,5 @@
-//! Convolution of 3 x 3 weights and stride 1 with a quarter of the multiplications: F(4 x 4, 3 x 3) of Winograd's
-//! minimal filtering (Lavin & Gray 2016, section 4), on slices: batch, channel, row, column.
+//! Convolution of 3 x 3 weights and stride 1 with a quarter of the multiplications: F(4 x 4, 3 x 3) of
+//! Winograd's minimal filtering (Lavin & Gray 2016, section 4), on slices: batch, channel, row, column.
 //!
 //! Each 4 x 4 pixels of the result are made of 6 x 6 of the image. Both are transformed along columns and
 //! rows; between the transforms, each of the 36 places is a product of matrices of its own. The result

@@ -28,7 +28,8 @@ impl BiasWeights {
         on_own: 1.0,
     };
 
-    /// From the expected squared bias over its variance, for each way of moving; `components`: number of components of the bias.
+    /// From the expected squared bias over its variance, for each way of moving; `components`: number of
+    /// components of the bias.
     pub fn from_squares(components: f64, square: impl Fn(Moving) -> f64) -> Self {
         let weight = |moving| (FREEDOM + components) / (FREEDOM + square(moving));
         Self {

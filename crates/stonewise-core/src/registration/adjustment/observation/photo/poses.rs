@@ -355,23 +355,17 @@ impl PoseProblem<'_> {
     }
 
     /// What a sight's shift is off by.
-    fn residual(
+    pub fn residual(
         &self,
         stone: &PoseStone,
         sight: &Sight,
         own: &SMatrix<f64, STONE, 1>,
         corrections: &DVector<f64>,
     ) -> Vector2<f64> {
-        let (a, _, _) = self.rows(stone, sight);
-        sight.shift - a * own - self.of_poses(stone, sight, corrections)
-    }
-
-    /// The part of a sight's shift that corrections of the poses make.
-    pub fn of_poses(&self, stone: &PoseStone, sight: &Sight, corrections: &DVector<f64>) -> Vector2<f64> {
-        let (_, pose, whole) = self.rows(stone, sight);
+        let (a, pose, whole) = self.rows(stone, sight);
         let of_pose = corrections.fixed_rows::<POSE>(POSE * sight.photo);
         let of_whole = corrections.fixed_rows::<WHOLE>(POSE * self.centres.len());
-        pose * of_pose + whole * of_whole
+        sight.shift - a * own - (pose * of_pose + whole * of_whole)
     }
 }
 

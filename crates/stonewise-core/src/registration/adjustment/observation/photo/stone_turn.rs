@@ -7,9 +7,9 @@ use crate::registration::photos::turn_by_rotation;
 use nalgebra::{RowSVector, RowVector3};
 
 /// Ratio of the bias of a turn to (bias of the shift / radius of the face). Parts of a face that are biased
-/// independently of each other would make it one; changes on a stone are correlated over longer distances. With two, 96 to 98
-/// of 100 turns of stones that were not loose lie within 1.96 standard deviations on `dam_small` and on each of
-/// three simulated walls (521 stones); with one 82 to 87.
+/// independently of each other would make it one; changes on a stone are correlated over longer distances. With
+/// two, 96 to 98 of 100 turns of stones that were not loose lie within 1.96 standard deviations on `dam_small`
+/// and on each of three simulated walls (521 stones); with one 82 to 87.
 const BIAS_OF_TURN: f64 = 2.0;
 
 /// How far a stone's picture turned between the epochs, from the axis along to the axis up.
@@ -99,8 +99,8 @@ impl StoneTurn {
     }
 
     /// Expected square of the bias over its variance before it is weighted, given the motion
-    /// `expected` from all other observations, with this covariance; `bias_sd_m`: standard deviation of the bias before it is weighted,
-    /// metres.
+    /// `expected` from all other observations, with this covariance; `bias_sd_m`: standard deviation of the
+    /// bias before it is weighted, metres.
     pub fn bias_square(
         &self,
         bias_sd_m: f64,
@@ -125,7 +125,7 @@ mod tests {
     use crate::geometry::{Camera, FaceFrame, Rigid3, View};
     use crate::id::ImageId;
     use crate::registration::photos::{FaceMotion, Photo, PhotoStatus, Sight, Track};
-    use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Point3, Vector2, Vector3};
+    use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Point3, Vector2, Vector3, Vector6};
 
     const CENTRES: [[f64; 3]; 4] = [
         [6.0, -2.0, 0.5],
@@ -191,28 +191,35 @@ mod tests {
         }
     }
 
+    /// Two photos an epoch at `centres`.
+    fn problem(centres: &[Point3<f64>], middle: Point3<f64>) -> PoseProblem<'_> {
+        PoseProblem {
+            centres,
+            epochs: &[0, 0, 1, 1],
+            scales: &[[0.003, 6.0]; 4],
+            pose_error_px: 0.5,
+            stones: Vec::new(),
+            middle,
+            extent_m: 2.0,
+        }
+    }
+
     /// Error of the turn of a stone that turned by 4 mrad, and the turn of the last photo.
     fn error(poses: &Poses) -> [f64; 2] {
         let turn_to_face = FaceFrame::from_normal(&Vector3::new(0.9, 0.1, 0.3)).face_from_world();
         let centres = CENTRES.map(Point3::from);
         let centroid = Point3::new(0.1, -0.3, 0.4);
-        let problem = PoseProblem {
-            centres: &centres,
-            epochs: &[0, 0, 1, 1],
-            scales: &[[0.003, 6.0]; 4],
-            pose_error_px: 0.5,
-            stones: Vec::new(),
-            middle: Point3::new(0.0, 0.0, 1.0),
-            extent_m: 2.0,
-        };
+        let problem = problem(&centres, Point3::new(0.0, 0.0, 1.0));
         // Differences of the shifts over the face, whose antisymmetric part is the turn.
         let by_shifts = |photo: usize| {
             let shift = |place: [f64; 2]| {
                 let at = centroid + turn_to_face.transpose() * Vector3::new(place[0], place[1], 0.0);
                 let track = track(Vec::new(), place);
-                problem.of_poses(
+                // The sight has no shift: what the poses make of it is missing.
+                -problem.residual(
                     &stone(&track, &centroid, &turn_to_face),
                     &sight(photo, &at, &turn_to_face),
+                    &Vector6::zeros(),
                     &poses.corrections,
                 )
             };
@@ -245,15 +252,7 @@ mod tests {
         let turn_to_face = FaceFrame::from_normal(&Vector3::x()).face_from_world();
         let at = Point3::origin();
         let track = track((0..4).map(|p| sight(p, &at, &turn_to_face)).collect(), [0.0; 2]);
-        let problem = PoseProblem {
-            centres: &centres,
-            epochs: &[0, 0, 1, 1],
-            scales: &[[0.003, 6.0]; 4],
-            pose_error_px: 0.5,
-            stones: Vec::new(),
-            middle: at,
-            extent_m: 2.0,
-        };
+        let problem = problem(&centres, at);
         let stone = stone(&track, &at, &turn_to_face);
         let found = problem.turn(&stone, &[1.0; 4], &poses(0.0)).unwrap();
         let expected = (1e-8 + 3.6e-9) / 0.01;
