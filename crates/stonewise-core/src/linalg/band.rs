@@ -1,6 +1,7 @@
 //! Symmetric positive definite band matrices: Cholesky factor, solves, log determinant.
 
 use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
 use std::ops::Range;
 
 /// Columns that are eliminated together: each later column is then read and written once for all of them.
@@ -32,21 +33,25 @@ impl Band {
         }
     }
 
-    /// Rows `first ..= first + count - 1` of column `column`; all must lie in the band and not above the
-    /// diagonal.
-    pub fn column_part(&mut self, column: usize, first: usize, count: usize) -> &mut [f64] {
-        let range = self.range(column, first, count);
-        &mut self.columns[range]
+    /// Adds to one entry of the lower triangle.
+    pub fn add(&mut self, row: usize, column: usize, value: f64) {
+        let range = self.range(column, row, 1);
+        self.columns[range][0] += value;
+    }
+
+    /// Adds `scale * values` to four rows of a column, the first of which must lie in the band and not above
+    /// the diagonal. Rows beyond the band or the last row must get zeros.
+    #[inline(always)]
+    pub fn add_run(&mut self, column: usize, first: usize, scale: f64, values: &[f64; 4]) {
+        let start = column * self.stride + first - column;
+        if let Some(run) = self.columns[start..].first_chunk_mut::<4>() {
+            *run = from_fn(|k| run[k] + scale * values[k]);
+        }
     }
 
     fn range(&self, column: usize, first: usize, count: usize) -> Range<usize> {
         let start = column * self.stride + first - column;
         start..start + count
-    }
-
-    /// Adds to one entry of the lower triangle.
-    pub fn add(&mut self, row: usize, column: usize, value: f64) {
-        self.column_part(column, row, 1)[0] += value;
     }
 
     /// L L' = A; `None` where A is not positive definite. Cost: size * half^2 / 2 multiplications.
@@ -154,16 +159,7 @@ impl BandFactor {
 
     /// Replaces the right-hand sides by L^-1 times them.
     pub fn forward<const N: usize>(&self, rhs: &mut [[f64; N]]) {
-        for j in 0..self.0.size {
-            let column = self.0.column(j);
-            let known = rhs[j].map(|y| y * column[0]);
-            rhs[j] = known;
-            for (l, y) in column[1..].iter().zip(&mut rhs[j + 1..]) {
-                for c in 0..N {
-                    y[c] -= l * known[c];
-                }
-            }
-        }
+        Arch::new().dispatch(Forward { factor: &self.0, rhs });
     }
 
     /// Replaces the right-hand side by A^-1 times it.
@@ -179,9 +175,43 @@ impl BandFactor {
     /// The inverse within the band, column by column from the last (Takahashi, Fagan & Chen 1973). Cost: size
     /// * half^2 multiplications.
     pub fn inverse(&self) -> BandInverse {
+        Arch::new().dispatch(Inversion(&self.0))
+    }
+}
+
+/// Solves with a factor, forward alone.
+struct Forward<'a, const N: usize> {
+    factor: &'a Band,
+    rhs: &'a mut [[f64; N]],
+}
+
+impl<const N: usize> WithSimd for Forward<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for j in 0..self.factor.size {
+            let column = self.factor.column(j);
+            let known = self.rhs[j].map(|y| y * column[0]);
+            self.rhs[j] = known;
+            for (l, y) in column[1..].iter().zip(&mut self.rhs[j + 1..]) {
+                *y = from_fn(|c| y[c] - l * known[c]);
+            }
+        }
+    }
+}
+
+/// Inverts a factored matrix within its band.
+struct Inversion<'a>(&'a Band);
+
+impl WithSimd for Inversion<'_> {
+    type Output = BandInverse;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> BandInverse {
         let Band {
             size, half, stride, ..
-        } = self.0;
+        } = *self.0;
         let mut inverse = Band::zeros(size, half);
         let mut sums = vec![0.0; half];
         for j in (0..size).rev() {
@@ -194,10 +224,7 @@ impl BandFactor {
             for (k, l) in below.iter().enumerate() {
                 let column = &known[k * stride..][..below.len() - k];
                 let (here, after) = sums[k..].split_at_mut(1);
-                here[0] += l * column[0] + dot(&column[1..], &below[k + 1..]);
-                for (sum, z) in after.iter_mut().zip(&column[1..]) {
-                    *sum += l * z;
-                }
+                here[0] += l * column[0] + dot_and_add(&column[1..], &below[k + 1..], *l, after);
             }
             let target = &mut before[j * stride..];
             for (entry, sum) in target[1..].iter_mut().zip(&*sums) {
@@ -209,16 +236,34 @@ impl BandFactor {
     }
 }
 
+/// The sum of products of a column and a row, as [`dot`] finds it; adds the column, times a factor, to sums.
+#[inline(always)]
+fn dot_and_add(column: &[f64], row: &[f64], factor: f64, sums: &mut [f64]) -> f64 {
+    let (columns, columns_rest) = column.as_chunks::<LANES>();
+    let (rows, rows_rest) = row.as_chunks::<LANES>();
+    let (totals, totals_rest) = sums.as_chunks_mut::<LANES>();
+    let mut lanes = [0.0; LANES];
+    for ((z, l), total) in columns.iter().zip(rows).zip(totals) {
+        lanes = from_fn(|k| lanes[k] + z[k] * l[k]);
+        *total = from_fn(|k| total[k] + factor * z[k]);
+    }
+    let mut rest = 0.0;
+    for ((z, l), total) in columns_rest.iter().zip(rows_rest).zip(totals_rest) {
+        rest += z * l;
+        *total += factor * z;
+    }
+    lanes.iter().sum::<f64>() + rest
+}
+
 /// Sum of products in lanes, so that no product waits for the sum before it. The longer of the two is cut.
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let length = a.len().min(b.len());
     let (a, a_rest) = a[..length].as_chunks::<LANES>();
     let (b, b_rest) = b[..length].as_chunks::<LANES>();
     let mut lanes = [0.0; LANES];
     for (a, b) in a.iter().zip(b) {
-        for k in 0..LANES {
-            lanes[k] += a[k] * b[k];
-        }
+        lanes = from_fn(|k| lanes[k] + a[k] * b[k]);
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
     lanes.iter().sum::<f64>() + rest

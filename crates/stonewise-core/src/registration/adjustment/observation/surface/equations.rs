@@ -7,7 +7,7 @@ use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
-use super::patch_grid::{PatchGrid, WeightedPoint};
+use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
 use super::patches::{PatchPoints, pool_into_patches};
 use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
@@ -76,7 +76,7 @@ pub(crate) fn equations(
     let motion = InverseMotion::new(motion);
     let patches = pool_into_patches(pair, &motion, &InverseMotion::new(window), layout);
     let mut sum = Equations::zeros(patches.overlap);
-    for patch in &patches.list {
+    for patch in patches.list {
         add_patch(patch, &motion, noise, layout, &mut sum);
     }
     if sum.scatter[1].1 > 0.0 {
@@ -88,9 +88,8 @@ pub(crate) fn equations(
 /// [`Equations::deviance`] alone, at `motion`, of all of these points.
 pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNoise, layout: &Layout) -> f64 {
     let motion = InverseMotion::new(motion);
-    let of_patch = |patch: &PatchPoints| {
-        let mut epochs = patch.epochs.clone();
-        robust_fit(patch.grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
+    let of_patch = |PatchPoints { grid, mut epochs }| {
+        robust_fit(grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
             let of_points = |(observations, sigma): (&Vec<WeightedPoint>, f64)| -> f64 {
                 fit.squares(observations, sigma).map(|square| square - 1.0).sum()
             };
@@ -99,32 +98,30 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
     };
     pool_into_patches(pair, &motion, &motion, layout)
         .list
-        .iter()
+        .into_iter()
         .map(of_patch)
         .sum()
 }
 
 /// Adds what a patch says to the equations.
 fn add_patch(
-    patch: &PatchPoints,
+    PatchPoints { grid, mut epochs }: PatchPoints,
     motion: &InverseMotion,
     noise: &SurfaceNoise,
     layout: &Layout,
     sum: &mut Equations,
 ) {
-    let mut epochs = patch.epochs.clone();
-    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
+    let Some(fit) = robust_fit(grid, &mut epochs, noise, layout) else {
         return;
     };
-    let mut coupling = vec![[0.0; 9]; patch.grid.coefficient_count()];
-    let mut cells = PatchCells::new(&patch.grid, layout.cell_m);
+    let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
+    let mut cells = PatchCells::new(&grid, layout.cell_m);
     let inverse = fit.factor.inverse();
     for (epoch, points) in epochs.iter().enumerate() {
         let sigma = noise.sigma_m[epoch];
         for o in points {
-            let [u, v, z] = o.position;
-            let [h, hu, hv] = fit.surface(u, v);
-            let r = z - h;
+            let [h, hu, hv] = fit.surface(&o.basis);
+            let r = o.position[2] - h;
             cells.add(epoch, o, r, [hu, hv]);
             sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
             sum.scatter[epoch].1 += 1.0;
@@ -135,7 +132,7 @@ fn add_patch(
             // The surface follows each point a little, most at the edge of the points, and takes the slope
             // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
             // the determinant makes good.
-            let bias = motion.jacobian(&o.position, fit.slope_covariance(u, v, &inverse));
+            let bias = motion.jacobian(&o.position, fit.slope_covariance(&o.basis, &inverse));
             let level = motion.jacobian(&o.position, [0.0; 2]);
             let bias = Vector9::from(bias) - Vector9::from(level);
             // What matters is the motion of one epoch against the other: half a step of each. Where the
@@ -143,7 +140,7 @@ fn add_patch(
             // out.
             sum.gradient += (j * r - bias) * (w * [-0.5, 0.5][epoch]);
             if epoch == 1 {
-                fit.scatter(u, v, w, &row, &mut coupling);
+                scatter(&o.basis, w, &row, &mut coupling);
                 sum.information.syger(w, &j, &j, 1.0);
             }
         }
@@ -151,6 +148,21 @@ fn add_patch(
     sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
     take_off_surface(&fit, coupling, &mut sum.information);
     cells.finish(noise, sum);
+}
+
+/// Adds `weight * basis * row` to the right-hand sides of the coefficients, one column for each of the motion's
+/// unknowns.
+fn scatter<const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
+    let [short, long] = basis.value;
+    for a in 0..4 {
+        let first = basis.row(a);
+        for (target, b) in into[first..first + 4].iter_mut().zip(short) {
+            let w = weight * long[a] * b;
+            for c in 0..N {
+                target[c] += w * row[c];
+            }
+        }
+    }
 }
 
 /// The surface is unknown: what it absorbs is taken off the information (Schur complement).

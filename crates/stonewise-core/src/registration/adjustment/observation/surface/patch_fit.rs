@@ -3,7 +3,7 @@
 //! Points of both epochs observe the surface with noise `sigma`; the coefficients are eliminated, which
 //! leaves the normal equations of the motion alone.
 
-use super::patch_grid::{PatchGrid, WeightedPoint};
+use super::patch_grid::{Basis, PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
 use crate::linalg::{BandFactor, BandInverse};
 
@@ -40,80 +40,56 @@ impl PatchFit {
     }
 
     /// Height and its slopes along u and v.
-    pub fn surface(&self, u: f64, v: f64) -> [f64; 3] {
-        let basis = self.grid.basis(u, v);
+    pub fn surface(&self, basis: &Basis) -> [f64; 3] {
         let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 3];
         for a in 0..4 {
-            let first = self.grid.index(&basis, a, 0);
+            let first = basis.row(a);
             let row = self.coefficients[first..first + 4].as_flattened();
             let along = |b: &[f64; 4]| row.iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
-            let (value, slope) = (along(&basis.value[s]), along(&basis.slope[s]));
-            out[0] += value * basis.value[l][a];
-            out[1 + s] += slope * basis.value[l][a];
-            out[1 + l] += value * basis.slope[l][a];
+            let (value, slope) = (along(&basis.value[0]), along(&basis.slope[0]));
+            out[0] += value * basis.value[1][a];
+            out[1 + s] += slope * basis.value[1][a];
+            out[1 + l] += value * basis.slope[1][a];
         }
         out
     }
 
     /// Covariance of the height with its slopes along u and v, given the points: `inverse` is that of
     /// [`Self::factor`].
-    pub fn slope_covariance(&self, u: f64, v: f64, inverse: &BandInverse) -> [f64; 2] {
-        let basis = self.grid.basis(u, v);
-        let (s, l) = (self.grid.short, 1 - self.grid.short);
-        let (bs, bl) = (basis.value[s], basis.value[l]);
+    pub fn slope_covariance(&self, basis: &Basis, inverse: &BandInverse) -> [f64; 2] {
+        let [short, long] = basis.value;
         // Covariance of each coefficient with the height.
         let mut with_height = [[0.0; 4]; 4];
         for a in 0..4 {
             for b in 0..4 {
-                let column = self.grid.index(&basis, a, b);
+                let column = basis.row(a) + b;
                 let own = inverse.column_part(column, column, 4 - b);
                 for (d, z) in (b..4).zip(own) {
-                    with_height[a][b] += z * bl[a] * bs[d];
+                    with_height[a][b] += z * long[a] * short[d];
                     if d > b {
-                        with_height[a][d] += z * bl[a] * bs[b];
+                        with_height[a][d] += z * long[a] * short[b];
                     }
                 }
                 for c in a + 1..4 {
-                    let part = inverse.column_part(column, self.grid.index(&basis, c, 0), 4);
-                    let sum: f64 = part.iter().zip(bs).map(|(z, s)| z * s).sum();
-                    with_height[a][b] += sum * bl[c];
-                    let back = bl[a] * bs[b];
+                    let part = inverse.column_part(column, basis.row(c), 4);
+                    let sum: f64 = part.iter().zip(short).map(|(z, s)| z * s).sum();
+                    with_height[a][b] += sum * long[c];
+                    let back = long[a] * short[b];
                     for (target, z) in with_height[c].iter_mut().zip(part) {
                         *target += z * back;
                     }
                 }
             }
         }
+        let (s, l) = (self.grid.short, 1 - self.grid.short);
         let mut out = [0.0; 2];
         for a in 0..4 {
             let along = |b: &[f64; 4]| with_height[a].iter().zip(b).map(|(c, b)| c * b).sum::<f64>();
-            out[s] += along(&basis.slope[s]) * bl[a];
-            out[l] += along(&bs) * basis.slope[l][a];
+            out[s] += along(&basis.slope[0]) * long[a];
+            out[l] += along(&short) * basis.slope[1][a];
         }
         out
-    }
-
-    /// Adds `weight * basis * row` to one right-hand side per column of the motion's Jacobian.
-    pub fn scatter<const N: usize>(
-        &self,
-        u: f64,
-        v: f64,
-        weight: f64,
-        row: &[f64; N],
-        into: &mut [[f64; N]],
-    ) {
-        let basis = self.grid.basis(u, v);
-        let (s, l) = (self.grid.short, 1 - self.grid.short);
-        for a in 0..4 {
-            for b in 0..4 {
-                let w = weight * basis.value[l][a] * basis.value[s][b];
-                let target = &mut into[self.grid.index(&basis, a, b)];
-                for c in 0..N {
-                    target[c] += w * row[c];
-                }
-            }
-        }
     }
 
     /// The surface's part of [`Self::deviance`].
@@ -136,7 +112,7 @@ impl PatchFit {
     /// Weighted squared residual of each point of an epoch, in units of its variance.
     pub fn squares(&self, observations: &[WeightedPoint], sigma: f64) -> impl Iterator<Item = f64> {
         observations.iter().map(move |o| {
-            let r = o.position[2] - self.surface(o.position[0], o.position[1])[0];
+            let r = o.position[2] - self.surface(&o.basis)[0];
             o.weight * r * r / (sigma * sigma)
         })
     }
@@ -155,13 +131,14 @@ mod tests {
     };
 
     fn points(seed: u64, count: usize, height: impl Fn(f64, f64) -> f64) -> Vec<WeightedPoint> {
+        let grid = grid();
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count)
             .map(|_| {
                 let (u, v) = (rng.random_range(0.0..0.10), rng.random_range(0.0..0.06));
                 WeightedPoint {
-                    position: [u, v, height(u, v)],
                     weight: rng.random_range(0.5..1.0),
+                    ..grid.point([u, v, height(u, v)])
                 }
             })
             .collect()
@@ -225,7 +202,7 @@ mod tests {
         let band = fit.factor.inverse();
         for (u, v) in [(0.013, 0.021), (0.05, 0.03), (0.099, 0.001), (0.0, 0.06)] {
             let basis = dense_basis(u, v);
-            let [h, hu, hv] = fit.surface(u, v);
+            let [h, hu, hv] = fit.surface(&grid().basis(u, v));
             assert!((h - basis.dot(&solution)).abs() < 1e-10, "{u} {v}");
             // One-sided where the patch ends: evaluation outside is clamped to the border.
             let step = 1e-6;
@@ -234,7 +211,7 @@ mod tests {
                 (dense_basis(u + du * step, v + dv * step) - back) / (2.0 * step)
             };
             let slopes = [slope(1.0, 0.0), slope(0.0, 1.0)];
-            let covariance = fit.slope_covariance(u, v, &band);
+            let covariance = fit.slope_covariance(&grid().basis(u, v), &band);
             for ((slope, found), with_height) in slopes.iter().zip([hu, hv]).zip(covariance) {
                 assert!((found - slope.dot(&solution)).abs() < 1e-6, "{u} {v}");
                 let expected = (slope.transpose() * &inverse * &basis)[0];
@@ -252,7 +229,7 @@ mod tests {
         let epochs = [points(3, 60, plane), points(4, 60, plane)];
         let fit = PatchFit::new(grid(), [&epochs[0], &epochs[1]], &NOISE).unwrap();
         assert!(fit.prior_quadratic < 1e-6, "{}", fit.prior_quadratic);
-        let [h, hu, hv] = fit.surface(0.04, 0.03);
+        let [h, hu, hv] = fit.surface(&grid().basis(0.04, 0.03));
         assert!((h - plane(0.04, 0.03)).abs() < 1e-7);
         assert!((hu - 0.3).abs() < 1e-5 && (hv + 0.2).abs() < 1e-5, "{hu} {hv}");
     }

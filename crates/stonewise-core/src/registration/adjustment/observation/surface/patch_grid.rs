@@ -5,16 +5,20 @@
 
 use super::surface_noise::SurfaceNoise;
 use crate::linalg::Band;
+use pulp::{Arch, Simd, WithSimd};
+use std::array::from_fn;
 
 /// Information of every coefficient in units of the prior's: keeps a patch whose points lie on a line
 /// solvable; far below any observation's weight.
 const RIDGE: f64 = 1e-8;
 
-/// A point in the stone's frame, with the factor by which its weight is reduced as an outlier.
+/// A point in the stone's frame, with the factor by which its weight is reduced as an outlier and the basis
+/// functions of its patch there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WeightedPoint {
     pub position: [f64; 3],
     pub weight: f64,
+    pub basis: Basis,
 }
 
 /// Where a patch lies and how its coefficients are numbered.
@@ -27,12 +31,24 @@ pub(crate) struct PatchGrid {
     pub short: usize,
 }
 
-/// Basis functions at a point: first coefficient along (short, long), values and derivatives per axis u, v.
-#[derive(Clone, Copy)]
+/// Basis functions at a point that are not zero there: four along each axis of the grid, the short one first.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
-    at: [usize; 2],
+    /// Number of the first coefficient.
+    first: usize,
+    /// Number of coefficients from one to the next along the long axis.
+    stride: usize,
     pub value: [[f64; 4]; 2],
+    /// Derivatives by the place along the axis, 1/m.
     pub slope: [[f64; 4]; 2],
+}
+
+impl Basis {
+    /// Number of the first of the four coefficients that lie `long` steps along the long axis.
+    #[inline(always)]
+    pub fn row(&self, long: usize) -> usize {
+        self.first + long * self.stride
+    }
 }
 
 impl PatchGrid {
@@ -66,46 +82,60 @@ impl PatchGrid {
         short * long
     }
 
+    /// A point that counts in full.
+    pub fn point(&self, position: [f64; 3]) -> WeightedPoint {
+        WeightedPoint {
+            position,
+            weight: 1.0,
+            basis: self.basis(position[0], position[1]),
+        }
+    }
+
     pub fn basis(&self, u: f64, v: f64) -> Basis {
+        let place = [u, v];
         let mut at = [0; 2];
         let mut value = [[0.0; 4]; 2];
         let mut slope = [[0.0; 4]; 2];
-        for (axis, x) in [u, v].into_iter().enumerate() {
-            let s = ((x - self.origin[axis]) / self.cell_m).clamp(0.0, self.cells[axis] as f64);
+        for (k, axis) in [self.short, 1 - self.short].into_iter().enumerate() {
+            let s = ((place[axis] - self.origin[axis]) / self.cell_m).clamp(0.0, self.cells[axis] as f64);
             let cell = (s as usize).min(self.cells[axis] - 1);
             let t = s - cell as f64;
             let r = 1.0 - t;
-            value[axis] = [
+            value[k] = [
                 r * r * r / 6.0,
                 (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
                 (3.0 * r * r * r - 6.0 * r * r + 4.0) / 6.0,
                 t * t * t / 6.0,
             ];
-            slope[axis] = [
+            slope[k] = [
                 -r * r / 2.0,
                 (3.0 * t * t - 4.0 * t) / 2.0,
                 (4.0 * r - 3.0 * r * r) / 2.0,
                 t * t / 2.0,
             ]
             .map(|d| d / self.cell_m);
-            at[usize::from(axis != self.short)] = cell;
+            at[k] = cell;
         }
-        Basis { at, value, slope }
-    }
-
-    /// Number of the coefficient `long` and `short` steps from the first one that the point touches.
-    pub fn index(&self, basis: &Basis, long: usize, short: usize) -> usize {
-        (basis.at[1] + long) * (self.cells[self.short] + 3) + basis.at[0] + short
+        let [stride, _] = self.counts();
+        Basis {
+            first: at[1] * stride + at[0],
+            stride,
+            value,
+            slope,
+        }
     }
 
     pub fn assemble(&self, epochs: [&[WeightedPoint]; 2], noise: &SurfaceNoise) -> (Band, Vec<[f64; 1]>) {
         let [short, _] = self.counts();
         let mut matrix = Band::zeros(self.coefficient_count(), 3 * short + 3);
         let mut rhs = vec![[0.0]; self.coefficient_count()];
-        for (observations, sigma) in epochs.into_iter().zip(noise.sigma_m) {
-            for o in observations {
-                self.add_observation(o, o.weight / (sigma * sigma), &mut matrix, &mut rhs);
-            }
+        for (points, sigma) in epochs.into_iter().zip(noise.sigma_m) {
+            Arch::new().dispatch(Observations {
+                points,
+                variance: sigma * sigma,
+                matrix: &mut matrix,
+                rhs: &mut rhs,
+            });
         }
         self.each_difference(|taps| {
             let scale = 1.0 / (noise.tau_m * noise.tau_m);
@@ -122,31 +152,6 @@ impl PatchGrid {
             matrix.add(i, i, RIDGE / (noise.tau_m * noise.tau_m));
         }
         (matrix, rhs)
-    }
-
-    /// Adds what a point says to the normal equations of the coefficients: products of its basis along the
-    /// short axis, times those along the long one.
-    fn add_observation(&self, o: &WeightedPoint, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
-        let basis = self.basis(o.position[0], o.position[1]);
-        let (bs, bl) = (basis.value[self.short], basis.value[1 - self.short]);
-        let products = bs.map(|x| bs.map(|y| weight * x * y));
-        for a in 0..4 {
-            for b in 0..4 {
-                let column = self.index(&basis, a, b);
-                rhs[column][0] += weight * bl[a] * bs[b] * o.position[2];
-                let own = matrix.column_part(column, column, 4 - b);
-                for (entry, p) in own.iter_mut().zip(&products[b][b..]) {
-                    *entry += bl[a] * bl[a] * p;
-                }
-                for c in a + 1..4 {
-                    let along = bl[a] * bl[c];
-                    let part = matrix.column_part(column, self.index(&basis, c, 0), 4);
-                    for (entry, p) in part.iter_mut().zip(products[b]) {
-                        *entry += along * p;
-                    }
-                }
-            }
-        }
     }
 
     /// The prior's second differences: along each axis, and mixed (twice, as in a thin plate).
@@ -170,6 +175,49 @@ impl PatchGrid {
                         (i, mixed),
                     ]);
                 }
+            }
+        }
+    }
+}
+
+/// Adds what points of an epoch say to the normal equations of the coefficients.
+struct Observations<'a> {
+    points: &'a [WeightedPoint],
+    /// Of a point of full weight, m^2.
+    variance: f64,
+    matrix: &'a mut Band,
+    rhs: &'a mut [[f64; 1]],
+}
+
+impl WithSimd for Observations<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for point in self.points {
+            let weight = point.weight / self.variance;
+            add_observation(point, weight, self.matrix, self.rhs);
+        }
+    }
+}
+
+/// Adds what a point says: products of its basis along the short axis, times those along the long one.
+#[inline(always)]
+fn add_observation(point: &WeightedPoint, weight: f64, matrix: &mut Band, rhs: &mut [[f64; 1]]) {
+    let [short, long] = point.basis.value;
+    let products: [[f64; 4]; 4] = from_fn(|b| from_fn(|d| weight * short[b] * short[d]));
+    // The same from the diagonal on, as columns of the lower triangle hold them.
+    let below: [[f64; 4]; 4] = from_fn(|b| from_fn(|k| products[b].get(b + k).copied().unwrap_or(0.0)));
+    for a in 0..4 {
+        let row = point.basis.row(a);
+        let along = weight * long[a];
+        for (entry, b) in rhs[row..row + 4].iter_mut().zip(short) {
+            entry[0] += along * b * point.position[2];
+        }
+        for b in 0..4 {
+            matrix.add_run(row + b, row + b, long[a] * long[a], &below[b]);
+            for c in a + 1..4 {
+                matrix.add_run(row + b, point.basis.row(c), long[a] * long[c], &products[b]);
             }
         }
     }

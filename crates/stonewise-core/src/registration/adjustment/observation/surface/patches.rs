@@ -39,27 +39,22 @@ pub(crate) fn pool_into_patches(
             overlap: 0.0,
         };
     };
-    let mut epochs = vec![[Vec::new(), Vec::new()]; cuts.count[0] * cuts.count[1]];
+    let mut list: Vec<PatchPoints> = (0..cuts.count[0] * cuts.count[1])
+        .map(|patch| PatchPoints {
+            grid: cuts.grid(patch, layout.cell_m),
+            epochs: [Vec::new(), Vec::new()],
+        })
+        .collect();
     let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
     let moved = pair.second_moved_back(motion, window).map(|p| (1, p));
     for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
         compare.count(epoch, &p);
         if let Some(patch) = cuts.patch_at(&p) {
-            epochs[patch][epoch].push(WeightedPoint {
-                position: p,
-                weight: 1.0,
-            });
+            let PatchPoints { grid, epochs } = &mut list[patch];
+            epochs[epoch].push(grid.point(p));
         }
     }
-    let list = epochs
-        .into_iter()
-        .enumerate()
-        .filter(|(_, e)| e.iter().all(|o| o.len() >= PATCH_POINTS))
-        .map(|(patch, epochs)| PatchPoints {
-            grid: cuts.grid(patch, layout.cell_m),
-            epochs,
-        })
-        .collect();
+    list.retain(|patch| patch.epochs.iter().all(|o| o.len() >= PATCH_POINTS));
     Patches {
         list,
         overlap: compare.overlap(),

@@ -50,10 +50,9 @@ pub(crate) fn robust_fit(
 
 /// Weight of a point by the slopes of the surface there and its distance from it.
 fn weight(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
-    let [u, v, z] = point.position;
-    let [h, hu, hv] = fit.surface(u, v);
+    let [h, hu, hv] = fit.surface(&point.basis);
     let steepness = steepness([hu, hv]);
-    let distance = (z - h).abs() * steepness.sqrt();
+    let distance = (point.position[2] - h).abs() * steepness.sqrt();
     let outlying = if distance > limit_m {
         (limit_m / distance).powi(2)
     } else {
