@@ -182,6 +182,7 @@ impl<S: PairSource> Run<'_, S> {
 
     /// Iterates with frozen weights and components until no stone moves; whether they came to rest.
     fn settle(&mut self) -> Result<bool, AdjustError<S::Error>> {
+        self.adjustment.forget_swings();
         while self.begins() {
             self.adjustment.evaluate(self.source, self.progress)?;
             let equations = self.adjustment.equations();

@@ -57,6 +57,12 @@ impl CandidateMotion {
         }
     }
 
+    /// Takes full steps again: what the candidate swung with has come to rest.
+    pub fn forget_swings(&mut self) {
+        self.last_step = Vector3::zeros();
+        self.share = 1.0;
+    }
+
     /// Steps towards a motion, not farther than `max_step_m`, less where the stone swings; the length of the
     /// step, metres.
     pub fn move_to(&mut self, target: &StoneVector, max_step_m: f64) -> f64 {
@@ -94,6 +100,18 @@ mod tests {
             assert!((length - expected).abs() < 1e-15, "{lengths:?}");
         }
         assert!((stone.motion.translation().x - 0.04).abs() < 1e-15);
+    }
+
+    #[test]
+    fn full_steps_return_once_swings_are_forgotten() {
+        let mut stone = CandidateMotion::new(along(0.0));
+        for target in [4e-3, 0.0, 4e-3, 0.0] {
+            stone.move_to(&along(target), 0.015);
+        }
+        assert!(stone.share < 0.2, "{}", stone.share);
+        stone.forget_swings();
+        stone.move_to(&along(9e-3), 0.015);
+        assert!((stone.motion.translation().x - 9e-3).abs() < 1e-15);
     }
 
     #[test]

@@ -40,6 +40,17 @@ impl Adjustment {
         restless * RESTLESS <= self.stones.len()
     }
 
+    /// Lets all stones take full steps again, once weights and components are frozen: while these followed each
+    /// other, whole walls swung with them.
+    pub fn forget_swings(&mut self) {
+        for stone in &mut self.stones {
+            stone.with_field.forget_swings();
+            if let Some(own) = &mut stone.on_own {
+                own.forget_swings();
+            }
+        }
+    }
+
     /// Moves a stone on its own, or begins to where that has become likely.
     fn step_on_own(&mut self, i: usize, equations: &StoneEquations, field: &Field) -> Step {
         let wide = self.loose.own_variances(&self.components);
