@@ -127,6 +127,12 @@ pub enum Error {
     /// The weights of the detector could not be read.
     #[error(transparent)]
     Weights(#[from] stonewise_segment::model::WeightsError),
+    /// Labelled photos could not be used.
+    #[error(transparent)]
+    Labelled(#[from] stonewise_segment::dataset::DatasetError),
+    /// The detector could not be trained.
+    #[error(transparent)]
+    Training(#[from] stonewise_segment::train::TrainError),
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] stonewise_io::image_io::ImageIoError),

@@ -1,12 +1,16 @@
 //! Experiments on a small simulated survey: what they find, against single runs and against what is known
 //! beforehand.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that cannot go on must stop"
+)]
 
 use nalgebra::Vector3;
 use std::fs;
 use std::path::Path;
 use stonewise::experiment::{
-    Influence, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
+    Influence, PaperOptions, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
 };
 use stonewise::simulate::{SurveyParams, write_survey};
 use stonewise::{OutputFolder, Part, Project, Until, run};
@@ -15,8 +19,13 @@ use stonewise_core::progress::Silent;
 use stonewise_core::simulate::{PhotoParams, SceneParams, SurroundingsParams, TlsParams, WallParams};
 use tempfile::TempDir;
 
-/// A wall of a few dozen stones and four photos an epoch, whose halves still have two.
 fn survey() -> (TempDir, Project) {
+    survey_with_photos(false)
+}
+
+/// A wall of a few dozen stones and four photos an epoch, whose halves still have two. `rendered`: the photos
+/// show the wall.
+fn survey_with_photos(rendered: bool) -> (TempDir, Project) {
     let params = SurveyParams {
         scene: SceneParams {
             wall: WallParams {
@@ -43,7 +52,7 @@ fn survey() -> (TempDir, Project) {
             height: 400,
             focal_px: 900.0,
             distance_m: 5.0,
-            rendered: false,
+            rendered,
             ..PhotoParams::default()
         },
         ..SurveyParams::default()
@@ -148,7 +157,11 @@ fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
         project,
         paper_part: Some(part),
     }];
-    let tables = paper(&surveys, None, 1, &out, &Silent).unwrap();
+    let options = PaperOptions {
+        seed: 1,
+        ..PaperOptions::default()
+    };
+    let tables = paper(&surveys, &options, &out, &Silent).unwrap();
     let text = tables.markdown();
     assert_eq!(text, fs::read_to_string(out.join("tables.md")).unwrap());
     // The paper's own figures stand beside ours.
@@ -187,10 +200,69 @@ fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
         "the page needs other files"
     );
     assert!(out.join("figures/figure_6-tls-stonewise.svg").exists());
-    let unknown = paper(&surveys, Some("2031"), 1, &out, &Silent)
-        .unwrap_err()
-        .to_string();
+    assert!(page.contains("TLS: in all tables and figures the stones are given as masks"));
+    assert!(tables.segmentation.is_empty() && !out.join("segmentation.csv").exists());
+    let later = PaperOptions {
+        epoch: Some("2031".to_owned()),
+        ..options
+    };
+    let unknown = paper(&surveys, &later, &out, &Silent).unwrap_err().to_string();
     assert!(unknown.contains("epoch 1"), "{unknown}");
+}
+
+#[test]
+fn a_detector_learns_some_stones_is_measured_on_the_others_and_finds_all() {
+    let (dir, project) = survey_with_photos(true);
+    let masks = fs::read_to_string(project.epochs[0].masks.as_ref().unwrap()).unwrap();
+    let masks: serde_json::Value = serde_json::from_str(&masks).unwrap();
+    let labelled = masks["annotations"].as_array().unwrap().len();
+    let out = dir.path().join("paper");
+    let surveys = ["TLS", "again"].map(|name| PaperSurvey {
+        name: name.to_owned(),
+        project: project.clone(),
+        paper_part: None,
+    });
+    let options = PaperOptions {
+        train_minutes: Some(0.001),
+        ..PaperOptions::default()
+    };
+    let tables = paper(&surveys, &options, &out, &Silent).unwrap();
+    // Both surveys have the same photos: one training, of a single step.
+    let [trained, before] = &tables.segmentation[..] else {
+        panic!("{:?}", tables.segmentation)
+    };
+    assert!(trained.detector.contains("(1 step"), "{}", trained.detector);
+    assert_eq!((before.surveys.as_str(), before.photos), ("TLS, again", 4));
+    let held_out = trained.score.references;
+    assert_eq!(before.score.references, held_out);
+    let share = held_out as f64 / labelled as f64;
+    assert!((0.02..0.3).contains(&share), "{held_out} of {labelled}");
+    assert!(before.score.f1.unwrap() > 0.5, "{:?}", before.score);
+    let text = tables.markdown();
+    assert!(
+        text.contains("| the paper's network, on its own dam | – | – | – | – | 0.92 | 0.72 | 0.81 | 0.84 |")
+    );
+    let csv = fs::read_to_string(out.join("segmentation.csv")).unwrap();
+    let counts = format!("\"TLS, again\",4,{held_out},");
+    assert!(csv.lines().skip(1).all(|row| row.contains(&counts)), "{csv}");
+    // The masks that were given took no part in the runs.
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.contains("instances), found by the detector that was trained"));
+    assert!(!page.contains("given as masks"));
+    let repeated = paper(&surveys, &options, &out, &Silent).unwrap();
+    assert_eq!(repeated, tables);
+    let mut unlabelled = project;
+    unlabelled.epochs[0].masks = None;
+    let surveys = [PaperSurvey {
+        name: "TLS".to_owned(),
+        project: unlabelled,
+        paper_part: None,
+    }];
+    let error = paper(&surveys, &options, &out, &Silent).unwrap_err().to_string();
+    assert!(
+        error.contains("epoch 1") && error.contains("--train-minutes"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -8,7 +8,7 @@ use anyhow::{Result, bail};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stonewise::experiment::{
-    PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
+    PaperOptions, PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
 };
 use stonewise::simulate::SurveyParams;
 use stonewise::{OutputFolder, Owner, Project};
@@ -25,7 +25,8 @@ pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> 
 fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     // Read first, so that a project with a mistake claims no folder.
     let given: Vec<PaperSurvey> = args.surveys.iter().map(|s| survey(s)).collect::<Result<_>>()?;
-    let inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
+    let mut inputs: Vec<PathBuf> = given.iter().flat_map(|s| s.project.inputs()).collect();
+    inputs.extend(args.valid.clone());
     let files: Vec<PathBuf> = given.iter().map(|s| s.project.path.clone()).collect();
     let owner = Owner::inputs("experiment paper", &files);
     let folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &["work"], force)?;
@@ -39,7 +40,13 @@ fn paper(args: &PaperArgs, force: bool, printer: &Printer) -> Result<Outcome> {
             survey.paper_part = Some(part("--paper-part", text, &survey.project)?);
         }
     }
-    let tables = run_paper(&surveys, args.epoch.as_deref(), args.seed, folder.path(), printer)?;
+    let options = PaperOptions {
+        epoch: args.epoch.clone(),
+        seed: args.seed,
+        train_minutes: args.train_minutes,
+        valid: args.valid.clone(),
+    };
+    let tables = run_paper(&surveys, &options, folder.path(), printer)?;
     printer.finish();
     write!(std::io::stdout(), "{}", tables.markdown())?;
     printer.log(&format!("open {}", args.out.join("index.html").display()));

@@ -71,6 +71,15 @@ impl<'a> PhotoCrops<'a> {
             .collect())
     }
 
+    /// A whole photo, by its place in the list, with nothing known but the stones that are kept for measuring.
+    ///
+    /// # Errors
+    /// The photo or its masks cannot be read.
+    pub fn held_out(&self, index: usize) -> Result<Sample, DatasetError> {
+        let photo = Photo::new(self.photos.read(&self.photos.photos()[index])?);
+        Ok(self.split(&photo, index).for_validation(photo.sample()))
+    }
+
     /// Edge of a block, pixels of the photo: what an image shows that is measured on.
     fn block_px(&self, photo: &Photo) -> u32 {
         let sides = [photo.sample().image().width(), photo.sample().image().height()];

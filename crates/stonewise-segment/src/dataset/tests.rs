@@ -104,6 +104,19 @@ fn crops_come_from_labelled_photos_and_repeat() {
 }
 
 #[test]
+fn crops_show_no_label_of_what_is_held_out() {
+    let (dir, masks) = folder();
+    std::fs::remove_file(dir.path().join("b.png")).unwrap();
+    let photos = LabelledPhotos::open(dir.path(), &masks, None).unwrap();
+    let crops = PhotoCrops::new(&photos, AugmentParams::default(), 64, 5);
+    let held_out = stones(&crops.held_out(0).unwrap());
+    let learnt: BTreeSet<u32> = (0..200).flat_map(|n| stones(&crops.sample(n).unwrap())).collect();
+    assert!(!held_out.is_empty() && held_out.is_disjoint(&learnt));
+    // All 80 stones are seen by one or the other.
+    assert_eq!(held_out.len() + learnt.len(), 80);
+}
+
+#[test]
 fn outside_valid_regions_nothing_is_known() {
     let (dir, masks) = folder();
     let valid = dir.path().join("valid.json");

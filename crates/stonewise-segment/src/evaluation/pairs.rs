@@ -1,6 +1,7 @@
 //! Stones found against reference stones, in one photo.
 
 use crate::Segmentation;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::raster::{LabelImage, Raster};
 
@@ -9,7 +10,7 @@ use stonewise_core::raster::{LabelImage, Raster};
 const LEAST_IOU: f64 = 0.5;
 
 /// What became of the stones of one photo.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotoPairs {
     /// Reference stones that count.
     pub references: usize,
@@ -18,7 +19,7 @@ pub struct PhotoPairs {
 }
 
 /// A stone that was found, and the reference stone that it fits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundStone {
     /// How sure the detector was.
     pub score: f32,

@@ -11,6 +11,6 @@ mod sensitivity;
 mod settings_with;
 mod tune;
 
-pub use paper::{Detail, PaperSurvey, PaperTables, paper};
+pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
 pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};

@@ -57,13 +57,6 @@ pub(super) struct Case {
     pub inside: Option<[MotionScore; 2]>,
 }
 
-/// A photo with the outlines of its stones, for the paper's figure 5.
-pub(super) struct Example {
-    pub photo: String,
-    pub instances: usize,
-    pub jpeg: Vec<u8>,
-}
-
 /// A name as a folder: letters, digits, dashes.
 pub(super) fn file_name(name: &str) -> PathBuf {
     let plain: String = name

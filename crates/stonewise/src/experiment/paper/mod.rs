@@ -2,18 +2,21 @@
 //! table again.
 
 mod case;
+mod detectors;
+mod figure_5;
 mod figures;
+mod options;
+mod outcome;
 mod page;
-mod segmentation;
 mod tables;
 
-pub use tables::{Detail, PaperTables};
+pub use options::{PaperOptions, PaperSurvey};
+pub use tables::{Detail, PaperTables, Segmented};
 
 use crate::error::{Error, Result};
 use crate::experiment::halves::halves_of;
 use crate::experiment::known_motion::{KnownMotion, paper_motions};
 use crate::experiment::quiet::Quiet;
-use crate::part::Part;
 use crate::pipeline::{Context, Until, first_stones, run_in};
 use crate::project::{Epoch, Project};
 use crate::results::ResultSet;
@@ -21,73 +24,90 @@ use crate::settings::Settings;
 use crate::storage::store::{Keeps, StepStore};
 use crate::truth::outcome;
 use case::{Case, Method, file_name};
+use detectors::DetectorTraining;
 use nalgebra::{Point3, Vector3};
+use outcome::{MaskOrigin, Outcome};
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint};
 use stonewise_core::evaluate::{MotionScore, StoneOutcome, score_change, score_stones};
 use stonewise_core::progress::Progress;
 
-/// A survey whose first epoch is split, under the name of its scanner.
-#[derive(Clone, Debug)]
-pub struct PaperSurvey {
-    /// `TLS`, `UAV`, or what the caller calls it.
-    pub name: String,
-    /// The survey; only one epoch of it is used.
-    pub project: Project,
-    /// Where the paper's estimator measures, which takes seconds a stone; everywhere where absent.
-    pub paper_part: Option<Part>,
-}
-
-/// Does the whole experiment and writes `index.html`, `tables.md`, `table2.csv` and `figures/` into `out`.
+/// Does the whole experiment and writes `index.html`, `tables.md`, `table2.csv`, `segmentation.csv` (where a
+/// detector is measured) and `figures/` into `out`.
 ///
-/// Each survey: the epoch of this name (the first where absent) is split at random into halves of its points
-/// and photos; each half is labelled on its own; the points of the second are moved by the paper's
-/// translation, or by its bulge, after labelling; stones are matched and measured with the project's settings
-/// and again in the paper's way; M3C2 runs on the same clouds. The folder of each run holds its tables. An
-/// interrupted experiment goes on where it stopped.
+/// Each survey: the epoch is split at random into halves of its points and photos; each half is labelled on
+/// its own; the points of the second are moved by the paper's translation, or by its bulge, after labelling;
+/// stones are matched and measured with the project's settings and again in the paper's way; M3C2 runs on the
+/// same clouds. The folder of each run holds its tables. An interrupted experiment goes on where it stopped.
 ///
 /// # Errors
-/// No survey, no such epoch, or what stops a run.
+/// No survey, no such epoch, no masks to learn from, or what stops a run.
 pub fn paper(
     surveys: &[PaperSurvey],
-    epoch: Option<&str>,
-    seed: u64,
+    options: &PaperOptions,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<PaperTables> {
-    let mut cases = Vec::new();
-    let mut example = None;
+    let mut all = Outcome::default();
     let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
     for survey in surveys {
-        let epoch = epoch_of(&survey.project, epoch)?;
-        let halves = halves_of(&survey.project, epoch, seed, &store, progress)?;
-        let folder = out.join(file_name(&survey.name));
-        let context = Context::with_store(&halves, &folder, Arc::clone(&store), progress)?;
-        let split = SplitSurvey {
-            survey,
-            halves: &halves,
-        };
-        let motions = paper_motions(&first_stones(&context)?)?;
-        if example.is_none() {
-            example = segmentation::example(&context)?;
-        }
-        for motion in &motions {
-            for method in Method::ALL {
-                progress.begin(&format!("{}: {}, {}", survey.name, motion.name, method.name()), 1);
-                let folder = folder.join(format!("{}-{}", motion.name, method.folder()));
-                cases.extend(measure(&split, motion, method, &folder, &store, progress)?);
-                progress.advance(1);
-            }
-        }
+        add(&mut all, survey, options, out, &store, progress)?;
     }
-    if cases.is_empty() {
+    if all.cases.is_empty() {
         let message = "nothing to show: no survey was given, or no stone of one half was found in the other";
         return Err(Error::Survey(message.to_owned()));
     }
-    let tables = PaperTables::new(&cases);
-    page::write(&cases, example.as_ref(), &tables, out)?;
+    let tables = PaperTables::new(&all);
+    page::write(&all, &tables, out)?;
     Ok(tables)
+}
+
+/// All runs of a survey.
+fn add(
+    all: &mut Outcome,
+    survey: &PaperSurvey,
+    options: &PaperOptions,
+    out: &Path,
+    store: &Arc<StepStore>,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let epoch = epoch_of(&survey.project, options.epoch.as_deref())?;
+    let mut halves = halves_of(&survey.project, epoch, options.seed, store, progress)?;
+    if let Some(minutes) = options.train_minutes {
+        let training = DetectorTraining {
+            epoch,
+            valid: options.valid.as_deref(),
+            params: &survey.project.settings.segment,
+            minutes,
+            store,
+            out: &out.join("work/training"),
+        };
+        halves.settings.segment.model = training.run(&survey.name, &mut all.detectors, progress)?;
+        halves.epochs.iter_mut().for_each(|half| half.masks = None);
+    }
+    let origin = MaskOrigin::of(survey, &halves, options);
+    let folder = out.join(file_name(&survey.name));
+    let context = Context::with_store(&halves, &folder, Arc::clone(store), progress)?;
+    let motions = paper_motions(&first_stones(&context)?)?;
+    if all.example.is_none() {
+        all.example = figure_5::example(&context, &origin.words)?;
+    }
+    all.origins.push(origin);
+    let split = SplitSurvey {
+        survey,
+        halves: &halves,
+    };
+    for motion in &motions {
+        for method in Method::ALL {
+            progress.begin(&format!("{}: {}, {}", survey.name, motion.name, method.name()), 1);
+            let folder = folder.join(format!("{}-{}", motion.name, method.folder()));
+            all.cases
+                .extend(measure(&split, motion, method, &folder, store, progress)?);
+            progress.advance(1);
+        }
+    }
+    Ok(())
 }
 
 /// The epoch of this name, or the first.

@@ -1,11 +1,14 @@
 //! The paper's tables beside ours.
 
 use super::case::{Case, Method};
+use super::detectors::MeasuredDetectors;
+use super::outcome::Outcome;
 use crate::error::Result;
 use crate::figure::number;
 use std::fmt::Write;
 use stonewise_core::evaluate::{Directions, ErrorStatistics, MotionScore};
 use stonewise_io::table::Table;
+use stonewise_segment::evaluation::MaskScore;
 
 /// What Table 2 of the paper says, RMSE in centimetres: in-plane (translation), out-of-plane (bulge).
 const PAPER: [(&str, &str, [f64; 2]); 4] = [
@@ -15,6 +18,10 @@ const PAPER: [(&str, &str, [f64; 2]); 4] = [
     ("M3C2", "TLS", [3.8, 0.6]),
 ];
 
+/// What section 4 of the paper says of its network, trained on photos of its dam: precision, recall, F1, mean
+/// IoU.
+const PAPER_SEGMENTATION: [f64; 4] = [0.92, 0.72, 0.81, 0.84];
+
 /// The tables of the experiment, as text.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PaperTables {
@@ -23,8 +30,23 @@ pub struct PaperTables {
     /// Method, survey, how many were estimated with either motion, RMSE in-plane per axis (translation) and
     /// out of plane (bulge) in cm, the paper's two figures.
     pub rmse: Vec<Vec<String>>,
+    /// Figures of every detector on the stones held out of labelled photos; empty where none was asked for.
+    pub segmentation: Vec<Segmented>,
     /// All figures of every run, one row a method, survey, motion and region.
     pub details: Vec<Detail>,
+}
+
+/// Figures of one detector on the stones held out of labelled photos.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segmented {
+    /// Detector.
+    pub detector: String,
+    /// Surveys with these photos.
+    pub surveys: String,
+    /// Photos with masks.
+    pub photos: usize,
+    /// The figures.
+    pub score: MaskScore,
 }
 
 /// Figures of one method on one survey with one motion; lengths in metres.
@@ -73,24 +95,40 @@ pub(super) const RMSE_HEAD: [&str; 8] = [
     "paper: in-plane cm",
     "paper: out-of-plane cm",
 ];
+pub(super) const SEGMENTATION_HEAD: [&str; 9] = [
+    "detector",
+    "surveys",
+    "photos",
+    "stones held out",
+    "found",
+    "precision",
+    "recall",
+    "F1",
+    "mean IoU",
+];
 pub(super) const PARAMETER_HEAD: [&str; 4] =
     ["parameter", "paper", "the paper's estimator here", "stonewise"];
 
 impl PaperTables {
-    pub(super) fn new(cases: &[Case]) -> Self {
+    pub(super) fn new(all: &Outcome) -> Self {
         Self {
-            parameters: parameters(cases),
-            rmse: rmse(cases),
-            details: cases.iter().flat_map(details).collect(),
+            parameters: parameters(&all.cases),
+            rmse: rmse(&all.cases),
+            segmentation: all.detectors.iter().flat_map(segmented).collect(),
+            details: all.cases.iter().flat_map(details).collect(),
         }
     }
 
-    /// Table 1, Table 2 and the details as Markdown.
+    /// Table 1, Table 2, the segmentation and the details as Markdown.
     pub fn markdown(&self) -> String {
         let mut out = String::from("Table 1: parameters\n\n");
         out += &markdown(&PARAMETER_HEAD, &self.parameters);
         out += "\nTable 2: RMSE of detected and applied motions; in-plane: per axis, of the translation; out-of-plane: of the bulge\n\n";
         out += &markdown(&RMSE_HEAD, &self.rmse);
+        if !self.segmentation.is_empty() {
+            out += "\nSegmentation: stones held out of the training\n\n";
+            out += &markdown(&SEGMENTATION_HEAD, &self.segmentation_rows());
+        }
         out += "\nAll figures\n\n";
         out += &markdown(&DETAIL_HEAD, &self.detail_rows());
         out
@@ -111,6 +149,53 @@ impl PaperTables {
             row
         };
         self.details.iter().map(row).collect()
+    }
+
+    /// The paper's figures, and those of the detectors.
+    pub(super) fn segmentation_rows(&self) -> Vec<Vec<String>> {
+        let shares = |values: [Option<f64>; 4]| values.map(|v| number(v.unwrap_or(f64::NAN), 2));
+        let mut paper = vec!["the paper's network, on its own dam".to_owned()];
+        paper.extend(["–"; 4].map(str::to_owned));
+        paper.extend(shares(PAPER_SEGMENTATION.map(Some)));
+        let row = |s: &Segmented| {
+            let counts = [s.photos, s.score.references, s.score.found].map(|n| n.to_string());
+            let mut row = vec![s.detector.clone(), s.surveys.clone()];
+            row.extend(counts);
+            row.extend(shares(figures(&s.score)));
+            row
+        };
+        std::iter::once(paper)
+            .chain(self.segmentation.iter().map(row))
+            .collect()
+    }
+
+    /// Figures of the detectors as a table of numbers; NaN where a figure is not defined.
+    pub(super) fn segmentation_csv(&self) -> Result<Table> {
+        let all = &self.segmentation;
+        let count = |of: fn(&Segmented) -> usize| all.iter().map(|s| of(s) as u32).collect::<Vec<u32>>();
+        let mut table = Table::new();
+        let detectors: Vec<String> = all.iter().map(|s| s.detector.clone()).collect();
+        table.push("detector", "", "detector", detectors)?;
+        let surveys: Vec<String> = all.iter().map(|s| s.surveys.clone()).collect();
+        table.push("surveys", "", "surveys with these photos", surveys)?;
+        table.push("photos", "", "photos with masks", count(|s| s.photos))?;
+        let meaning = "true stones held out of training";
+        table.push("references", "", meaning, count(|s| s.score.references))?;
+        let meaning = "stones found where they lie";
+        table.push("found", "", meaning, count(|s| s.score.found))?;
+        let meaning = "stones found that fit a true one with an IoU of at least 0.5";
+        table.push("right", "", meaning, count(|s| s.score.right))?;
+        let columns = [
+            ("precision", "share of the stones found that are right, 0 to 1"),
+            ("recall", "share of the true stones that are found, 0 to 1"),
+            ("f1", "harmonic mean of precision and recall, 0 to 1"),
+            ("mean_iou", "mean IoU of the stones that are right, 0 to 1"),
+        ];
+        for (i, (name, meaning)) in columns.into_iter().enumerate() {
+            let values = all.iter().map(|s| figures(&s.score)[i].unwrap_or(f64::NAN));
+            table.push(name, "", meaning, values.collect::<Vec<f64>>())?;
+        }
+        Ok(table)
     }
 
     /// The details as a table of numbers, metres.
@@ -154,6 +239,20 @@ impl PaperTables {
         table.push("outlier_rate", "", meaning, real(&|d| d.outlier_rate))?;
         Ok(table)
     }
+}
+
+fn segmented(measured: &MeasuredDetectors) -> Vec<Segmented> {
+    let row = |(detector, score): &(String, MaskScore)| Segmented {
+        detector: detector.clone(),
+        surveys: measured.surveys.join(", "),
+        photos: measured.photos,
+        score: score.clone(),
+    };
+    measured.scores.iter().map(row).collect()
+}
+
+fn figures(score: &MaskScore) -> [Option<f64>; 4] {
+    [score.precision, score.recall, score.f1, score.mean_iou]
 }
 
 fn parameters(cases: &[Case]) -> Vec<Vec<String>> {

@@ -1,6 +1,6 @@
 //! Figure 5: a photo with its stones.
 
-use super::case::Example;
+use super::outcome::Example;
 use crate::error::Result;
 use crate::files::read_bytes;
 use crate::pipeline::{Context, segment};
@@ -14,8 +14,8 @@ const WIDTH_PX: u32 = 1400;
 const COVER: f64 = 0.45;
 
 /// The photo of the first half with the most instances, each in a colour of its own; `None` where there is no
-/// photo.
-pub(super) fn example(context: &Context) -> Result<Option<Example>> {
+/// photo. `origin`: where the instances come from.
+pub(super) fn example(context: &Context, origin: &str) -> Result<Option<Example>> {
     let segmented = segment(context, 1)?;
     let chosen = segmented
         .photos
@@ -37,6 +37,7 @@ pub(super) fn example(context: &Context) -> Result<Option<Example>> {
             .to_string_lossy()
             .into_owned(),
         instances: photo.instances.len(),
+        origin: origin.to_owned(),
         jpeg: read_bytes(&path)?,
     }))
 }
