@@ -4,42 +4,16 @@
 
 mod support;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::layers::{Geometry, Layer, read_polygons, write_geopackage};
 use stonewise_io::table::Table;
+use support::stones::{SIGNED, inner, nearest, number, place, rows};
 use support::{copy_tree, outcome, run, stonewise, survey};
 use tempfile::TempDir;
-
-const SIGNED: &str = r#""who": "A. Keller", "when": "2026-11-20", "why": "seen on site""#;
-
-/// Rows of a CSV file by the cell of its first column, each by the names of the columns; cells hold no
-/// commas.
-fn rows(path: &Path) -> BTreeMap<u32, BTreeMap<String, String>> {
-    let text = fs::read_to_string(path).unwrap();
-    let mut lines = text.lines();
-    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let row = |line: &str| {
-        let cells: BTreeMap<String, String> = head
-            .iter()
-            .map(|h| (*h).to_owned())
-            .zip(line.split(',').map(str::to_owned))
-            .collect();
-        (line.split(',').next().unwrap().parse().unwrap(), cells)
-    };
-    lines.map(row).collect()
-}
-
-fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
-    row[column].parse().unwrap()
-}
-
-fn place(row: &BTreeMap<String, String>) -> [f64; 2] {
-    [number(row, "along_m"), number(row, "up_m")]
-}
 
 /// A survey in `survey` and a finished run of it without edits in `results`, made once for all tests.
 fn base() -> &'static Path {
@@ -96,27 +70,6 @@ fn step(out: &Path, name: &str) -> serde_json::Value {
     let run: serde_json::Value = serde_json::from_str(&text).unwrap();
     let steps = run["steps"].as_array().unwrap().clone();
     steps.into_iter().find(|s| s["step"] == name).unwrap()
-}
-
-/// Measured stones that lie inside the wall, from left to right in courses as the places tell.
-fn inner(stones: &BTreeMap<u32, BTreeMap<String, String>>) -> Vec<u32> {
-    let ok = stones
-        .iter()
-        .filter(|s| s.1["status"] == "ok" && number(s.1, "area_m2") > 0.02);
-    ok.map(|s| *s.0).collect()
-}
-
-/// The measured stone nearest to another.
-fn nearest(stones: &BTreeMap<u32, BTreeMap<String, String>>, to: u32, but: &[u32]) -> u32 {
-    let [x, y] = place(&stones[&to]);
-    let distance = |id: &u32| {
-        let [a, b] = place(&stones[id]);
-        (a - x).hypot(b - y)
-    };
-    let others = inner(stones)
-        .into_iter()
-        .filter(|id| *id != to && !but.contains(id));
-    others.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
 }
 
 #[test]

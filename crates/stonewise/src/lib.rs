@@ -45,7 +45,7 @@ pub use pipeline::{
 pub use project::{Epoch, Project};
 pub use report_params::{Language, ReportParams};
 pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
-pub use split::split;
+pub use split::{Halves, SPLIT_FILES, split};
 pub use stable::StableArea;
 pub use storage::step::set_program;
 pub use thresholds::{Levels, Measures, Thresholds, Zone};

@@ -4,7 +4,7 @@ use crate::args::SplitArgs;
 use crate::commands::Outcome;
 use crate::printer::Printer;
 use anyhow::{Result, anyhow};
-use stonewise::{OutputFolder, Owner, Project};
+use stonewise::{OutputFolder, Owner, Project, SPLIT_FILES};
 
 /// Makes two halves of one epoch.
 pub fn split(args: &SplitArgs, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -17,9 +17,15 @@ pub fn split(args: &SplitArgs, force: bool, printer: &Printer) -> Result<Outcome
     let epoch = epoch.ok_or_else(|| anyhow!("no such epoch; there are: {}", names.join(", ")))?;
     let kind = format!("halves of epoch {:?}, seed {}", epoch.name, args.seed);
     let owner = Owner::inputs(&kind, std::slice::from_ref(&project.path));
-    let written = ["stonewise.toml", "half1", "half2"];
-    let folder = OutputFolder::of_inputs(&args.out, &owner, &project.inputs(), &written, force)?;
-    let path = stonewise::split(&project, epoch, args.seed, folder.path(), printer)?;
-    printer.log(&format!("wrote {}", path.display()));
-    Ok(Outcome::Done)
+    let folder = OutputFolder::of_inputs(&args.out, &owner, &project.inputs(), &SPLIT_FILES, force)?;
+    let halves = stonewise::split(&project, epoch, args.seed, folder.path(), printer)?;
+    printer.log(&format!("wrote {}", halves.project.display()));
+    for edit in &halves.left_out {
+        printer.log(&format!("left out: {edit}"));
+    }
+    Ok(if halves.left_out.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::InDoubt
+    })
 }

@@ -1,6 +1,8 @@
 //! A small simulated survey and runs of the command on it.
 #![allow(dead_code)] // each test program uses a part
 
+pub mod stones;
+
 use assert_cmd::Command;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -118,7 +120,8 @@ pub fn sharp_survey() -> &'static Path {
     &DIR.get_or_init(|| simulated(SHARP)).1
 }
 
-fn simulated(params: &str) -> (TempDir, PathBuf) {
+/// A survey made with these parameters, and the folder that holds it.
+pub fn simulated(params: &str) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("params.toml");
     fs::write(&file, params).unwrap();

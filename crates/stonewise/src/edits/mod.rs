@@ -5,8 +5,10 @@ mod from_coco;
 mod from_layer;
 mod import;
 mod lines;
+mod photo_name;
 mod signed;
 
 pub use edits_file::{Action, Edit, EditsFile};
 pub use import::{Imported, import};
+pub(crate) use photo_name::photo_named;
 pub use signed::Signed;

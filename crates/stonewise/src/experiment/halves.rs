@@ -2,14 +2,14 @@
 
 use crate::error::Result;
 use crate::project::{Epoch, Project};
-use crate::split;
+use crate::split::split;
 use crate::storage::step::Key;
 use crate::storage::store::StepStore;
 use stonewise_core::progress::Progress;
 use stonewise_io::cameras::find_photos;
 
-/// The project of the two halves of an epoch, with the settings and the part of the whole; nothing moved
-/// between them.
+/// The project of the two halves of an epoch, with the settings, the part and the edits of the whole; nothing
+/// moved between them.
 ///
 /// Made by [`crate::split()`], or taken from the store where an earlier run of the experiment made them.
 pub(super) fn halves_of(
@@ -23,6 +23,9 @@ pub(super) fn halves_of(
     for cloud in &epoch.clouds {
         digests.push(store.digest(cloud)?);
     }
+    if let Some(edits) = &project.edits {
+        digests.push(store.digest(&edits.path)?);
+    }
     let photos = find_photos(&epoch.images, &epoch.read_cameras()?)?.paths;
     let key = Key::new(
         "halves",
@@ -30,7 +33,11 @@ pub(super) fn halves_of(
         &digests.iter().map(String::as_str).collect::<Vec<_>>(),
     );
     let (dir, _) = store.step("halves", key, &[], |dir| {
-        split::split(project, epoch, seed, dir.path(), progress).map(|_| ())
+        let halves = split(project, epoch, seed, dir.path(), progress)?;
+        for edit in &halves.left_out {
+            progress.note(&format!("left out: {edit}"));
+        }
+        Ok(())
     })?;
     let halves = Project::read(&dir.file("stonewise.toml"))?;
     Ok(Project {

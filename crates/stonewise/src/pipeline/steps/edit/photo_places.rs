@@ -1,6 +1,6 @@
 //! Edits drawn in photos, brought onto the wall.
 
-use crate::edits::{Edit, EditsFile};
+use crate::edits::{Edit, EditsFile, photo_named};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
@@ -104,43 +104,16 @@ fn nowhere(pixel: [f64; 2], what: &str) -> NoEffect {
     NoEffect::NoPlace(format!("pixel ({:.1}, {:.1}) {what}", pixel[0], pixel[1]))
 }
 
-/// The photo of an edit: by its name, with or without folders and extension, in small letters.
+/// The photo of an edit.
 fn view_of<'a>(edit: &Edit, photos: &'a Segmented) -> std::result::Result<&'a View, NoEffect> {
-    let wanted = edit.photo.as_deref().unwrap_or_default();
-    let file = |name: &str| name.rsplit(['/', '\\']).next().unwrap_or(name).to_lowercase();
-    let stem = |name: &str| {
-        let file = file(name);
-        file.rsplit_once('.')
-            .map_or(file.clone(), |(stem, _)| stem.to_owned())
-    };
-    let named = |name: &str| {
-        let (name, wanted) = (name.to_lowercase(), wanted.to_lowercase());
-        [
-            name == wanted,
-            file(&name) == file(&wanted),
-            stem(&name) == stem(&wanted),
-        ]
-    };
-    for level in 0..3 {
-        let fits: Vec<&View> = photos
-            .views
-            .iter()
-            .zip(&photos.photos)
-            .filter(|(v, p)| named(&v.name)[level] || named(&p.path.to_string_lossy())[level])
-            .map(|(v, _)| v)
-            .collect();
-        match fits[..] {
-            [] => {}
-            [view] => return Ok(view),
-            _ => {
-                let message = format!("{} photos are named {wanted:?}: give its folder too", fits.len());
-                return Err(NoEffect::NoPlace(message));
-            }
-        }
-    }
-    Err(NoEffect::NoPlace(format!(
-        "no photo of the epoch is named {wanted:?}"
-    )))
+    let names: Vec<Vec<String>> = photos
+        .views
+        .iter()
+        .zip(&photos.photos)
+        .map(|(view, photo)| vec![view.name.clone(), photo.path.to_string_lossy().into_owned()])
+        .collect();
+    let index = photo_named(edit.photo.as_deref().unwrap_or_default(), &names).map_err(NoEffect::NoPlace)?;
+    Ok(&photos.views[index])
 }
 
 /// The ray of a pixel and the points of stones around it.
