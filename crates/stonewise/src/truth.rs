@@ -9,8 +9,8 @@ use nalgebra::{Matrix3, Point3, Vector3};
 use std::fs;
 use std::path::Path;
 use stonewise_core::evaluate::{
-    Evaluation, EvaluationParams, StoneOutcome, TrueStone, owners_by_centroid, score_against_truth,
-    score_neighbours,
+    Evaluation, EvaluationParams, RotationEstimate, StoneOutcome, TrueStone, owners_by_centroid,
+    score_against_truth, score_neighbours, score_rotations,
 };
 use stonewise_core::id::StoneId;
 
@@ -42,6 +42,7 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
     let owners = owners_by_centroid(&centroids, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
     evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
+    evaluation.rotations = score_rotations(&outcomes, &owners, &stones, params);
     evaluation.neighbours = score_neighbours(&outcomes, &owners, &stones, &set.neighbours, params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
@@ -51,6 +52,7 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
 pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>, datum: Option<&Datum>) -> StoneOutcome {
     let motion = row.motion.as_ref();
     let registration = datum.and_then(|d| d.covariance_at(&row.centroid));
+    let turn = datum.and_then(Datum::rotation_covariance).unwrap_or_default();
     StoneOutcome {
         stone: StoneId(row.stone_id),
         centroid: row.centroid,
@@ -58,6 +60,11 @@ pub(crate) fn outcome(row: &StoneRow, normal: Vector3<f64>, datum: Option<&Datum
         displacement: motion.map(|m| m.displacement),
         covariance: motion.map(|m| m.covariance),
         covariance_without_datum: motion.map(|m| m.covariance - registration.unwrap_or_else(Matrix3::zeros)),
+        rotation: motion.map(|m| RotationEstimate {
+            rotation: m.rotation,
+            covariance: m.rotation_covariance,
+            covariance_without_datum: m.rotation_covariance - turn,
+        }),
         datum_known: registration.is_some(),
         detection_limit_m: motion.map(|m| m.detection_limit_m),
         significant: motion.map(|m| m.significant),

@@ -1,7 +1,7 @@
 //! Whether claimed uncertainties are honest.
 
-use crate::evaluate::MotionSample;
 use crate::statistics::quantile;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 /// 95 % quantile of chi-square with 3 degrees of freedom.
@@ -33,18 +33,28 @@ pub struct Coverage {
     pub out: Option<f64>,
 }
 
+/// An error along three axes, with what was claimed about it.
+pub(super) struct Claim {
+    /// Estimate minus truth.
+    pub error: Vector3<f64>,
+    /// Half-widths of the 95 % intervals; `None` where nothing is claimed.
+    pub half_width: [Option<f64>; 3],
+    /// Squared Mahalanobis length of the error; `None` without a positive definite covariance.
+    pub normalised: Option<f64>,
+}
+
 impl Calibration {
     /// Counts how often the truth lies where it was claimed to lie.
-    pub(super) fn of(samples: &[MotionSample]) -> Self {
-        let mut normalised: Vec<f64> = samples.iter().filter_map(normalised_error).collect();
+    pub(super) fn of(claims: &[Claim]) -> Self {
+        let mut normalised: Vec<f64> = claims.iter().filter_map(|c| c.normalised).collect();
         normalised.sort_by(f64::total_cmp);
         let n = normalised.len();
         let share = |count: usize| count as f64 / n as f64;
         Self {
             coverage_95: Coverage {
-                along: covered(samples, 0),
-                up: covered(samples, 1),
-                out: covered(samples, 2),
+                along: covered(claims, 0),
+                up: covered(claims, 1),
+                out: covered(claims, 2),
             },
             chi_square_count: n,
             chi_square_mean: (n > 0).then(|| normalised.iter().sum::<f64>() / n as f64),
@@ -55,26 +65,19 @@ impl Calibration {
     }
 }
 
-fn covered(samples: &[MotionSample], axis: usize) -> Option<f64> {
-    let claims: Vec<bool> = samples
+fn covered(claims: &[Claim], axis: usize) -> Option<f64> {
+    let inside: Vec<bool> = claims
         .iter()
-        .filter_map(|s| Some(s.error()[axis].abs() <= s.half_width_m[axis]?))
+        .filter_map(|c| Some(c.error[axis].abs() <= c.half_width[axis]?))
         .collect();
-    let hits = claims.iter().filter(|hit| **hit).count();
-    (!claims.is_empty()).then(|| hits as f64 / claims.len() as f64)
-}
-
-/// Squared Mahalanobis length of the error; `None` without a positive definite covariance.
-fn normalised_error(sample: &MotionSample) -> Option<f64> {
-    let error = sample.estimated - sample.truth;
-    let solved = sample.covariance?.cholesky()?.solve(&error);
-    Some(error.dot(&solved)).filter(|x| x.is_finite())
+    let hits = inside.iter().filter(|hit| **hit).count();
+    (!inside.is_empty()).then(|| hits as f64 / inside.len() as f64)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::StoneOutcome;
+    use crate::evaluate::{MotionSample, StoneOutcome};
     use crate::id::StoneId;
     use nalgebra::{Matrix3, Point3, Vector3};
     use rand::{RngExt, SeedableRng};
@@ -101,6 +104,7 @@ mod tests {
                     displacement: Some(truth + error),
                     covariance: Some(root * root.transpose()),
                     covariance_without_datum: None,
+                    rotation: None,
                     datum_known: true,
                     detection_limit_m: None,
                     significant: None,
@@ -113,7 +117,7 @@ mod tests {
 
     #[test]
     fn honest_claims_are_found_honest() {
-        let right = Calibration::of(&samples(1.0));
+        let right = Calibration::of(&MotionSample::claims(&samples(1.0)));
         let c = &right.coverage_95;
         for share in [c.along, c.up, c.out, right.chi_square_share_95] {
             assert!((share.unwrap() - 0.95).abs() < 0.006, "{right:?}");
@@ -124,7 +128,7 @@ mod tests {
 
     #[test]
     fn claims_that_are_half_too_small_are_found_out() {
-        let proud = Calibration::of(&samples(2.0));
+        let proud = Calibration::of(&MotionSample::claims(&samples(2.0)));
         // A normal error of twice the claim stays inside with probability erf(0.98 / sqrt 2) = 0.673.
         assert!((proud.coverage_95.up.unwrap() - 0.673).abs() < 0.012);
         assert!((proud.chi_square_mean.unwrap() - 12.0).abs() < 0.2);

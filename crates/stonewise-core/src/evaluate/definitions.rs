@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-const WORDS: [(&str, &str); 24] = [
+const WORDS: [(&str, &str); 25] = [
     ("error", "estimate minus truth; all lengths in metres"),
     (
         "truth",
@@ -55,6 +55,10 @@ const WORDS: [(&str, &str); 24] = [
     (
         "neighbours",
         "displacement of a stone less that of a neighbour, compared with the same difference of the truth, with the covariance of the difference (neighbours.parquet); shows how accurate openings of joints are",
+    ),
+    (
+        "rotations",
+        "rotation vector of the estimated against the true attitude of a stone, milliradians, about the axes along the dam, up the face and out of it; angle: its length; coverage_95.along is that of the rotation about the axis along, and so on",
     ),
     (
         "significance",

@@ -1,8 +1,8 @@
 //! The whole evaluation of one pair of epochs, as written to evaluation.json.
 
 use crate::evaluate::{
-    EvaluationParams, InstanceScore, LabelScore, MatchScore, MotionScore, NeighbourScore, TruthScore,
-    definitions,
+    EvaluationParams, InstanceScore, LabelScore, MatchScore, MotionScore, NeighbourScore, RotationScore,
+    TruthScore, definitions,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,6 +28,9 @@ pub struct Evaluation {
     /// Motions of neighbours relative to each other, compared with an external truth.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub neighbours: Option<NeighbourScore>,
+    /// Rotations of stones, compared with an external truth.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub rotations: Option<RotationScore>,
     /// Matches across epochs.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub matches: Option<MatchScore>,
@@ -50,6 +53,7 @@ impl Evaluation {
             m3c2: None,
             external: None,
             neighbours: None,
+            rotations: None,
             matches: None,
             labels: None,
             instances: None,

@@ -106,27 +106,12 @@ pub fn score_against_truth(
     stones: &[TrueStone],
     params: &EvaluationParams,
 ) -> TruthScore {
+    let Rows {
+        of_stone: rows,
+        duplicates: duplicate_rows,
+        foreign: foreign_rows,
+    } = Rows::new(outcomes, owners, stones);
     let by_id: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
-    let mut rows: BTreeMap<u32, &StoneOutcome> = BTreeMap::new();
-    let (mut duplicate_rows, mut foreign_rows) = (0, 0);
-    for (outcome, owner) in outcomes.iter().zip(owners) {
-        let Some(stone) = owner.and_then(|id| by_id.get(&id)) else {
-            foreign_rows += 1;
-            continue;
-        };
-        let off = |o: &StoneOutcome| (o.centroid - stone.centroid).norm_squared();
-        match rows.get_mut(&stone.stone_id) {
-            None => {
-                rows.insert(stone.stone_id, outcome);
-            }
-            Some(kept) => {
-                duplicate_rows += 1;
-                if off(outcome) < off(kept) {
-                    *kept = outcome;
-                }
-            }
-        }
-    }
     let countable: Vec<&TrueStone> = by_id.into_values().filter(|s| s.is_countable(params)).collect();
     let (mut without_row, mut without_motion, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     for stone in &countable {
@@ -149,6 +134,47 @@ pub fn score_against_truth(
         duplicate_rows,
         foreign_rows,
         motions: score_motions(&samples, countable.len(), params),
+    }
+}
+
+/// Which row of the results counts for each true stone.
+pub(super) struct Rows<'a> {
+    /// By number of the true stone: of its rows the one nearest to its centroid.
+    pub of_stone: BTreeMap<u32, &'a StoneOutcome>,
+    /// Further rows of these stones.
+    duplicates: usize,
+    /// Rows that belong to no true stone.
+    foreign: usize,
+}
+
+impl<'a> Rows<'a> {
+    /// `owners` runs parallel to `outcomes`.
+    pub(super) fn new(outcomes: &'a [StoneOutcome], owners: &[Owner], stones: &[TrueStone]) -> Self {
+        let by_id: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
+        let mut rows = Self {
+            of_stone: BTreeMap::new(),
+            duplicates: 0,
+            foreign: 0,
+        };
+        for (outcome, owner) in outcomes.iter().zip(owners) {
+            let Some(stone) = owner.and_then(|id| by_id.get(&id)) else {
+                rows.foreign += 1;
+                continue;
+            };
+            let off = |o: &StoneOutcome| (o.centroid - stone.centroid).norm_squared();
+            match rows.of_stone.get_mut(&stone.stone_id) {
+                None => {
+                    rows.of_stone.insert(stone.stone_id, outcome);
+                }
+                Some(kept) => {
+                    rows.duplicates += 1;
+                    if off(outcome) < off(kept) {
+                        *kept = outcome;
+                    }
+                }
+            }
+        }
+        rows
     }
 }
 
@@ -209,6 +235,7 @@ mod tests {
             displacement,
             covariance: None,
             covariance_without_datum: None,
+            rotation: None,
             datum_known: true,
             detection_limit_m: None,
             significant: None,

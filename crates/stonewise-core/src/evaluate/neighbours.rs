@@ -47,7 +47,7 @@ pub fn score_neighbours(
     (!samples.is_empty()).then(|| NeighbourScore {
         pairs: samples.len(),
         errors: directions(&samples, params.outlier_m),
-        calibration: Calibration::of(&samples),
+        calibration: Calibration::of(&MotionSample::claims(&samples)),
     })
 }
 
@@ -81,6 +81,7 @@ mod tests {
             displacement: Some(shared + Vector3::new(0.0, errors[k as usize], 0.0)),
             covariance: Some(Matrix3::identity()),
             covariance_without_datum: None,
+            rotation: None,
             datum_known: true,
             detection_limit_m: None,
             significant: None,

@@ -1,5 +1,6 @@
 //! One estimated motion beside the truth.
 
+use super::calibration::Claim;
 use crate::change::ChangePoint;
 use crate::geometry::{DisplacementSample, FaceFrame, SmallMotion};
 use crate::id::StoneId;
@@ -82,6 +83,8 @@ pub struct StoneOutcome {
     pub covariance: Option<Matrix3<f64>>,
     /// The same without registration error of the epochs, m^2.
     pub covariance_without_datum: Option<Matrix3<f64>>,
+    /// Its rotation; `None` where there is no estimate.
+    pub rotation: Option<RotationEstimate>,
     /// Whether the registration error is known; else limits and alarms hold for motions against the common
     /// rigid motion of the stones that are not reported as loose.
     pub datum_known: bool,
@@ -91,6 +94,17 @@ pub struct StoneOutcome {
     pub significant: Option<bool>,
     /// Reported as moving unlike its neighbours.
     pub loose: Option<bool>,
+}
+
+/// An estimated rotation of a stone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotationEstimate {
+    /// Rotation vector, world frame, radians.
+    pub rotation: Vector3<f64>,
+    /// Its covariance, rad^2, registration error included where it is known.
+    pub covariance: Matrix3<f64>,
+    /// The same without registration error of the epochs, rad^2.
+    pub covariance_without_datum: Matrix3<f64>,
 }
 
 /// An estimated displacement with its truth and what was claimed about it.
@@ -174,13 +188,12 @@ impl MotionSample {
         })
     }
 
-    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the
-    /// claims that hold without a datum; samples without such a claim are left out.
-    pub(super) fn without_datum(samples: &[Self]) -> Vec<Self> {
-        let claimed = samples.iter().filter(|s| s.covariance_without_datum.is_some());
+    /// The common rigid motions of estimates and of truths: least squares over the samples that are not
+    /// reported as loose, weighted by the inverse covariances that hold without a datum.
+    pub(super) fn common_motions(samples: &[Self]) -> (Option<SmallMotion>, Option<SmallMotion>) {
         let common = |of: fn(&Self) -> Vector3<f64>| {
-            let fitted: Vec<DisplacementSample> = claimed
-                .clone()
+            let fitted: Vec<DisplacementSample> = samples
+                .iter()
                 .filter(|s| s.is_common)
                 .filter_map(|s| {
                     Some(DisplacementSample {
@@ -192,7 +205,13 @@ impl MotionSample {
                 .collect();
             SmallMotion::fit(&fitted)
         };
-        let (estimated, truth) = (common(|s| s.estimated), common(|s| s.truth));
+        (common(|s| s.estimated), common(|s| s.truth))
+    }
+
+    /// The same samples with the common rigid motion of estimates and of truths taken off, and with the
+    /// claims that hold without a datum; samples without such a claim are left out.
+    pub(super) fn without_datum(samples: &[Self]) -> Vec<Self> {
+        let (estimated, truth) = Self::common_motions(samples);
         let at = |fitted: &Option<SmallMotion>, p: &Point3<f64>| {
             fitted.as_ref().map_or_else(Vector3::zeros, |f| f.at(p))
         };
@@ -206,7 +225,21 @@ impl MotionSample {
             ),
             ..s.clone()
         };
-        claimed.clone().map(relative).collect()
+        samples
+            .iter()
+            .filter(|s| s.covariance_without_datum.is_some())
+            .map(relative)
+            .collect()
+    }
+
+    /// The errors along, up and out with what was claimed about them.
+    pub(super) fn claims(samples: &[Self]) -> Vec<Claim> {
+        let claim = |s: &Self| Claim {
+            error: s.error(),
+            half_width: s.half_width_m,
+            normalised: normalised(&(s.estimated - s.truth), s.covariance.as_ref()),
+        };
+        samples.iter().map(claim).collect()
     }
 
     /// Estimate minus truth in (along, up, out), metres.
@@ -220,8 +253,14 @@ impl MotionSample {
     }
 }
 
+/// Squared Mahalanobis length of an error; `None` without a positive definite covariance.
+pub(super) fn normalised(error: &Vector3<f64>, covariance: Option<&Matrix3<f64>>) -> Option<f64> {
+    let solved = covariance?.cholesky()?.solve(error);
+    Some(error.dot(&solved)).filter(|x| x.is_finite())
+}
+
 /// Half-widths of the 95 % intervals along these axes.
-fn half_widths(axes: &[Vector3<f64>; 3], covariance: Option<&Matrix3<f64>>) -> [Option<f64>; 3] {
+pub(super) fn half_widths(axes: &[Vector3<f64>; 3], covariance: Option<&Matrix3<f64>>) -> [Option<f64>; 3] {
     axes.map(|axis| covariance.map(|c| Z95 * axis.dot(&(c * axis)).max(0.0).sqrt()))
 }
 

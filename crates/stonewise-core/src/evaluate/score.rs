@@ -63,8 +63,9 @@ pub fn score_motions(samples: &[MotionSample], expected: usize, params: &Evaluat
         outlier_rate: errors.norm_3d.as_ref().map(|s| s.outlier_rate),
         errors,
         errors_without_datum: directions(&relative, params.outlier_m),
-        calibration: is_absolute.then(|| Calibration::of(samples)),
-        calibration_without_datum: (!relative.is_empty()).then(|| Calibration::of(&relative)),
+        calibration: is_absolute.then(|| Calibration::of(&MotionSample::claims(samples))),
+        calibration_without_datum: (!relative.is_empty())
+            .then(|| Calibration::of(&MotionSample::claims(&relative))),
         significance: Detection::of(tested, params.still_m),
         loose: LooseDetection::of(samples),
     }
@@ -137,6 +138,7 @@ mod tests {
             displacement,
             covariance: None,
             covariance_without_datum: None,
+            rotation: None,
             datum_known: true,
             detection_limit_m: Some(0.004),
             significant: Some(displacement.is_some_and(|d| d.norm() > 0.004)),
