@@ -154,10 +154,10 @@ fn add_patch(
 /// unknowns.
 fn scatter<const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
     let [short, long] = basis.value;
-    for a in 0..4 {
+    for (a, l) in long.into_iter().enumerate() {
         let first = basis.row(a);
         for (target, b) in into[first..first + 4].iter_mut().zip(short) {
-            let w = weight * long[a] * b;
+            let w = weight * l * b;
             for c in 0..N {
                 target[c] += w * row[c];
             }
