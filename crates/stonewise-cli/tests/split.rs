@@ -115,7 +115,7 @@ fn halves_have_the_stones_of_the_edited_epoch() {
     let whole = rows(&results.join("stones.csv"));
     assert_eq!(found.len(), whole.len() + 2, "a merge, a split, two deletions");
 
-    // Half of the points have another leftmost stone: the wall must be named.
+    // With half of the points, another stone may be the leftmost one: the file must have `facade`.
     let halves = survey.join("halves");
     let (code, log) = split(survey, &halves);
     assert_eq!(code, 2, "{log}");

@@ -32,7 +32,7 @@ pub fn place(row: &BTreeMap<String, String>) -> [f64; 2] {
     [number(row, "along_m"), number(row, "up_m")]
 }
 
-/// Measured stones that lie inside the wall, from left to right in courses as the places tell.
+/// Measured stones with a face of more than 0.02 m^2, by number.
 pub fn inner(stones: &BTreeMap<u32, BTreeMap<String, String>>) -> Vec<u32> {
     let ok = stones
         .iter()

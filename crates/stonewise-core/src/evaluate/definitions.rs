@@ -58,7 +58,7 @@ const WORDS: [(&str, &str); 25] = [
     ),
     (
         "rotations",
-        "rotation vector of the estimated against the true attitude of a stone, milliradians, about the axes along the dam, up the face and out of it; angle: its length; coverage_95.along is that of the rotation about the axis along, and so on",
+        "error of a stone's rotation: rotation vector from the true to the estimated orientation, milliradians, about the axes along the dam, up the face and out of it; angle: its length; coverage_95.along is the coverage of the rotation about the axis along the dam, and so on",
     ),
     (
         "significance",

@@ -139,7 +139,7 @@ pub fn score_against_truth(
 
 /// Which row of the results counts for each true stone.
 pub(super) struct Rows<'a> {
-    /// By number of the true stone: of its rows the one nearest to its centroid.
+    /// By number of the true stone: the row whose centroid is nearest to the true one.
     pub of_stone: BTreeMap<u32, &'a StoneOutcome>,
     /// Further rows of these stones.
     duplicates: usize,

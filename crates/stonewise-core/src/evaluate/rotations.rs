@@ -10,32 +10,32 @@ use crate::geometry::{FaceFrame, SmallMotion};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// How right the rotations of stones are.
+/// How accurate the rotations of stones are.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RotationScore {
     /// Countable stones with a rotation.
     pub estimated: usize,
     /// Errors about the axes of the true face.
     pub errors: RotationAxes,
-    /// The same with the rotations of the common rigid motions of estimates and of truths taken off.
+    /// The same after the rotations of the common rigid motions of estimates and of truths are subtracted.
     pub errors_without_datum: RotationAxes,
-    /// Whether the stated covariances are correct; `None` where the datum is unknown. The coverage `along` is
-    /// that of the rotation about the axis along the dam, and so on.
+    /// Whether the stated covariances are correct; `None` where the datum is unknown. `coverage_95.along` is
+    /// the coverage of the rotation about the axis along the dam, and so on.
     pub calibration: Option<Calibration>,
-    /// The same against the common rigid motion, registration error left out.
+    /// The same relative to the common rigid motion, with covariances without the registration error.
     pub calibration_without_datum: Calibration,
 }
 
 /// Statistics of the errors of rotation vectors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RotationAxes {
-    /// About the axis along the dam, signed: leaning outwards or inwards.
+    /// About the axis along the dam, signed: tilt outwards or inwards.
     pub about_along: Option<RotationStatistics>,
     /// About the axis up the face, signed.
     pub about_up: Option<RotationStatistics>,
-    /// About the outward normal, signed: the turn in the face.
+    /// About the outward normal, signed: rotation in the plane of the face.
     pub about_out: Option<RotationStatistics>,
-    /// Angle between the estimated and the true attitude.
+    /// Angle between the estimated and the true orientation.
     pub angle: Option<RotationStatistics>,
 }
 
@@ -54,7 +54,7 @@ pub struct RotationStatistics {
     pub nmad_mrad: f64,
     /// 95th percentile of the absolute errors.
     pub p95_mrad: f64,
-    /// RMSE of an estimator that always says "did not turn".
+    /// RMSE of an estimator that always reports no rotation.
     pub zero_predictor_rmse_mrad: f64,
 }
 
@@ -110,8 +110,8 @@ impl RotationSample {
 
 /// Scores the rotations of countable stones; `owners` runs parallel to `outcomes`. `None` without rotations.
 ///
-/// The error is the rotation vector of the estimated attitude against the true one; a rigid stone has one
-/// rotation, wherever its centroid is taken. The common rigid motions are those of the displacements.
+/// The error is the rotation vector from the true to the estimated orientation; the rotation of a rigid stone
+/// does not depend on its centroid. The common rigid motions are those fitted to the displacements.
 pub fn score_rotations(
     outcomes: &[StoneOutcome],
     owners: &[Owner],
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_is_the_rotation_between_two_attitudes() {
+    fn the_error_is_the_rotation_between_two_orientations() {
         // A quarter turn about z, reported with a further 2 mrad about the turned stone's own x, which is the
         // world's y.
         let truth = Rotation3::from_scaled_axis(Vector3::z() * std::f64::consts::FRAC_PI_2);

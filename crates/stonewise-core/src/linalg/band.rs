@@ -40,7 +40,7 @@ impl Band {
     }
 
     /// Adds `scale * values` to four rows of a column, the first of which must lie in the band and not above
-    /// the diagonal. Rows beyond the band or the last row must get zeros.
+    /// the diagonal. `values` must be zero for rows beyond the band or beyond the last row.
     #[inline(always)]
     pub fn add_run(&mut self, column: usize, first: usize, scale: f64, values: &[f64; 4]) {
         let start = column * self.stride + first - column;
@@ -179,7 +179,7 @@ impl BandFactor {
     }
 }
 
-/// Solves with a factor, forward alone.
+/// Forward substitution with a factor.
 struct Forward<'a, const N: usize> {
     factor: &'a Band,
     rhs: &'a mut [[f64; N]],
@@ -236,7 +236,7 @@ impl WithSimd for Inversion<'_> {
     }
 }
 
-/// The sum of products of a column and a row, as [`dot`] finds it; adds the column, times a factor, to sums.
+/// The sum of products of a column and a row, computed as in [`dot`]; also adds `factor * column` to `sums`.
 #[inline(always)]
 fn dot_and_add(column: &[f64], row: &[f64], factor: f64, sums: &mut [f64]) -> f64 {
     let (columns, columns_rest) = column.as_chunks::<LANES>();

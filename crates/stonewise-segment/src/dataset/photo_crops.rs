@@ -71,7 +71,7 @@ impl<'a> PhotoCrops<'a> {
             .collect())
     }
 
-    /// A whole photo, by its place in the list, with nothing known but the stones that are kept for measuring.
+    /// A whole photo, by its index; everything but the blocks and stones kept for measuring is to be ignored.
     ///
     /// # Errors
     /// The photo or its masks cannot be read.

@@ -1,7 +1,8 @@
-//! Which photo a name means.
+//! Finds a photo by its name.
 
-/// Index of the photo that a name means: by the whole name, without folders, or without folders and extension;
-/// the first of these that any photo fits decides, and case does not count. `photos`: all names of each photo.
+/// Index of the photo with this name. Whole names are compared first, then names without folders, then names
+/// without folders and extension; the first comparison that any photo passes decides. Case is ignored.
+/// `photos`: all names of each photo.
 ///
 /// # Errors
 /// No photo or several photos have this name; the message says which.

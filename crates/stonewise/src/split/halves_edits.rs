@@ -17,12 +17,12 @@ pub(super) struct HalvesEdits {
 
 /// The project's edits for the halves of this epoch, to be written to `path`.
 ///
-/// A shape drawn in a photo stays in it: the photo belongs to one half, and the edit to both. Photos are dealt
-/// to the halves in turn.
+/// A shape drawn in a photo stays in it: the photo belongs to one half, and the edit applies to both. Photos
+/// are dealt to the halves in turn.
 ///
 /// # Errors
-/// An edit in metres lies on an unrolled wall that the file does not name: a half has other stones than the
-/// epoch, so that its own wall starts elsewhere.
+/// An edit is in metres and the file has no `facade`: the outermost stones of a half may differ from those of
+/// the epoch, so its own unrolled wall may have another origin.
 pub(super) fn halves_edits(
     project: &Project,
     epoch: &Epoch,
@@ -75,8 +75,8 @@ fn no_wall(given: &EditsFile, index: usize) -> Error {
         path: given.path.clone(),
         line: given.lines.get(index).copied().unwrap_or(1),
         message: format!(
-            "edit {} is in metres on the unrolled wall, which begins elsewhere where half of the points show it: put \
-             \"facade\" beside \"edits\", with the content of facade.json from the results of a run with these edits",
+            "edit {} is in metres on the unrolled wall, whose origin may differ in the halves: put \"facade\" beside \
+             \"edits\", with the content of facade.json from the results of a run with these edits",
             index + 1
         ),
     }

@@ -43,8 +43,8 @@ const EDITS: &str = "edits.json";
 /// Source: the experiment of the paper, section 4.
 ///
 /// # Errors
-/// A cloud or the folder of photos cannot be read; the files of the halves cannot be written; an edit in
-/// metres lies on an unrolled wall that its file does not name; interruption.
+/// A cloud or the folder of photos cannot be read; the files of the halves cannot be written; an edit is in
+/// metres and its file has no `facade`; interruption.
 pub fn split(
     project: &Project,
     epoch: &Epoch,

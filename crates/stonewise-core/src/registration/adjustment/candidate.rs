@@ -57,7 +57,7 @@ impl CandidateMotion {
         }
     }
 
-    /// Takes full steps again: what the candidate swung with has come to rest.
+    /// Returns to full steps. For use once the weights are frozen: their changes can make a candidate swing.
     pub fn forget_swings(&mut self) {
         self.last_step = Vector3::zeros();
         self.share = 1.0;

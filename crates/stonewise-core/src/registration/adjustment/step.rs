@@ -40,8 +40,8 @@ impl Adjustment {
         restless * RESTLESS <= self.stones.len()
     }
 
-    /// Lets all stones take full steps again, once weights and components are frozen: while these followed each
-    /// other, whole walls swung with them.
+    /// Returns to full steps for all stones once the weights and variance components are frozen. Before that,
+    /// each update of one changes the other, which can make all stones of a wall swing and so shortens steps.
     pub fn forget_swings(&mut self) {
         for stone in &mut self.stones {
             stone.with_field.forget_swings();

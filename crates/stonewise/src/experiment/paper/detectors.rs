@@ -1,4 +1,4 @@
-//! The paper's segmentation: a detector trained on nine tenths of the labelled photos and measured on the rest.
+//! The paper's segmentation: a detector trained on nine tenths of each photo and measured on the rest.
 
 use crate::error::{Error, Result};
 use crate::files::{create_results_folder, read_json, write_json};
@@ -17,7 +17,7 @@ use stonewise_segment::{StoneFinder, Weights};
 
 /// The step that measures a detector.
 const STEP: &str = "segmentation-score";
-/// What is kept of a photo, and of all of them.
+/// File with the pairs of stones of one photo, or with the scores over all photos.
 const SCORE: &str = "score.json";
 /// Digits of a key that name the folder of a training.
 const FOLDER_DIGITS: usize = 16;
@@ -31,7 +31,7 @@ pub(super) struct MeasuredDetectors {
     pub surveys: Vec<String>,
     /// Photos with masks.
     pub photos: usize,
-    /// What finds the stones, as a project names it.
+    /// The detector that finds the stones, as `[segment] model` names it.
     pub model: PathBuf,
     /// Each detector with its figures on the stones held out; the one that finds the stones comes first.
     pub scores: Vec<(String, MaskScore)>,
@@ -45,7 +45,7 @@ pub(super) struct DetectorTraining<'a> {
     pub valid: Option<&'a Path>,
     /// The detector at the start, and how photos are cut into tiles.
     pub params: &'a SegmentParams,
-    /// Minutes in all; 0 for the detector as it is.
+    /// Minutes in total; 0: the detector is not trained.
     pub minutes: f64,
     /// Steps of the experiment.
     pub store: &'a StepStore,
@@ -54,9 +54,9 @@ pub(super) struct DetectorTraining<'a> {
 }
 
 impl DetectorTraining<'_> {
-    /// Trains, or resumes an interrupted training, and measures the detector before and after. A training
-    /// that an earlier survey of the experiment had is not repeated. Returns what finds the stones, as a
-    /// project names it.
+    /// Trains, or resumes an interrupted training, and measures the detector before and after. If an earlier
+    /// survey of the experiment has the same photos, masks and detector, its training is used. Returns the
+    /// detector that finds the stones, as `[segment] model` names it.
     ///
     /// # Errors
     /// There are no masks, a file cannot be used, the training diverges, or the caller stopped it.
@@ -104,7 +104,7 @@ impl DetectorTraining<'_> {
     fn masks(&self) -> Result<&Path> {
         self.epoch.masks.as_deref().ok_or_else(|| {
             Error::Parameters(format!(
-                "epoch {:?} has no masks from which a detector could learn: leave --train-minutes away, or add `masks = ...` to it",
+                "epoch {:?} has no masks with which a detector could be trained and measured: omit --train-minutes, or add `masks = ...` to the epoch",
                 self.epoch.name
             ))
         })
@@ -133,7 +133,7 @@ impl DetectorTraining<'_> {
         Ok(Key::new("detector-training", &params, &digests))
     }
 
-    /// Trains until the minutes are over; the name of the detector.
+    /// Trains until the time is up, and returns the name of the detector.
     fn train(&self, crops: &PhotoCrops, folder: &Path, progress: &dyn Progress) -> Result<String> {
         create_results_folder(folder)?;
         let start = Start::Weights(Weights::named(&self.params.model));
@@ -152,7 +152,7 @@ impl DetectorTraining<'_> {
         }
         let elapsed = session.elapsed();
         Ok(format!(
-            "trained on nine tenths of the photos ({} step{} in {:.1} min)",
+            "trained on nine tenths of each photo ({} step{} in {:.1} min)",
             elapsed.steps,
             if elapsed.steps == 1 { "" } else { "s" },
             elapsed.seconds / 60.0

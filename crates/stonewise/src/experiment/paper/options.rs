@@ -1,4 +1,4 @@
-//! What the experiment is made with.
+//! Surveys and options of the experiment.
 
 use crate::part::Part;
 use crate::project::Project;
@@ -11,20 +11,20 @@ pub struct PaperSurvey {
     pub name: String,
     /// The survey; only one epoch of it is used.
     pub project: Project,
-    /// Where the paper's estimator measures, which takes seconds a stone; everywhere where absent.
+    /// Where the paper's estimator, which is slow, measures; everywhere where absent.
     pub paper_part: Option<Part>,
 }
 
-/// What the experiment does beside its runs.
+/// Options that hold for all surveys of the experiment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PaperOptions {
     /// The epoch that is split; the first where absent.
     pub epoch: Option<String>,
-    /// Decides the halves.
+    /// Seed of the random division into halves.
     pub seed: u64,
-    /// Minutes that a detector is trained on nine tenths of the labelled photos, 0 for the detector of the
-    /// project as it is. It finds the stones, and the masks are only used to train and to measure it. Where
-    /// absent, the masks themselves are the stones.
+    /// Minutes for which the project's detector is trained on nine tenths of each labelled photo; with 0 it
+    /// is not trained. The detector finds the stones; masks are used only to train and to measure it. Where
+    /// absent, the stones come from the masks.
     pub train_minutes: Option<f64>,
     /// A file of the regions in which the masks are complete, for training and measuring; everywhere where
     /// absent.

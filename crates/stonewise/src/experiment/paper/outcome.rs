@@ -1,11 +1,11 @@
-//! Everything that the experiment came to.
+//! All results of the experiment.
 
 use super::case::Case;
 use super::detectors::MeasuredDetectors;
 use super::options::{PaperOptions, PaperSurvey};
 use crate::project::Project;
 
-/// Runs, and what found their stones.
+/// The runs, and where their stones come from.
 #[derive(Default)]
 pub(super) struct Outcome {
     pub cases: Vec<Case>,
@@ -44,7 +44,7 @@ impl MaskOrigin {
                 masks.file_name().unwrap_or_default().to_string_lossy()
             ),
             (None, Some(minutes)) if minutes > 0.0 => {
-                "found by the detector that was trained on nine tenths of the labelled photos".to_owned()
+                "found by the detector that was trained on nine tenths of each labelled photo".to_owned()
             }
             _ => format!(
                 "found by the {} detector",

@@ -57,9 +57,9 @@ pub(super) fn write(all: &Outcome, tables: &PaperTables, out: &Path) -> Result<(
         page.heading("Segmentation: stones held out of the training")
             .html(&table(&SEGMENTATION_HEAD, &tables.segmentation_rows(), None));
         page.note(
-            "A tenth of each labelled photo, in blocks, is held out of the training. All detectors are measured on the stones of \
-             these blocks alone; they are given whole photos, without relief. A detected stone is right if its IoU with a true one \
-             is at least 0.5; mean IoU is that of the stones that are right.",
+            "A tenth of each labelled photo, in blocks, is held out of the training. All detectors but the paper's network are \
+             measured on the stones of these blocks alone; they are given whole photos, without relief. A detected stone is \
+             correct if its IoU with a true one is at least 0.5; mean IoU is the mean over the correct stones.",
         );
     }
     if let Some(example) = &all.example {

@@ -181,7 +181,7 @@ impl PaperTables {
         table.push("photos", "", "photos with masks", count(|s| s.photos))?;
         let meaning = "true stones held out of training";
         table.push("references", "", meaning, count(|s| s.score.references))?;
-        let meaning = "stones found where they lie";
+        let meaning = "stones found in the areas held out";
         table.push("found", "", meaning, count(|s| s.score.found))?;
         let meaning = "stones found that fit a true one with an IoU of at least 0.5";
         table.push("right", "", meaning, count(|s| s.score.right))?;

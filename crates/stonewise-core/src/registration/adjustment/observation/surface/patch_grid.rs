@@ -31,7 +31,7 @@ pub(crate) struct PatchGrid {
     pub short: usize,
 }
 
-/// Basis functions at a point that are not zero there: four along each axis of the grid, the short one first.
+/// The basis functions that are not zero at a point: four along each axis of the grid, the short axis first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Basis {
     /// Number of the first coefficient.
@@ -39,7 +39,7 @@ pub(crate) struct Basis {
     /// Number of coefficients from one to the next along the long axis.
     stride: usize,
     pub value: [[f64; 4]; 2],
-    /// Derivatives by the place along the axis, 1/m.
+    /// Derivatives with respect to the position along the axis, 1/m.
     pub slope: [[f64; 4]; 2],
 }
 
@@ -82,7 +82,7 @@ impl PatchGrid {
         short * long
     }
 
-    /// A point that counts in full.
+    /// A point with full weight.
     pub fn point(&self, position: [f64; 3]) -> WeightedPoint {
         WeightedPoint {
             position,
