@@ -35,4 +35,8 @@ impl PhotoCamera for SeenBeforeMotion {
     fn centre(&self) -> Point3<f64> {
         self.view.centre()
     }
+
+    fn height_px(&self) -> f64 {
+        self.view.height_px()
+    }
 }

@@ -21,6 +21,8 @@ mod verify;
 
 pub use params::PhotoParams;
 pub(crate) use patch::FaceMotion;
+#[cfg(test)]
+pub(crate) use photo::ByRows;
 pub use photo::{Chip, Photo, PhotoCamera};
 pub use pictures::FacePictures;
 pub use track::PhotoStatus;

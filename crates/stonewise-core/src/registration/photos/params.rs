@@ -11,6 +11,10 @@ pub struct PhotoParams {
     /// Error of a photo's pose, pixels on the wall: standard deviation of what its position and of what its
     /// attitude shift. 0.5: that of a bundle adjustment with some dozens of tie points a photo.
     pub pose_error_px: f64,
+    /// Whether a rolling shutter exposed the rows of the photos one after the other: how far the last row of
+    /// each photo is shifted against its first is then estimated. false: as with a mechanical or global
+    /// shutter.
+    pub rolling_shutter: bool,
     /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
     /// as the appearance of a stone is wrong alike in all photos of an epoch.
     pub max_photos: usize,
@@ -38,6 +42,7 @@ impl Default for PhotoParams {
         Self {
             enabled: true,
             pose_error_px: 0.5,
+            rolling_shutter: false,
             max_photos: 8,
             min_photos: 2,
             rim_m: 0.02,

@@ -1,7 +1,7 @@
 //! Photos as the tracking sees them: cameras, and the parts that show a stone.
 
 use crate::geometry::View;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix2, Matrix3, Point3, RowVector2, Vector3};
 
 /// Where a photo shows a point of the world.
 ///
@@ -11,6 +11,8 @@ pub trait PhotoCamera: Send + Sync {
     fn project(&self, world: &Point3<f64>) -> Option<[f64; 2]>;
     /// Centre of projection, world.
     fn centre(&self) -> Point3<f64>;
+    /// Height of the photo, pixels.
+    fn height_px(&self) -> f64;
 }
 
 impl PhotoCamera for View {
@@ -20,6 +22,10 @@ impl PhotoCamera for View {
 
     fn centre(&self) -> Point3<f64> {
         View::centre(self)
+    }
+
+    fn height_px(&self) -> f64 {
+        f64::from(self.camera.height)
     }
 }
 
@@ -33,6 +39,27 @@ pub struct Photo {
     pub camera: Box<dyn PhotoCamera>,
 }
 
+/// What it does to a face if a photo's rows are shifted in proportion to their distance from its middle, by
+/// one pixel from the first to the last: along the rows, along the columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ByRows {
+    /// Shift in the face, metres, one column for each direction.
+    pub shift: Matrix2<f64>,
+    /// Turn in the face from the axis along to the axis up, radians.
+    pub turn: RowVector2<f64>,
+}
+
+#[cfg(test)]
+impl ByRows {
+    /// Nothing.
+    pub fn none() -> Self {
+        Self {
+            shift: Matrix2::zeros(),
+            turn: RowVector2::zeros(),
+        }
+    }
+}
+
 /// Distance over which a camera's scale is measured, metres: far below a pixel on the wall, far above
 /// rounding.
 const STEP_M: f64 = 1e-4;
@@ -41,23 +68,41 @@ impl Photo {
     /// Size of a pixel on a face at this point, metres: square root of its area there. `None` where the photo
     /// does not see the point.
     pub fn pixel_m(&self, at: &Point3<f64>, along: &Vector3<f64>, up: &Vector3<f64>) -> Option<f64> {
+        let (_, scale) = self.pixels_per_metre(at, along, up)?;
+        let area = scale.determinant().abs();
+        (area > 0.0).then(|| area.sqrt().recip())
+    }
+
+    /// Pixel of this point, and how it changes with the point's place along and up a face.
+    fn pixels_per_metre(
+        &self,
+        at: &Point3<f64>,
+        along: &Vector3<f64>,
+        up: &Vector3<f64>,
+    ) -> Option<([f64; 2], Matrix2<f64>)> {
         let here = self.camera.project(at)?;
         let step = |axis: &Vector3<f64>| {
             let there = self.camera.project(&(at + axis * STEP_M))?;
             Some([(there[0] - here[0]) / STEP_M, (there[1] - here[1]) / STEP_M])
         };
         let (a, b) = (step(along)?, step(up)?);
-        let area = (a[0] * b[1] - a[1] * b[0]).abs();
-        (area > 0.0).then(|| area.sqrt().recip())
+        Some((here, Matrix2::new(a[0], b[0], a[1], b[1])))
+    }
+
+    /// What a shift of the photo's rows does to a face at this point; `None` where the photo does not see it.
+    pub(crate) fn by_rows(&self, at: &Point3<f64>, face_from_world: &Matrix3<f64>) -> Option<ByRows> {
+        let axis = |r: usize| face_from_world.row(r).transpose();
+        let (pixel, scale) = self.pixels_per_metre(at, &axis(0), &axis(1))?;
+        let (inverse, height_px) = (scale.try_inverse()?, self.camera.height_px());
+        Some(ByRows {
+            shift: inverse * (pixel[1] / height_px - 0.5),
+            turn: (inverse.row(1) * scale[(1, 0)] - inverse.row(0) * scale[(1, 1)]) * (0.5 / height_px),
+        })
     }
 
     /// Shift in the face of what stands a metre out of it, in a frame (along, up, out): the photo's parallax
     /// at this point.
-    pub(crate) fn parallax(
-        &self,
-        at: &Point3<f64>,
-        face_from_world: &nalgebra::Matrix3<f64>,
-    ) -> Option<[f64; 2]> {
+    pub(crate) fn parallax(&self, at: &Point3<f64>, face_from_world: &Matrix3<f64>) -> Option<[f64; 2]> {
         let ray = face_from_world * (at - self.camera.centre());
         (ray.z < 0.0).then(|| [-ray.x / ray.z, -ray.y / ray.z])
     }
@@ -139,13 +184,13 @@ mod tests {
         assert_eq!(chip.sample([119.5, 44.0]), None);
     }
 
-    #[test]
-    fn parallax_is_how_a_raised_point_seems_to_shift() {
+    /// A photo that sees a face obliquely: the photo, a point of the face, the face's frame.
+    fn oblique() -> (Photo, Point3<f64>, Matrix3<f64>) {
         let normal = Vector3::new(0.9, 0.1, 0.3).normalize();
         let turn = FaceFrame::from_normal(&normal).face_from_world();
         let at = Point3::new(1.0, 2.0, 3.0);
         let centre = at + normal * 7.0 + Vector3::new(0.0, 2.0, -1.0);
-        let look = Rigid3::face_towards(&centre, &at, &Vector3::z()).inverse();
+        let look = Rigid3::face_towards(&centre, &(at - Vector3::z()), &Vector3::z()).inverse();
         let photo = Photo {
             name: "a".to_owned(),
             epoch: 0,
@@ -156,6 +201,33 @@ mod tests {
                 cam_from_world: look,
             }),
         };
+        (photo, at, turn)
+    }
+
+    #[test]
+    fn rows_shift_what_they_show_in_proportion_to_their_distance_from_the_middle() {
+        let (photo, at, turn) = oblique();
+        let pixel = photo.camera.project(&at).unwrap();
+        let share = (pixel[1] - 750.0) / 1500.0;
+        assert!(share.abs() > 0.1, "{share}");
+        let by_rows = photo.by_rows(&at, &turn).unwrap().shift;
+        for shift_px in [[2.0, 0.0], [0.0, 2.0]] {
+            let moved = by_rows * nalgebra::Vector2::from(shift_px);
+            let seen = photo
+                .camera
+                .project(&(at + turn.transpose() * Vector3::new(moved.x, moved.y, 0.0)));
+            let seen = seen.unwrap();
+            for k in 0..2 {
+                let expected = pixel[k] + share * shift_px[k];
+                assert!((seen[k] - expected).abs() < 1e-3, "{seen:?} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn parallax_is_how_a_raised_point_seems_to_shift() {
+        let (photo, at, turn) = oblique();
+        let (normal, centre) = (turn.row(2).transpose(), photo.camera.centre());
         let q = photo.parallax(&at, &turn).unwrap();
         let raised = photo.camera.project(&(at + normal * 1e-4)).unwrap();
         let shifted = at + turn.transpose() * Vector3::new(q[0], q[1], 0.0) * 1e-4;

@@ -3,7 +3,7 @@
 use super::matching::{Match, Template, Warp};
 use super::params::{OTHER_WINDOW, PhotoParams};
 use super::patch::{FaceMotion, Patch, Placed, normalised};
-use super::photo::{Chip, Photo};
+use super::photo::{ByRows, Chip, Photo};
 use super::pictures::{FacePictures, Shown, pictures};
 use super::surface::Surface;
 use super::template::{Face, Mean, median_shift};
@@ -32,6 +32,8 @@ pub(crate) struct Sight {
     pub turn: Option<f64>,
     /// Shift per height above the face.
     pub parallax: [f64; 2],
+    /// What a shift of the photo's rows does to the face.
+    pub by_rows: ByRows,
     pub correlation: f64,
 }
 
@@ -301,6 +303,7 @@ impl Tracker<'_> {
         let local = nalgebra::Vector3::new(surface.middle[0], surface.middle[1], 0.0) + moved;
         let at = self.pair.centroid + self.face_from_world.transpose() * local;
         let parallax = self.photos[photo].parallax(&at, self.face_from_world)?;
+        let by_rows = self.photos[photo].by_rows(&at, self.face_from_world)?;
         let shift =
             found.warp.shift * cell + Vector2::new(moved.x, moved.y) + Vector2::from(parallax) * moved.z;
         Some(Sight {
@@ -311,6 +314,7 @@ impl Tracker<'_> {
                 .is_affine
                 .then(|| found.warp.turn() + (turn_by_rotation(parallax) * taken.rotation).x),
             parallax,
+            by_rows,
             correlation: found.correlation,
         })
     }

@@ -108,6 +108,10 @@ pub struct PhotosRecord {
     pub appearance_m: f64,
     /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
+    /// Shift of the last row of each photo against its first, along the rows and along the columns, pixels,
+    /// in the order of `poses_px`; missing without a rolling shutter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rows_px: Vec<[f64; 2]>,
     /// Each stone of the first epoch, ascending.
     pub stones: Vec<StoneInPhotosRecord>,
 }
@@ -142,6 +146,7 @@ impl PhotosRecord {
             sigma_factor: photos.sigma_factor,
             appearance_m: photos.appearance_m,
             poses_px: photos.poses_px.clone(),
+            rows_px: photos.rows_px.clone(),
             stones,
         })
     }

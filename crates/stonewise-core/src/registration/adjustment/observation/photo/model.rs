@@ -36,7 +36,10 @@ pub(crate) struct PhotoModel {
     /// What each photo shows of each stone, with the poses as they are.
     shifts: Vec<Vec<PhotoShift>>,
     factor: f64,
+    /// Corrections of the photos' poses.
     poses_px: Vec<f64>,
+    /// Shifts of the photos' rows, where these are unknowns.
+    rows_px: Vec<[f64; 2]>,
     /// Covariance of the poses' errors.
     of_poses: DMatrix<f64>,
 }
@@ -61,6 +64,9 @@ pub struct PhotoReport {
     pub appearance_m: f64,
     /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
+    /// Shift of the last row of each photo against its first, along the rows and along the columns, pixels,
+    /// in the order of `poses_px`; empty without a rolling shutter.
+    pub rows_px: Vec<[f64; 2]>,
     /// What clouds and photos say each by itself, per stone in the order of the pairs; `None` where the stone
     /// is not tracked. Photos are counted as in `poses_px`.
     #[serde(skip)]
@@ -105,6 +111,7 @@ impl PhotoModel {
             tracks,
             factor: 1.0,
             poses_px: vec![0.0; photos.len()],
+            rows_px: Vec::new(),
             of_poses: DMatrix::zeros(0, 0),
         }
     }
@@ -132,6 +139,7 @@ impl PhotoModel {
             epochs: &self.epochs,
             scales: &self.scales,
             pose_error_px: self.params.pose_error_px,
+            rolling_shutter: self.params.rolling_shutter,
             stones: used
                 .iter()
                 .filter_map(|&i| {
@@ -153,7 +161,7 @@ impl PhotoModel {
         let mut found = vec![None; stones.len()];
         let mut shifts = vec![Vec::new(); stones.len()];
         for (k, (&i, stone)) in used.iter().zip(&problem.stones).enumerate() {
-            let system = problem.system(stone, &poses.weights[k], poses.factor);
+            let system = problem.system(stone, &poses.weights[k], &poses.scatter);
             found[i] = system
                 .displacement(&poses)
                 .map(|(information, vector, by_poses)| StonePhotos {
@@ -170,12 +178,12 @@ impl PhotoModel {
                 .and_then(|d| problem.shifts(stone, &poses.weights[k], &poses, &d))
                 .unwrap_or_default();
         }
-        let px = |i: usize| {
-            let correction = poses.corrections.rows(6 * i, 6);
-            self.params.pose_error_px * (correction.norm_squared() / 6.0).sqrt()
-        };
-        self.poses_px = (0..self.centres.len()).map(px).collect();
-        self.factor = poses.factor.sqrt();
+        let photos = 0..self.centres.len();
+        self.poses_px = photos.clone().map(|i| problem.pose_px(i, &poses)).collect();
+        self.rows_px = photos
+            .filter_map(|i| Some(problem.rows_px(i, &poses)?.into()))
+            .collect();
+        self.factor = poses.scatter.factor.sqrt();
         self.of_poses = poses.covariance;
         self.stones = found;
         self.shifts = shifts;
@@ -279,6 +287,7 @@ impl PhotoModel {
             sigma_factor: self.factor,
             appearance_m: bias_m,
             poses_px: poses.collect(),
+            rows_px: self.rows_px.clone(),
             evidence: tracks.map(|i| self.evidence(i, bias_m, moving[i])).collect(),
         }
     }
@@ -329,7 +338,7 @@ fn is_finite(pair: &[f64; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::registration::photos::{FaceMotion, Sight};
+    use crate::registration::photos::{ByRows, FaceMotion, Sight};
     use nalgebra::{Matrix2, Vector2};
 
     fn model(stones: &[(f64, f64)]) -> PhotoModel {
@@ -342,6 +351,7 @@ mod tests {
                     covariance: Matrix2::identity() * (if photo == 0 { 1.0 } else { sd_m * sd_m }),
                     turn: None,
                     parallax: [0.0; 2],
+                    by_rows: ByRows::none(),
                     correlation: 0.9,
                 })
                 .to_vec(),
@@ -362,6 +372,7 @@ mod tests {
             shifts: vec![Vec::new(); stones.len()],
             factor: 1.0,
             poses_px: vec![0.0; 2],
+            rows_px: Vec::new(),
             of_poses: DMatrix::zeros(0, 0),
         }
     }

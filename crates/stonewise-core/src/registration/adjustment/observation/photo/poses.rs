@@ -2,19 +2,41 @@
 //!
 //! For photo i of stone k, with the parallax q_i (shift in the face per height):
 //!
-//! s_ki = o_k + q_i h_k + [second epoch] F_i d_k + F_i E (w_i x r - c_i) + e,   F_i = (1, q_i)
+//! s_ki = o_k + q_i h_k + [second epoch] F_i d_k + F_i E (w_i x r - c_i) + R_i v_i + e,   F_i = (1, q_i)
 //!
 //! o_k: place of the stone's template, h_k: error of the height of its face, d_k: its displacement, E: world
 //! to face, r: from the camera to the stone, c_i and w_i: corrections of the camera's position and attitude.
+//! Rows that a rolling shutter exposes one after the other in a moving camera are shifted in proportion to
+//! their distance from the photo's middle: R_i v_i, two unknowns of each photo, two of the difference between
+//! the epochs and two of all photos.
 //! All photos of the second epoch share a similarity transformation beside that, of any size: photos show
 //! motions relative to each other.
 
 use super::evidence::{FaceShift, PhotoShift};
 use crate::registration::photos::{Sight, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Point3, SMatrix, Vector2, Vector3};
+use std::array::from_fn;
 
-/// Unknowns of a pose.
+/// Unknowns of a photo: position, attitude; with a rolling shutter also the shift of the last row against the
+/// first beyond what the photos of its epoch share.
+const PHOTO: usize = 8;
+/// Unknowns of a photo's pose, and the first of those that shift its rows.
 const POSE: usize = 6;
+/// Standard deviation of the shift of the last row against the first, pixels, along the rows and along the
+/// columns, that all photos share: a lens model that is off does the same.
+const COMMON_PX: f64 = 2.0;
+/// Start of the standard deviations of what the shift of an epoch's photos, and that of a single photo, has
+/// beyond that, pixels. How large they are follows from the photos: a camera that reads its rows in 30 ms moves
+/// by two pixels of 3 mm at 0.2 m/s, and turns by as much at 2 degrees a second.
+const START_ROWS_PX: [f64; 2] = [0.3; 2];
+/// Weight of this start, in unknowns.
+const ROWS_PRIOR: f64 = 2.0;
+/// Unknowns of the rows that photos share: of all photos, half the difference of the epochs.
+const ALIKE: usize = 4;
+/// Signs of the epochs in half their difference.
+const SIGNS: [f64; 2] = [-1.0, 1.0];
+/// Unknowns that photos share: the second epoch as a whole, and rows that are shifted alike.
+const SHARED: usize = WHOLE + ALIKE;
 /// Unknowns of the second epoch as a whole: translation, rotation, scale.
 const WHOLE: usize = 7;
 /// Unknowns of a stone: place of the template (2), height of the face, displacement (3).
@@ -56,10 +78,22 @@ pub(super) struct PoseProblem<'a> {
     /// Size of a pixel on the wall and distance from it, metres, per photo.
     pub scales: &'a [[f64; 2]],
     pub pose_error_px: f64,
+    /// Whether rows are shifted against each other.
+    pub rolling_shutter: bool,
     pub stones: Vec<PoseStone<'a>>,
     /// Middle of the wall, and its extent, metres.
     pub middle: Point3<f64>,
     pub extent_m: f64,
+}
+
+/// How far shifts of photos scatter.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scatter {
+    /// Factor on the formal variances of matches.
+    pub factor: f64,
+    /// Standard deviations of the shift of the last row against the first, pixels: of an epoch's photos, of a
+    /// single photo.
+    pub rows_px: [f64; 2],
 }
 
 /// Adjusted poses.
@@ -68,8 +102,7 @@ pub(super) struct Poses {
     /// Corrections in units of their standard deviations before.
     pub corrections: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Factor on the formal variances of matches.
-    pub factor: f64,
+    pub scatter: Scatter,
     /// Weight of each sight, in the order of stones and sights.
     pub weights: Vec<Vec<f64>>,
 }
@@ -116,19 +149,54 @@ impl PoseInfluence {
 
 impl PoseProblem<'_> {
     pub fn unknowns(&self) -> usize {
-        POSE * self.centres.len() + WHOLE
+        self.first_shared() + self.of_all()
     }
 
-    /// What a sight's shift changes by: with the stone's unknowns, with its pose, with the second epoch as a
-    /// whole.
+    /// Unknowns of each photo.
+    fn of_photo(&self) -> usize {
+        if self.rolling_shutter { PHOTO } else { POSE }
+    }
+
+    /// Unknowns that photos share.
+    fn of_all(&self) -> usize {
+        if self.rolling_shutter { SHARED } else { WHOLE }
+    }
+
+    /// The first unknown that photos share.
+    fn first_shared(&self) -> usize {
+        self.of_photo() * self.centres.len()
+    }
+
+    /// Root mean square of what the correction of a photo's position and attitude shifts, pixels.
+    pub fn pose_px(&self, photo: usize, poses: &Poses) -> f64 {
+        let pose = poses.corrections.fixed_rows::<POSE>(self.of_photo() * photo);
+        self.pose_error_px * (pose.norm_squared() / POSE as f64).sqrt()
+    }
+
+    /// Shift of a photo's last row against its first, along the rows and along the columns, pixels; `None`
+    /// without a rolling shutter.
+    pub fn rows_px(&self, photo: usize, poses: &Poses) -> Option<Vector2<f64>> {
+        let part = |first: usize| poses.corrections.fixed_rows::<2>(first);
+        let alike = self.first_shared() + WHOLE;
+        let [epoch_px, own_px] = poses.scatter.rows_px;
+        self.rolling_shutter.then(|| {
+            part(alike) * COMMON_PX
+                + part(alike + 2) * (SIGNS[self.epochs[photo]] * epoch_px)
+                + part(PHOTO * photo + POSE) * own_px
+        })
+    }
+
+    /// What a sight's shift changes by: with the stone's unknowns, with its photo's, with those that photos
+    /// share.
     fn rows(
         &self,
         stone: &PoseStone,
         sight: &Sight,
+        scatter: &Scatter,
     ) -> (
         SMatrix<f64, 2, STONE>,
-        SMatrix<f64, 2, POSE>,
-        SMatrix<f64, 2, WHOLE>,
+        SMatrix<f64, 2, PHOTO>,
+        SMatrix<f64, 2, SHARED>,
     ) {
         let q = Vector2::from(sight.parallax);
         let f = SMatrix::<f64, 2, 3>::new(1.0, 0.0, q.x, 0.0, 1.0, q.y);
@@ -142,32 +210,40 @@ impl PoseProblem<'_> {
         let to_face = f * stone.face_from_world;
         let [pixel_m, distance_m] = self.scales[sight.photo];
         let shift_m = self.pose_error_px * pixel_m;
-        let mut pose = SMatrix::<f64, 2, POSE>::zeros();
+        let mut pose = SMatrix::<f64, 2, PHOTO>::zeros();
         pose.fixed_view_mut::<2, 3>(0, 0).copy_from(&(-to_face * shift_m));
         let turned = -to_face * (at - self.centres[sight.photo]).cross_matrix();
         pose.fixed_view_mut::<2, 3>(0, 3)
             .copy_from(&(turned * (shift_m / distance_m)));
-        let mut whole = SMatrix::<f64, 2, WHOLE>::zeros();
+        pose.fixed_view_mut::<2, 2>(0, POSE)
+            .copy_from(&(sight.by_rows.shift * scatter.rows_px[1]));
+        let mut shared = SMatrix::<f64, 2, SHARED>::zeros();
         let arm = at - self.middle;
         let reach = WHOLE_M / self.extent_m;
-        whole
+        shared
             .fixed_view_mut::<2, 3>(0, 0)
             .copy_from(&(to_face * (second * WHOLE_M)));
-        whole
+        shared
             .fixed_view_mut::<2, 3>(0, 3)
             .copy_from(&(-to_face * arm.cross_matrix() * (second * reach)));
-        whole
+        shared
             .fixed_view_mut::<2, 1>(0, 6)
             .copy_from(&(to_face * arm * (second * reach)));
-        (own, pose, whole)
+        let sign = SIGNS[self.epochs[sight.photo]];
+        for (k, px) in [COMMON_PX, sign * scatter.rows_px[0]].into_iter().enumerate() {
+            shared
+                .fixed_view_mut::<2, 2>(0, WHOLE + 2 * k)
+                .copy_from(&(sight.by_rows.shift * px));
+        }
+        (own, pose, shared)
     }
 
     /// How far the adjusted poses turn a photo, with the second epoch as a whole: rotation vector, world,
     /// radians.
     pub fn rotation(&self, photo: usize, poses: &Poses) -> Vector3<f64> {
         let [pixel_m, distance_m] = self.scales[photo];
-        let own = poses.corrections.fixed_rows::<3>(POSE * photo + 3);
-        let whole = poses.corrections.fixed_rows::<3>(POSE * self.centres.len() + 3);
+        let own = poses.corrections.fixed_rows::<3>(self.of_photo() * photo + 3);
+        let whole = poses.corrections.fixed_rows::<3>(self.first_shared() + 3);
         let second = f64::from(u8::from(self.epochs[photo] == 1));
         own * (self.pose_error_px * pixel_m / distance_m) + whole * (second * WHOLE_M / self.extent_m)
     }
@@ -181,14 +257,15 @@ impl PoseProblem<'_> {
     }
 
     /// The equations of a stone without what the clouds say.
-    pub fn system(&self, stone: &PoseStone, weights: &[f64], factor: f64) -> StoneSystem {
+    pub fn system(&self, stone: &PoseStone, weights: &[f64], scatter: &Scatter) -> StoneSystem {
         let sights = &stone.track.sights;
-        let count = POSE * sights.len() + WHOLE;
+        let (own_count, shared_count) = (self.of_photo(), self.of_all());
+        let count = own_count * sights.len() + shared_count;
         let mut columns: Vec<usize> = sights
             .iter()
-            .flat_map(|s| POSE * s.photo..POSE * (s.photo + 1))
+            .flat_map(|s| own_count * s.photo..own_count * (s.photo + 1))
             .collect();
-        columns.extend(POSE * self.centres.len()..self.unknowns());
+        columns.extend(self.first_shared()..self.unknowns());
         let mut system = StoneSystem {
             own: StoneMatrix::zeros(),
             right: SMatrix::zeros(),
@@ -199,12 +276,13 @@ impl PoseProblem<'_> {
         };
         system.own[(2, 2)] = HEIGHT_M.powi(-2);
         for (k, (sight, w)) in sights.iter().zip(weights).enumerate() {
-            let (own, pose, whole) = self.rows(stone, sight);
-            let weight = self.weight(sight, factor) * *w;
+            let (own, pose, shared) = self.rows(stone, sight, scatter);
+            let weight = self.weight(sight, scatter.factor) * *w;
             let mut row = DMatrix::zeros(2, count);
-            row.view_mut((0, POSE * k), (2, POSE)).copy_from(&pose);
-            row.view_mut((0, POSE * sights.len()), (2, WHOLE))
-                .copy_from(&whole);
+            row.columns_mut(own_count * k, own_count)
+                .copy_from(&pose.columns(0, own_count));
+            row.columns_mut(own_count * sights.len(), shared_count)
+                .copy_from(&shared.columns(0, shared_count));
             system.own += own.transpose() * weight * own;
             system.right += own.transpose() * weight * sight.shift;
             system.cross += own.transpose() * weight * &row;
@@ -223,19 +301,23 @@ impl PoseProblem<'_> {
             .map(|s| vec![1.0; s.track.sights.len()])
             .collect();
         let mut trust = vec![1.0; self.stones.len()];
-        let mut factor = START_FACTOR;
+        let mut scatter = Scatter {
+            factor: START_FACTOR,
+            rows_px: START_ROWS_PX,
+        };
         let mut found = None;
         for _ in 0..ROUNDS {
-            let (corrections, covariance) = self.solve_weighted(&weights, &trust, factor, bias_m, factors)?;
+            let (corrections, covariance) =
+                self.solve_weighted(&weights, &trust, &scatter, bias_m, factors)?;
             let (mut square, mut redundancy) = (0.0, 0.0);
             for (k, stone) in self.stones.iter().enumerate() {
                 let prior = self.prior(stone, trust[k], bias_m, factors[k]);
-                let Some(own) = self.own(stone, &weights[k], factor, &prior, &corrections) else {
+                let Some(own) = self.own(stone, &weights[k], &scatter, &prior, &corrections) else {
                     continue;
                 };
                 for (sight, w) in stone.track.sights.iter().zip(&mut weights[k]) {
-                    let r = self.residual(stone, sight, &own, &corrections);
-                    let r2 = r.dot(&(self.weight(sight, factor) * r));
+                    let r = self.residual(stone, sight, &own, &scatter, &corrections);
+                    let r2 = r.dot(&(self.weight(sight, scatter.factor) * r));
                     square += *w * r2;
                     redundancy += 2.0;
                     *w = (FREEDOM + 2.0) / (FREEDOM + r2);
@@ -246,16 +328,41 @@ impl PoseProblem<'_> {
                 let r2 = spread.try_inverse().map_or(0.0, |i| apart.dot(&(i * apart)));
                 trust[k] = ((FREEDOM + 3.0) / (FREEDOM + r2)).min(1.0);
             }
-            factor = (factor * square / f64::max(redundancy - POSE as f64 * self.centres.len() as f64, 1.0))
-                .max(1.0);
+            let redundancy = redundancy - self.first_shared() as f64;
+            scatter.factor = (scatter.factor * square / redundancy.max(1.0)).max(1.0);
+            let rows_px = self.scatter_of_rows(&corrections, &covariance, scatter.rows_px);
             found = Some(Poses {
                 corrections,
                 covariance,
-                factor,
+                scatter,
                 weights: weights.clone(),
             });
+            scatter.rows_px = rows_px;
         }
         found
+    }
+
+    /// Standard deviations of the shifts of rows for which these corrections, found with `rows_px`, are most
+    /// likely: a step of expectation maximisation.
+    fn scatter_of_rows(
+        &self,
+        corrections: &DVector<f64>,
+        covariance: &DMatrix<f64>,
+        rows_px: [f64; 2],
+    ) -> [f64; 2] {
+        if !self.rolling_shutter {
+            return rows_px;
+        }
+        let of_epochs: Vec<usize> = (self.unknowns() - 2..self.unknowns()).collect();
+        let photos = 0..self.centres.len();
+        let of_photos = photos.flat_map(|i| PHOTO * i + POSE..PHOTO * (i + 1)).collect();
+        let unknowns = [of_epochs, of_photos];
+        from_fn(|k| {
+            let square = |i: &usize| corrections[*i].powi(2) + covariance[(*i, *i)];
+            let sum: f64 = unknowns[k].iter().map(square).sum();
+            let of_start = ROWS_PRIOR * START_ROWS_PX[k].powi(2);
+            ((sum * rows_px[k].powi(2) + of_start) / (unknowns[k].len() as f64 + ROWS_PRIOR)).sqrt()
+        })
     }
 
     /// Information of the clouds on a stone's displacement as the photos see it.
@@ -269,7 +376,7 @@ impl PoseProblem<'_> {
         &self,
         weights: &[Vec<f64>],
         trust: &[f64],
-        factor: f64,
+        scatter: &Scatter,
         bias_m: f64,
         factors: &[f64],
     ) -> Option<(DVector<f64>, DMatrix<f64>)> {
@@ -277,7 +384,7 @@ impl PoseProblem<'_> {
         let mut normal = DMatrix::<f64>::identity(count, count);
         let mut right = DVector::<f64>::zeros(count);
         for (k, stone) in self.stones.iter().enumerate() {
-            let mut system = self.system(stone, &weights[k], factor);
+            let mut system = self.system(stone, &weights[k], scatter);
             let prior = self.prior(stone, trust[k], bias_m, factors[k]);
             system.add_prior(&prior, &stone.clouds.mean);
             let Some(own) = system.own.cholesky() else {
@@ -301,11 +408,11 @@ impl PoseProblem<'_> {
         &self,
         stone: &PoseStone,
         weights: &[f64],
-        factor: f64,
+        scatter: &Scatter,
         prior: &Matrix3<f64>,
         corrections: &DVector<f64>,
     ) -> Option<SMatrix<f64, STONE, 1>> {
-        let mut system = self.system(stone, weights, factor);
+        let mut system = self.system(stone, weights, scatter);
         system.add_prior(prior, &stone.clouds.mean);
         let right = system.right - &system.cross * system.of(corrections);
         Some(system.own.cholesky()?.solve(&right))
@@ -320,7 +427,7 @@ impl PoseProblem<'_> {
         poses: &Poses,
         displacement: &Vector3<f64>,
     ) -> Option<Vec<PhotoShift>> {
-        let system = self.system(stone, weights, poses.factor);
+        let system = self.system(stone, weights, &poses.scatter);
         let right = system.right - &system.cross * system.of(&poses.corrections);
         let mixed = system.own.fixed_view::<3, 3>(0, 3);
         let inner = system.own.fixed_view::<3, 3>(0, 0).into_owned().cholesky()?;
@@ -335,11 +442,11 @@ impl PoseProblem<'_> {
             } else {
                 Vector2::zeros()
             };
-            let shift = moved + self.residual(stone, sight, &own, &poses.corrections);
+            let shift = moved + self.residual(stone, sight, &own, &poses.scatter, &poses.corrections);
             Some(PhotoShift {
                 photo: sight.photo,
                 epoch,
-                shift: FaceShift::new(&shift, &self.weight(sight, poses.factor).try_inverse()?)?,
+                shift: FaceShift::new(&shift, &self.weight(sight, poses.scatter.factor).try_inverse()?)?,
                 weight: *weight,
             })
         };
@@ -360,12 +467,16 @@ impl PoseProblem<'_> {
         stone: &PoseStone,
         sight: &Sight,
         own: &SMatrix<f64, STONE, 1>,
+        scatter: &Scatter,
         corrections: &DVector<f64>,
     ) -> Vector2<f64> {
-        let (a, pose, whole) = self.rows(stone, sight);
-        let of_pose = corrections.fixed_rows::<POSE>(POSE * sight.photo);
-        let of_whole = corrections.fixed_rows::<WHOLE>(POSE * self.centres.len());
-        sight.shift - a * own - (pose * of_pose + whole * of_whole)
+        let (a, pose, shared) = self.rows(stone, sight, scatter);
+        let (own_count, shared_count) = (self.of_photo(), self.of_all());
+        let of_photo = corrections.rows(own_count * sight.photo, own_count);
+        let of_shared = corrections.rows(self.first_shared(), shared_count);
+        sight.shift
+            - a * own
+            - (pose.columns(0, own_count) * of_photo + shared.columns(0, shared_count) * of_shared)
     }
 }
 

@@ -49,8 +49,10 @@ impl PoseProblem<'_> {
         for (sight, w) in stone.track.sights.iter().zip(weights) {
             let Some(turn) = sight.turn else { continue };
             let by_rotation = turn_by_rotation(sight.parallax);
-            let of_pose = by_rotation * stone.face_from_world * self.rotation(sight.photo, poses);
-            let shift_m2 = 0.5 * self.weight(sight, poses.factor).try_inverse()?.trace();
+            let rows_px = self.rows_px(sight.photo, poses).unwrap_or_default();
+            let of_pose = by_rotation * stone.face_from_world * self.rotation(sight.photo, poses)
+                + sight.by_rows.turn * rows_px;
+            let shift_m2 = 0.5 * self.weight(sight, poses.scatter.factor).try_inverse()?.trace();
             let weight = w * radius_m * radius_m / shift_m2;
             let sum = &mut sums[self.epochs[sight.photo]];
             sum.weight += weight;
@@ -120,7 +122,7 @@ impl StoneTurn {
 
 #[cfg(test)]
 mod tests {
-    use super::super::poses::CloudMotion;
+    use super::super::poses::{CloudMotion, Scatter};
     use super::*;
     use crate::geometry::{Camera, FaceFrame, Rigid3, View};
     use crate::id::ImageId;
@@ -153,6 +155,7 @@ mod tests {
             covariance: Matrix2::identity() * 1e-8,
             turn: Some(0.0),
             parallax: camera.parallax(at, turn_to_face).unwrap(),
+            by_rows: camera.by_rows(at, turn_to_face).unwrap(),
             correlation: 0.9,
         }
     }
@@ -181,12 +184,25 @@ mod tests {
         }
     }
 
-    /// Corrections of four poses and of the second epoch as a whole, `size` times all sizes.
-    fn poses(size: f64) -> Poses {
+    /// Corrections of four photos and of those that they share: `pose` of position and attitude, `rows` of the
+    /// rows.
+    fn poses(pose: f64, rows: f64) -> Poses {
+        let count = problem(&[Point3::origin(); 4], Point3::origin()).unknowns();
+        let correction = |k: usize| {
+            let is_of_rows = (k < 32 && k % 8 >= 6) || k >= count - 4;
+            if is_of_rows {
+                rows * (((k * 5) % 7) as f64 - 3.0)
+            } else {
+                pose * (((k * 7) % 11) as f64 - 5.0)
+            }
+        };
         Poses {
-            corrections: DVector::from_fn(31, |k, _| size * (((k * 7) % 11) as f64 - 5.0)),
-            covariance: DMatrix::zeros(31, 31),
-            factor: 1.0,
+            corrections: DVector::from_fn(count, |k, _| correction(k)),
+            covariance: DMatrix::zeros(count, count),
+            scatter: Scatter {
+                factor: 1.0,
+                rows_px: [1.0; 2],
+            },
             weights: vec![vec![1.0; 4]],
         }
     }
@@ -198,6 +214,7 @@ mod tests {
             epochs: &[0, 0, 1, 1],
             scales: &[[0.003, 6.0]; 4],
             pose_error_px: 0.5,
+            rolling_shutter: true,
             stones: Vec::new(),
             middle,
             extent_m: 2.0,
@@ -220,6 +237,7 @@ mod tests {
                     &stone(&track, &centroid, &turn_to_face),
                     &sight(photo, &at, &turn_to_face),
                     &Vector6::zeros(),
+                    &poses.scatter,
                     &poses.corrections,
                 )
             };
@@ -241,8 +259,17 @@ mod tests {
 
     #[test]
     fn the_turn_by_a_pose_is_that_of_the_shifts_by_it_and_is_taken_off() {
-        let [error, turn] = error(&poses(1.0));
-        assert!(turn.abs() > 1e-3 && error.abs() < 1e-7, "{turn} {error}");
+        let [error_of_poses, turn] = error(&poses(1.0, 0.0));
+        assert!(
+            turn.abs() > 1e-3 && error_of_poses.abs() < 1e-7,
+            "{turn} {error_of_poses}"
+        );
+        // Shifts by the rows also follow the distance, which changes over an oblique face by a few percent.
+        let [error_of_rows, turn] = error(&poses(0.0, 0.1));
+        assert!(
+            turn.abs() > 1e-4 && error_of_rows.abs() < 0.15 * turn.abs(),
+            "{turn} {error_of_rows}"
+        );
     }
 
     #[test]
@@ -254,7 +281,7 @@ mod tests {
         let track = track((0..4).map(|p| sight(p, &at, &turn_to_face)).collect(), [0.0; 2]);
         let problem = problem(&centres, at);
         let stone = stone(&track, &at, &turn_to_face);
-        let found = problem.turn(&stone, &[1.0; 4], &poses(0.0)).unwrap();
+        let found = problem.turn(&stone, &[1.0; 4], &poses(0.0, 0.0)).unwrap();
         let expected = (1e-8 + 3.6e-9) / 0.01;
         assert!(
             (found.variance - expected).abs() < 1e-9 * expected,
@@ -262,6 +289,10 @@ mod tests {
             found.variance
         );
         // Without sights of one epoch there is none.
-        assert!(problem.turn(&stone, &[0.0, 0.0, 1.0, 1.0], &poses(0.0)).is_none());
+        assert!(
+            problem
+                .turn(&stone, &[0.0, 0.0, 1.0, 1.0], &poses(0.0, 0.0))
+                .is_none()
+        );
     }
 }
