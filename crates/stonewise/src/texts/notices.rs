@@ -142,7 +142,7 @@ messages! {
             "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras";
 
         ROLLING_SHUTTER:
-            "rolling shutter compensation is not applied: points may fall some pixels beside their photo place",
-            "die Korrektur des Rolling Shutters ist nicht angewandt: Punkte können einige Pixel neben ihrem Platz im Foto liegen";
+            "the camera's rolling shutter is not compensated: points may fall some pixels beside their place in the photo; rolling_shutter = true in [registration.photos] estimates how far",
+            "der Rolling Shutter der Kamera ist nicht korrigiert: Punkte können einige Pixel neben ihrem Platz im Foto liegen; rolling_shutter = true in [registration.photos] schätzt, wie weit";
     }
 }

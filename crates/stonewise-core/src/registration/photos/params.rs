@@ -11,9 +11,9 @@ pub struct PhotoParams {
     /// Error of a photo's pose, pixels on the wall: standard deviation of what its position and of what its
     /// attitude shift. 0.5: that of a bundle adjustment with some dozens of tie points a photo.
     pub pose_error_px: f64,
-    /// Whether a rolling shutter exposed the rows of the photos one after the other: how far the last row of
-    /// each photo is shifted against its first is then estimated. false: as with a mechanical or global
-    /// shutter.
+    /// Whether the camera has a rolling shutter, which exposes the rows of a photo one after the other. If
+    /// true, the shift of each photo's last row relative to its first is estimated. false: for a mechanical
+    /// or global shutter.
     pub rolling_shutter: bool,
     /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
     /// as the appearance of a stone is wrong alike in all photos of an epoch.

@@ -39,8 +39,9 @@ pub struct Photo {
     pub camera: Box<dyn PhotoCamera>,
 }
 
-/// What it does to a face if a photo's rows are shifted in proportion to their distance from its middle, by
-/// one pixel from the first to the last: along the rows, along the columns.
+/// How a point of a face seems to move when a photo's rows are shifted in proportion to their distance from
+/// the middle row, per pixel of shift of the last row relative to the first: along the rows, along the
+/// columns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ByRows {
     /// Shift in the face, metres, one column for each direction.
@@ -51,7 +52,7 @@ pub(crate) struct ByRows {
 
 #[cfg(test)]
 impl ByRows {
-    /// Nothing.
+    /// No effect.
     pub fn none() -> Self {
         Self {
             shift: Matrix2::zeros(),
@@ -73,7 +74,7 @@ impl Photo {
         (area > 0.0).then(|| area.sqrt().recip())
     }
 
-    /// Pixel of this point, and how it changes with the point's place along and up a face.
+    /// Pixel of this point, and its derivatives along and up a face, pixels per metre.
     fn pixels_per_metre(
         &self,
         at: &Point3<f64>,
@@ -89,7 +90,7 @@ impl Photo {
         Some((here, Matrix2::new(a[0], b[0], a[1], b[1])))
     }
 
-    /// What a shift of the photo's rows does to a face at this point; `None` where the photo does not see it.
+    /// Effect of a shift of the photo's rows at this point of a face; `None` where the photo does not see it.
     pub(crate) fn by_rows(&self, at: &Point3<f64>, face_from_world: &Matrix3<f64>) -> Option<ByRows> {
         let axis = |r: usize| face_from_world.row(r).transpose();
         let (pixel, scale) = self.pixels_per_metre(at, &axis(0), &axis(1))?;

@@ -32,7 +32,7 @@ pub(crate) struct Sight {
     pub turn: Option<f64>,
     /// Shift per height above the face.
     pub parallax: [f64; 2],
-    /// What a shift of the photo's rows does to the face.
+    /// Effect of a shift of the photo's rows on the stone's face.
     pub by_rows: ByRows,
     pub correlation: f64,
 }

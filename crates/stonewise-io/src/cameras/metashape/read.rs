@@ -10,6 +10,10 @@ use std::path::Path;
 use stonewise_core::geometry::{Camera, View};
 use stonewise_core::id::ImageId;
 
+/// Warning about sensors with `<rolling_shutter>`.
+const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not compensated: points may fall some pixels beside their \
+    place in the photo; rolling_shutter = true in [registration.photos] estimates how far";
+
 /// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
 pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     let text = read_text(path)?;
@@ -94,8 +98,7 @@ fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile
         });
     }
     if rolling {
-        let warning = "rolling shutter compensation is not applied: points may fall some pixels beside their photo place";
-        file.warnings.push(warning.to_owned());
+        file.warnings.push(ROLLING_SHUTTER.to_owned());
     }
     if file.crs.is_some() && !file.views.is_empty() {
         place(&mut file, path, map)?;

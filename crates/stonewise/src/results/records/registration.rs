@@ -108,8 +108,8 @@ pub struct PhotosRecord {
     pub appearance_m: f64,
     /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
-    /// Shift of the last row of each photo against its first, along the rows and along the columns, pixels,
-    /// in the order of `poses_px`; missing without a rolling shutter.
+    /// Shift of each photo's last row relative to its first, along the rows and along the columns, pixels, in
+    /// the order of `poses_px`; absent unless `rolling_shutter` is set.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rows_px: Vec<[f64; 2]>,
     /// Each stone of the first epoch, ascending.

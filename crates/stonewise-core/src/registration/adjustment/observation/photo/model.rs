@@ -38,7 +38,7 @@ pub(crate) struct PhotoModel {
     factor: f64,
     /// Corrections of the photos' poses.
     poses_px: Vec<f64>,
-    /// Shifts of the photos' rows, where these are unknowns.
+    /// Shift of each photo's last row relative to its first, pixels; empty if not estimated.
     rows_px: Vec<[f64; 2]>,
     /// Covariance of the poses' errors.
     of_poses: DMatrix<f64>,
@@ -64,8 +64,8 @@ pub struct PhotoReport {
     pub appearance_m: f64,
     /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
-    /// Shift of the last row of each photo against its first, along the rows and along the columns, pixels,
-    /// in the order of `poses_px`; empty without a rolling shutter.
+    /// Shift of each photo's last row relative to its first, along the rows and along the columns, pixels, in
+    /// the order of `poses_px`; empty unless `rolling_shutter` is set.
     pub rows_px: Vec<[f64; 2]>,
     /// What clouds and photos say each by itself, per stone in the order of the pairs; `None` where the stone
     /// is not tracked. Photos are counted as in `poses_px`.

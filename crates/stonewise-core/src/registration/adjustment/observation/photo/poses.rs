@@ -6,9 +6,11 @@
 //!
 //! o_k: place of the stone's template, h_k: error of the height of its face, d_k: its displacement, E: world
 //! to face, r: from the camera to the stone, c_i and w_i: corrections of the camera's position and attitude.
-//! Rows that a rolling shutter exposes one after the other in a moving camera are shifted in proportion to
-//! their distance from the photo's middle: R_i v_i, two unknowns of each photo, two of the difference between
-//! the epochs and two of all photos.
+//! A rolling shutter exposes the rows one after the other; if the camera moves meanwhile, each row is shifted
+//! in proportion to its distance from the photo's middle row. v_i is the shift of the last row relative to
+//! the first, in pixels; R_i converts it to the shift of the stone in the face. v_i is the sum of three
+//! parts of two unknowns each: common to all photos, half the difference between the epochs (with opposite
+//! signs), and of the photo alone.
 //! All photos of the second epoch share a similarity transformation beside that, of any size: photos show
 //! motions relative to each other.
 
@@ -17,25 +19,26 @@ use crate::registration::photos::{Sight, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix3, Matrix3xX, Point3, SMatrix, Vector2, Vector3};
 use std::array::from_fn;
 
-/// Unknowns of a photo: position, attitude; with a rolling shutter also the shift of the last row against the
-/// first beyond what the photos of its epoch share.
+/// Unknowns of a photo: position and attitude; with a rolling shutter also its own part of the shift of the
+/// last row relative to the first.
 const PHOTO: usize = 8;
-/// Unknowns of a photo's pose, and the first of those that shift its rows.
+/// Unknowns of a photo's pose, which is also the index of the first unknown for the shift of its rows.
 const POSE: usize = 6;
-/// Standard deviation of the shift of the last row against the first, pixels, along the rows and along the
-/// columns, that all photos share: a lens model that is off does the same.
+/// A priori standard deviation of the part of this shift that all photos share, pixels, along the rows and
+/// along the columns. Errors of the camera calibration can have the same effect.
 const COMMON_PX: f64 = 2.0;
-/// Start of the standard deviations of what the shift of an epoch's photos, and that of a single photo, has
-/// beyond that, pixels. How large they are follows from the photos: a camera that reads its rows in 30 ms moves
-/// by two pixels of 3 mm at 0.2 m/s, and turns by as much at 2 degrees a second.
+/// Starting values of the standard deviations of the other two parts, of the epoch and of the single photo,
+/// pixels. The final values are estimated from the photos. With a readout time of 30 ms and pixels of 3 mm on
+/// the wall, a speed of 0.2 m/s shifts the last row by two pixels; so do 2 degrees a second at 6 m.
 const START_ROWS_PX: [f64; 2] = [0.3; 2];
-/// Weight of this start, in unknowns.
+/// Weight of these starting values, as a number of unknowns.
 const ROWS_PRIOR: f64 = 2.0;
-/// Unknowns of the rows that photos share: of all photos, half the difference of the epochs.
+/// Unknowns of the shift of rows that photos share: common to all photos (2), half the difference between the
+/// epochs (2).
 const ALIKE: usize = 4;
-/// Signs of the epochs in half their difference.
+/// Sign of half the difference between the epochs, in the first and in the second.
 const SIGNS: [f64; 2] = [-1.0, 1.0];
-/// Unknowns that photos share: the second epoch as a whole, and rows that are shifted alike.
+/// Unknowns that photos share: those of the second epoch as a whole, and the shared shift of rows.
 const SHARED: usize = WHOLE + ALIKE;
 /// Unknowns of the second epoch as a whole: translation, rotation, scale.
 const WHOLE: usize = 7;
@@ -78,7 +81,7 @@ pub(super) struct PoseProblem<'a> {
     /// Size of a pixel on the wall and distance from it, metres, per photo.
     pub scales: &'a [[f64; 2]],
     pub pose_error_px: f64,
-    /// Whether rows are shifted against each other.
+    /// Whether the shift of each photo's rows is estimated.
     pub rolling_shutter: bool,
     pub stones: Vec<PoseStone<'a>>,
     /// Middle of the wall, and its extent, metres.
@@ -86,13 +89,13 @@ pub(super) struct PoseProblem<'a> {
     pub extent_m: f64,
 }
 
-/// How far shifts of photos scatter.
+/// Scatter of the matches and of the shifts of rows, estimated with the poses.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scatter {
     /// Factor on the formal variances of matches.
     pub factor: f64,
-    /// Standard deviations of the shift of the last row against the first, pixels: of an epoch's photos, of a
-    /// single photo.
+    /// Standard deviations of two parts of the shift of the last row relative to the first, pixels: that of
+    /// the epoch and that of the single photo.
     pub rows_px: [f64; 2],
 }
 
@@ -173,8 +176,8 @@ impl PoseProblem<'_> {
         self.pose_error_px * (pose.norm_squared() / POSE as f64).sqrt()
     }
 
-    /// Shift of a photo's last row against its first, along the rows and along the columns, pixels; `None`
-    /// without a rolling shutter.
+    /// Shift of a photo's last row relative to its first, along the rows and along the columns, pixels;
+    /// `None` unless `rolling_shutter` is set.
     pub fn rows_px(&self, photo: usize, poses: &Poses) -> Option<Vector2<f64>> {
         let part = |first: usize| poses.corrections.fixed_rows::<2>(first);
         let alike = self.first_shared() + WHOLE;
@@ -186,8 +189,8 @@ impl PoseProblem<'_> {
         })
     }
 
-    /// What a sight's shift changes by: with the stone's unknowns, with its photo's, with those that photos
-    /// share.
+    /// Derivatives of a sight's shift with respect to the unknowns of the stone, those of its photo, and
+    /// those that photos share.
     fn rows(
         &self,
         stone: &PoseStone,
@@ -342,8 +345,8 @@ impl PoseProblem<'_> {
         found
     }
 
-    /// Standard deviations of the shifts of rows for which these corrections, found with `rows_px`, are most
-    /// likely: a step of expectation maximisation.
+    /// New standard deviations of the shifts of rows from the corrections found with `rows_px`: one step of
+    /// expectation maximisation.
     fn scatter_of_rows(
         &self,
         corrections: &DVector<f64>,

@@ -184,8 +184,8 @@ mod tests {
         }
     }
 
-    /// Corrections of four photos and of those that they share: `pose` of position and attitude, `rows` of the
-    /// rows.
+    /// Corrections of four photos' own unknowns and of those that they share; `rows` scales those that shift
+    /// rows, `pose` scales all others.
     fn poses(pose: f64, rows: f64) -> Poses {
         let count = problem(&[Point3::origin(); 4], Point3::origin()).unknowns();
         let correction = |k: usize| {
@@ -264,7 +264,7 @@ mod tests {
             turn.abs() > 1e-3 && error_of_poses.abs() < 1e-7,
             "{turn} {error_of_poses}"
         );
-        // Shifts by the rows also follow the distance, which changes over an oblique face by a few percent.
+        // `by_rows.turn` neglects that the size of a pixel changes over an oblique face.
         let [error_of_rows, turn] = error(&poses(0.0, 0.1));
         assert!(
             turn.abs() > 1e-4 && error_of_rows.abs() < 0.15 * turn.abs(),

@@ -233,7 +233,7 @@ fn shifted_rows_do_not_move_stones() {
         let stones = problem.stones.iter().zip(&poses.weights);
         stones.map(moved).fold(0.0, f64::max)
     };
-    // The last row of each photo lies up to four pixels of 3 mm beside where it should; nothing moved.
+    // The last row is shifted by up to four pixels of 3 mm in each direction; no stone has moved.
     for shifts_px in [each, alike] {
         let [known, unknown] = [1.0, 0.0].map(|known| worst_m(&shifts_px, known));
         assert!(known < 2e-4 && unknown > 5e-4, "{known} {unknown}");
