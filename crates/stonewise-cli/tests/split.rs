@@ -9,27 +9,7 @@ use std::path::Path;
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::layers::read_polygons;
 use support::stones::{SIGNED, inner, nearest, number, place, rows};
-use support::{outcome, run, simulated, stonewise};
-
-/// Four photos an epoch, so that each half has two.
-const SURVEY: &str = r#"
-name = "Test wall"
-[scene]
-seed = 3
-[scene.wall]
-width_m = 1.6
-height_m = 1.0
-seed = 3
-[scene.tls]
-spacing_m = 0.008
-[photos]
-columns = 4
-rows = 1
-width = 800
-height = 600
-focal_px = 1100.0
-distance_m = 5.0
-"#;
+use support::{SURVEY, outcome, run, simulated, stonewise};
 
 type Rows = BTreeMap<u32, BTreeMap<String, String>>;
 
@@ -97,7 +77,8 @@ fn edits_of(before: &Rows, survey: &Path, results: &Path) -> Vec<String> {
 
 #[test]
 fn halves_have_the_stones_of_the_edited_epoch() {
-    let (_dir, survey) = simulated(SURVEY);
+    // Four photos an epoch, so that each half has two.
+    let (_dir, survey) = simulated(&SURVEY.replace("columns = 2", "columns = 4"));
     let survey = survey.as_path();
     let results = survey.join("results");
     assert_eq!(run(survey, &results, &[]).0, 0);

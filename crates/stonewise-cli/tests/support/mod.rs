@@ -10,7 +10,7 @@ use std::sync::OnceLock;
 use tempfile::TempDir;
 
 /// A wall of a few dozen stones, small enough to be run many times.
-const SURVEY: &str = r#"
+pub const SURVEY: &str = r#"
 name = "Test wall"
 [scene]
 seed = 3

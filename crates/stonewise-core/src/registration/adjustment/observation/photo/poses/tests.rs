@@ -42,6 +42,21 @@ fn tracks(centres: &[Point3<f64>], places: &[Point3<f64>], turn: &Matrix3<f64>) 
     places.iter().map(&mut of_place).collect()
 }
 
+fn pose_stones<'a>(
+    tracks: &'a [Track],
+    places: &[Point3<f64>],
+    turn: &'a Matrix3<f64>,
+    clouds: CloudMotion,
+) -> Vec<PoseStone<'a>> {
+    let of_place = |(track, at): (&'a Track, &Point3<f64>)| PoseStone {
+        track,
+        centroid: *at,
+        face_from_world: turn,
+        clouds,
+    };
+    tracks.iter().zip(places).map(of_place).collect()
+}
+
 #[test]
 fn poses_and_displacements_are_those_of_dense_least_squares() {
     let turn = FaceFrame::from_normal(&Vector3::x()).face_from_world();
@@ -62,16 +77,7 @@ fn poses_and_displacements_are_those_of_dense_least_squares() {
         scales: &[[0.003, 6.0]; 5],
         pose_error_px: 0.5,
         rolling_shutter: true,
-        stones: tracks
-            .iter()
-            .zip(&places)
-            .map(|(track, at)| PoseStone {
-                track,
-                centroid: *at,
-                face_from_world: &turn,
-                clouds,
-            })
-            .collect(),
+        stones: pose_stones(&tracks, &places, &turn, clouds),
         middle: Point3::new(0.0, 0.0, 1.0),
         extent_m: 2.0,
     };
@@ -209,16 +215,7 @@ fn shifted_rows_do_not_move_stones() {
             scales: &[[0.003, 6.0]; 12],
             pose_error_px: 0.5,
             rolling_shutter: true,
-            stones: tracks
-                .iter()
-                .zip(&places)
-                .map(|(track, at)| PoseStone {
-                    track,
-                    centroid: *at,
-                    face_from_world: &turn,
-                    clouds,
-                })
-                .collect(),
+            stones: pose_stones(&tracks, &places, &turn, clouds),
             middle: Point3::origin(),
             extent_m: 2.0,
         };
