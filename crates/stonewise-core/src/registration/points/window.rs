@@ -1,7 +1,7 @@
 //! The part of a stone's face in which points count.
 
 use crate::cloud::GridIndex;
-use crate::geometry::{FaceFrame, OutlineParams, outline, signed_area};
+use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outline, signed_area};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
@@ -26,7 +26,7 @@ const MEDIAN_DIFFERENCE: f64 = 0.954;
 pub struct Window {
     face_from_world: Matrix3<f64>,
     /// Outline of each epoch, in the place of the first.
-    rings: [Vec<Point2<f64>>; 2],
+    rings: [RingIndex; 2],
     /// Width of the border along the inside of the rings.
     border_m: f64,
     /// Lowest and highest place across the face.
@@ -53,7 +53,7 @@ impl Window {
                 first.depth[0].max(second.depth[0]),
                 first.depth[1].min(second.depth[1]),
             ],
-            rings: [first.ring, second.ring],
+            rings: [&first.ring, &second.ring].map(|ring| RingIndex::new(ring)),
         })
     }
 
@@ -65,19 +65,25 @@ impl Window {
     /// Whether a point counts that lies here, in the window's axes about the stone's centroid.
     pub(crate) fn holds(&self, at: &Point3<f64>, labelled: bool) -> bool {
         let (flat, [low, high]) = (at.xy(), self.depth);
-        let is_close = |ring: &Vec<Point2<f64>>| distance_to_ring(ring, &flat) < self.border_m;
-        self.rings.iter().all(|ring| is_inside(ring, &flat))
-            && match self.rings.iter().any(is_close) {
-                true => at.z > low && at.z < high,
-                false => labelled,
-            }
+        let is_in_depth = at.z > low && at.z < high;
+        let is_inside = || self.rings.iter().all(|ring| ring.contains(&flat));
+        let is_at_border = || {
+            self.rings
+                .iter()
+                .any(|ring| ring.passes_within(self.border_m, &flat))
+        };
+        // At the border the depth decides, elsewhere the label: most often they agree.
+        if is_in_depth == labelled {
+            labelled && is_inside()
+        } else {
+            is_inside() && is_at_border() == is_in_depth
+        }
     }
 
     /// Whether a point that lies here may come to lie in the window once the stone's motion is known better.
     pub(super) fn is_near(&self, at: &Point3<f64>) -> bool {
         let flat = at.xy();
-        let is_near =
-            |ring: &Vec<Point2<f64>>| is_inside(ring, &flat) || distance_to_ring(ring, &flat) < REACH_M;
+        let is_near = |ring: &RingIndex| ring.contains(&flat) || ring.passes_within(REACH_M, &flat);
         self.rings.iter().all(is_near)
     }
 
@@ -138,24 +144,4 @@ fn noise_m(local: &[Point3<f64>], size_m: f64) -> f64 {
         })
         .collect();
     upper_median(&mut differences).map_or(0.0, |median| median / MEDIAN_DIFFERENCE)
-}
-
-fn edges(ring: &[Point2<f64>]) -> impl Iterator<Item = (&Point2<f64>, &Point2<f64>)> {
-    ring.iter().zip(ring.iter().cycle().skip(1))
-}
-
-/// Even-odd rule.
-fn is_inside(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
-    let crossings = edges(ring)
-        .filter(|(a, b)| (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x));
-    crossings.count() % 2 == 1
-}
-
-fn distance_to_ring(ring: &[Point2<f64>], p: &Point2<f64>) -> f64 {
-    let to_edge = |(a, b): (&Point2<f64>, &Point2<f64>)| {
-        let edge = b - a;
-        let t = ((p - a).dot(&edge) / edge.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (p - (a + edge * t)).norm()
-    };
-    edges(ring).map(to_edge).fold(f64::INFINITY, f64::min)
 }
