@@ -66,6 +66,21 @@ fn metashape_puts_points_where_its_formulae_do() {
 }
 
 #[test]
+fn metashape_says_that_a_shutter_is_rolling() {
+    let good = std::fs::read_to_string(fixture("metashape.xml")).unwrap();
+    let rows = "<rolling_shutter>1 0 0 0.002 0 1 0 0 0 0 1 0</rolling_shutter></camera>";
+    let dir = tempfile::tempdir().unwrap();
+    for (text, says) in [(good.clone(), false), (good.replacen("</camera>", rows, 1), true)] {
+        let path = dir.path().join("cameras.xml");
+        std::fs::write(&path, text).unwrap();
+        let file = read_cameras(&path).unwrap();
+        assert_eq!(file.rolling_shutter, says);
+        let warned = file.warnings.iter().any(|w| w.contains("rolling shutter"));
+        assert_eq!(warned, says, "{:?}", file.warnings);
+    }
+}
+
+#[test]
 fn opensfm_puts_points_where_opencv_does() {
     let file = read_cameras(&fixture("opensfm.json")).unwrap();
     assert_pixels(&file, &expected("opensfm"));

@@ -142,7 +142,7 @@ messages! {
             "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras";
 
         ROLLING_SHUTTER:
-            "the camera's rolling shutter is not compensated: points may fall some pixels beside their place in the photo; rolling_shutter = true in [registration.photos] estimates how far",
-            "der Rolling Shutter der Kamera ist nicht korrigiert: Punkte können einige Pixel neben ihrem Platz im Foto liegen; rolling_shutter = true in [registration.photos] schätzt, wie weit";
+            "the camera's rolling shutter is not compensated where stones of photos are carried into clouds: points may fall some pixels beside their place in the photo",
+            "der Rolling Shutter der Kamera ist nicht korrigiert, wo Steine der Fotos in die Punktwolken übertragen werden: Punkte können einige Pixel neben ihrem Platz im Foto liegen";
     }
 }

@@ -13,8 +13,8 @@ pub struct PhotoParams {
     pub pose_error_px: f64,
     /// Whether the camera has a rolling shutter, which exposes the rows of a photo one after the other. If
     /// true, the shift of each photo's last row relative to its first is estimated. false: for a mechanical
-    /// or global shutter.
-    pub rolling_shutter: bool,
+    /// or global shutter. `None`: what the camera files say; without any, as false.
+    pub rolling_shutter: Option<bool>,
     /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
     /// as the appearance of a stone is wrong alike in all photos of an epoch.
     pub max_photos: usize,
@@ -42,7 +42,7 @@ impl Default for PhotoParams {
         Self {
             enabled: true,
             pose_error_px: 0.5,
-            rolling_shutter: false,
+            rolling_shutter: None,
             max_photos: 8,
             min_photos: 2,
             rim_m: 0.02,

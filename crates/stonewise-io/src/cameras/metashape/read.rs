@@ -11,8 +11,8 @@ use stonewise_core::geometry::{Camera, View};
 use stonewise_core::id::ImageId;
 
 /// Warning about sensors with `<rolling_shutter>`.
-const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not compensated: points may fall some pixels beside their \
-    place in the photo; rolling_shutter = true in [registration.photos] estimates how far";
+const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not compensated where stones of photos are carried into \
+    clouds: points may fall some pixels beside their place in the photo";
 
 /// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
 pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
@@ -68,7 +68,6 @@ fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile
     };
     let frames = Frames::read(chunk, path)?;
     let mut sensors: BTreeMap<&str, Camera> = BTreeMap::new();
-    let mut rolling = false;
     let mut cameras = Vec::new();
     if let Some(list) = chunk.child("cameras") {
         collect_cameras(list, &mut cameras);
@@ -89,7 +88,7 @@ fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile
                 sensor::camera(find_sensor(chunk, id, element, path)?, &name, path)?,
             );
         }
-        rolling |= element.child("rolling_shutter").is_some();
+        file.rolling_shutter |= element.child("rolling_shutter").is_some();
         file.views.push(View {
             image: ImageId(file.views.len() as u32),
             camera: sensors[id].clone(),
@@ -97,7 +96,7 @@ fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile
             name,
         });
     }
-    if rolling {
+    if file.rolling_shutter {
         file.warnings.push(ROLLING_SHUTTER.to_owned());
     }
     if file.crs.is_some() && !file.views.is_empty() {

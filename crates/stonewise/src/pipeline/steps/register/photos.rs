@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
+use crate::project::Project;
 use crate::results::track_side_px;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
@@ -60,9 +61,12 @@ impl DiskPhotos {
         step: &StepDir,
         warnings: &Warnings,
     ) -> Result<Option<Self>> {
-        let params = context.project.settings.registration.photos.clone();
+        let mut params = context.project.settings.registration.photos.clone();
         if photos.iter().any(|p| p.views.len() < params.min_photos) {
             return Ok(None);
+        }
+        if params.rolling_shutter.is_none() {
+            params.rolling_shutter = Some(has_rolling_shutter(context.project)?);
         }
         let (boxes, counts) = boxes(pairs)?;
         let mut list = Vec::new();
@@ -109,6 +113,16 @@ impl DiskPhotos {
             counts,
         }))
     }
+}
+
+/// Whether a camera file of the project says that a camera has a rolling shutter.
+fn has_rolling_shutter(project: &Project) -> Result<bool> {
+    for epoch in &project.epochs {
+        if epoch.read_cameras()?.rolling_shutter {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// A moved point was where it was when the photo was taken: the camera of a self-check sees it there.
