@@ -66,7 +66,7 @@ pub fn split(
     let edits = halves_edits(project, epoch, &photos, &out.join(EDITS))?;
     let mut text = head(project, epoch);
     for half in 0..2 {
-        copy_photos(&photos, half, out, progress)?;
+        copy_photos(&photos, &epoch.images, half, out, progress)?;
         let clouds = write_clouds(epoch, half, seed, out, progress)?;
         text += &epoch_table(epoch, half, &clouds)?;
     }

@@ -43,19 +43,58 @@ pub(super) fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PosedPhoto
     Ok(keyed.into_iter().map(|(_, photo)| photo).collect())
 }
 
-/// Copies the photos of a half into its folder.
+/// Copies the photos of a half into its folder; what lies in a folder below `images` keeps that folder, so that
+/// photos of the same name stay apart.
 pub(super) fn copy_photos(
     photos: &[PosedPhoto],
+    images: &Path,
     half: usize,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let images = out.join(half_folder(half)).join("images");
-    fs::create_dir_all(&images).map_err(Error::io("making a folder", &images))?;
+    let folder = out.join(half_folder(half)).join("images");
     for photo in photos.iter().skip(half).step_by(2) {
         progress.check()?;
-        let copy = images.join(photo.path.file_name().unwrap_or_default());
+        let below_images = photo.path.strip_prefix(images).ok();
+        let name = below_images.or(photo.path.file_name().map(Path::new));
+        let copy = folder.join(name.unwrap_or(Path::new("")));
+        let parent = copy.parent().unwrap_or(&folder);
+        fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
         fs::copy(&photo.path, &copy).map_err(Error::io("copying a photo to", &copy))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stonewise_core::progress::Silent;
+
+    #[test]
+    fn photos_of_one_name_in_two_folders_are_both_copied() {
+        let dir = tempfile::tempdir().unwrap();
+        let images = dir.path().join("images");
+        let photos: Vec<PosedPhoto> = ["morning/1.jpg", "noon/1.jpg", "evening/1.jpg", "2.jpg"]
+            .map(|name| {
+                let path = images.join(name);
+                fs::create_dir_all(path.parent().unwrap()).unwrap();
+                fs::write(&path, name).unwrap();
+                PosedPhoto {
+                    path,
+                    view: name.to_owned(),
+                }
+            })
+            .into();
+        for half in 0..2 {
+            copy_photos(&photos, &images, half, dir.path(), &Silent).unwrap();
+        }
+        let copied = |half: usize, name: &str| {
+            fs::read_to_string(dir.path().join(half_folder(half)).join("images").join(name)).ok()
+        };
+        for (i, photo) in photos.iter().enumerate() {
+            let kept = copied(i % 2, &photo.view);
+            assert_eq!(kept.as_deref(), Some(photo.view.as_str()));
+            assert_eq!(copied(1 - i % 2, &photo.view), None);
+        }
+    }
 }
