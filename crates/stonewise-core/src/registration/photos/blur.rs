@@ -1,7 +1,6 @@
 //! Gaussian windows over grids.
 
 use super::params::WINDOW_SDS;
-use pulp::Arch;
 
 /// A Gaussian window of this reach (standard deviation, cells) over a grid, zero outside it.
 pub(crate) fn blur(values: &[f64], columns: usize, rows: usize, reach: f64) -> Vec<f64> {
@@ -11,17 +10,10 @@ pub(crate) fn blur(values: &[f64], columns: usize, rows: usize, reach: f64) -> V
         .collect();
     let sum: f64 = kernel.iter().sum();
     let kernel: Vec<f64> = kernel.iter().map(|k| k / sum).collect();
-    Arch::new().dispatch(|| convolved(values, columns, rows, &kernel))
-}
-
-/// The values under a kernel of odd length along rows and columns, zero outside the grid.
-#[inline(always)]
-fn convolved(values: &[f64], columns: usize, rows: usize, kernel: &[f64]) -> Vec<f64> {
-    let radius = kernel.len() as isize / 2;
     // Taps in ascending order, each over a whole line, so that lines are summed in lanes.
     let mut along = vec![0.0; values.len()];
     for (from, to) in values.chunks(columns).zip(along.chunks_mut(columns)) {
-        for (shift, weight) in (-radius..).zip(kernel) {
+        for (shift, weight) in (-radius..).zip(&kernel) {
             let start = shift.unsigned_abs().min(columns);
             match shift < 0 {
                 true => add(&mut to[start..], from, *weight),
@@ -31,7 +23,7 @@ fn convolved(values: &[f64], columns: usize, rows: usize, kernel: &[f64]) -> Vec
     }
     let mut both = vec![0.0; values.len()];
     for (row, to) in (0..rows as isize).zip(both.chunks_mut(columns)) {
-        for (shift, weight) in (-radius..).zip(kernel) {
+        for (shift, weight) in (-radius..).zip(&kernel) {
             let Ok(from) = usize::try_from(row + shift) else {
                 continue;
             };
@@ -44,7 +36,6 @@ fn convolved(values: &[f64], columns: usize, rows: usize, kernel: &[f64]) -> Vec
 }
 
 /// Adds a multiple; the longer of the two is cut.
-#[inline(always)]
 fn add(to: &mut [f64], from: &[f64], weight: f64) {
     for (to, from) in to.iter_mut().zip(from) {
         *to += from * weight;

@@ -8,8 +8,6 @@
 use super::patch::Patch;
 use super::surface::Surface;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
-use pulp::Arch;
-use std::array::from_fn;
 
 /// Most steps: each halves the error at least where the start lies within the grain of the stone.
 const STEPS: usize = 20;
@@ -138,12 +136,12 @@ impl FaceCells {
     /// A photo's values at the warped cells, on the grid.
     pub fn warped(&self, patch: &Patch, surface: &Surface, warp: &Warp) -> Patch {
         let place = |k: usize| Vector2::new((k % surface.columns) as f64, (k / surface.columns) as f64);
-        let sample = |k: usize| {
-            let to = self.middle + warp.at(place(k) - self.middle);
-            patch.sample(surface, to.x, to.y)
-        };
-        let cells = 0..patch.values.len();
-        let values: Vec<Option<f32>> = Arch::new().dispatch(|| cells.map(sample).collect());
+        let values: Vec<Option<f32>> = (0..patch.values.len())
+            .map(|k| {
+                let to = self.middle + warp.at(place(k) - self.middle);
+                patch.sample(surface, to.x, to.y)
+            })
+            .collect();
         Patch {
             valid: values.iter().map(Option::is_some).collect(),
             values: values.into_iter().map(|v| v.unwrap_or(0.0)).collect(),
@@ -151,7 +149,6 @@ impl FaceCells {
     }
 
     /// Pairs of values (template, photo) at warped cells, with the cell's place and gradient.
-    #[inline(always)]
     fn pairs(&self, template: &Template, patch: &Patch, surface: &Surface, warp: &Warp) -> Vec<Pair> {
         self.cells
             .iter()
@@ -179,17 +176,14 @@ impl FaceCells {
         start: Warp,
         reach: f64,
     ) -> Option<Match> {
-        Arch::new().dispatch(|| {
-            let shifted = self.settled(template, patch, surface, start, reach, false)?;
-            let affine = match self.count() >= AFFINE_CELLS {
-                true => self.settled(template, patch, surface, shifted.warp, reach, true),
-                false => None,
-            };
-            Some(affine.unwrap_or(shifted))
-        })
+        let shifted = self.settled(template, patch, surface, start, reach, false)?;
+        let affine = match self.count() >= AFFINE_CELLS {
+            true => self.settled(template, patch, surface, shifted.warp, reach, true),
+            false => None,
+        };
+        Some(affine.unwrap_or(shifted))
     }
 
-    #[inline(always)]
     fn settled(
         &self,
         template: &Template,
@@ -252,7 +246,6 @@ fn correlation(pairs: &[Pair]) -> f64 {
 }
 
 /// The step of the warp, and the covariance of its shift.
-#[inline(always)]
 fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
     match is_affine {
         true => {
@@ -286,7 +279,6 @@ fn step(
 
 /// Robust least squares of the photo's values on rows of offset, gain, shift and what else there is; the
 /// unknowns, and the covariance of the shift.
-#[inline(always)]
 fn least_squares<const N: usize>(
     pairs: &[Pair],
     row: impl Fn(&Pair) -> [f64; N],
@@ -294,18 +286,20 @@ fn least_squares<const N: usize>(
     let mut weights = vec![1.0; pairs.len()];
     let mut found = None;
     for _ in 0..2 {
-        // Whole rows, though the matrix is symmetric: they are summed in lanes.
-        let (mut normal, mut right) = ([[0.0; N]; N], [0.0; N]);
+        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
         for (p, w) in pairs.iter().zip(&weights) {
             let row = row(p);
-            let weighted = row.map(|x| w * x);
-            right = from_fn(|k| right[k] + weighted[k] * p.photo);
-            for (sums, x) in normal.iter_mut().zip(row) {
-                *sums = from_fn(|k| sums[k] + weighted[k] * x);
+            for i in 0..N {
+                let weighted = w * row[i];
+                right[i] += weighted * p.photo;
+                for j in i..N {
+                    normal[(j, i)] += weighted * row[j];
+                }
             }
         }
-        let inverse = SMatrix::<f64, N, N>::from(normal).cholesky()?.inverse();
-        let solution = inverse * SVector::<f64, N>::from(right);
+        normal.fill_upper_triangle_with_lower_triangle();
+        let inverse = normal.cholesky()?.inverse();
+        let solution = inverse * right;
         let fitted = |p: &Pair| {
             row(p)
                 .iter()

@@ -4,7 +4,6 @@ use super::blur::blur;
 use super::photo::{Chip, Photo, cubic};
 use super::surface::Surface;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
-use std::array::from_fn;
 
 /// Noise of grey values that is not raised to full contrast, 0..255: a smooth face stays smooth.
 const GREY_NOISE: f64 = 3.0;
@@ -101,7 +100,6 @@ pub(super) fn normalised(grey: &[Option<f32>], surface: &Surface, window_m: f64)
 impl Patch {
     /// Value at a place in cells, by cubic convolution; `None` outside, and where a cell around it is not
     /// shown.
-    #[inline(always)]
     pub fn sample(&self, surface: &Surface, x: f64, y: f64) -> Option<f32> {
         let inside = |v: f64, size: usize| v >= 1.0 && v < size as f64 - 2.0;
         if !(inside(x, surface.columns) && inside(y, surface.rows)) {
@@ -109,15 +107,16 @@ impl Patch {
         }
         let (column, row) = (x as usize, y as usize);
         let (wx, wy) = (cubic((x - column as f64) as f32), cubic((y - row as f64) as f32));
-        let mut along = [0.0; 4];
+        let mut sum = 0.0;
         for (j, wy) in wy.iter().enumerate() {
             let start = (row + j - 1) * surface.columns + column - 1;
-            if self.valid[start..].first_chunk() != Some(&[true; 4]) {
+            if !self.valid[start..start + 4].iter().all(|v| *v) {
                 return None;
             }
-            let line = self.values[start..].first_chunk::<4>()?;
-            along = from_fn(|k| along[k] + wy * line[k]);
+            let line = &self.values[start..start + 4];
+            let of_line: f32 = line.iter().zip(&wx).map(|(g, w)| g * w).sum();
+            sum += wy * of_line;
         }
-        Some(along.iter().zip(&wx).map(|(g, w)| g * w).sum())
+        Some(sum)
     }
 }

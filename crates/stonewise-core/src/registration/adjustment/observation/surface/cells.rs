@@ -23,7 +23,6 @@ impl CellSums {
         }
     }
 
-    #[inline(always)]
     pub fn add(&mut self, epoch: usize, p: &[f64; 3], product: f64, weight: f64) {
         let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.cell_m).floor());
         if (0..2).all(|a| at[a] >= 0.0 && at[a] < self.counts[a] as f64) {

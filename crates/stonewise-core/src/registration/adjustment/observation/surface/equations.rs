@@ -13,7 +13,6 @@ use super::robust::{robust_fit, steepness};
 use super::slope_scatter::SlopeScatter;
 use super::surface_noise::SurfaceNoise;
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-use pulp::Arch;
 
 /// The normal equations of a stone's points at one of its motions, and figures of how well both epochs agree
 /// there.
@@ -118,36 +117,34 @@ fn add_patch(
     let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
     let mut cells = PatchCells::new(&grid, layout.cell_m);
     let inverse = fit.factor.inverse();
-    Arch::new().dispatch(|| {
-        for (epoch, points) in epochs.iter().enumerate() {
-            let sigma = noise.sigma_m[epoch];
-            for o in points {
-                let [h, hu, hv] = fit.surface(&o.basis);
-                let r = o.position[2] - h;
-                cells.add(epoch, o, r, [hu, hv]);
-                sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
-                sum.scatter[epoch].1 += 1.0;
-                sum.deviance += o.weight * r * r / (sigma * sigma);
-                let w = o.weight / (sigma * sigma);
-                let row = motion.jacobian(&o.position, [hu, hv]);
-                let j = Vector9::from(row);
-                // The surface follows each point a little, most at the edge of the points, and takes the slope
-                // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
-                // the determinant makes good.
-                let bias = motion.jacobian(&o.position, fit.slope_covariance(&o.basis, &inverse));
-                let level = motion.jacobian(&o.position, [0.0; 2]);
-                let bias = Vector9::from(bias) - Vector9::from(level);
-                // What matters is the motion of one epoch against the other: half a step of each. Where the
-                // surface cannot follow the stone, at joints, both epochs' residuals are alike, and that drops
-                // out.
-                sum.gradient += (j * r - bias) * (w * [-0.5, 0.5][epoch]);
-                if epoch == 1 {
-                    scatter(&o.basis, w, &row, &mut coupling);
-                    sum.information.syger(w, &j, &j, 1.0);
-                }
+    for (epoch, points) in epochs.iter().enumerate() {
+        let sigma = noise.sigma_m[epoch];
+        for o in points {
+            let [h, hu, hv] = fit.surface(&o.basis);
+            let r = o.position[2] - h;
+            cells.add(epoch, o, r, [hu, hv]);
+            sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
+            sum.scatter[epoch].1 += 1.0;
+            sum.deviance += o.weight * r * r / (sigma * sigma);
+            let w = o.weight / (sigma * sigma);
+            let row = motion.jacobian(&o.position, [hu, hv]);
+            let j = Vector9::from(row);
+            // The surface follows each point a little, most at the edge of the points, and takes the slope
+            // with it: residuals and slopes are correlated by minus this covariance, which the gradient of
+            // the determinant makes good.
+            let bias = motion.jacobian(&o.position, fit.slope_covariance(&o.basis, &inverse));
+            let level = motion.jacobian(&o.position, [0.0; 2]);
+            let bias = Vector9::from(bias) - Vector9::from(level);
+            // What matters is the motion of one epoch against the other: half a step of each. Where the
+            // surface cannot follow the stone, at joints, both epochs' residuals are alike, and that drops
+            // out.
+            sum.gradient += (j * r - bias) * (w * [-0.5, 0.5][epoch]);
+            if epoch == 1 {
+                scatter(&o.basis, w, &row, &mut coupling);
+                sum.information.syger(w, &j, &j, 1.0);
             }
         }
-    });
+    }
     sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
     take_off_surface(&fit, coupling, &mut sum.information);
     cells.finish(noise, sum);
@@ -155,7 +152,6 @@ fn add_patch(
 
 /// Adds `weight * basis * row` to the right-hand sides of the coefficients, one column for each of the motion's
 /// unknowns.
-#[inline(always)]
 fn scatter<const N: usize>(basis: &Basis, weight: f64, row: &[f64; N], into: &mut [[f64; N]]) {
     let [short, long] = basis.value;
     for (a, l) in long.into_iter().enumerate() {
@@ -199,7 +195,6 @@ impl PatchCells {
         }
     }
 
-    #[inline(always)]
     fn add(&mut self, epoch: usize, point: &WeightedPoint, residual: f64, slopes: [f64; 2]) {
         let (at, weight) = (&point.position, steepness(slopes));
         self.small.add(epoch, at, weight * residual, weight);

@@ -20,7 +20,6 @@ impl InverseMotion {
     }
 
     /// Where a point of the second epoch was in the first; bending is taken off its height.
-    #[inline(always)]
     pub fn undo(&self, q: &[f64; 3]) -> [f64; 3] {
         let y = self
             .rotation
@@ -35,7 +34,6 @@ impl InverseMotion {
 
     /// Derivative of the residual of a point, now at `p`, with respect to the motion, where the surface has
     /// these slopes.
-    #[inline(always)]
     pub fn jacobian(&self, p: &[f64; 3], slopes: [f64; 2]) -> [f64; 9] {
         let [u, v, _] = *p;
         let [uu, uv, vv] = self.bending;

@@ -83,7 +83,6 @@ impl PatchGrid {
     }
 
     /// A point with full weight.
-    #[inline(always)]
     pub fn point(&self, position: [f64; 3]) -> WeightedPoint {
         WeightedPoint {
             position,
@@ -92,7 +91,6 @@ impl PatchGrid {
         }
     }
 
-    #[inline(always)]
     pub fn basis(&self, u: f64, v: f64) -> Basis {
         let place = [u, v];
         let mut at = [0; 2];

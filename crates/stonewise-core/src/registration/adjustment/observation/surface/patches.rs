@@ -5,7 +5,6 @@ use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
 use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
-use pulp::Arch;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be
 /// told.
@@ -48,15 +47,13 @@ pub(crate) fn pool_into_patches(
         .collect();
     let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
     let moved = pair.second_moved_back(motion, window).map(|p| (1, p));
-    Arch::new().dispatch(|| {
-        for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
-            compare.count(epoch, &p);
-            if let Some(patch) = cuts.patch_at(&p) {
-                let PatchPoints { grid, epochs } = &mut list[patch];
-                epochs[epoch].push(grid.point(p));
-            }
+    for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
+        compare.count(epoch, &p);
+        if let Some(patch) = cuts.patch_at(&p) {
+            let PatchPoints { grid, epochs } = &mut list[patch];
+            epochs[epoch].push(grid.point(p));
         }
-    });
+    }
     list.retain(|patch| patch.epochs.iter().all(|o| o.len() >= PATCH_POINTS));
     Patches {
         list,
@@ -95,7 +92,6 @@ impl Cuts {
         })
     }
 
-    #[inline(always)]
     fn patch_at(&self, p: &[f64; 3]) -> Option<usize> {
         let at = [0, 1].map(|a| ((p[a] - self.low[a]) / self.step[a]).floor());
         let is_inside = (0..2).all(|a| at[a] >= 0.0 && at[a] < self.count[a] as f64);

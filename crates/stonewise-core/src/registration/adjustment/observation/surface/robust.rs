@@ -4,7 +4,6 @@ use super::layout::Layout;
 use super::patch_fit::PatchFit;
 use super::patch_grid::{PatchGrid, WeightedPoint};
 use super::surface_noise::SurfaceNoise;
-use pulp::Arch;
 
 /// Most rounds of reweighting. A second round moves weights by some percent, a third by none; each costs a
 /// factorisation.
@@ -16,7 +15,6 @@ const CHANGED: f64 = 0.05;
 /// counts is the distance from the surface and not that along the height (orthogonal distance regression,
 /// Boggs, Byrd & Schnabel 1987). At the steep rims of stones, where a surface of cells also fits worst,
 /// points say little.
-#[inline(always)]
 pub(crate) fn steepness([u, v]: [f64; 2]) -> f64 {
     1.0 / (1.0 + u * u + v * v)
 }
@@ -36,7 +34,7 @@ pub(crate) fn robust_fit(
         let weights = [0, 1].map(|epoch| {
             let limit = layout.outlier_sigmas * noise.sigma_m[epoch];
             let points = epochs[epoch].iter();
-            Arch::new().dispatch(|| points.map(|o| weight(&fit, o, limit)).collect::<Vec<f64>>())
+            points.map(|o| weight(&fit, o, limit)).collect::<Vec<f64>>()
         });
         let points = || epochs.iter().flatten().zip(weights.iter().flatten());
         if points().all(|(o, weight)| (weight - o.weight).abs() <= CHANGED) {
@@ -51,7 +49,6 @@ pub(crate) fn robust_fit(
 }
 
 /// Weight of a point by the slopes of the surface there and its distance from it.
-#[inline(always)]
 fn weight(fit: &PatchFit, point: &WeightedPoint, limit_m: f64) -> f64 {
     let [h, hu, hv] = fit.surface(&point.basis);
     let steepness = steepness([hu, hv]);
