@@ -1,4 +1,4 @@
-//! A closed polygon that is asked about many points.
+//! A closed polygon, indexed for queries about many points.
 
 use nalgebra::Point2;
 use std::ops::RangeInclusive;
@@ -8,7 +8,8 @@ use std::ops::RangeInclusive;
 pub struct RingIndex {
     low_y: f64,
     bands_per_m: f64,
-    /// The sides that touch each band, as many bands as sides. What lies beyond counts to the first or last.
+    /// The sides that touch each band; there are as many bands as sides. Points below or above all bands belong
+    /// to the first or last.
     bands: Vec<Vec<Side>>,
 }
 
@@ -35,7 +36,7 @@ impl RingIndex {
         index
     }
 
-    /// Whether a point lies inside: what [`ring_contains`](super::ring_contains) says of all sides.
+    /// Whether a point lies inside: the same answer as [`ring_contains`](super::ring_contains).
     pub fn contains(&self, p: &Point2<f64>) -> bool {
         let crosses = |[a, b]: &&Side| {
             (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
@@ -54,7 +55,7 @@ impl RingIndex {
     }
 
     fn band_at(&self, y: f64) -> usize {
-        // The cast takes what is below the first band there.
+        // The cast turns negative values into 0, the first band.
         (((y - self.low_y) * self.bands_per_m) as usize).min(self.bands.len() - 1)
     }
 
@@ -104,7 +105,7 @@ mod tests {
                 if let Some(corner) = ring.get(k) {
                     p.y = corner.y;
                 }
-                // Places along each side, a thousandth of it apart: another way to the distance.
+                // An independent estimate of the distance: the nearest of 1001 points along each side.
                 let nearest = (0..ring.len())
                     .flat_map(|i| {
                         let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);

@@ -11,7 +11,7 @@ pub struct CameraFile {
     pub skipped: Vec<(String, String)>,
     /// Coordinate reference system of the world frame as the file writes it, where it says.
     pub crs: Option<String>,
-    /// Whether a camera of the file has a rolling shutter, where the file says.
+    /// Whether the file says that a camera has a rolling shutter.
     pub rolling_shutter: bool,
     /// How the file was read, where a reader of the results must be told.
     pub warnings: Vec<String>,

@@ -43,8 +43,8 @@ pub(super) fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PosedPhoto
     Ok(keyed.into_iter().map(|(_, photo)| photo).collect())
 }
 
-/// Copies the photos of a half into its folder; what lies in a folder below `images` keeps that folder, so that
-/// photos of the same name stay apart.
+/// Copies the photos of a half into its folder; photos in subfolders of `images` keep their subfolders, so
+/// that photos of the same name stay apart.
 pub(super) fn copy_photos(
     photos: &[PosedPhoto],
     images: &Path,

@@ -142,7 +142,7 @@ messages! {
             "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras";
 
         ROLLING_SHUTTER:
-            "the camera's rolling shutter is not compensated where stones of photos are carried into clouds: points may fall some pixels beside their place in the photo",
-            "der Rolling Shutter der Kamera ist nicht korrigiert, wo Steine der Fotos in die Punktwolken übertragen werden: Punkte können einige Pixel neben ihrem Platz im Foto liegen";
+            "the camera's rolling shutter is not corrected when stones are transferred from photos to clouds: points may be assigned to places a few pixels off in the photo",
+            "der Rolling Shutter der Kamera wird nicht korrigiert, wenn Steine aus den Fotos in die Punktwolken übertragen werden: Punkte können im Foto um einige Pixel versetzt liegen";
     }
 }

@@ -13,7 +13,8 @@ pub struct PhotoParams {
     pub pose_error_px: f64,
     /// Whether the camera has a rolling shutter, which exposes the rows of a photo one after the other. If
     /// true, the shift of each photo's last row relative to its first is estimated. false: for a mechanical
-    /// or global shutter. `None`: what the camera files say; without any, as false.
+    /// or global shutter. `None`: true if a camera file says that the camera
+    /// has a rolling shutter, otherwise false.
     pub rolling_shutter: Option<bool>,
     /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
     /// as the appearance of a stone is wrong alike in all photos of an epoch.

@@ -11,8 +11,8 @@ use stonewise_core::geometry::{Camera, View};
 use stonewise_core::id::ImageId;
 
 /// Warning about sensors with `<rolling_shutter>`.
-const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not compensated where stones of photos are carried into \
-    clouds: points may fall some pixels beside their place in the photo";
+const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not corrected when stones are transferred from photos to \
+    clouds: points may be assigned to places a few pixels off in the photo";
 
 /// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
 pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {

@@ -109,7 +109,7 @@ pub struct PhotosRecord {
     /// Each photo: name, and root mean square of what the correction of its pose shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
     /// Shift of each photo's last row relative to its first, along the rows and along the columns, pixels, in
-    /// the order of `poses_px`; absent without a rolling shutter.
+    /// the order of `poses_px`; absent if the shift is not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rows_px: Vec<[f64; 2]>,
     /// Each stone of the first epoch, ascending.

@@ -65,7 +65,7 @@ pub struct PhotoReport {
     /// Correction of each photo's pose: name, and root mean square of what it shifts, pixels.
     pub poses_px: Vec<(String, f64)>,
     /// Shift of each photo's last row relative to its first, along the rows and along the columns, pixels, in
-    /// the order of `poses_px`; empty without a rolling shutter.
+    /// the order of `poses_px`; empty if the shift is not estimated.
     pub rows_px: Vec<[f64; 2]>,
     /// What clouds and photos say each by itself, per stone in the order of the pairs; `None` where the stone
     /// is not tracked. Photos are counted as in `poses_px`.
