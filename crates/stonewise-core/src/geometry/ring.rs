@@ -25,11 +25,13 @@ pub fn is_simple(ring: &[Point2<f64>]) -> bool {
 /// Whether a point lies inside the polygon: a ray from it crosses an odd number of sides. A point on a side
 /// may be either.
 pub fn ring_contains(ring: &[Point2<f64>], p: &Point2<f64>) -> bool {
-    let crosses = |i: usize| {
-        let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
-        (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-    };
-    (0..ring.len()).filter(|&i| crosses(i)).count() % 2 == 1
+    let is_crossed = |i: &usize| crosses(p, &ring[*i], &ring[(i + 1) % ring.len()]);
+    (0..ring.len()).filter(is_crossed).count() % 2 == 1
+}
+
+/// Whether the ray from a point along x crosses the side from `a` to `b`.
+pub(super) fn crosses(p: &Point2<f64>, a: &Point2<f64>, b: &Point2<f64>) -> bool {
+    (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
 }
 
 /// Whether two segments share a point.

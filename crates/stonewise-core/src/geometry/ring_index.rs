@@ -1,5 +1,6 @@
 //! A closed polygon, indexed for queries about many points.
 
+use super::ring::crosses;
 use nalgebra::Point2;
 use std::ops::RangeInclusive;
 
@@ -38,10 +39,8 @@ impl RingIndex {
 
     /// Whether a point lies inside: the same answer as [`ring_contains`](super::ring_contains).
     pub fn contains(&self, p: &Point2<f64>) -> bool {
-        let crosses = |[a, b]: &&Side| {
-            (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-        };
-        self.bands[self.band_at(p.y)].iter().filter(crosses).count() % 2 == 1
+        let sides = self.bands[self.band_at(p.y)].iter();
+        sides.filter(|[a, b]| crosses(p, a, b)).count() % 2 == 1
     }
 
     /// Whether a point, inside or outside, is nearer to a side than `reach`.
