@@ -55,9 +55,8 @@ pub(super) fn copy_photos(
     let folder = out.join(half_folder(half)).join("images");
     for photo in photos.iter().skip(half).step_by(2) {
         progress.check()?;
-        let below_images = photo.path.strip_prefix(images).ok();
-        let name = below_images.or(photo.path.file_name().map(Path::new));
-        let copy = folder.join(name.unwrap_or(Path::new("")));
+        let name = photo.path.strip_prefix(images);
+        let copy = folder.join(name.unwrap_or(Path::new(&photo.view)));
         let parent = copy.parent().unwrap_or(&folder);
         fs::create_dir_all(parent).map_err(Error::io("making a folder", parent))?;
         fs::copy(&photo.path, &copy).map_err(Error::io("copying a photo to", &copy))?;
