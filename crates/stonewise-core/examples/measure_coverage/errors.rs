@@ -38,10 +38,13 @@ pub enum Kind {
     Brightness,
     /// Errors up and out differ by a factor of four from those along.
     Uneven,
+    /// Stations along a wall of 12.5 m for each, which see 20 m to either side, and each place in the face
+    /// displaced by what sights from one side get wrong.
+    Chain,
 }
 
 impl Kind {
-    pub const ALL: [(&'static str, Self); 12] = [
+    pub const ALL: [(&'static str, Self); 13] = [
         ("usual", Self::Usual),
         ("nothing-shared", Self::NothingShared),
         ("shared-like-source", Self::SharedLikeSource),
@@ -54,13 +57,14 @@ impl Kind {
         ("incidence", Self::Incidence),
         ("brightness", Self::Brightness),
         ("uneven", Self::Uneven),
+        ("chain", Self::Chain),
     ];
 
     /// Whether a survey of this sensor can have it.
     pub fn suits(self, sensor: Sensor) -> bool {
         match self {
             Self::Walk | Self::Sine | Self::Jump => sensor == Sensor::Uav,
-            Self::Scale => sensor == Sensor::Tls,
+            Self::Scale | Self::Chain => sensor == Sensor::Tls,
             _ => true,
         }
     }
@@ -73,8 +77,14 @@ pub struct SourceError {
     pub place: Point3<f64>,
     /// A strip looks ahead or back by this much, radians.
     pub squint: f64,
+    /// How far to either side of `front` it sees, metres.
+    pub reach_m: f64,
+    /// Where its registration is at its best.
+    pub front: Point3<f64>,
     shift: Vector3<f64>,
     turn: Vector3<f64>,
+    /// Relative stretch in the face about `front`.
+    stretch: f64,
     scale: f64,
     incidence_m: f64,
     brightness_m: f64,
@@ -109,12 +119,18 @@ impl SourceError {
             + self.incidence_m * (1.0 - cosine)
             + self.brightness_m * target.brightness;
         let drift = self.drift.as_ref();
+        let arm = target.place - self.front;
         self.shift
-            + self.turn.cross(&(target.place - MIDDLE))
+            + self.turn.cross(&arm)
+            + self.stretch * (arm - target.normal * target.normal.dot(&arm))
             + beam.normalize() * range
             + drift.map_or_else(Vector3::zeros, |(d, k)| d.at(*k, target.place.y))
     }
 }
+
+/// Distance of the stations of a long wall from each other and from it, and how far to either side they see,
+/// metres.
+pub const CHAIN_M: [f64; 3] = [12.5, 25.0, 20.0];
 
 /// Typical size of a source's error in one survey, metres: surveys differ by a factor of four.
 pub fn size_m(sensor: Sensor, rng: &mut ChaCha8Rng) -> f64 {
@@ -126,6 +142,17 @@ pub fn size_m(sensor: Sensor, rng: &mut ChaCha8Rng) -> f64 {
     low * (high / low).powf(share)
 }
 
+/// Relative stretch of what the stations of a survey show: of both epochs, and further of each.
+pub fn stretches(kind: Kind, rng: &mut ChaCha8Rng) -> [f64; 2] {
+    match kind {
+        Kind::Chain => {
+            let shared = 5e-5 * normal(rng);
+            [0, 1].map(|_| shared + 5e-6 * normal(rng))
+        }
+        _ => [0.0; 2],
+    }
+}
+
 /// The sources of one epoch. `shared_m`: what is assumed of the error that they share; `size_m`: of a
 /// source's own.
 pub fn draw(
@@ -134,6 +161,7 @@ pub fn draw(
     kind: Kind,
     size_m: f64,
     shared_m: f64,
+    stretch: f64,
     seed: u64,
 ) -> Vec<SourceError> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -181,8 +209,13 @@ pub fn draw(
     (0..count)
         .map(|k| {
             let spread = (f64::from(k) + 0.5) / f64::from(count) - 0.5;
+            let [apart, distance, reach_m] = match kind {
+                Kind::Chain => CHAIN_M,
+                _ => [4.0 / f64::from(count), 9.0, f64::INFINITY],
+            };
+            let along = apart * f64::from(count) * spread;
             let (place, squint, rest) = match sensor {
-                Sensor::Tls => (Point3::new(9.0, 4.0 * spread, 1.7) + jitter[k as usize], 0.0, 1.0),
+                Sensor::Tls => (Point3::new(distance, along, 1.7) + jitter[k as usize], 0.0, 1.0),
                 Sensor::Uav => (
                     Point3::new(12.0, 0.0, 3.5 + 3.0 * spread),
                     [0.0, 0.14, -0.14][k as usize % 3],
@@ -193,6 +226,12 @@ pub fn draw(
                 sensor,
                 place,
                 squint,
+                reach_m,
+                front: match kind {
+                    Kind::Chain => Point3::new(0.0, along, 1.5),
+                    _ => MIDDLE,
+                },
+                stretch,
                 shift: shared + shifts[k as usize] * rest,
                 turn: if sensor == Sensor::Tls {
                     turns[k as usize]

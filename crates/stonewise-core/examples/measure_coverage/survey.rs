@@ -1,7 +1,7 @@
 //! A small wall and stable areas as the sources of two epochs show them: points enough for the comparison of
 //! sources; the motions that the adjustment would measure are drawn from the same errors.
 
-use crate::errors::{Kind, STRETCH, Sensor, SourceError, Target, draw, size_m};
+use crate::errors::{CHAIN_M, Kind, STRETCH, Sensor, SourceError, Target, draw, size_m, stretches};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -40,8 +40,17 @@ pub struct Survey {
     pub noise: Vec<Matrix3<f64>>,
 }
 
-/// Stones along and up.
-const GRID: [usize; 2] = [7, 4];
+/// Stones along and up, and how long the wall is, metres.
+fn grid(case: &Case) -> ([usize; 2], f64) {
+    match case.kind {
+        Kind::Chain => {
+            let stations = case.sources as usize;
+            ([3 * stations, 4], CHAIN_M[0] * stations as f64)
+        }
+        _ => ([7, 4], 4.0),
+    }
+}
+
 /// Points of a source on a stone; fewer than a scan has, with less noise.
 const POINTS: usize = 120;
 
@@ -84,8 +93,19 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
         Sensor::Uav => 2e-3,
     };
     let size = size_m(case.sensor, &mut rng);
-    let mut of_epoch = |_: usize| draw(case.sensor, case.sources, case.kind, size, assumed, rng.random());
-    let errors: Vec<SourceError> = [0, 1].into_iter().flat_map(&mut of_epoch).collect();
+    let stretches = stretches(case.kind, &mut of_its_own(seed));
+    let mut of_epoch = |stretch| {
+        draw(
+            case.sensor,
+            case.sources,
+            case.kind,
+            size,
+            assumed,
+            stretch,
+            rng.random(),
+        )
+    };
+    let errors: Vec<SourceError> = stretches.into_iter().flat_map(&mut of_epoch).collect();
     let count = case.sources as usize;
     let sources = (0..errors.len())
         .map(|s| Source {
@@ -96,8 +116,13 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
         .collect();
     let mut stones = Vec::new();
     let mut seeming = Vec::new();
-    for k in 0..GRID[0] * GRID[1] {
-        let (stone, error) = stone(k, &errors, &what, &mut rng);
+    let (grid, width_m) = grid(case);
+    for k in 0..grid[0] * grid[1] {
+        let place = [
+            ((k % grid[0]) as f64 + 0.5) / grid[0] as f64 * width_m - 0.5 * width_m,
+            ((k / grid[0]) as f64 + 0.5) * 3.0 / grid[1] as f64,
+        ];
+        let (stone, error) = stone(place, &errors, &what, &mut rng);
         stones.push(stone);
         seeming.push(error);
     }
@@ -124,6 +149,13 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
     }
 }
 
+/// Random numbers of their own, so that they change no others.
+fn of_its_own(seed: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(1);
+    rng
+}
+
 /// When a source measures a place: a strip flies along the wall, a station scans in columns.
 fn time_s(source: usize, place: &Point3<f64>) -> f64 {
     100.0 * source as f64 + (place.y - STRETCH[0]) / 2.0
@@ -131,15 +163,12 @@ fn time_s(source: usize, place: &Point3<f64>) -> f64 {
 
 /// A stone and the error of the later epoch against the reference there.
 fn stone(
-    k: usize,
+    [along, up]: [f64; 2],
     errors: &[SourceError],
     what: &Instrument,
     rng: &mut ChaCha8Rng,
 ) -> (SeenStone, Vector3<f64>) {
-    let [columns, rows] = GRID;
-    let (i, j) = ((k % columns) as f64, (k / columns) as f64);
-    let up = (j + 0.5) * 3.0 / rows as f64;
-    let centroid = Point3::new(-0.2 * up, (i + 0.5) / columns as f64 * 4.0 - 2.0, up);
+    let centroid = Point3::new(-0.2 * up, along, up);
     let normal_of_face = Vector3::new(1.0, 0.0, 0.2).normalize();
     let target = Target {
         place: centroid,
@@ -149,28 +178,39 @@ fn stone(
     let phases: [f64; 4] = std::array::from_fn(|_| rng.random_range(0.0..6.0));
     let half = errors.len() / 2;
     let mut difference = Vector3::zeros();
-    let sights = errors.iter().enumerate().map(|(s, error)| {
-        let own = Vector3::new(
-            what.nugget_m[1] * normal(rng),
-            what.nugget_m[0] * normal(rng),
-            what.nugget_m[0] * normal(rng),
-        );
-        let shift = error.at(&target) + own;
-        difference += shift * if s < half { -1.0 } else { 1.0 } / half as f64;
-        let points = (0..POINTS).map(|_| {
-            let (y, z): (f64, f64) = (rng.random_range(-0.14..0.14), rng.random_range(-0.1..0.1));
-            let relief = 0.005 * ((42.0 * y + phases[0]).sin() + (38.0 * z + phases[1]).sin())
-                + 0.008 * ((17.0 * y + phases[2]).sin() + (15.0 * z + phases[3]).cos());
-            let x = relief + what.thinned_m * normal(rng) - 0.2 * z;
-            centroid + Vector3::new(x, y, z) + shift
+    let sees = |e: &SourceError| (e.front.y - along).abs() <= e.reach_m;
+    let seeing = [&errors[..half], &errors[half..]].map(|of| of.iter().filter(|e| sees(e)).count() as f64);
+    let sights = errors
+        .iter()
+        .enumerate()
+        .filter(|(_, e)| sees(e))
+        .map(|(s, error)| {
+            let own = Vector3::new(
+                what.nugget_m[1] * normal(rng),
+                what.nugget_m[0] * normal(rng),
+                what.nugget_m[0] * normal(rng),
+            );
+            let shift = error.at(&target) + own;
+            difference += shift
+                * if s < half {
+                    -1.0 / seeing[0]
+                } else {
+                    1.0 / seeing[1]
+                };
+            let points = (0..POINTS).map(|_| {
+                let (y, z): (f64, f64) = (rng.random_range(-0.14..0.14), rng.random_range(-0.1..0.1));
+                let relief = 0.005 * ((42.0 * y + phases[0]).sin() + (38.0 * z + phases[1]).sin())
+                    + 0.008 * ((17.0 * y + phases[2]).sin() + (15.0 * z + phases[3]).cos());
+                let x = relief + what.thinned_m * normal(rng) - 0.2 * z;
+                centroid + Vector3::new(x, y, z) + shift
+            });
+            SourcePoints {
+                source: s,
+                count: POINTS as u64,
+                time_s: time_s(s, &centroid),
+                points: Cloud::from_world(centroid, points.collect::<Vec<_>>()),
+            }
         });
-        SourcePoints {
-            source: s,
-            count: POINTS as u64,
-            time_s: time_s(s, &centroid),
-            points: Cloud::from_world(centroid, points.collect::<Vec<_>>()),
-        }
-    });
     let stone = SeenStone {
         centroid,
         normal: normal_of_face,

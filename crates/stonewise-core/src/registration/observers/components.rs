@@ -64,6 +64,18 @@ impl SensorClass {
         0.6 * self.typical_m()
     }
 
+    /// Prior of the stretch of what a source shows of the stones; `None` where sources see every place from
+    /// the same side.
+    pub(super) fn stretch(self) -> Option<Stretch> {
+        match self {
+            Self::Terrestrial => Some(Stretch {
+                shared: 1e-4,
+                of_epoch: 2e-5,
+            }),
+            Self::Airborne => None,
+        }
+    }
+
     /// Median of the prior of a source's translation, metres: registration by targets; direct georeferencing
     /// after strip adjustment.
     fn typical_m(self) -> f64 {
@@ -72,6 +84,15 @@ impl SensorClass {
             Self::Airborne => 5e-3,
         }
     }
+}
+
+/// Standard deviations of a relative stretch, in the face, of what a source shows about its middle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// Of what all sources of both epochs share.
+    pub shared: f64,
+    /// Of what the sources of one epoch share.
+    pub of_epoch: f64,
 }
 
 /// Number of components.

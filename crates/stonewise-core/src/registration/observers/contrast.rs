@@ -1,7 +1,7 @@
 //! Differences between the sources of one epoch, from the points of single stones.
 
 use super::observation::Observation;
-use super::sight::{SeenStone, Sight, Source, SourcePoints};
+use super::sight::{SeenStone, Sight, Source, SourcePoints, Target};
 use crate::cloud::Cloud;
 use crate::geometry::FaceFrame;
 use crate::id::StoneId;
@@ -130,7 +130,7 @@ impl Comparison {
                 source: s.source,
                 time_s: s.time_s,
                 place: stone.centroid,
-                plane: None,
+                target: Target::Stone { normal: stone.normal },
             };
             (sight, s.points.len().min(params.max_points) as u64)
         };

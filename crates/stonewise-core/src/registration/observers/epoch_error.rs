@@ -62,6 +62,10 @@ pub struct EpochErrors {
     pub shared_error_m: f64,
     /// Variances of the sources' errors; `None` where no epoch has sources to compare.
     pub components: Option<ObserverComponents>,
+    /// Relative stretch, in the face, of what the sources of each epoch show about their middles; `None` for
+    /// a sensor without one.
+    #[serde(default)]
+    pub stretch: Option<[f64; 2]>,
     /// Twice the log likelihood that errors of the sources gain over none.
     pub significance: f64,
     /// Comparisons of sources per epoch, and cells of stable areas that stood still.
@@ -107,7 +111,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     let mut within: [Vec<Observation>; 2] =
         [0, 1].map(|e| contrasts(pair.sources, pair.stones, e, &params.contrasts));
     let stable = stable_observations(pair.stable, pair.sigma_m, &params.stable);
-    let unknowns = Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &stable));
+    let unknowns = Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &stable), class);
     let (components, significance) = estimated(&unknowns, &mut within, class);
     let overlaps = within.iter().all(|w| !w.is_empty());
     let is_significant = overlaps && significance > SIGNIFICANT;
@@ -163,6 +167,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         class,
         shared_error_m,
         components: overlaps.then_some(components),
+        stretch: found.stretches(&unknowns).filter(|_| overlaps),
         significance,
         observations,
         moved_areas,
@@ -305,6 +310,16 @@ impl Averaged {
             self.function(&row).covariance
         };
         pair.neighbours.par_iter().map(difference).collect()
+    }
+
+    /// The mean stretch of each epoch.
+    fn stretches(&self, unknowns: &Unknowns) -> Option<[f64; 2]> {
+        let parts: Option<Vec<[f64; 2]>> = self
+            .solutions
+            .iter()
+            .map(|(w, s)| Some(unknowns.stretches(&s.mean)?.map(|k| k * w)))
+            .collect();
+        parts.map(|list| [0, 1].map(|e| list.iter().map(|p| p[e]).sum()))
     }
 
     /// The solutions with their weights.

@@ -2,7 +2,7 @@
 
 use super::contrast::ContrastParams;
 use super::observation::Observation;
-use super::sight::{SeenStone, Sight, Source};
+use super::sight::{SeenStone, Sight, Source, Target};
 use super::stable::{StableParams, StablePoints};
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,7 @@ pub struct EpochPair<'a> {
 /// All sights; they determine the blocks of the unknowns.
 pub(super) fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
     let of_stone = |stone: &SeenStone| {
-        let centroid = stone.centroid;
+        let (centroid, normal) = (stone.centroid, stone.normal);
         stone
             .sights
             .iter()
@@ -51,7 +51,7 @@ pub(super) fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight>
                 source: s.source,
                 time_s: s.time_s,
                 place: centroid,
-                plane: None,
+                target: Target::Stone { normal },
             })
             .collect::<Vec<_>>()
     };

@@ -5,14 +5,15 @@
 //! at time t displaced by an error
 //!
 //! ```text
-//! b_s(p, t) = c_s + w_s x (p - p_s) + v_s(t) + g_e
+//! b_s(p, t) = c_s + w_s x (p - p_s) + k_e P (p - p_s) + v_s(t) + g_e
 //! ```
 //!
-//! c_s: registration error of the source; w_s: its rotation about the middle p_s of what it sees; v_s: drift,
-//! a Gaussian process in time (Matern 3/2; Rasmussen & Williams 2006, eq. 4.17) at knots (Glira, Pfeifer &
-//! Mandlburger 2016 use splines in the same place); g_e: error of the whole epoch, which no comparison of its
-//! own sources shows. Within one epoch nothing moves, so differences between its sources on the same stone
-//! are differences of errors. Their variances are estimated from these alone (restricted maximum likelihood),
+//! c_s: registration error of the source; w_s: its rotation about the middle p_s of what it sees; k_e: stretch
+//! in the face of the stone (P projects onto it), because a scanner misses or smears the flanks of a stone
+//! that are turned away from it; v_s: drift, a Gaussian process in time (Matern 3/2; Rasmussen & Williams
+//! 2006, eq. 4.17) at knots (Glira, Pfeifer & Mandlburger 2016 use splines in the same place); g_e: error of
+//! the whole epoch, which no comparison of its own sources shows. Within one epoch nothing moves, so
+//! differences between its sources on the same stone are differences of errors. Their variances are estimated from these alone (restricted maximum likelihood),
 //! then held; stable areas, which both epochs see unmoved, add differences between the epochs. What comes out
 //! is the error of the second epoch against the first at every stone, with its covariance: an epoch's mean
 //! error stays as uncertain as its prior where nothing shows it.

@@ -1,8 +1,8 @@
 //! The unknown errors of the sources, and their prior.
 
-use super::components::ObserverComponents;
+use super::components::{ObserverComponents, SensorClass, Stretch};
 use super::observation::Observation;
-use super::sight::{Sight, Source, StablePlane};
+use super::sight::{Sight, Source, StablePlane, Target};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
 use std::collections::BTreeMap;
 
@@ -26,6 +26,7 @@ const LEAST_M: f64 = 1e-7;
 #[derive(Clone, Debug)]
 struct Block {
     first: usize,
+    epoch: usize,
     middle: Point3<f64>,
     radius_m: f64,
     /// Direction along which places are ordered where times cannot order them.
@@ -33,8 +34,9 @@ struct Block {
     knots: Vec<f64>,
 }
 
-/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3), then what each
-/// source gets wrong on each plane of the stable areas (3 each).
+/// All unknowns: the blocks of the sources, then the error of the later epoch as a whole (3), then the stretch
+/// of what sources show of the stones (3, where the class of the sensor has one), then what each source gets
+/// wrong on each plane of the stable areas (3 each).
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
     /// Block of each source; sources of one survey share theirs.
@@ -42,6 +44,9 @@ pub(super) struct Unknowns {
     of_source: Vec<usize>,
     epochs: Vec<usize>,
     whole: usize,
+    /// First unknown of the stretch about the sources' middles (shared, and of each epoch), with the standard
+    /// deviations of its prior.
+    stretch: Option<(usize, Stretch)>,
     /// First unknown of each plane and block.
     planes: BTreeMap<(StablePlane, usize), usize>,
 }
@@ -82,7 +87,7 @@ pub(super) type Row = Vec<(usize, Matrix3<f64>)>;
 
 impl Unknowns {
     /// `same_as[s]`: the source whose error source s shares, itself where it has its own.
-    pub fn new(sources: &[Source], same_as: &[usize], sights: &[Sight]) -> Self {
+    pub fn new(sources: &[Source], same_as: &[usize], sights: &[Sight], class: SensorClass) -> Self {
         let mut blocks = Vec::new();
         let mut of_source = vec![0; sources.len()];
         let mut first = 0;
@@ -92,7 +97,7 @@ impl Unknowns {
                 continue;
             }
             let own: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
-            let block = Block::new(first, &own, sources[s].has_times);
+            let block = Block::new(first, &own, &sources[s]);
             first += 6 + 3 * block.knots.len();
             of_source[s] = blocks.len();
             blocks.push(block);
@@ -102,6 +107,7 @@ impl Unknowns {
             of_source,
             epochs: sources.iter().map(|s| s.epoch).collect(),
             whole: first,
+            stretch: class.stretch().map(|sd| (first + 3, sd)),
             planes: BTreeMap::new(),
         }
     }
@@ -110,7 +116,7 @@ impl Unknowns {
     pub fn with_planes(mut self, observations: &[Observation]) -> Self {
         for sight in observations.iter().flat_map(|o| &o.sights) {
             let next = self.count();
-            if let Some(plane) = sight.plane {
+            if let Some(plane) = sight.plane() {
                 let key = (plane, self.of_source[sight.source]);
                 self.planes.entry(key).or_insert(next);
             }
@@ -119,7 +125,8 @@ impl Unknowns {
     }
 
     pub fn count(&self) -> usize {
-        self.whole + 3 + 3 * self.planes.len()
+        let stretch = if self.stretch.is_some() { 3 } else { 0 };
+        self.whole + 3 + stretch + 3 * self.planes.len()
     }
 
     /// First unknown of a source's translation.
@@ -130,6 +137,13 @@ impl Unknowns {
     /// First unknown of the later epoch's error as a whole.
     pub fn whole(&self) -> usize {
         self.whole
+    }
+
+    /// Relative stretch, in the face, of what the sources of each epoch show about their middles; `mean`: the
+    /// unknowns. `None` where the model has none.
+    pub fn stretches(&self, mean: &DVector<f64>) -> Option<[f64; 2]> {
+        let (first, _) = self.stretch?;
+        Some([1, 2].map(|of_epoch| mean[first] + mean[first + of_epoch]))
     }
 
     /// How a sight's error depends on the unknowns.
@@ -146,7 +160,19 @@ impl Unknowns {
         if self.epochs[sight.source] == 1 {
             row.push((self.whole, Matrix3::identity()));
         }
-        let Some(plane) = sight.plane else { return row };
+        if let (Some((first, _)), Target::Stone { normal }) = (self.stretch, sight.target) {
+            let arm = sight.place - block.middle;
+            let in_face = arm - normal * normal.dot(&arm);
+            let of_epoch = |epoch| {
+                if block.epoch == epoch {
+                    in_face
+                } else {
+                    Vector3::zeros()
+                }
+            };
+            row.push((first, Matrix3::from_columns(&[in_face, of_epoch(0), of_epoch(1)])));
+        }
+        let Some(plane) = sight.plane() else { return row };
         if let Some(first) = self.planes.get(&(plane, self.of_source[sight.source])) {
             row.push((*first, Matrix3::identity()));
         }
@@ -192,19 +218,22 @@ impl Unknowns {
     pub fn prior(&self, prior: &Prior) -> (DMatrix<f64>, f64) {
         let mut matrix = DMatrix::zeros(self.count(), self.count());
         let mut log_det = 0.0;
-        let mut diagonal = |matrix: &mut DMatrix<f64>, first: usize, sd: f64| {
-            for k in first..first + 3 {
+        let mut diagonal = |matrix: &mut DMatrix<f64>, first: usize, sds: [f64; 3]| {
+            for (k, sd) in (first..).zip(sds) {
                 matrix[(k, k)] = 1.0 / (sd * sd);
+                log_det -= 2.0 * sd.ln();
             }
-            log_det -= 6.0 * sd.ln();
         };
         for block in &self.blocks {
-            diagonal(&mut matrix, block.first, prior.translation_m);
-            diagonal(&mut matrix, block.first + 3, prior.rotation_m);
+            diagonal(&mut matrix, block.first, [prior.translation_m; 3]);
+            diagonal(&mut matrix, block.first + 3, [prior.rotation_m; 3]);
         }
-        diagonal(&mut matrix, self.whole, prior.whole_m.max(LEAST_M));
+        diagonal(&mut matrix, self.whole, [prior.whole_m.max(LEAST_M); 3]);
+        if let Some((first, sd)) = self.stretch {
+            diagonal(&mut matrix, first, [sd.shared, sd.of_epoch, sd.of_epoch]);
+        }
         for first in self.planes.values() {
-            diagonal(&mut matrix, *first, prior.plane_m.max(LEAST_M));
+            diagonal(&mut matrix, *first, [prior.plane_m.max(LEAST_M); 3]);
         }
         for block in &self.blocks {
             let (inverse, knots_log_det) = knot_information(&block.knots, prior);
@@ -224,15 +253,16 @@ impl Unknowns {
 }
 
 impl Block {
-    fn new(first: usize, sights: &[&Sight], has_times: bool) -> Self {
+    fn new(first: usize, sights: &[&Sight], source: &Source) -> Self {
         let count = sights.len().max(1) as f64;
         let middle = Point3::from(sights.iter().map(|s| s.place.coords).sum::<Vector3<f64>>() / count);
         let squares: f64 = sights.iter().map(|s| (s.place - middle).norm_squared()).sum();
         let mut block = Self {
             first,
+            epoch: source.epoch,
             middle,
             radius_m: (squares / count).sqrt().max(0.1),
-            along: (!has_times).then(|| principal_axis(sights, &middle)),
+            along: (!source.has_times).then(|| principal_axis(sights, &middle)),
             knots: Vec::new(),
         };
         let mut order: Vec<f64> = sights.iter().map(|s| block.order(s)).collect();

@@ -26,7 +26,7 @@ pub(super) struct Observation {
 impl Observation {
     /// The plane of a stable area that it is part of; `None` for a stone.
     pub fn plane(&self) -> Option<StablePlane> {
-        self.sights[0].plane
+        self.sights[0].plane()
     }
 
     /// Number of differences.

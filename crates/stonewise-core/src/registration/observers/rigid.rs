@@ -2,7 +2,7 @@
 
 use super::epoch_pair::EpochPair;
 use super::model::{Row, Solution, Unknowns};
-use super::sight::{SeenStone, Sight, Source, SourcePoints};
+use super::sight::{SeenStone, Sight, Source, SourcePoints, Target};
 use crate::geometry::lever;
 use nalgebra::{Matrix6, Point3, SMatrix, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -105,7 +105,7 @@ pub(super) fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &U
             source: s.source,
             time_s: s.time_s,
             place: stone.centroid,
-            plane: None,
+            target: Target::Stone { normal: stone.normal },
         };
         row.extend(unknowns.row(&sight).into_iter().map(|(k, m)| (k, m * share)));
     }

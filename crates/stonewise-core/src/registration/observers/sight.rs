@@ -45,8 +45,26 @@ pub(super) struct Sight {
     pub source: usize,
     pub time_s: f64,
     pub place: Point3<f64>,
-    /// The stable area and the plane in it where the sight is of one.
-    pub plane: Option<StablePlane>,
+    pub target: Target,
+}
+
+/// What a sight is of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Target {
+    /// A stone with this outward unit normal of its face.
+    Stone { normal: Vector3<f64> },
+    /// A plane of a stable area.
+    Plane(StablePlane),
+}
+
+impl Sight {
+    /// The plane of a stable area; `None` for a stone.
+    pub fn plane(&self) -> Option<StablePlane> {
+        match self.target {
+            Target::Plane(plane) => Some(plane),
+            Target::Stone { .. } => None,
+        }
+    }
 }
 
 /// A plane of a stable area.

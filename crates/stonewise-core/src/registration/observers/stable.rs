@@ -1,7 +1,7 @@
 //! Differences between sources, of one epoch and of both, on planes that did not move.
 
 use super::observation::Observation;
-use super::sight::{Sight, StablePlane};
+use super::sight::{Sight, StablePlane, Target};
 use crate::cloud::Cloud;
 use crate::geometry::FaceFrame;
 use crate::statistics::upper_median;
@@ -293,7 +293,7 @@ impl CellPlane {
             source,
             time_s: own.iter().sum::<f64>() / own.len().max(1) as f64,
             place: self.centre,
-            plane: Some(of),
+            target: Target::Plane(of),
         }
     }
 }

@@ -6,7 +6,7 @@ use super::epoch_error::{Datum, EpochErrors, epoch_errors};
 use super::epoch_pair::{EpochErrorParams, EpochPair};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
-use super::sight::{SeenStone, Sight, Source, SourcePoints};
+use super::sight::{SeenStone, Sight, Source, SourcePoints, Target};
 use super::stable::{StableParams, StablePoints, stable_observations};
 use crate::cloud::Cloud;
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
@@ -32,7 +32,7 @@ fn sight(source: usize, place: Point3<f64>) -> Sight {
         source,
         time_s: 10.0 * source as f64 + place.y,
         place,
-        plane: None,
+        target: Target::Stone { normal: Vector3::x() },
     }
 }
 
@@ -80,10 +80,76 @@ fn the_size_of_the_sources_errors_is_found_within_its_sampling_range() {
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
     let same: Vec<usize> = (0..2 * count).collect();
-    let unknowns = Unknowns::new(&sources(count), &same, &sights);
+    let unknowns = Unknowns::new(&sources(count), &same, &sights, SensorClass::Airborne);
     let found = estimate(&Problem::new(&unknowns, &all), SensorClass::Airborne);
     assert!((0.0022..0.0042).contains(&found.translation_m), "{found:?}");
     assert!(found.drift_m < 0.001 && found.noise_scale < 1.5, "{found:?}");
+}
+
+/// Differences of stations 10 m apart along y, each of which sees 15 m to either side, shifted by `errors` and
+/// stretched by `stretch` about itself.
+fn chain(epoch: usize, errors: &[Vector3<f64>], stretch: f64, sd_m: f64, seed: u64) -> Vec<Observation> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let count = errors.len() / 2;
+    let station = |s: usize| 10.0 * (s % count) as f64;
+    (0..4 * count)
+        .map(|k| {
+            let place = Point3::new(0.0, 2.5 * k as f64 - 3.7, 2.0);
+            let seeing: Vec<usize> = (epoch * count..(epoch + 1) * count)
+                .filter(|&s| (station(s) - place.y).abs() < 15.0)
+                .collect();
+            let seen: Vec<Vector3<f64>> = seeing
+                .iter()
+                .map(|&s| {
+                    let noise = Vector3::from_fn(|_, _| sd_m * normal(&mut rng));
+                    errors[s] + Vector3::y() * stretch * (place.y - station(s)) + noise
+                })
+                .collect();
+            let others = seeing.len() - 1;
+            let covariance = DMatrix::from_fn(3 * others, 3 * others, |r, c| {
+                let shared = if r % 3 == c % 3 { 1.0 } else { 0.0 };
+                sd_m * sd_m * (shared + if r == c { 1.0 } else { 0.0 })
+            });
+            Observation {
+                sights: seeing.iter().map(|&s| sight(s, place)).collect(),
+                directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
+                values: DVector::from_fn(3 * others, |r, _| seen[1 + r / 3][r % 3] - seen[0][r % 3]),
+                covariance,
+                face_from_world: Matrix3::identity(),
+                weight: 1.0,
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn a_stretch_that_all_stations_share_is_not_taken_for_errors_of_their_registration() {
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let (count, stretch) = (12, 4e-5);
+    let errors: Vec<Vector3<f64>> = (0..2 * count)
+        .map(|_| Vector3::from_fn(|_, _| 0.3e-3 * normal(&mut rng)))
+        .collect();
+    let list: Vec<Observation> = (0..2)
+        .flat_map(|e| chain(e, &errors, stretch, 0.1e-3, 3 + e as u64))
+        .collect();
+    let all: Vec<&Observation> = list.iter().collect();
+    let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
+    let same: Vec<usize> = (0..2 * count).collect();
+    let class = SensorClass::Terrestrial;
+    let unknowns = Unknowns::new(&sources(count), &same, &sights, class);
+    let problem = Problem::new(&unknowns, &all);
+    let components = estimate(&problem, class);
+    // 72 shifts: their scatter is known to a tenth.
+    assert!(
+        (0.2e-3..0.4e-3).contains(&components.translation_m),
+        "{components:?}"
+    );
+    let solution = problem.solve(&Prior::new(&components, 0.0), &components).unwrap();
+    let found = unknowns.stretches(&solution.mean).unwrap();
+    // 0.3 mm on twelve stations over 110 m leaves 2.5 ppm.
+    for of_epoch in found {
+        assert!((of_epoch - stretch).abs() < 8e-6, "{found:?}");
+    }
 }
 
 /// Covariance of all differences, unknowns included, and their values.
@@ -129,7 +195,7 @@ fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
     let list: Vec<Observation> = list.into_iter().step_by(9).collect();
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights);
+    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights, SensorClass::Terrestrial);
     let problem = Problem::new(&unknowns, &all);
     let dense = |c: &ObserverComponents| {
         let (total, values) = dense(&unknowns, &all, &Prior::new(c, 1e-3), c);
@@ -299,7 +365,8 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     list.extend(cells.into_iter().step_by(12));
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights).with_planes(&list);
+    let unknowns =
+        Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights, SensorClass::Airborne).with_planes(&list);
     let c = ObserverComponents::expected(SensorClass::Airborne);
     let prior = Prior::with_planes(&c, 0.01, 0.001);
     let problem = Problem::new(&unknowns, &all);

@@ -30,6 +30,10 @@ pub struct ObserversRecord {
     pub assumed_shared_error_m: f64,
     /// Variances of the sources' errors; absent where an epoch has no two sources that overlap.
     pub components: Option<ObserverComponents>,
+    /// Relative stretch, in the face, of what the sources of each epoch show about their middles, without
+    /// unit; absent for airborne sensors and where no sources overlap.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stretch: Option<[f64; 2]>,
     /// Twice the log likelihood that errors of the sources gain over none.
     pub significance: f64,
     /// Stones on which sources were compared, per epoch.
@@ -47,6 +51,7 @@ impl From<&EpochErrors> for ObserversRecord {
             sensor: errors.class,
             assumed_shared_error_m: errors.shared_error_m,
             components: errors.components,
+            stretch: errors.stretch,
             significance: errors.significance,
             compared_stones: [errors.observations[0], errors.observations[1]],
             stable_cells: errors.observations[2],
