@@ -173,6 +173,7 @@ fn main() {
         "{:#?} significance {:.1} observations {:?}",
         found.components, found.significance, found.observations
     );
+    println!("stretch {:?}", found.stretch);
     for s in &found.sources {
         println!(
             "{} {} +- {} mm",

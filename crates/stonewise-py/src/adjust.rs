@@ -5,18 +5,21 @@ use crate::attended::{Listeners, attended};
 use crate::clouds::Tiled;
 use crate::command::parameters_of;
 use crate::error::{error, explained};
-use nalgebra::{Isometry3, Point2, Point3};
+use nalgebra::{Isometry3, Matrix3, Point2, Point3};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use stonewise::results::{Reference, StoneRow, stone_table};
 use stonewise::{MatchedPair, PairPlaces, Settings};
-use stonewise_core::cloud::TileSource;
+use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, Camera, Plane, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::Progress;
+use stonewise_core::registration::observers::{
+    EpochErrorParams, EpochPair, SeenStone, Source, SourcePoints, epoch_errors,
+};
 use stonewise_core::registration::{
     AdjustmentReport, MemoryPairs, NearPoint, PairPoints, adjust as adjust_pairs,
 };
@@ -99,8 +102,9 @@ fn measure(
         e => stonewise::Error::Registration(e.to_string()),
     })?;
     report.results.sort_by_key(|r| r.first);
+    let relative = relative_errors(&first, &report, &settings.registration.observers);
     Ok((
-        stone_table(&rows(&first, &second, &matched, &report.results))?,
+        stone_table(&rows(&first, &second, &matched, &report.results, &relative))?,
         report,
     ))
 }
@@ -223,9 +227,56 @@ fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f
         .collect()
 }
 
+/// What the registration of clouds without stations or strips is assumed to get wrong at each matched stone
+/// besides a rigid motion, covariances in m^2.
+fn relative_errors(
+    first: &Epoch,
+    report: &AdjustmentReport,
+    params: &EpochErrorParams,
+) -> BTreeMap<StoneId, Matrix3<f64>> {
+    let matched: BTreeSet<StoneId> = report.results.iter().map(|r| r.first).collect();
+    let stones: Vec<&Stone> = first.stones.iter().filter(|s| matched.contains(&s.id)).collect();
+    let sources = [0, 1].map(|epoch| Source {
+        name: String::new(),
+        epoch,
+        has_times: false,
+    });
+    let sight = |source, stone: &Stone| SourcePoints {
+        source,
+        count: 1,
+        time_s: 0.0,
+        points: Cloud::new(stone.centroid, Vec::new()),
+    };
+    let seen: Vec<SeenStone> = stones
+        .iter()
+        .map(|stone| SeenStone {
+            centroid: stone.centroid,
+            normal: stone.normal,
+            sights: vec![sight(0, stone), sight(1, stone)],
+        })
+        .collect();
+    let pair = EpochPair {
+        sources: &sources,
+        same_as: &[0, 1],
+        stones: &seen,
+        neighbours: &[],
+        stable: &[],
+        offered: &[],
+        sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
+    };
+    let errors = epoch_errors(&pair, params);
+    stones.iter().map(|s| s.id).zip(errors.relative).collect()
+}
+
 /// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of
-/// the epochs.
-fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairResult]) -> Vec<StoneRow> {
+/// the epochs. `relative`: what the registration gets wrong besides a rigid motion.
+fn rows(
+    first: &Epoch,
+    second: &Epoch,
+    matched: &MatchReport,
+    results: &[PairResult],
+    relative: &BTreeMap<StoneId, Matrix3<f64>>,
+) -> Vec<StoneRow> {
     let partners: BTreeMap<StoneId, &Stone> = second.stones.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<StoneId, MatchOutcome> = matched.outcomes.iter().copied().collect();
     let motions: BTreeMap<StoneId, &PairResult> = results.iter().map(|r| (r.first, r)).collect();
@@ -236,7 +287,8 @@ fn rows(first: &Epoch, second: &Epoch, matched: &MatchReport, results: &[PairRes
             MatchOutcome::Matched { second } => partners.get(second).copied(),
             MatchOutcome::Unmatched(_) => None,
         };
-        let reference = Reference::against(common.as_ref(), stone);
+        let relative = relative.get(&stone.id).copied().unwrap_or_default();
+        let reference = Reference::against(common.as_ref(), stone, &relative);
         let pair = motions.get(&stone.id).copied();
         Some(StoneRow::new(
             stone,

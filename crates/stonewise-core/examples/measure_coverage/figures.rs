@@ -52,7 +52,7 @@ impl Wall {
             let (rest, covariance) = match (&common, is_known) {
                 (Some(common), false) => (
                     measured - common.at(&stone.centroid),
-                    survey.noise[k] + common.covariance_at(&stone.centroid),
+                    survey.noise[k] + common.covariance_at(&stone.centroid) + found.relative[k],
                 ),
                 _ => (
                     measured - found.at[k].mean,
@@ -75,9 +75,10 @@ impl Wall {
             motions.push(Some((rest, covariance)));
         }
         wall.called[1] = moved_stones(&motions, 0.05).contains(&true);
-        if is_known {
-            wall.inside_relative = inside_relative(survey, found);
-        }
+        wall.inside_relative = match is_known {
+            true => inside_relative(survey, found),
+            false => [0, 1, 2].map(|axis| wall.inside[axis]),
+        };
         let mean = survey.seeming.iter().sum::<Vector3<f64>>() / n;
         let claimed = found.rigid.covariance.fixed_view::<3, 3>(0, 0).into_owned();
         let off = mean - found.rigid.error.fixed_rows::<3>(0);
@@ -138,12 +139,13 @@ pub fn print_head(walls: u64) {
 }
 
 pub fn print(label: &str, walls: &[Wall], seconds: f64) {
-    let known: Vec<Wall> = walls
-        .iter()
-        .copied()
-        .filter(|w| w.datum != Some(Datum::Unknown))
-        .collect();
+    let is_known = |w: &&Wall| w.datum != Some(Datum::Unknown);
+    let mut known: Vec<Wall> = walls.iter().filter(is_known).copied().collect();
     let unknown = (walls.len() - known.len()) as f64 / walls.len() as f64;
+    if known.is_empty() {
+        // Against the common rigid motion.
+        known = walls.to_vec();
+    }
     let mean = |of: &dyn Fn(&Wall) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
     let share =
         |of: &dyn Fn(&Wall) -> bool| walls.iter().filter(|w| of(w)).count() as f64 / walls.len() as f64;

@@ -94,11 +94,12 @@ pub struct Reference {
 
 impl Reference {
     /// The common motion at a stone with the error of its estimate: what a stone is tested against where
-    /// nothing is known about the registration.
-    pub fn against(common: Option<&SmallMotion>, stone: &Stone) -> Self {
+    /// nothing is known about the registration. `relative`: covariance of what the registration gets wrong at
+    /// the stone besides a rigid motion, m^2.
+    pub fn against(common: Option<&SmallMotion>, stone: &Stone, relative: &Matrix3<f64>) -> Self {
         common.map_or_else(Self::default, |common| Self {
             motion: common.at(&stone.centroid),
-            covariance: common.covariance_at(&stone.centroid),
+            covariance: common.covariance_at(&stone.centroid) + relative,
             rotation_covariance: common.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
             ..Self::default()
         })

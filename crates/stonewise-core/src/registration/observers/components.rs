@@ -76,6 +76,24 @@ impl SensorClass {
         }
     }
 
+    /// What is assumed of the points of an epoch among each other where its files keep no sources apart.
+    ///
+    /// Terrestrial: a place belongs to the few stations nearest to it, each as far off as is typical or
+    /// somewhat further, and the next ones stand 10 to 20 m further. Airborne: the drift of the trajectory,
+    /// averaged over the strips, in a second or two of flight.
+    pub(super) fn merged(self) -> MergedDrift {
+        match self {
+            Self::Terrestrial => MergedDrift {
+                sd_m: 0.7e-3,
+                length_m: 15.0,
+            },
+            Self::Airborne => MergedDrift {
+                sd_m: 2e-3,
+                length_m: 6.0,
+            },
+        }
+    }
+
     /// Median of the prior of a source's translation, metres: registration by targets; direct georeferencing
     /// after strip adjustment.
     fn typical_m(self) -> f64 {
@@ -93,6 +111,16 @@ pub(super) struct Stretch {
     pub shared: f64,
     /// Of what the sources of one epoch share.
     pub of_epoch: f64,
+}
+
+/// Errors of the points of an epoch against each other where its files keep no sources apart: a Gaussian
+/// process along the wall, the same for each axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MergedDrift {
+    /// Standard deviation, metres.
+    pub sd_m: f64,
+    /// Correlation length, metres.
+    pub length_m: f64,
 }
 
 /// Number of components.

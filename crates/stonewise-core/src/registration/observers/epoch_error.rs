@@ -9,6 +9,7 @@ use super::cross_check::{CrossCheck, cross_check};
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
+use super::relative::relative_errors;
 use super::rigid::{RigidError, difference_row, rigid_rows, shares};
 use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
@@ -82,8 +83,12 @@ pub struct EpochErrors {
     pub cross_check: Option<CrossCheck>,
     /// Error at each stone, in their order.
     pub at: Vec<ErrorAt>,
+    /// Where the datum is unknown: covariance of the error at each stone, in their order, after the closest
+    /// rigid motion of all stones is taken off; world, m^2. Empty otherwise.
+    #[serde(default)]
+    pub relative: Vec<Matrix3<f64>>,
     /// Covariance of the error at the second of two neighbours less the error at the first, world, m^2, in
-    /// the order of [`EpochPair::neighbours`].
+    /// the order of [`EpochPair::neighbours`]; where the datum is unknown, without the rigid motion.
     #[serde(skip)]
     pub between: Vec<Matrix3<f64>>,
 }
@@ -158,6 +163,14 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
     let rigid = rigid_rows(pair, &unknowns).error(&found.weighted());
+    let relative = match datum {
+        Datum::Unknown => relative_errors(pair, &within, &components, class, params),
+        Datum::Stable | Datum::Sources => None,
+    };
+    let (relative, between) = match relative {
+        Some(relative) => (relative.at, relative.between),
+        None => (Vec::new(), found.between(pair, &unknowns)),
+    };
     let cross_check = match datum {
         Datum::Sources => cross_check(pair, &within, &rigid, &model, params),
         Datum::Stable | Datum::Unknown => None,
@@ -175,7 +188,8 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         rigid,
         cross_check,
         at: found.at_stones(pair, &unknowns, model.components.nugget_m),
-        between: found.between(pair, &unknowns),
+        relative,
+        between,
     }
 }
 

@@ -9,14 +9,16 @@
 //! ```
 //!
 //! c_s: registration error of the source; w_s: its rotation about the middle p_s of what it sees; k_e: stretch
-//! in the face of the stone (P projects onto it), because a scanner misses or smears the flanks of a stone
-//! that are turned away from it; v_s: drift, a Gaussian process in time (Matern 3/2; Rasmussen & Williams
+//! in the face of the stone (P projects onto it), because the noise of oblique ranges makes a stone seem
+//! shifted away from the station; v_s: drift, a Gaussian process in time (Matern 3/2; Rasmussen & Williams
 //! 2006, eq. 4.17) at knots (Glira, Pfeifer & Mandlburger 2016 use splines in the same place); g_e: error of
 //! the whole epoch, which no comparison of its own sources shows. Within one epoch nothing moves, so
-//! differences between its sources on the same stone are differences of errors. Their variances are estimated from these alone (restricted maximum likelihood),
-//! then held; stable areas, which both epochs see unmoved, add differences between the epochs. What comes out
-//! is the error of the second epoch against the first at every stone, with its covariance: an epoch's mean
-//! error stays as uncertain as its prior where nothing shows it.
+//! differences between its sources on the same stone are differences of errors. Their variances are estimated
+//! from these alone (restricted maximum likelihood), then held; stable areas, which both epochs see unmoved,
+//! add differences between the epochs. What comes out is the error of the second epoch against the first at
+//! every stone, with its covariance: an epoch's mean error stays as uncertain as its prior where nothing shows
+//! it. Where nothing shows the datum at all, motions hold against the common rigid motion of the stones, and
+//! only what the error has besides a rigid motion counts.
 //!
 //! Frame: world; metres, seconds, radians.
 
@@ -30,6 +32,7 @@ mod epoch_error;
 mod epoch_pair;
 mod model;
 mod observation;
+mod relative;
 mod rigid;
 mod sight;
 mod stable;

@@ -1,6 +1,6 @@
 //! The unknown errors of the sources, and their prior.
 
-use super::components::{ObserverComponents, SensorClass, Stretch};
+use super::components::{MergedDrift, ObserverComponents, SensorClass, Stretch};
 use super::observation::Observation;
 use super::sight::{Sight, Source, StablePlane, Target};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
@@ -9,6 +9,9 @@ use std::collections::BTreeMap;
 /// Sights for each knot of a source's drift, and the least and most knots.
 const SIGHTS_PER_KNOT: usize = 8;
 const KNOTS: [usize; 2] = [4, 20];
+/// Distance of the knots along an epoch whose files keep no sources apart, metres, and the most of them.
+const MERGED_KNOT_M: f64 = 2.0;
+const MOST_KNOTS: usize = 200;
 /// Smallest share of a drift's variance by which neighbouring knots differ: keeps the prior's matrix
 /// invertible.
 const KNOT_NUGGET: f64 = 1e-6;
@@ -27,6 +30,8 @@ const LEAST_M: f64 = 1e-7;
 struct Block {
     first: usize,
     epoch: usize,
+    /// Whether it is the only one of its epoch: the whole epoch, if files keep no sources apart.
+    is_alone: bool,
     middle: Point3<f64>,
     radius_m: f64,
     /// Direction along which places are ordered where times cannot order them.
@@ -62,6 +67,8 @@ pub(super) struct Prior {
     pub whole_m: f64,
     /// Of a source on a plane of the stable areas.
     pub plane_m: f64,
+    /// Drift of an epoch whose files keep no sources apart, along the wall; `None`: that of a source.
+    pub merged: Option<MergedDrift>,
 }
 
 impl Prior {
@@ -78,6 +85,15 @@ impl Prior {
             drift_length: components.drift_length,
             whole_m,
             plane_m,
+            merged: None,
+        }
+    }
+
+    /// Standard deviation and correlation length of a block's drift at its knots, the length in their unit.
+    fn drift(&self, block: &Block) -> (f64, f64) {
+        match self.merged {
+            Some(merged) if block.is_alone => (merged.sd_m, merged.length_m),
+            _ => (self.drift_m, self.drift_length * block.duration()),
         }
     }
 }
@@ -91,13 +107,16 @@ impl Unknowns {
         let mut blocks = Vec::new();
         let mut of_source = vec![0; sources.len()];
         let mut first = 0;
+        let own =
+            |epoch: usize| (0..sources.len()).filter(move |&s| same_as[s] == s && sources[s].epoch == epoch);
         for s in 0..sources.len() {
             if same_as[s] != s {
                 of_source[s] = of_source[same_as[s]];
                 continue;
             }
-            let own: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
-            let block = Block::new(first, &own, &sources[s]);
+            let seen: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
+            let is_alone = own(sources[s].epoch).count() == 1;
+            let block = Block::new(first, &seen, &sources[s], is_alone);
             first += 6 + 3 * block.knots.len();
             of_source[s] = blocks.len();
             blocks.push(block);
@@ -160,7 +179,10 @@ impl Unknowns {
         if self.epochs[sight.source] == 1 {
             row.push((self.whole, Matrix3::identity()));
         }
-        if let (Some((first, _)), Target::Stone { normal }) = (self.stretch, sight.target) {
+        // The middle of a whole epoch is no foot of a station.
+        if let (Some((first, _)), Target::Stone { normal }) = (self.stretch, sight.target)
+            && !block.is_alone
+        {
             let arm = sight.place - block.middle;
             let in_face = arm - normal * normal.dot(&arm);
             let of_epoch = |epoch| {
@@ -236,7 +258,7 @@ impl Unknowns {
             diagonal(&mut matrix, *first, [prior.plane_m.max(LEAST_M); 3]);
         }
         for block in &self.blocks {
-            let (inverse, knots_log_det) = knot_information(&block.knots, prior);
+            let (inverse, knots_log_det) = knot_information(&block.knots, prior.drift(block));
             log_det += 3.0 * knots_log_det;
             for ((r, c), value) in (0..block.knots.len())
                 .flat_map(|r| (0..block.knots.len()).map(move |c| (r, c)))
@@ -253,13 +275,14 @@ impl Unknowns {
 }
 
 impl Block {
-    fn new(first: usize, sights: &[&Sight], source: &Source) -> Self {
+    fn new(first: usize, sights: &[&Sight], source: &Source, is_alone: bool) -> Self {
         let count = sights.len().max(1) as f64;
         let middle = Point3::from(sights.iter().map(|s| s.place.coords).sum::<Vector3<f64>>() / count);
         let squares: f64 = sights.iter().map(|s| (s.place - middle).norm_squared()).sum();
         let mut block = Self {
             first,
             epoch: source.epoch,
+            is_alone,
             middle,
             radius_m: (squares / count).sqrt().max(0.1),
             along: (!source.has_times).then(|| principal_axis(sights, &middle)),
@@ -269,10 +292,19 @@ impl Block {
         order.sort_by(f64::total_cmp);
         let (low, high) = (order.first().copied(), order.last().copied());
         let (low, high) = (low.unwrap_or(0.0), high.unwrap_or(1.0));
-        let knots = (sights.len() / SIGHTS_PER_KNOT).clamp(KNOTS[0], KNOTS[1]);
+        let knots = match &block.along {
+            Some(_) if is_alone => ((high - low) / MERGED_KNOT_M).ceil() as usize + 1,
+            _ => (sights.len() / SIGHTS_PER_KNOT).min(KNOTS[1]),
+        };
+        let knots = knots.clamp(KNOTS[0], MOST_KNOTS);
         let step = ((high - low) / (knots - 1) as f64).max(1e-6);
         block.knots = (0..knots).map(|k| low + step * k as f64).collect();
         block
+    }
+
+    /// From the first knot to the last, in seconds or metres.
+    fn duration(&self) -> f64 {
+        self.knots[self.knots.len() - 1] - self.knots[0]
     }
 
     /// What orders a source's errors: its time, or the place along it.
@@ -294,13 +326,12 @@ impl Block {
     }
 }
 
-/// Information of a drift at its knots and the logarithm of its determinant, for one axis; length in units of
-/// the source's duration.
-fn knot_information(knots: &[f64], prior: &Prior) -> (DMatrix<f64>, f64) {
+/// Information of a drift at its knots and the logarithm of its determinant, for one axis; `drift`: standard
+/// deviation and correlation length.
+fn knot_information(knots: &[f64], drift: (f64, f64)) -> (DMatrix<f64>, f64) {
     let n = knots.len();
-    let duration = knots[n - 1] - knots[0];
-    let length = prior.drift_length * duration;
-    let variance = prior.drift_m * prior.drift_m;
+    let (sd_m, length) = drift;
+    let variance = sd_m * sd_m;
     let covariance = DMatrix::from_fn(n, n, |r, c| {
         let scaled = 3f64.sqrt() * (knots[r] - knots[c]).abs() / length;
         let nugget = if r == c { KNOT_NUGGET } else { 0.0 };

@@ -62,6 +62,19 @@ pub(super) fn rigid_rows(pair: &EpochPair, unknowns: &Unknowns) -> RigidRows {
 }
 
 impl RigidRows {
+    /// Inverse normal equations times the right-hand sides: how the rigid motion depends on the unknowns, by
+    /// the first of three.
+    pub fn of_unknowns(&self) -> impl Iterator<Item = (usize, SMatrix<f64, 6, 3>)> + '_ {
+        self.parts
+            .iter()
+            .map(|(first, part)| (*first, self.inverse * part))
+    }
+
+    /// The displacement of a place by the six parameters of the rigid motion.
+    pub fn lever(&self, place: &Point3<f64>) -> SMatrix<f64, 3, 6> {
+        lever(&(place - self.centre))
+    }
+
     /// The rigid motion. `solutions`: solutions with their weights, which sum to one.
     pub fn error(&self, solutions: &[(f64, &Solution)]) -> RigidError {
         let mut error = Vector6::zeros();

@@ -565,3 +565,78 @@ fn sources_without_errors_leave_the_datum_unknown() {
         found.significance
     );
 }
+
+#[test]
+fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_less_a_rigid_motion() {
+    let places: Vec<Point3<f64>> = (0..60)
+        .map(|k| {
+            Point3::new(
+                0.1 * f64::from(k % 3),
+                3.0 * f64::from(k / 3),
+                2.0 * f64::from(k % 3),
+            )
+        })
+        .collect();
+    let sight = |source, place: &Point3<f64>| SourcePoints {
+        source,
+        count: 100,
+        time_s: 0.0,
+        points: Cloud::new(*place, Vec::new()),
+    };
+    let stones: Vec<SeenStone> = places
+        .iter()
+        .map(|p| SeenStone {
+            centroid: *p,
+            normal: Vector3::x(),
+            sights: vec![sight(0, p), sight(1, p)],
+        })
+        .collect();
+    let neighbours = [[4, 7], [0, 59]];
+    let pair = EpochPair {
+        sources: &sources(1),
+        same_as: &[0, 1],
+        stones: &stones,
+        neighbours: &neighbours,
+        stable: &[],
+        offered: &[],
+        sigma_m: 0.002,
+    };
+    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    assert_eq!(found.datum, Datum::Unknown);
+    // Both epochs: twice a Matern 3/2 process of 0.7 mm and 15 m along the wall, for each axis.
+    let n = places.len();
+    let matern = |k: usize, l: usize| {
+        let scaled = 3f64.sqrt() * (places[k].y - places[l].y).abs() / 15.0;
+        2.0 * 0.7e-3 * 0.7e-3 * (1.0 + scaled) * (-scaled).exp()
+    };
+    let all = DMatrix::from_fn(3 * n, 3 * n, |r, c| match r % 3 == c % 3 {
+        true => matern(r / 3, c / 3),
+        false => 0.0,
+    });
+    let mut levers = DMatrix::zeros(3 * n, 6);
+    for (k, p) in places.iter().enumerate() {
+        let arm = p.coords - Vector3::new(0.1, 28.5, 2.0);
+        levers
+            .view_mut((3 * k, 0), (3, 3))
+            .copy_from(&Matrix3::identity());
+        levers
+            .view_mut((3 * k, 3), (3, 3))
+            .copy_from(&-arm.cross_matrix());
+    }
+    let normal = (levers.transpose() * &levers).try_inverse().unwrap();
+    let rest = DMatrix::identity(3 * n, 3 * n) - &levers * normal * levers.transpose();
+    let expected = &rest * all * rest.transpose();
+    let block = |r: usize, c: usize| expected.fixed_view::<3, 3>(3 * r, 3 * c).into_owned();
+    let close = |found: &Matrix3<f64>, expected: &Matrix3<f64>| {
+        // Between knots, 2 m apart, the drift is linear, which takes off up to 1.2 % of its variance.
+        let off = (found - expected).amax();
+        assert!(off < 0.015 * 2.0 * 0.7e-3 * 0.7e-3, "{found} {expected}");
+    };
+    for k in 0..n {
+        close(&found.relative[k], &block(k, k));
+    }
+    for (k, [i, j]) in neighbours.into_iter().enumerate() {
+        let expected = block(i, i) + block(j, j) - block(i, j) - block(j, i);
+        close(&found.between[k], &expected);
+    }
+}

@@ -5,7 +5,7 @@ use crate::pipeline::steps::r#match::Matched;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::Datum;
 use crate::results::{Facade, Reference, StoneRow};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::geometry::SmallMotion;
 use stonewise_core::stone::{MatchOutcome, Stone, common_motion};
@@ -28,6 +28,7 @@ pub fn stone_rows(
         true => registered.errors(),
         false => BTreeMap::new(),
     };
+    let relative = registered.relative_errors();
     // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
     let turn = registered.epoch_errors.as_ref();
     let turn: Vector3<f64> =
@@ -49,7 +50,10 @@ pub fn stone_rows(
                     rotation_covariance,
                 }
             }
-            _ => Reference::against(common.as_ref(), stone),
+            _ => {
+                let relative = relative.get(&stone.id).map_or_else(Matrix3::zeros, |r| **r);
+                Reference::against(common.as_ref(), stone, &relative)
+            }
         };
         let pair = motions.get(&stone.id).copied();
         let place = facade.place(&stone.centroid);

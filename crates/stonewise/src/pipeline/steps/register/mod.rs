@@ -130,9 +130,7 @@ pub fn register(
             ..params.observers.clone()
         };
         let errors = epoch_errors(&pair, &observers);
-        if errors.datum != observers::Datum::Unknown {
-            registered.add_registration(&errors.between);
-        }
+        registered.add_registration(&errors.between);
         registered.epoch_errors = Some(errors);
         registered.error_stones = sights.stones;
         write_json(&step.file("motions.json"), &registered)

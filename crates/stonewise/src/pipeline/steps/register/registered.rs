@@ -50,6 +50,13 @@ impl Registered {
         self.error_stones.iter().copied().zip(errors).collect()
     }
 
+    /// Where the datum is unknown: covariance of that error after the common rigid motion is taken off, by
+    /// stone of the reference.
+    pub fn relative_errors(&self) -> BTreeMap<StoneId, &Matrix3<f64>> {
+        let errors = self.epoch_errors.iter().flat_map(|e| &e.relative);
+        self.error_stones.iter().copied().zip(errors).collect()
+    }
+
     /// The pairs of neighbours as indices into `stones`. Pairs with other stones are removed, also from the
     /// results.
     pub(super) fn neighbours_among(&mut self, stones: &[StoneId]) -> Vec<[usize; 2]> {

@@ -1,0 +1,113 @@
+//! What the epochs' registration leaves uncertain of motions against each other where nothing shows the datum.
+
+use super::components::{MergedDrift, ObserverComponents, SensorClass};
+use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
+use super::model::{Prior, Problem, Row, Solution, Unknowns};
+use super::observation::Observation;
+use super::rigid::{RigidRows, difference_row, rigid_rows};
+use super::sight::Source;
+use nalgebra::{Dyn, Matrix3, Matrix6, OMatrix, SMatrix, U6};
+use rayon::prelude::*;
+
+/// Covariances of the later epoch's error after the closest rigid motion of all stones is taken off.
+pub(super) struct RelativeErrors {
+    /// At each stone, world, m^2.
+    pub at: Vec<Matrix3<f64>>,
+    /// Of the difference between two neighbours, world, m^2.
+    pub between: Vec<Matrix3<f64>>,
+}
+
+/// The covariances for the stones and neighbours of `pair`.
+///
+/// `within`: comparisons of sources, where there are any; an epoch without sources has the error that is
+/// assumed of merged points. `None` where the numbers fail.
+pub(super) fn relative_errors(
+    pair: &EpochPair,
+    within: &[Vec<Observation>; 2],
+    components: &ObserverComponents,
+    class: SensorClass,
+    params: &EpochErrorParams,
+) -> Option<RelativeErrors> {
+    // Several stations or strips make a merged epoch: the time of a point says nothing of its neighbours'
+    // errors, its place does.
+    let sources: Vec<Source> = pair
+        .sources
+        .iter()
+        .map(|s| Source {
+            has_times: s.has_times && pair.sources.iter().filter(|o| o.epoch == s.epoch).count() > 1,
+            ..s.clone()
+        })
+        .collect();
+    let unknowns = Unknowns::new(&sources, pair.same_as, &all_sights(pair, &[]), class);
+    let merged = class.merged();
+    let prior = Prior {
+        merged: Some(MergedDrift {
+            sd_m: params.merged_error_m.unwrap_or(merged.sd_m).max(LEAST_M),
+            ..merged
+        }),
+        ..Prior::new(components, 0.0)
+    };
+    let all: Vec<&Observation> = within.iter().flatten().collect();
+    let solution = Problem::new(&unknowns, &all).solve(&prior, components)?;
+    let rigid = Rigid::new(rigid_rows(pair, &unknowns), &solution);
+    let row = |k: usize| difference_row(&pair.stones[k], pair.sources, &unknowns);
+    let lever = |k: usize| rigid.rows.lever(&pair.stones[k].centroid);
+    let at = |k: usize| rigid.relative(&row(k), &lever(k), &solution);
+    let between = |stones: &[usize; 2]| {
+        let [first, second] = *stones;
+        let mut difference = row(second);
+        difference.extend(row(first).into_iter().map(|(a, m)| (a, -m)));
+        rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
+    };
+    Some(RelativeErrors {
+        at: (0..pair.stones.len()).into_par_iter().map(at).collect(),
+        between: pair.neighbours.par_iter().map(between).collect(),
+    })
+}
+
+/// Standard deviation that stands for none, metres.
+const LEAST_M: f64 = 1e-7;
+
+/// The rigid part of the error as a function of the unknowns, with its covariances.
+struct Rigid {
+    rows: RigidRows,
+    /// Second moments of the unknowns and the rigid motion.
+    cross: OMatrix<f64, Dyn, U6>,
+    /// Second moments of the rigid motion.
+    own: Matrix6<f64>,
+}
+
+impl Rigid {
+    fn new(rows: RigidRows, solution: &Solution) -> Self {
+        let n = solution.mean.len();
+        let mut of_unknowns = OMatrix::<f64, U6, Dyn>::zeros(n);
+        for (first, part) in rows.of_unknowns() {
+            of_unknowns.fixed_view_mut::<6, 3>(0, first).copy_from(&part);
+        }
+        let mean = &of_unknowns * &solution.mean;
+        let cross = &solution.covariance * of_unknowns.transpose() + &solution.mean * mean.transpose();
+        let own = &of_unknowns * &cross;
+        Self {
+            rows,
+            cross,
+            own: own.fixed_view::<6, 6>(0, 0).into_owned(),
+        }
+    }
+
+    /// Second moments of a linear function of the unknowns less the rigid motion times `lever`: the error is
+    /// not taken off the motions, so that its mean counts.
+    fn relative(&self, row: &Row, lever: &SMatrix<f64, 3, 6>, solution: &Solution) -> Matrix3<f64> {
+        let mut own = Matrix3::zeros();
+        let mut cross = SMatrix::<f64, 3, 6>::zeros();
+        for (a, of_a) in row {
+            cross += of_a * self.cross.fixed_view::<3, 6>(*a, 0);
+            for (b, of_b) in row {
+                let mean = solution.mean.fixed_rows::<3>(*a) * solution.mean.fixed_rows::<3>(*b).transpose();
+                own += of_a * (solution.covariance.fixed_view::<3, 3>(*a, *b) + mean) * of_b.transpose();
+            }
+        }
+        let with_rigid = cross * lever.transpose();
+        let sum = own - with_rigid - with_rigid.transpose() + lever * self.own * lever.transpose();
+        0.5 * (sum + sum.transpose())
+    }
+}
