@@ -1,7 +1,7 @@
 //! Which values parameters can have.
 
 use crate::settings::Settings;
-use serde_json::Value;
+use toml::Value;
 
 /// Parameters that zero makes useless: sizes, radii, counts, steps.
 const POSITIVE: [&str; 18] = [
@@ -38,30 +38,34 @@ pub fn impossible(settings: &Settings) -> Option<(String, String)> {
         let message = format!("size_m = {size_m} is not possible: tiles have edges of {least} to {most} m");
         return Some(("size_m".to_owned(), message));
     }
-    let all = serde_json::to_value(settings).ok()?;
+    let all = Value::try_from(settings).ok()?;
     let mut open: Vec<(&str, &Value)> = vec![("", &all)];
     while let Some((key, value)) = open.pop() {
-        match value {
-            Value::Object(map) => open.extend(map.iter().rev().map(|(k, v)| (k.as_str(), v))),
-            Value::Number(number) => {
-                let number = number.as_f64().unwrap_or(f64::NAN);
-                let is_share = key.ends_with("_share") || SHARES.contains(&key);
-                let wanted = if POSITIVE.contains(&key) && number <= 0.0 {
-                    "it must be above 0"
-                } else if number < 0.0 {
-                    "it must not be negative"
-                } else if is_share && number > 1.0 {
-                    "it is a share, 0 to 1"
-                } else {
-                    continue;
-                };
-                return Some((
-                    key.to_owned(),
-                    format!("{key} = {number} is not possible: {wanted}"),
-                ));
+        let number = match value {
+            Value::Table(table) => {
+                open.extend(table.iter().map(|(k, v)| (k.as_str(), v)));
+                continue;
             }
-            _ => {}
-        }
+            Value::Integer(number) => *number as f64,
+            Value::Float(number) => *number,
+            _ => continue,
+        };
+        let is_share = key.ends_with("_share") || SHARES.contains(&key);
+        let wanted = if !number.is_finite() {
+            "it must be a finite number"
+        } else if POSITIVE.contains(&key) && number <= 0.0 {
+            "it must be above 0"
+        } else if number < 0.0 {
+            "it must not be negative"
+        } else if is_share && number > 1.0 {
+            "it is a share, 0 to 1"
+        } else {
+            continue;
+        };
+        return Some((
+            key.to_owned(),
+            format!("{key} = {number} is not possible: {wanted}"),
+        ));
     }
     None
 }
@@ -69,6 +73,7 @@ pub fn impossible(settings: &Settings) -> Option<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::Value;
 
     #[test]
     fn defaults_are_possible_and_senseless_values_are_named() {
@@ -84,6 +89,10 @@ mod tests {
         let mut settings = Settings::default();
         settings.registration.epoch_error_m = Some(-0.001);
         assert_eq!(impossible(&settings).unwrap().0, "epoch_error_m");
+        for number in [f64::NAN, f64::INFINITY] {
+            settings.registration.epoch_error_m = Some(number);
+            assert_eq!(impossible(&settings).unwrap().0, "epoch_error_m");
+        }
     }
 
     #[test]

@@ -142,7 +142,7 @@ pub fn size_m(sensor: Sensor, rng: &mut ChaCha8Rng) -> f64 {
     low * (high / low).powf(share)
 }
 
-/// Relative stretch of what the stations of a survey show: of both epochs, and further of each.
+/// Stretch of each epoch's stations: a part that both epochs share plus a part of its own.
 pub fn stretches(kind: Kind, rng: &mut ChaCha8Rng) -> [f64; 2] {
     match kind {
         Kind::Chain => {

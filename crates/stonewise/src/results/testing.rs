@@ -70,6 +70,7 @@ pub(crate) fn registration_record() -> RegistrationRecord {
         sensor: SensorClass::Terrestrial,
         assumed_shared_error_m: 3e-4,
         components: None,
+        assumed_merged_error_m: None,
         stretch: None,
         significance: 12.0,
         compared_stones: [20, 21],

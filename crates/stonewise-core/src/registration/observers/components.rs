@@ -77,10 +77,9 @@ impl SensorClass {
     }
 
     /// What is assumed of the points of an epoch among each other where its files keep no sources apart.
-    ///
-    /// Terrestrial: a place belongs to the few stations nearest to it, each as far off as is typical or
-    /// somewhat further, and the next ones stand 10 to 20 m further. Airborne: the drift of the trajectory,
-    /// averaged over the strips, in a second or two of flight.
+    /// Terrestrial: each place is measured by the few stations nearest to it, whose registration errors are of
+    /// typical size or somewhat larger; stations are 10 to 20 m apart. Airborne: drift of the trajectory over
+    /// one or two seconds of flight, averaged over the strips.
     pub(super) fn merged(self) -> MergedDrift {
         match self {
             Self::Terrestrial => MergedDrift {

@@ -63,7 +63,8 @@ pub struct EpochErrors {
     pub shared_error_m: f64,
     /// Variances of the sources' errors; `None` where no epoch has sources to compare.
     pub components: Option<ObserverComponents>,
-    /// Relative stretch, in the face, of what the sources of each epoch show about their middles; `None` for
+    /// Dimensionless stretch in the face, one value per epoch: each source is stretched about the middle of
+    /// what it sees; `None` for
     /// a sensor without one.
     #[serde(default)]
     pub stretch: Option<[f64; 2]>,
@@ -83,6 +84,10 @@ pub struct EpochErrors {
     pub cross_check: Option<CrossCheck>,
     /// Error at each stone, in their order.
     pub at: Vec<ErrorAt>,
+    /// Where the datum is unknown and files keep no sources apart: assumed non-rigid part of an epoch's
+    /// registration error, per axis, metres.
+    #[serde(default)]
+    pub merged_error_m: Option<f64>,
     /// Where the datum is unknown: covariance of the error at each stone, in their order, after the closest
     /// rigid motion of all stones is taken off; world, m^2. Empty otherwise.
     #[serde(default)]
@@ -167,6 +172,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
     };
+    let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
     let (relative, between) = match relative {
         Some(relative) => (relative.at, relative.between),
         None => (Vec::new(), found.between(pair, &unknowns)),
@@ -188,6 +194,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         rigid,
         cross_check,
         at: found.at_stones(pair, &unknowns, model.components.nugget_m),
+        merged_error_m,
         relative,
         between,
     }

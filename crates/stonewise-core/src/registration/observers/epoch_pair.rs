@@ -18,8 +18,8 @@ pub struct EpochErrorParams {
     /// sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shared_error_m: Option<f64>,
-    /// Error of the points of an epoch against each other, 1 sigma per axis, metres, where its files keep no
-    /// stations or strips apart; absent: by the class of the sensor.
+    /// Non-rigid part of the registration error of an epoch whose files keep no stations or strips apart,
+    /// 1 sigma per axis, metres; absent: by the class of the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merged_error_m: Option<f64>,
 }

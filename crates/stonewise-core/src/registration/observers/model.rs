@@ -158,8 +158,8 @@ impl Unknowns {
         self.whole
     }
 
-    /// Relative stretch, in the face, of what the sources of each epoch show about their middles; `mean`: the
-    /// unknowns. `None` where the model has none.
+    /// Dimensionless stretch in the face, one value per epoch: each source is stretched about the middle of
+    /// what it sees; `mean`: the unknowns. `None` where the model has none.
     pub fn stretches(&self, mean: &DVector<f64>) -> Option<[f64; 2]> {
         let (first, _) = self.stretch?;
         Some([1, 2].map(|of_epoch| mean[first] + mean[first + of_epoch]))

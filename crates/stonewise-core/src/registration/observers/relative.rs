@@ -11,6 +11,9 @@ use rayon::prelude::*;
 
 /// Covariances of the later epoch's error after the closest rigid motion of all stones is taken off.
 pub(super) struct RelativeErrors {
+    /// Assumed non-rigid part of the registration error of an epoch without sources, per axis, metres; `None`
+    /// where both epochs keep sources apart.
+    pub merged_error_m: Option<f64>,
     /// At each stone, world, m^2.
     pub at: Vec<Matrix3<f64>>,
     /// Of the difference between two neighbours, world, m^2.
@@ -30,19 +33,21 @@ pub(super) fn relative_errors(
 ) -> Option<RelativeErrors> {
     // Several stations or strips make a merged epoch: the time of a point says nothing of its neighbours'
     // errors, its place does.
+    let is_merged = |epoch: usize| pair.sources.iter().filter(|s| s.epoch == epoch).count() == 1;
     let sources: Vec<Source> = pair
         .sources
         .iter()
         .map(|s| Source {
-            has_times: s.has_times && pair.sources.iter().filter(|o| o.epoch == s.epoch).count() > 1,
+            has_times: s.has_times && !is_merged(s.epoch),
             ..s.clone()
         })
         .collect();
     let unknowns = Unknowns::new(&sources, pair.same_as, &all_sights(pair, &[]), class);
     let merged = class.merged();
+    let sd_m = params.merged_error_m.unwrap_or(merged.sd_m);
     let prior = Prior {
         merged: Some(MergedDrift {
-            sd_m: params.merged_error_m.unwrap_or(merged.sd_m).max(LEAST_M),
+            sd_m: sd_m.max(LEAST_M),
             ..merged
         }),
         ..Prior::new(components, 0.0)
@@ -60,6 +65,7 @@ pub(super) fn relative_errors(
         rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
     };
     Some(RelativeErrors {
+        merged_error_m: (0..2).any(is_merged).then_some(sd_m),
         at: (0..pair.stones.len()).into_par_iter().map(at).collect(),
         between: pair.neighbours.par_iter().map(between).collect(),
     })
@@ -68,7 +74,7 @@ pub(super) fn relative_errors(
 /// Standard deviation that stands for none, metres.
 const LEAST_M: f64 = 1e-7;
 
-/// The rigid part of the error as a function of the unknowns, with its covariances.
+/// The rigid part of the error as a function of the unknowns, with its second moments.
 struct Rigid {
     rows: RigidRows,
     /// Second moments of the unknowns and the rigid motion.
@@ -94,8 +100,8 @@ impl Rigid {
         }
     }
 
-    /// Second moments of a linear function of the unknowns less the rigid motion times `lever`: the error is
-    /// not taken off the motions, so that its mean counts.
+    /// Second moments of a linear function of the unknowns minus the rigid motion times `lever`. Second moments
+    /// instead of covariances, because the estimated error is not subtracted from the motions.
     fn relative(&self, row: &Row, lever: &SMatrix<f64, 3, 6>, solution: &Solution) -> Matrix3<f64> {
         let mut own = Matrix3::zeros();
         let mut cross = SMatrix::<f64, 3, 6>::zeros();

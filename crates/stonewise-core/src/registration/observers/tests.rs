@@ -602,7 +602,10 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
         sigma_m: 0.002,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
-    assert_eq!(found.datum, Datum::Unknown);
+    assert_eq!(
+        (found.datum, found.merged_error_m),
+        (Datum::Unknown, Some(0.7e-3))
+    );
     // Both epochs: twice a Matern 3/2 process of 0.7 mm and 15 m along the wall, for each axis.
     let n = places.len();
     let matern = |k: usize, l: usize| {

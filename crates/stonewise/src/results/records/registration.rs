@@ -28,10 +28,14 @@ pub struct ObserversRecord {
     pub sensor: SensorClass,
     /// Error that all sources of an epoch are assumed to share, per axis, metres.
     pub assumed_shared_error_m: f64,
+    /// Non-rigid part of an epoch's registration error, per axis, metres: assumed where the datum is unknown
+    /// and files keep no stations or strips apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assumed_merged_error_m: Option<f64>,
     /// Variances of the sources' errors; absent where an epoch has no two sources that overlap.
     pub components: Option<ObserverComponents>,
-    /// Relative stretch, in the face, of what the sources of each epoch show about their middles, without
-    /// unit; absent for airborne sensors and where no sources overlap.
+    /// Dimensionless stretch in the face, one value per epoch: each source is stretched about the middle of
+    /// what it sees; absent for airborne sensors and where no sources overlap.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stretch: Option<[f64; 2]>,
     /// Twice the log likelihood that errors of the sources gain over none.
@@ -50,6 +54,7 @@ impl From<&EpochErrors> for ObserversRecord {
         Self {
             sensor: errors.class,
             assumed_shared_error_m: errors.shared_error_m,
+            assumed_merged_error_m: errors.merged_error_m,
             components: errors.components,
             stretch: errors.stretch,
             significance: errors.significance,
