@@ -227,8 +227,8 @@ fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f
         .collect()
 }
 
-/// What the registration of clouds without stations or strips is assumed to get wrong at each matched stone
-/// besides a rigid motion, covariances in m^2.
+/// Covariance of the non-rigid part of the registration error at each matched stone, m^2, as assumed for clouds
+/// without stations or strips.
 fn relative_errors(
     first: &Epoch,
     report: &AdjustmentReport,
@@ -269,7 +269,7 @@ fn relative_errors(
 }
 
 /// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of
-/// the epochs. `relative`: what the registration gets wrong besides a rigid motion.
+/// the epochs. `relative`: covariances of the non-rigid part of the registration error.
 fn rows(
     first: &Epoch,
     second: &Epoch,

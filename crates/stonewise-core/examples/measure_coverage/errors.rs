@@ -38,8 +38,8 @@ pub enum Kind {
     Brightness,
     /// Errors up and out differ by a factor of four from those along.
     Uneven,
-    /// Stations along a wall of 12.5 m for each, which see 20 m to either side, and each place in the face
-    /// displaced by what sights from one side get wrong.
+    /// Stations every 12.5 m along a wall, each of which sees 20 m to either side and stretches what it sees in
+    /// the face.
     Chain,
 }
 

@@ -94,8 +94,8 @@ pub struct Reference {
 
 impl Reference {
     /// The common motion at a stone with the error of its estimate: what a stone is tested against where
-    /// nothing is known about the registration. `relative`: covariance of what the registration gets wrong at
-    /// the stone besides a rigid motion, m^2.
+    /// nothing is known about the registration. `relative`: covariance of the non-rigid part of the
+    /// registration error at the stone, m^2.
     pub fn against(common: Option<&SmallMotion>, stone: &Stone, relative: &Matrix3<f64>) -> Self {
         common.map_or_else(Self::default, |common| Self {
             motion: common.at(&stone.centroid),

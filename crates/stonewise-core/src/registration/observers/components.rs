@@ -64,8 +64,8 @@ impl SensorClass {
         0.6 * self.typical_m()
     }
 
-    /// Prior of the stretch of what a source shows of the stones; `None` where sources see every place from
-    /// the same side.
+    /// Prior of the stretch about the middle of what a source sees; `None` where a source sees all places from
+    /// the same direction.
     pub(super) fn stretch(self) -> Option<Stretch> {
         match self {
             Self::Terrestrial => Some(Stretch {
@@ -76,7 +76,8 @@ impl SensorClass {
         }
     }
 
-    /// What is assumed of the points of an epoch among each other where its files keep no sources apart.
+    /// Assumed non-rigid error of an epoch whose files keep no sources apart.
+    ///
     /// Terrestrial: each place is measured by the few stations nearest to it, whose registration errors are of
     /// typical size or somewhat larger; stations are 10 to 20 m apart. Airborne: drift of the trajectory over
     /// one or two seconds of flight, averaged over the strips.
@@ -112,8 +113,8 @@ pub(super) struct Stretch {
     pub of_epoch: f64,
 }
 
-/// Errors of the points of an epoch against each other where its files keep no sources apart: a Gaussian
-/// process along the wall, the same for each axis.
+/// Non-rigid error of an epoch whose files keep no sources apart: a Gaussian process along the wall, the same
+/// for each axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MergedDrift {
     /// Standard deviation, metres.

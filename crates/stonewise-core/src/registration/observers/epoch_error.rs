@@ -10,7 +10,7 @@ use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
-use super::rigid::{RigidError, difference_row, rigid_rows, shares};
+use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
 use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
 use nalgebra::{Matrix3, Vector3};
@@ -64,8 +64,7 @@ pub struct EpochErrors {
     /// Variances of the sources' errors; `None` where no epoch has sources to compare.
     pub components: Option<ObserverComponents>,
     /// Dimensionless stretch in the face, one value per epoch: each source is stretched about the middle of
-    /// what it sees; `None` for
-    /// a sensor without one.
+    /// what it sees; `None` for a sensor without one.
     #[serde(default)]
     pub stretch: Option<[f64; 2]>,
     /// Twice the log likelihood that errors of the sources gain over none.
@@ -295,7 +294,7 @@ impl Averaged {
             .solutions
             .iter()
             .map(|(w, s)| {
-                let (mean, covariance) = applied(row, s);
+                let (mean, covariance) = s.function(row);
                 (*w, mean, covariance)
             })
             .collect();
@@ -324,12 +323,8 @@ impl Averaged {
 
     /// Covariances between neighbours, without the independent error of each source at each stone.
     fn between(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<Matrix3<f64>> {
-        let difference = |stones: &[usize; 2]| {
-            let [first, second] = stones.map(|i| difference_row(&pair.stones[i], pair.sources, unknowns));
-            let mut row = second;
-            row.extend(first.into_iter().map(|(k, m)| (k, -m)));
-            self.function(&row).covariance
-        };
+        let difference =
+            |stones: &[usize; 2]| self.function(&neighbour_row(pair, stones, unknowns)).covariance;
         pair.neighbours.par_iter().map(difference).collect()
     }
 
@@ -372,18 +367,6 @@ impl Averaged {
         };
         pair.sources.iter().enumerate().map(describe).collect()
     }
-}
-
-fn applied(row: &Row, solution: &Solution) -> (Vector3<f64>, Matrix3<f64>) {
-    let mut mean = Vector3::zeros();
-    let mut covariance = Matrix3::zeros();
-    for (a, of_a) in row {
-        mean += of_a * solution.mean.fixed_rows::<3>(*a);
-        for (b, of_b) in row {
-            covariance += of_a * solution.covariance.fixed_view::<3, 3>(*a, *b) * of_b.transpose();
-        }
-    }
-    (mean, 0.5 * (covariance + covariance.transpose()))
 }
 
 /// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96

@@ -92,7 +92,7 @@ impl Prior {
     /// Standard deviation and correlation length of a block's drift at its knots, the length in their unit.
     fn drift(&self, block: &Block) -> (f64, f64) {
         match self.merged {
-            Some(merged) if block.is_alone => (merged.sd_m, merged.length_m),
+            Some(merged) if block.is_alone => (merged.sd_m.max(LEAST_M), merged.length_m),
             _ => (self.drift_m, self.drift_length * block.duration()),
         }
     }
@@ -107,15 +107,17 @@ impl Unknowns {
         let mut blocks = Vec::new();
         let mut of_source = vec![0; sources.len()];
         let mut first = 0;
-        let own =
-            |epoch: usize| (0..sources.len()).filter(move |&s| same_as[s] == s && sources[s].epoch == epoch);
+        let blocks_of = |epoch| {
+            let own = (0..sources.len()).filter(|&s| same_as[s] == s);
+            own.filter(|&s| sources[s].epoch == epoch).count()
+        };
         for s in 0..sources.len() {
             if same_as[s] != s {
                 of_source[s] = of_source[same_as[s]];
                 continue;
             }
             let seen: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
-            let is_alone = own(sources[s].epoch).count() == 1;
+            let is_alone = blocks_of(sources[s].epoch) == 1;
             let block = Block::new(first, &seen, &sources[s], is_alone);
             first += 6 + 3 * block.knots.len();
             of_source[s] = blocks.len();
@@ -363,6 +365,21 @@ pub(super) struct Solution {
     pub mean: DVector<f64>,
     /// Covariance of the unknowns.
     pub covariance: DMatrix<f64>,
+}
+
+impl Solution {
+    /// A linear function of the unknowns: mean and covariance.
+    pub fn function(&self, row: &Row) -> (Vector3<f64>, Matrix3<f64>) {
+        let mut mean = Vector3::zeros();
+        let mut covariance = Matrix3::zeros();
+        for (a, of_a) in row {
+            mean += of_a * self.mean.fixed_rows::<3>(*a);
+            for (b, of_b) in row {
+                covariance += of_a * self.covariance.fixed_view::<3, 3>(*a, *b) * of_b.transpose();
+            }
+        }
+        (mean, 0.5 * (covariance + covariance.transpose()))
+    }
 }
 
 /// Observations with the unknowns that they touch.

@@ -4,7 +4,7 @@ use super::components::{MergedDrift, ObserverComponents, SensorClass};
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::Observation;
-use super::rigid::{RigidRows, difference_row, rigid_rows};
+use super::rigid::{RigidRows, difference_row, neighbour_row, rigid_rows};
 use super::sight::Source;
 use nalgebra::{Dyn, Matrix3, Matrix6, OMatrix, SMatrix, U6};
 use rayon::prelude::*;
@@ -31,8 +31,8 @@ pub(super) fn relative_errors(
     class: SensorClass,
     params: &EpochErrorParams,
 ) -> Option<RelativeErrors> {
-    // Several stations or strips make a merged epoch: the time of a point says nothing of its neighbours'
-    // errors, its place does.
+    // A merged epoch consists of several stations or strips: points measured at the same time need not lie
+    // together, so that its error varies with place, not with time.
     let is_merged = |epoch: usize| pair.sources.iter().filter(|s| s.epoch == epoch).count() == 1;
     let sources: Vec<Source> = pair
         .sources
@@ -46,10 +46,7 @@ pub(super) fn relative_errors(
     let merged = class.merged();
     let sd_m = params.merged_error_m.unwrap_or(merged.sd_m);
     let prior = Prior {
-        merged: Some(MergedDrift {
-            sd_m: sd_m.max(LEAST_M),
-            ..merged
-        }),
+        merged: Some(MergedDrift { sd_m, ..merged }),
         ..Prior::new(components, 0.0)
     };
     let all: Vec<&Observation> = within.iter().flatten().collect();
@@ -60,8 +57,7 @@ pub(super) fn relative_errors(
     let at = |k: usize| rigid.relative(&row(k), &lever(k), &solution);
     let between = |stones: &[usize; 2]| {
         let [first, second] = *stones;
-        let mut difference = row(second);
-        difference.extend(row(first).into_iter().map(|(a, m)| (a, -m)));
+        let difference = neighbour_row(pair, stones, &unknowns);
         rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
     };
     Some(RelativeErrors {
@@ -70,9 +66,6 @@ pub(super) fn relative_errors(
         between: pair.neighbours.par_iter().map(between).collect(),
     })
 }
-
-/// Standard deviation that stands for none, metres.
-const LEAST_M: f64 = 1e-7;
 
 /// The rigid part of the error as a function of the unknowns, with its second moments.
 struct Rigid {
@@ -103,15 +96,12 @@ impl Rigid {
     /// Second moments of a linear function of the unknowns minus the rigid motion times `lever`. Second moments
     /// instead of covariances, because the estimated error is not subtracted from the motions.
     fn relative(&self, row: &Row, lever: &SMatrix<f64, 3, 6>, solution: &Solution) -> Matrix3<f64> {
-        let mut own = Matrix3::zeros();
-        let mut cross = SMatrix::<f64, 3, 6>::zeros();
-        for (a, of_a) in row {
-            cross += of_a * self.cross.fixed_view::<3, 6>(*a, 0);
-            for (b, of_b) in row {
-                let mean = solution.mean.fixed_rows::<3>(*a) * solution.mean.fixed_rows::<3>(*b).transpose();
-                own += of_a * (solution.covariance.fixed_view::<3, 3>(*a, *b) + mean) * of_b.transpose();
-            }
-        }
+        let (mean, covariance) = solution.function(row);
+        let own = covariance + mean * mean.transpose();
+        let cross: SMatrix<f64, 3, 6> = row
+            .iter()
+            .map(|(a, of_a)| of_a * self.cross.fixed_view::<3, 6>(*a, 0))
+            .sum();
         let with_rigid = cross * lever.transpose();
         let sum = own - with_rigid - with_rigid.transpose() + lever * self.own * lever.transpose();
         0.5 * (sum + sum.transpose())

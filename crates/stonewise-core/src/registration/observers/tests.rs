@@ -36,6 +36,22 @@ fn sight(source: usize, place: Point3<f64>) -> Sight {
     }
 }
 
+/// Differences of the displacements that `sources` show of a place, each with noise `sd_m`.
+fn difference(sources: &[usize], seen: &[Vector3<f64>], place: Point3<f64>, sd_m: f64) -> Observation {
+    let others = sources.len() - 1;
+    Observation {
+        sights: sources.iter().map(|&s| sight(s, place)).collect(),
+        directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
+        values: DVector::from_fn(3 * others, |r, _| seen[1 + r / 3][r % 3] - seen[0][r % 3]),
+        covariance: DMatrix::from_fn(3 * others, 3 * others, |r, c| {
+            let shared = if r % 3 == c % 3 { 1.0 } else { 0.0 };
+            sd_m * sd_m * (shared + if r == c { 1.0 } else { 0.0 })
+        }),
+        face_from_world: Matrix3::identity(),
+        weight: 1.0,
+    }
+}
+
 /// Differences of `count` sources on 60 places, each source shifted by `errors`, seen with noise `sd_m`.
 fn observations(epoch: usize, errors: &[Vector3<f64>], sd_m: f64, seed: u64) -> Vec<Observation> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -48,20 +64,7 @@ fn observations(epoch: usize, errors: &[Vector3<f64>], sd_m: f64, seed: u64) -> 
                 .iter()
                 .map(|&s| errors[s] + Vector3::from_fn(|_, _| sd_m * normal(&mut rng)))
                 .collect();
-            let others = of_epoch.len() - 1;
-            let values = DVector::from_fn(3 * others, |r, _| seen[1 + r / 3][r % 3] - seen[0][r % 3]);
-            let covariance = DMatrix::from_fn(3 * others, 3 * others, |r, c| {
-                let shared = if r % 3 == c % 3 { 1.0 } else { 0.0 };
-                sd_m * sd_m * (shared + if r == c { 1.0 } else { 0.0 })
-            });
-            Observation {
-                sights: of_epoch.iter().map(|&s| sight(s, place)).collect(),
-                directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
-                values,
-                covariance,
-                face_from_world: Matrix3::identity(),
-                weight: 1.0,
-            }
+            difference(&of_epoch, &seen, place, sd_m)
         })
         .collect()
 }
@@ -105,19 +108,7 @@ fn chain(epoch: usize, errors: &[Vector3<f64>], stretch: f64, sd_m: f64, seed: u
                     errors[s] + Vector3::y() * stretch * (place.y - station(s)) + noise
                 })
                 .collect();
-            let others = seeing.len() - 1;
-            let covariance = DMatrix::from_fn(3 * others, 3 * others, |r, c| {
-                let shared = if r % 3 == c % 3 { 1.0 } else { 0.0 };
-                sd_m * sd_m * (shared + if r == c { 1.0 } else { 0.0 })
-            });
-            Observation {
-                sights: seeing.iter().map(|&s| sight(s, place)).collect(),
-                directions: vec![Vector3::x(), Vector3::y(), Vector3::z()],
-                values: DVector::from_fn(3 * others, |r, _| seen[1 + r / 3][r % 3] - seen[0][r % 3]),
-                covariance,
-                face_from_world: Matrix3::identity(),
-                weight: 1.0,
-            }
+            difference(&seeing, &seen, place, sd_m)
         })
         .collect()
 }
@@ -139,7 +130,7 @@ fn a_stretch_that_all_stations_share_is_not_taken_for_errors_of_their_registrati
     let unknowns = Unknowns::new(&sources(count), &same, &sights, class);
     let problem = Problem::new(&unknowns, &all);
     let components = estimate(&problem, class);
-    // 72 shifts: their scatter is known to a tenth.
+    // The scatter of 72 shifts has a standard error of a tenth.
     assert!(
         (0.2e-3..0.4e-3).contains(&components.translation_m),
         "{components:?}"
