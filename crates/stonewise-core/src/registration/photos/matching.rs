@@ -5,16 +5,16 @@
 //! d(x), and composes W with the inverse of that step (Baker and Matthews 2004): gradients are those of the
 //! template, which has the least noise.
 
+use super::least_squares::Observed;
 use super::patch::Patch;
 use super::surface::Surface;
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, Vector2};
+use std::ops::Range;
 
 /// Most steps: each halves the error at least where the start lies within the grain of the stone.
 const STEPS: usize = 20;
 /// A step below this ends the iteration, cells: a fifth of what is matched at best.
 const SETTLED: f64 = 0.01;
-/// Residuals beyond so many standard deviations lose weight (Huber 1964).
-const HUBER: f64 = 2.0;
 /// Cells that determine an affine match; fewer determine a shift.
 const AFFINE_CELLS: usize = 250;
 /// Cells that determine a shift.
@@ -106,68 +106,94 @@ pub(crate) struct Match {
     pub correlation: f64,
 }
 
-/// Cells of the face with their place relative to its middle, in cells.
+/// Cells of the face, as runs of neighbours in rows.
 pub(crate) struct FaceCells {
-    cells: Vec<(usize, Vector2<f64>)>,
+    runs: Vec<Run>,
     middle: Vector2<f64>,
+    /// Columns and rows that hold them.
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+}
+
+/// Cells side by side in a row.
+struct Run {
+    first: usize,
+    count: usize,
+    /// Place of the first relative to the middle of the face, cells.
+    place: Vector2<f64>,
 }
 
 impl FaceCells {
     pub fn new(surface: &Surface) -> Self {
         let middle = Vector2::from_fn(|a, _| (surface.middle[a] - surface.first[a]) / surface.cell_m);
-        let place = |k: usize| Vector2::new((k % surface.columns) as f64, (k / surface.columns) as f64);
-        let cells = (0..surface.inside.len())
-            .filter(|&k| surface.inside[k])
-            .map(|k| (k, place(k) - middle))
-            .collect();
-        Self { cells, middle }
+        let mut runs: Vec<Run> = Vec::new();
+        let (mut columns, mut rows) = (surface.columns..0, surface.rows..0);
+        for k in (0..surface.inside.len()).filter(|&k| surface.inside[k]) {
+            let (column, row) = (k % surface.columns, k / surface.columns);
+            columns = columns.start.min(column)..columns.end.max(column + 1);
+            rows = rows.start.min(row)..rows.end.max(row + 1);
+            match runs.last_mut() {
+                Some(run) if column > 0 && run.first + run.count == k => run.count += 1,
+                _ => runs.push(Run {
+                    first: k,
+                    count: 1,
+                    place: Vector2::new(column as f64, row as f64) - middle,
+                }),
+            }
+        }
+        Self {
+            runs,
+            middle,
+            columns,
+            rows,
+        }
     }
 
     pub fn count(&self) -> usize {
-        self.cells.len()
+        self.runs.iter().map(|run| run.count).sum()
     }
 
     /// Root mean square distance of the cells from the middle, cells.
     pub fn radius(&self) -> f64 {
-        let square: f64 = self.cells.iter().map(|(_, d)| d.norm_squared()).sum();
+        let of_run = |run: &Run| -> f64 {
+            let place = |k: usize| run.place + Vector2::new(k as f64, 0.0);
+            (0..run.count).map(|k| place(k).norm_squared()).sum()
+        };
+        let square: f64 = self.runs.iter().map(of_run).sum();
         (square / self.count().max(1) as f64).sqrt()
     }
 
-    /// A photo's values at the warped cells, on the grid.
-    pub fn warped(&self, patch: &Patch, surface: &Surface, warp: &Warp) -> Patch {
-        let place = |k: usize| Vector2::new((k % surface.columns) as f64, (k / surface.columns) as f64);
-        let values: Vec<Option<f32>> = (0..patch.values.len())
-            .map(|k| {
-                let to = self.middle + warp.at(place(k) - self.middle);
-                patch.sample(surface, to.x, to.y)
-            })
-            .collect();
-        Patch {
-            valid: values.iter().map(Option::is_some).collect(),
-            values: values.into_iter().map(|v| v.unwrap_or(0.0)).collect(),
+    /// A photo's values at the warped cells of the face and at those within `margin` cells of it.
+    pub fn warped(&self, patch: &Patch, surface: &Surface, warp: &Warp, margin: usize) -> Patch {
+        let around = |range: &Range<usize>, size: usize| {
+            range.start.saturating_sub(margin)..(range.end + margin).min(size)
+        };
+        let columns = around(&self.columns, surface.columns);
+        let mut values = vec![f32::NAN; patch.values.len()];
+        for row in around(&self.rows, surface.rows) {
+            let place = Vector2::new(columns.start as f64, row as f64) - self.middle;
+            let line = row * surface.columns;
+            let to = &mut values[line + columns.start..line + columns.end];
+            self.sample_row(patch, surface, warp, place, to);
         }
+        let valid: Vec<bool> = values.iter().map(|v| !v.is_nan()).collect();
+        for (value, valid) in values.iter_mut().zip(&valid) {
+            *value = if *valid { *value } else { 0.0 };
+        }
+        Patch::new(values, valid, surface.columns)
     }
 
-    /// Pairs of values (template, photo) at warped cells, with the cell's place and gradient.
-    fn pairs(&self, template: &Template, patch: &Patch, surface: &Surface, warp: &Warp) -> Vec<Pair> {
-        self.cells
-            .iter()
-            .filter(|(k, _)| template.patch.valid[*k])
-            .filter_map(|(k, d)| {
-                let to = self.middle + warp.at(*d);
-                Some(Pair {
-                    template: f64::from(template.patch.values[*k]),
-                    photo: f64::from(patch.sample(surface, to.x, to.y)?),
-                    gradient: template.gradients[*k].map(f64::from),
-                    place: *d,
-                })
-            })
-            .collect()
+    /// A photo's values at warped cells of a row, of which the first lies at `place` from the middle of the
+    /// face; not a number where it shows none.
+    fn sample_row(&self, patch: &Patch, surface: &Surface, warp: &Warp, place: Vector2<f64>, to: &mut [f32]) {
+        let start = self.middle + warp.at(place);
+        let step = warp.matrix.column(0).into_owned();
+        patch.sample_line(surface, start.into(), step.into(), to);
     }
 
     /// Matches a photo from a start: a shift first, then, where there are cells enough and it settles, an
-    /// affine warp from there. `None` where the shift does not settle, leaves `reach` cells, or where the
-    /// photo does not show the face.
+    /// affine warp from there. A start that is an affine match already is refined at once. `None` where the
+    /// shift does not settle, leaves `reach` cells, or where the photo does not show the face.
     pub fn matched(
         &self,
         template: &Template,
@@ -176,148 +202,107 @@ impl FaceCells {
         start: Warp,
         reach: f64,
     ) -> Option<Match> {
-        let shifted = self.settled(template, patch, surface, start, reach, false)?;
-        let affine = match self.count() >= AFFINE_CELLS {
-            true => self.settled(template, patch, surface, shifted.warp, reach, true),
+        let pair = Pair {
+            face: self,
+            template,
+            patch,
+            surface,
+            reach,
+        };
+        let affine = |start: Warp| match self.count() >= AFFINE_CELLS {
+            true => pair.settled::<AFFINE>(start),
             false => None,
         };
-        Some(affine.unwrap_or(shifted))
+        let is_refined = start.matrix != Matrix2::identity();
+        if let Some(refined) = is_refined.then(|| affine(start)).flatten() {
+            return Some(refined);
+        }
+        let shifted = pair.settled::<SHIFT>(start)?;
+        Some(affine(shifted.warp).unwrap_or(shifted))
     }
+}
 
-    fn settled(
-        &self,
-        template: &Template,
-        patch: &Patch,
-        surface: &Surface,
-        start: Warp,
-        reach: f64,
-        is_affine: bool,
-    ) -> Option<Match> {
+/// Unknowns of a match: offset and gain, the shift, and of an affine warp its strain.
+const SHIFT: usize = 4;
+const AFFINE: usize = 8;
+
+/// A photo to be matched with a template.
+struct Pair<'a> {
+    face: &'a FaceCells,
+    template: &'a Template,
+    patch: &'a Patch,
+    surface: &'a Surface,
+    /// Distance from its start at which a match is given up, cells.
+    reach: f64,
+}
+
+impl Pair<'_> {
+    fn settled<const N: usize>(&self, start: Warp) -> Option<Match> {
         let mut warp = start;
+        let mut observed = Observed::<N>::default();
         for _ in 0..STEPS {
-            let pairs = self.pairs(template, patch, surface, &warp);
-            if pairs.len() < LEAST_CELLS || (pairs.len() as f64) < LEAST_SHARE * self.count() as f64 {
+            self.observe(&warp, &mut observed);
+            let least = LEAST_CELLS.max((LEAST_SHARE * self.face.count() as f64).ceil() as usize);
+            if observed.count < least {
                 return None;
             }
-            let (step, covariance) = solve(&pairs, is_affine)?;
+            let (step, covariance) = step(&mut observed)?;
             warp = warp.after_inverse_of(&step)?;
             let strain = (warp.matrix - Matrix2::identity()).amax();
-            if (warp.shift - start.shift).norm() > reach || strain > LARGEST_STRAIN {
+            if (warp.shift - start.shift).norm() > self.reach || strain > LARGEST_STRAIN {
                 return None;
             }
             if step.shift.norm() < SETTLED {
                 return Some(Match {
                     warp,
-                    is_affine,
+                    is_affine: N == AFFINE,
                     covariance,
-                    correlation: correlation(&pairs),
+                    correlation: observed.correlation(),
                 });
             }
         }
         None
     }
-}
 
-struct Pair {
-    template: f64,
-    photo: f64,
-    gradient: [f64; 2],
-    place: Vector2<f64>,
-}
-
-fn correlation(pairs: &[Pair]) -> f64 {
-    let n = pairs.len() as f64;
-    let (mt, mp) = (
-        pairs.iter().map(|p| p.template).sum::<f64>() / n,
-        pairs.iter().map(|p| p.photo).sum::<f64>() / n,
-    );
-    let (mut tt, mut tp, mut pp) = (0.0, 0.0, 0.0);
-    for p in pairs {
-        let (t, q) = (p.template - mt, p.photo - mp);
-        tt += t * t;
-        tp += t * q;
-        pp += q * q;
-    }
-    if tt > 0.0 && pp > 0.0 {
-        tp / (tt * pp).sqrt()
-    } else {
-        0.0
+    /// Collects the cells that both show, with the photo at warped places.
+    fn observe<const N: usize>(&self, warp: &Warp, observed: &mut Observed<N>) {
+        observed.clear();
+        let template = self.template;
+        let mut values = vec![0.0; self.surface.columns];
+        for run in &self.face.runs {
+            let values = &mut values[..run.count];
+            self.face
+                .sample_row(self.patch, self.surface, warp, run.place, values);
+            for (along, value) in values.iter().enumerate() {
+                let k = run.first + along;
+                if value.is_nan() || !template.patch.valid[k] {
+                    continue;
+                }
+                let ([x, y], u, v) = (
+                    template.gradients[k],
+                    (run.place.x + along as f64) as f32,
+                    run.place.y as f32,
+                );
+                let all = [1.0, template.patch.values[k], x, y, x * u, x * v, y * u, y * v];
+                observed.push(std::array::from_fn(|i| all[i]), *value);
+            }
+        }
     }
 }
 
 /// The step of the warp, and the covariance of its shift.
-fn solve(pairs: &[Pair], is_affine: bool) -> Option<(Warp, Matrix2<f64>)> {
-    match is_affine {
-        true => {
-            let (x, covariance) = least_squares(pairs, |p| {
-                let ([x, y], u, v) = (p.gradient, p.place.x, p.place.y);
-                [1.0, p.template, x, y, x * u, x * v, y * u, y * v]
-            })?;
-            let strain = Matrix2::new(x[4], x[5], x[6], x[7]);
-            step([x[1], x[2], x[3]], strain, covariance)
-        }
-        false => {
-            let row = |p: &Pair| [1.0, p.template, p.gradient[0], p.gradient[1]];
-            let (x, covariance) = least_squares(pairs, row)?;
-            step([x[1], x[2], x[3]], Matrix2::zeros(), covariance)
-        }
-    }
-}
-
-/// The step that a gain, and a shift and a strain times this gain make.
-fn step(
-    [gain, x, y]: [f64; 3],
-    strain: Matrix2<f64>,
-    covariance: Matrix2<f64>,
-) -> Option<(Warp, Matrix2<f64>)> {
+fn step<const N: usize>(observed: &mut Observed<N>) -> Option<(Warp, Matrix2<f64>)> {
+    let (x, covariance) = observed.least_squares()?;
+    let gain = x[1];
+    let strain = match N == AFFINE {
+        true => Matrix2::new(x[4], x[5], x[6], x[7]),
+        false => Matrix2::zeros(),
+    };
     let warp = Warp {
-        shift: Vector2::new(x, y) / gain,
+        shift: Vector2::new(x[2], x[3]) / gain,
         matrix: Matrix2::identity() + strain / gain,
     };
     (gain > 0.0).then(|| (warp, covariance / (gain * gain)))
-}
-
-/// Robust least squares of the photo's values on rows of offset, gain, shift and what else there is; the
-/// unknowns, and the covariance of the shift.
-fn least_squares<const N: usize>(
-    pairs: &[Pair],
-    row: impl Fn(&Pair) -> [f64; N],
-) -> Option<(SVector<f64, N>, Matrix2<f64>)> {
-    let mut weights = vec![1.0; pairs.len()];
-    let mut found = None;
-    for _ in 0..2 {
-        let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
-        for (p, w) in pairs.iter().zip(&weights) {
-            let row = row(p);
-            for i in 0..N {
-                let weighted = w * row[i];
-                right[i] += weighted * p.photo;
-                for j in i..N {
-                    normal[(j, i)] += weighted * row[j];
-                }
-            }
-        }
-        normal.fill_upper_triangle_with_lower_triangle();
-        let inverse = normal.cholesky()?.inverse();
-        let solution = inverse * right;
-        let fitted = |p: &Pair| {
-            row(p)
-                .iter()
-                .zip(solution.iter())
-                .map(|(a, x)| a * x)
-                .sum::<f64>()
-        };
-        let residuals: Vec<f64> = pairs.iter().map(|p| p.photo - fitted(p)).collect();
-        let total: f64 = weights.iter().sum();
-        let square: f64 = residuals.iter().zip(&weights).map(|(r, w)| w * r * r).sum();
-        let sigma = (square / (total - N as f64).max(1.0)).sqrt();
-        for (w, r) in weights.iter_mut().zip(&residuals) {
-            *w = (HUBER * sigma / r.abs().max(f64::MIN_POSITIVE)).min(1.0);
-        }
-        let shift = inverse.fixed_view::<2, 2>(2, 2).into_owned();
-        found = Some((solution, shift * (sigma * sigma)));
-    }
-    found
 }
 
 #[cfg(test)]
@@ -340,10 +325,7 @@ mod tests {
 
     fn drawn(side: usize, value: impl Fn(f64, f64) -> f64) -> Patch {
         let at = |k: usize| value((k % side) as f64, (k / side) as f64) as f32;
-        Patch {
-            values: (0..side * side).map(at).collect(),
-            valid: vec![true; side * side],
-        }
+        Patch::new((0..side * side).map(at).collect(), vec![true; side * side], side)
     }
 
     /// A face whose texture was warped, with another gain and offset; what the match finds.
@@ -358,7 +340,7 @@ mod tests {
             0.3 + 1.4 * texture(from.x, from.y) + dirt(x, y)
         });
         let reach = 6;
-        let (start, _) = Search::new(&template, &surface).best_shift(&patch, reach)?;
+        let (start, _) = Search::new(&template, &surface, &face).best_shift(&patch, reach)?;
         face.matched(&template, &patch, &surface, Warp::shift(start), 4.0)
     }
 

@@ -5,11 +5,13 @@
 //! adjustment makes motions of them.
 
 mod blur;
+mod least_squares;
 mod matching;
 mod params;
 mod patch;
 mod photo;
 mod pictures;
+mod placed;
 mod search;
 mod surface;
 mod template;
@@ -20,11 +22,11 @@ mod turn;
 mod verify;
 
 pub use params::PhotoParams;
-pub(crate) use patch::FaceMotion;
 #[cfg(test)]
 pub(crate) use photo::ByRows;
 pub use photo::{Chip, Photo, PhotoCamera};
 pub use pictures::FacePictures;
+pub(crate) use placed::FaceMotion;
 pub use track::PhotoStatus;
 pub(crate) use track::{Sight, Track, Tracker};
 pub(crate) use turn::turn_by_rotation;

@@ -134,20 +134,23 @@ impl Chip {
         if !(inside(x, self.width) && inside(y, self.height)) {
             return None;
         }
-        let (column, row) = (x as usize, y as usize);
+        // Conversion to 32 bits takes fewer instructions.
+        let (column, row) = (x as u32 as usize, y as u32 as usize);
         let (wx, wy) = (cubic((x - column as f64) as f32), cubic((y - row as f64) as f32));
-        let mut sum = 0.0;
-        for (j, wy) in wy.iter().enumerate() {
+        let mut lines = [[0.0; 4]; 4];
+        for (j, line) in lines.iter_mut().enumerate() {
             let start = (row + j - 1) * self.width as usize + column - 1;
-            let line = self.grey.get(start..start + 4)?;
-            let of_line: f32 = line.iter().zip(&wx).map(|(g, w)| f32::from(*g) * w).sum();
-            sum += wy * of_line;
+            let grey: &[u8; 4] = self.grey.get(start..)?.first_chunk()?;
+            for (to, from) in line.iter_mut().zip(grey) {
+                *to = f32::from(*from);
+            }
         }
-        Some(sum)
+        Some(weighted(&lines, wx, wy))
     }
 }
 
 /// Weights of four neighbours for a place `t` between the second and the third (Keys 1981, a = -1/2).
+#[inline]
 pub(super) fn cubic(t: f32) -> [f32; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
@@ -158,11 +161,22 @@ pub(super) fn cubic(t: f32) -> [f32; 4] {
     ]
 }
 
+/// Sum of four lines of four values with weights along the lines and across them.
+#[inline]
+pub(super) fn weighted(lines: &[[f32; 4]; 4], along: [f32; 4], across: [f32; 4]) -> f32 {
+    let mut sums = [0.0; 4];
+    for (line, weight) in lines.iter().zip(across) {
+        for (sum, value) in sums.iter_mut().zip(line) {
+            *sum += weight * value;
+        }
+    }
+    sums.iter().zip(along).map(|(s, w)| s * w).sum()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::testing::oblique;
     use super::*;
-    use crate::geometry::{Camera, FaceFrame, Rigid3};
-    use crate::id::ImageId;
 
     #[test]
     fn cubic_convolution_reproduces_parabolas() {
@@ -183,26 +197,6 @@ mod tests {
         assert!((f64::from(at) / 4.0 - value(7.4, 4.25)).abs() < 0.13);
         assert_eq!(chip.sample([100.2, 44.0]), None);
         assert_eq!(chip.sample([119.5, 44.0]), None);
-    }
-
-    /// A photo that sees a face obliquely: the photo, a point of the face, the face's frame.
-    fn oblique() -> (Photo, Point3<f64>, Matrix3<f64>) {
-        let normal = Vector3::new(0.9, 0.1, 0.3).normalize();
-        let turn = FaceFrame::from_normal(&normal).face_from_world();
-        let at = Point3::new(1.0, 2.0, 3.0);
-        let centre = at + normal * 7.0 + Vector3::new(0.0, 2.0, -1.0);
-        let look = Rigid3::face_towards(&centre, &(at - Vector3::z()), &Vector3::z()).inverse();
-        let photo = Photo {
-            name: "a".to_owned(),
-            epoch: 0,
-            camera: Box::new(View {
-                image: ImageId(0),
-                name: "a".to_owned(),
-                camera: Camera::pinhole(2000, 1500, 1800.0),
-                cam_from_world: look,
-            }),
-        };
-        (photo, at, turn)
     }
 
     #[test]

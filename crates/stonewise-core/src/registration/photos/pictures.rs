@@ -68,10 +68,9 @@ pub(super) fn pictures(
 ) -> Option<FacePictures> {
     let frame = Frame::new(surface, side_px, rim_m)?;
     let grey = [first, second].map(|shown| {
-        let patch = Patch {
-            values: shown.grey.iter().map(|g| g.unwrap_or(0.0)).collect(),
-            valid: shown.grey.iter().map(Option::is_some).collect(),
-        };
+        let values = shown.grey.iter().map(|g| g.unwrap_or(0.0)).collect();
+        let valid = shown.grey.iter().map(Option::is_some).collect();
+        let patch = Patch::new(values, valid, surface.columns);
         stretched(&frame.drawn(|place| frame.value(&patch, &shown.found.warp, place)))
     });
     let difference = frame.drawn(|place| {

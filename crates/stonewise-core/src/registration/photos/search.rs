@@ -1,6 +1,6 @@
 //! Search for the shift of whole cells at which a photo agrees best with a template.
 
-use super::matching::{LEAST_SHARE, Template};
+use super::matching::{FaceCells, LEAST_SHARE, Template};
 use super::patch::Patch;
 use super::surface::Surface;
 use nalgebra::Vector2;
@@ -42,24 +42,13 @@ impl Shown {
 }
 
 impl<'a> Search<'a> {
-    pub fn new(template: &Template, surface: &'a Surface) -> Self {
-        let cells = (0..surface.inside.len()).filter(|&k| surface.inside[k]);
-        let mut bounds = [usize::MAX, 0, usize::MAX, 0];
-        for k in cells.clone() {
-            let (column, row) = (k % surface.columns, k / surface.columns);
-            bounds = [
-                bounds[0].min(row),
-                bounds[1].max(row + 1),
-                bounds[2].min(column),
-                bounds[3].max(column + 1),
-            ];
-        }
+    pub fn new(template: &Template, surface: &'a Surface, cells: &FaceCells) -> Self {
         Self {
             surface,
             template: Shown::new(&template.patch, |k| surface.inside[k]),
             count: cells.count(),
-            rows: bounds[0]..bounds[1],
-            columns: bounds[2]..bounds[3],
+            rows: cells.rows.clone(),
+            columns: cells.columns.clone(),
         }
     }
 
@@ -148,10 +137,9 @@ mod tests {
         let number = |k: usize, purpose: u64| {
             split_mix(seed ^ split_mix(k as u64 * 2 + purpose)) as f64 / u64::MAX as f64
         };
-        Patch {
-            values: (0..SIDE * SIDE).map(|k| number(k, 0) as f32 - 0.5).collect(),
-            valid: (0..SIDE * SIDE).map(|k| number(k, 1) > 0.1).collect(),
-        }
+        let values = (0..SIDE * SIDE).map(|k| number(k, 0) as f32 - 0.5).collect();
+        let valid = (0..SIDE * SIDE).map(|k| number(k, 1) > 0.1).collect();
+        Patch::new(values, valid, SIDE)
     }
 
     /// Cell by cell, in double precision.
@@ -182,7 +170,7 @@ mod tests {
         let surface = Surface::flat(SIDE, 9);
         let (first, photo) = (drawn(3), drawn(4));
         let template = Template::new(drawn(3), &surface);
-        let search = Search::new(&template, &surface);
+        let search = Search::new(&template, &surface, &FaceCells::new(&surface));
         let shown = Shown::new(&photo, |_| true);
         for shift in [
             [0, 0],

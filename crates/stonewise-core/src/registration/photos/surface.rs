@@ -172,7 +172,7 @@ struct HeightMap {
     low: [f64; 2],
     columns: usize,
     rows: usize,
-    heights: Vec<f64>,
+    heights: Vec<f32>,
 }
 
 impl HeightMap {
@@ -188,17 +188,17 @@ impl HeightMap {
             let column = ((p.x - low[0]) / HEIGHT_CELL_M).round() as usize;
             let row = ((p.y - low[1]) / HEIGHT_CELL_M).round() as usize;
             let k = row.min(rows - 1) * columns + column.min(columns - 1);
-            sums[k] += above(p);
+            sums[k] += above(p) as f32;
             weights[k] += 1.0;
             square += above(p).powi(2);
         }
         let noise_m = (square / points.len() as f64).sqrt();
-        let occupied = weights.iter().filter(|w| **w > 0.0).count() as f64;
+        let occupied = weights.iter().filter(|w| **w > 0.0_f32).count() as f64;
         let spacing_m = HEIGHT_CELL_M * (occupied / points.len() as f64).sqrt();
         // A Gaussian window of this reach averages 4 pi reach^2 / spacing^2 points.
         let reach_m = noise_m * spacing_m / (HEIGHT_NOISE_M * (4.0 * std::f64::consts::PI).sqrt());
         let reach = reach_m.clamp(SMOOTHING_M[0], SMOOTHING_M[1]) / HEIGHT_CELL_M;
-        let smooth = |v: &[f64]| blur(v, columns, rows, reach);
+        let smooth = |v: &[f32]| blur(v, columns, rows, reach);
         let heights = smooth(&sums)
             .iter()
             .zip(smooth(&weights))
@@ -223,7 +223,7 @@ impl HeightMap {
         );
         let (c, r) = (x as usize, y as usize);
         let (s, t) = (x - c as f64, y - r as f64);
-        let h = |dc: usize, dr: usize| self.heights[(r + dr) * self.columns + c + dc];
+        let h = |dc: usize, dr: usize| f64::from(self.heights[(r + dr) * self.columns + c + dc]);
         let above = (1.0 - t) * ((1.0 - s) * h(0, 0) + s * h(1, 0)) + t * ((1.0 - s) * h(0, 1) + s * h(1, 1));
         self.plane.x + self.plane.y * u + self.plane.z * v + above
     }

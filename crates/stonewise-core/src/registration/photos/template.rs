@@ -1,6 +1,6 @@
 //! The template of a stone: the mean of the first epoch's photos, brought onto each other.
 
-use super::matching::{FaceCells, Match, Template, Warp};
+use super::matching::{FaceCells, LEAST_SHARE, Match, Template, Warp};
 use super::params::PhotoParams;
 use super::patch::Patch;
 use super::search::Search;
@@ -24,6 +24,8 @@ pub(super) struct Face {
     min_correlation: f64,
     /// Distance within which photos of one epoch are searched for on each other, cells.
     pose_reach: isize,
+    /// Distance within which the other epoch is searched for, cells.
+    pub reach: isize,
 }
 
 /// The mean of one epoch's photos, and how each lies on it.
@@ -33,14 +35,16 @@ pub(super) struct Mean {
 }
 
 impl Face {
-    /// `pixel_m`: size of a pixel on the face, metres.
-    pub fn new(surface: Surface, pixel_m: f64, params: &PhotoParams) -> Self {
+    /// `pixel_m`: size of a pixel on the face, metres; `search_m`: distance within which the other epoch is
+    /// searched for, metres.
+    pub fn new(surface: Surface, pixel_m: f64, search_m: f64, params: &PhotoParams) -> Self {
         // Two photos, each shifted by errors of position and of attitude: the root of four variances.
         let apart_px = 2.0 * params.pose_error_px;
         Self {
             cells: FaceCells::new(&surface),
             pose_reach: (POSE_SDS * apart_px * pixel_m / surface.cell_m).ceil() as isize,
             min_correlation: params.min_correlation,
+            reach: (search_m / surface.cell_m).ceil() as isize,
             surface,
         }
     }
@@ -72,19 +76,22 @@ impl Face {
             let valid = &patches[i].valid;
             (0..valid.len()).filter(|&k| inside[k] && valid[k]).count()
         };
-        let mut references: Vec<usize> = (0..patches.len()).collect();
+        // A photo that shows less than this of the face matches none.
+        let least = LEAST_SHARE * self.cells.count() as f64;
+        let mut references: Vec<usize> = (0..patches.len()).filter(|&i| shown(i) as f64 >= least).collect();
         references.sort_by_key(|&i| (std::cmp::Reverse(shown(i)), i));
+        let most = references.len();
         let count = |m: &[Option<Match>]| m.iter().flatten().count();
         let mut best: Option<Vec<Option<Match>>> = None;
         for reference in references {
             let still = Warp::shift(Vector2::zeros());
-            let warped = self.cells.warped(&patches[reference], &self.surface, &still);
+            let warped = self.warped(&patches[reference], &still);
             let template = Template::new(warped, &self.surface);
             let found = self.matches(&template, patches, &[]);
             if best.as_ref().is_none_or(|b| count(&found) > count(b)) {
                 best = Some(found);
             }
-            if best.as_ref().is_some_and(|b| count(b) == patches.len()) {
+            if best.as_ref().is_some_and(|b| count(b) == most) {
                 break;
             }
         }
@@ -99,7 +106,7 @@ impl Face {
         patches: &[Patch],
         before: &[Option<Match>],
     ) -> Vec<Option<Match>> {
-        let search = Search::new(template, &self.surface);
+        let search = Search::new(template, &self.surface, &self.cells);
         let one = |(i, patch): (usize, &Patch)| {
             let start = match before.get(i).copied().flatten() {
                 Some(found) => found.warp,
@@ -112,16 +119,16 @@ impl Face {
 
     /// Photos of an epoch matched with the template of the other epoch.
     ///
-    /// The mean of their own epoch is searched for within `reach` cells, so that errors of single poses do
+    /// The mean of their own epoch is searched for as far as `reach`, so that errors of single poses do
     /// not blur the search. Each photo starts from its own shift on that mean.
     pub fn matches_across(
         &self,
         template: &Template,
         patches: &[Patch],
         own: &Mean,
-        reach: isize,
     ) -> Option<Vec<Option<Match>>> {
-        let (shift, _) = Search::new(template, &self.surface).best_shift(&own.template.patch, reach)?;
+        let (shift, _) =
+            Search::new(template, &self.surface, &self.cells).best_shift(&own.template.patch, self.reach)?;
         let between = Warp::shift(shift);
         let start = |found: &Option<Match>| found.map_or(between, |m| m.warp.after(&between));
         let starts: Vec<Warp> = own.matches.iter().map(start).collect();
@@ -150,6 +157,12 @@ impl Face {
         (found.correlation >= self.min_correlation).then_some(found)
     }
 
+    /// A warped photo on the face and around it, as far as it is searched for.
+    fn warped(&self, patch: &Patch, warp: &Warp) -> Patch {
+        let margin = self.reach.unsigned_abs();
+        self.cells.warped(patch, &self.surface, warp, margin)
+    }
+
     /// Mean of the warped photos, cell by cell; `None` without a match.
     pub fn mean(&self, patches: &[Patch], matches: &[Option<Match>]) -> Option<Template> {
         let warped: Vec<Patch> = patches
@@ -157,7 +170,7 @@ impl Face {
             .zip(matches)
             .filter_map(|(patch, found)| {
                 let warp = found.as_ref()?.warp;
-                Some(self.cells.warped(patch, &self.surface, &warp))
+                Some(self.warped(patch, &warp))
             })
             .collect();
         if warped.is_empty() {
@@ -170,13 +183,10 @@ impl Face {
                 .fold((0.0, 0), |(s, n), w| (s + w.values[k], n + 1))
         };
         let cells: Vec<(f32, u16)> = (0..self.surface.heights.len()).map(of_cell).collect();
-        let patch = Patch {
-            values: cells
-                .iter()
-                .map(|(s, n)| if *n > 0 { s / f32::from(*n) } else { 0.0 })
-                .collect(),
-            valid: cells.iter().map(|(_, n)| *n > 0).collect(),
-        };
+        let mean = |(sum, n): &(f32, u16)| if *n > 0 { sum / f32::from(*n) } else { 0.0 };
+        let values = cells.iter().map(mean).collect();
+        let valid = cells.iter().map(|(_, n)| *n > 0).collect();
+        let patch = Patch::new(values, valid, self.surface.columns);
         Some(Template::new(patch, &self.surface))
     }
 }
@@ -227,7 +237,7 @@ mod tests {
         let second = photos(moved);
         let mean = face.template(&photos([0.0; 2])).unwrap();
         let own = face.first_mean(&second).unwrap();
-        let found = face.matches_across(&mean.template, &second, &own, 11).unwrap();
+        let found = face.matches_across(&mean.template, &second, &own).unwrap();
         let error = largest_error(&found, moved);
         assert!(error.is_some_and(|e| e < 0.1), "{error:?}");
         let shift = |matches: &[Option<Match>]| median_shift(matches.iter().flatten().map(|m| m.warp.shift));

@@ -2,9 +2,10 @@
 
 use super::matching::{Match, Template, Warp};
 use super::params::{OTHER_WINDOW, PhotoParams};
-use super::patch::{FaceMotion, Patch, Placed, normalised};
+use super::patch::{Patch, normalised};
 use super::photo::{ByRows, Chip, Photo};
 use super::pictures::{FacePictures, Shown, pictures};
+use super::placed::{FaceMotion, Placed};
 use super::surface::Surface;
 use super::template::{Face, Mean, median_shift};
 use super::turn::turn_by_rotation;
@@ -121,15 +122,14 @@ impl Tracker<'_> {
         let margin_m = self.params.margin_around_m(self.search_m);
         let surface = Surface::new(self.pair, self.face_from_world, pixel_m, margin_m, self.params)
             .ok_or(PhotoStatus::SmallFace)?;
-        let face = Face::new(surface, pixel_m, self.params);
+        let face = Face::new(surface, pixel_m, self.search_m, self.params);
         track.place = face.surface.middle;
         track.radius_m = face.cells.radius() * face.surface.cell_m;
         let first = self.grey(&face.surface, &chips[0], &FaceMotion::none());
         let before = self.normalised(&first, &face.surface, 1.0);
         let mean = self.agreeing(face.template(&before))?;
-        let reach = (self.search_m / face.surface.cell_m).ceil() as isize;
-        let second = self.followed(&face, &mean.template, &chips[1], &mut track.start, reach)?;
-        if !is_beyond_chance(&face, &mean.template, &second.matches, reach) {
+        let second = self.followed(&face, &mean.template, &chips[1], &mut track.start)?;
+        if !is_beyond_chance(&face, &mean.template, &second.matches) {
             return Err(PhotoStatus::NotFound);
         }
         let others = [&first, &second.grey].map(|grey| self.normalised(grey, &face.surface, OTHER_WINDOW));
@@ -140,7 +140,7 @@ impl Tracker<'_> {
             second: &second.matches,
         };
         let apart = verification
-            .verified([&others[0], &others[1]], reach)
+            .verified([&others[0], &others[1]])
             .ok_or(PhotoStatus::Ambiguous)?;
         track.apart_m = (apart * face.surface.cell_m).into();
         for (epoch, matches) in [&mean.matches, &second.matches].into_iter().enumerate() {
@@ -224,7 +224,6 @@ impl Tracker<'_> {
         template: &Template,
         chips: &[&Chip],
         start: &mut FaceMotion,
-        reach: isize,
     ) -> Result<Second, PhotoStatus> {
         let take = |motion: &FaceMotion| {
             let grey = self.grey(&face.surface, chips, motion);
@@ -233,7 +232,7 @@ impl Tracker<'_> {
         };
         let (mut grey, mut patches) = take(start);
         let own = self.agreeing(face.first_mean(&patches))?;
-        let mut matches = self.found(face.matches_across(template, &patches, &own, reach))?;
+        let mut matches = self.found(face.matches_across(template, &patches, &own))?;
         for _ in 1..ROUNDS {
             let shifts = matches.iter().flatten().map(|m| m.warp.shift);
             let shift = median_shift(shifts).unwrap_or_else(Vector2::zeros);

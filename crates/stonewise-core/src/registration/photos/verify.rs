@@ -36,20 +36,19 @@ pub(super) struct Verification<'a> {
 
 impl Verification<'_> {
     /// What the match differs by under the other normalisation `others`, cells; `None` where the match fails:
-    /// the way back or the other normalisation lead elsewhere or nowhere. The way back is sought within
-    /// `reach` cells.
-    pub fn verified(&self, others: [&[Patch]; 2], reach: isize) -> Option<Vector2<f64>> {
-        let way_back = self.way_back(reach)?;
+    /// the way back or the other normalisation lead elsewhere or nowhere.
+    pub fn verified(&self, others: [&[Patch]; 2]) -> Option<Vector2<f64>> {
+        let way_back = self.way_back()?;
         let other = self.under(others)?;
         (way_back.norm() <= MOST_APART && other.norm() <= MOST_APART).then_some(other)
     }
 
     /// How far the first epoch's photos lie from their place when they are sought by the mean of the second
     /// epoch's.
-    fn way_back(&self, reach: isize) -> Option<Vector2<f64>> {
+    fn way_back(&self) -> Option<Vector2<f64>> {
         let [first, second] = self.patches;
         let template = self.face.mean(second, self.second)?;
-        let back = self.face.matches_across(&template, first, self.first, reach)?;
+        let back = self.face.matches_across(&template, first, self.first)?;
         apart(&back, &self.first.matches)
     }
 
@@ -69,21 +68,16 @@ impl Verification<'_> {
     }
 }
 
-/// Whether matches found within `reach` cells correlate better with a template than the best of chance.
+/// Whether matches found as far as the face is searched for correlate better with a template than the best of chance.
 ///
 /// A face of n independent grains has Fisher's z with a standard deviation of 1 / sqrt(n) (Fisher 1921); the
 /// search tries as many independent places as grains fit into its circle.
-pub(super) fn is_beyond_chance(
-    face: &Face,
-    template: &Template,
-    matches: &[Option<Match>],
-    reach: isize,
-) -> bool {
+pub(super) fn is_beyond_chance(face: &Face, template: &Template, matches: &[Option<Match>]) -> bool {
     let correlations: Vec<f64> = matches.iter().flatten().map(|m| m.correlation).collect();
     let mean = correlations.iter().sum::<f64>() / correlations.len() as f64;
     let grain_area = grain_cells(face, &template.patch).powi(2);
     let grains = face.cells.count() as f64 / grain_area;
-    let places = (PI * (reach * reach) as f64 / grain_area).max(1.0);
+    let places = (PI * (face.reach * face.reach) as f64 / grain_area).max(1.0);
     let z = mean.clamp(-MOST_CORRELATION, MOST_CORRELATION).atanh() * grains.sqrt();
     z > Normal::standard().inverse_cdf(1.0 - CHANCE / places)
 }
@@ -141,18 +135,18 @@ mod tests {
     #[test]
     fn the_best_of_chance_passes_as_rarely_as_stated() {
         let face = face(0.5);
-        let (mut passed, reach) = (0, 8);
+        let mut passed = 0;
         for seed in 0..120 {
             let template = Template::new(grained(2 * seed, 3.0, [0.0; 2]), &face.surface);
             let other = grained(2 * seed + 1, 3.0, [0.0; 2]);
-            let search = Search::new(&template, &face.surface);
-            let (_, best) = search.best_shift(&other, reach).unwrap();
-            passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)], reach));
+            let search = Search::new(&template, &face.surface, &face.cells);
+            let (_, best) = search.best_shift(&other, face.reach).unwrap();
+            passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)]));
         }
         // 5 % of 120 are 6, standard deviation 2.4.
         assert!(passed <= 14, "{passed}");
         let template = Template::new(grained(1, 3.0, [0.0; 2]), &face.surface);
-        assert!(is_beyond_chance(&face, &template, &[matched(0.8)], reach));
+        assert!(is_beyond_chance(&face, &template, &[matched(0.8)]));
     }
 
     #[test]
@@ -161,8 +155,8 @@ mod tests {
         let [fine, coarse] =
             [2.0, 9.0].map(|grain| Template::new(grained(3, grain, [0.0; 2]), &face.surface));
         let found = [matched(0.5)];
-        assert!(is_beyond_chance(&face, &fine, &found, 8));
-        assert!(!is_beyond_chance(&face, &coarse, &found, 8));
+        assert!(is_beyond_chance(&face, &fine, &found));
+        assert!(!is_beyond_chance(&face, &coarse, &found));
     }
 
     #[test]
@@ -179,8 +173,8 @@ mod tests {
                 first: &mean,
                 second: &twos,
             };
-            let apart = verification.way_back(10).map(|w| w.norm());
-            (apart, verification.verified([&first, &second], 10).is_some())
+            let apart = verification.way_back().map(|w| w.norm());
+            (apart, verification.verified([&first, &second]).is_some())
         };
         let (apart, is_verified) = at(3.0);
         assert!(apart.is_some_and(|a| a < 0.05) && is_verified, "{apart:?}");
