@@ -299,14 +299,15 @@ pub struct CompareArgs {
 /// Arguments of `segment`.
 #[derive(Debug, ClapArgs)]
 pub struct SegmentArgs {
-    /// A folder of photos, one photo, or a project file (its own parameters apply).
+    /// A folder of photos, one photo, or a project file (its own parameters apply; of the options below,
+    /// only --out can be used with it).
     pub input: PathBuf,
     /// Folder of the results; created if missing.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// The detector: `built-in`, or a file that `train` wrote.
-    #[arg(long, value_name = "FILE", default_value = "built-in")]
-    pub model: PathBuf,
+    /// The detector: `built-in` (default), or a file that `train` wrote.
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
     /// Scales at which photos are processed; 1 is the original size.
     #[arg(long, value_name = "S,...", value_delimiter = ',')]
     pub scales: Option<Vec<f64>>,

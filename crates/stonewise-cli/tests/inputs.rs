@@ -219,3 +219,36 @@ fn a_read_that_never_ends_is_ended_by_a_signal() {
     let _ = child.kill();
     assert!(ended);
 }
+
+#[test]
+fn segment_refuses_options_that_a_project_would_ignore() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = folder.path().join("stonewise.toml");
+    fs::write(&project, "[project]\nname = \"a\"\n").unwrap();
+    for (option, value, advice) in [
+        ("--model", "my.safetensors", "`model` in its section [segment]"),
+        ("--scales", "1,0.5", "`scales` in its section [segment.tiling]"),
+        (
+            "--min-score",
+            "0.4",
+            "`min_score` in its section [segment.tiling]",
+        ),
+        ("--reference", "masks.json", "the folder of its photos"),
+    ] {
+        let out = folder.path().join("out");
+        let output = stonewise()
+            .arg("segment")
+            .arg(&project)
+            .args([option, value, "--out"])
+            .arg(&out)
+            .output()
+            .unwrap();
+        let log = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{log}");
+        assert!(
+            log.contains(option) && log.contains(advice) && log.contains("stonewise.toml"),
+            "{log}"
+        );
+        assert!(!out.exists(), "{option}");
+    }
+}

@@ -13,6 +13,33 @@ use stonewise_segment::dataset::Reference;
 use stonewise_segment::evaluation::MaskScore;
 use stonewise_segment::tiling::TilingOptions;
 
+/// Refuses options that a project has as parameters, or that are for folders of photos only.
+fn refuse_options(args: &SegmentArgs) -> Result<()> {
+    let parameters = [
+        (args.model.is_some(), "model", "`model` in its section [segment]"),
+        (
+            args.scales.is_some(),
+            "scales",
+            "`scales` in its section [segment.tiling]",
+        ),
+        (
+            args.min_score.is_some(),
+            "min-score",
+            "`min_score` in its section [segment.tiling]",
+        ),
+    ];
+    let file = args.input.display();
+    if let Some((_, option, parameter)) = parameters.iter().find(|(is_given, ..)| *is_given) {
+        bail!("{file}: --{option} cannot be used with a project file; set {parameter} instead");
+    }
+    if args.reference.is_some() {
+        bail!(
+            "{file}: --reference cannot be used with a project file; give the folder of its photos as input instead"
+        );
+    }
+    Ok(())
+}
+
 /// Segments photos, or the photos of a project.
 pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     if args
@@ -20,6 +47,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
     {
+        refuse_options(&args)?;
         let project = ProjectArgs {
             project: args.input,
             out: args.out,
@@ -52,7 +80,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
         &FolderJob {
             photos: &args.input,
             out: folder.path(),
-            weights: &Weights::named(&args.model),
+            weights: &args.model.as_deref().map_or(Weights::BuiltIn, Weights::named),
             tiling: &tiling,
             reference: reference.as_ref(),
         },
