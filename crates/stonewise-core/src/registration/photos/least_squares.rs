@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix2, SMatrix, SVector};
 
-/// Residuals beyond so many standard deviations lose weight (Huber 1964).
+/// Residuals beyond this many standard deviations lose weight (Huber 1964).
 const HUBER: f64 = 2.0;
 /// Cells whose sums are made in single precision before they are added in double precision.
 const BLOCK: usize = 64;
@@ -35,7 +35,7 @@ impl<const N: usize> Block<N> {
         weights: [0.0; BLOCK],
     };
 
-    /// What the solution leaves of the photo.
+    /// Residuals of the photo's values.
     fn residuals(&self, solution: &SVector<f64, N>) -> [f32; BLOCK] {
         let mut residuals = self.values;
         for (row, x) in self.rows.iter().zip(solution) {
@@ -70,7 +70,7 @@ impl<const N: usize> Observed<N> {
         }
     }
 
-    /// Of template and photo.
+    /// Correlation of template and photo.
     pub fn correlation(&self) -> f64 {
         let ones: [f32; BLOCK] = [1.0; BLOCK];
         let [mut t, mut p, mut tt, mut tp, mut pp] = [0.0; 5];
@@ -93,7 +93,7 @@ impl<const N: usize> Observed<N> {
 
     /// Robust least squares of the photo's values; the unknowns, and the covariance of the shift.
     ///
-    /// Cells are weighed by the residuals of least squares without weights.
+    /// Cells are weighted by their residuals from an unweighted solution.
     pub fn least_squares(&mut self) -> Option<(SVector<f64, N>, Matrix2<f64>)> {
         let (unweighted, _) = self.solution()?;
         self.weigh(&unweighted, self.sigma(&unweighted));
@@ -143,7 +143,7 @@ impl<const N: usize> Observed<N> {
         (square / (total - N as f64).max(1.0)).sqrt()
     }
 
-    /// Weighs the cells by what a solution leaves of them.
+    /// Weights the cells by their residuals from a solution.
     fn weigh(&mut self, solution: &SVector<f64, N>, sigma: f64) {
         let limit = (HUBER * sigma) as f32;
         for block in &mut self.blocks {

@@ -11,15 +11,15 @@ use super::surface::Surface;
 use nalgebra::{Matrix2, Vector2};
 use std::ops::Range;
 
-/// Most steps: each halves the error at least where the start lies within the grain of the stone.
+/// Maximum number of steps; each at least halves the error if the start lies within the grain of the stone.
 const STEPS: usize = 20;
-/// A step below this ends the iteration, cells: a fifth of what is matched at best.
+/// A step below this ends the iteration, cells: a fifth of the smallest error of a match.
 const SETTLED: f64 = 0.01;
-/// Cells that determine an affine match; fewer determine a shift.
+/// Minimum number of cells for an affine match; with fewer, only a shift is matched.
 const AFFINE_CELLS: usize = 250;
-/// Cells that determine a shift.
+/// Minimum number of cells for a shift.
 const LEAST_CELLS: usize = 80;
-/// Share of the face that a photo must show.
+/// Minimum share of the face that a photo must show.
 pub(super) const LEAST_SHARE: f64 = 0.6;
 /// Strain of an affine match that is no longer that of the same face.
 const LARGEST_STRAIN: f64 = 0.2;
@@ -99,7 +99,7 @@ impl Warp {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Match {
     pub warp: Warp,
-    /// Whether the warp is affine: otherwise it is a shift, or its matrix is that of the start.
+    /// Whether an affine warp was matched; otherwise only the shift was, and the matrix is that of the start.
     pub is_affine: bool,
     /// Covariance of the shift, cells squared, of residuals taken as independent.
     pub covariance: Matrix2<f64>,
@@ -192,7 +192,7 @@ impl FaceCells {
     }
 
     /// Matches a photo from a start: a shift first, then, where there are cells enough and it settles, an
-    /// affine warp from there. A start that is an affine match already is refined at once. `None` where the
+    /// affine warp from there. A start that is already affine is refined directly. `None` where the
     /// shift does not settle, leaves `reach` cells, or where the photo does not show the face.
     pub fn matched(
         &self,

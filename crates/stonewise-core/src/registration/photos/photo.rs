@@ -1,11 +1,11 @@
-//! Photos as the tracking sees them: cameras, and the parts that show a stone.
+//! Photos for tracking: cameras, and the parts of photos that show a stone.
 
 use crate::geometry::View;
 use nalgebra::{Matrix2, Matrix3, Point3, RowVector2, Vector3};
 
 /// Where a photo shows a point of the world.
 ///
-/// A trait, so that a self-check can hand over a camera that sees moved points where they were.
+/// A trait, so that a self-check can pass a camera that projects moved points to their former pixels.
 pub trait PhotoCamera: Send + Sync {
     /// Pixel of a world point, which may lie outside the image; `None` behind the camera.
     fn project(&self, world: &Point3<f64>) -> Option<[f64; 2]>;

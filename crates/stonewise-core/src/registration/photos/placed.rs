@@ -4,8 +4,8 @@ use super::photo::{Chip, Photo};
 use super::surface::Surface;
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
-/// Cells between places that are projected into a photo; the pixels of the others are interpolated. Over four
-/// cells an oblique photo departs from that by some thousandths of a pixel.
+/// Spacing of the cells that are projected into a photo; the pixels of the others are interpolated. Over four
+/// cells, the interpolation error in an oblique photo is a few thousandths of a pixel.
 const NODE_CELLS: usize = 4;
 /// Step out of the face whose shift in a photo is its parallax, metres.
 const STEP_M: f64 = 0.001;
@@ -74,8 +74,8 @@ impl Placed<'_> {
         pixels
     }
 
-    /// Every so many cells of the moved face in a photo, row by row; the last ones lie on the border of the
-    /// grid or beyond.
+    /// Nodes of the moved face in a photo, one every `NODE_CELLS` cells, row by row; the last ones lie on the
+    /// border of the grid or beyond.
     fn nodes(&self, photo: &Photo, motion: &FaceMotion) -> Vec<Option<Node>> {
         let surface = self.surface;
         let turn = UnitQuaternion::from_scaled_axis(motion.rotation);
@@ -137,7 +137,7 @@ impl Node {
         })
     }
 
-    /// Pixel of what stands at another height there.
+    /// Pixel of a point at another height above this place.
     #[inline]
     fn pixel_at(&self, height: f64) -> [f64; 2] {
         let above = height - self.height;

@@ -38,7 +38,7 @@ pub(crate) struct Sight {
     pub correlation: f64,
 }
 
-/// Why photos say nothing of a stone.
+/// Whether photos measure a stone and, if not, why.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PhotoStatus {
@@ -61,11 +61,11 @@ pub enum PhotoStatus {
 pub(crate) struct Track {
     pub status: PhotoStatus,
     pub sights: Vec<Sight>,
-    /// Place on the face that shifts are those of, metres: along, up.
+    /// Place on the face to which the shifts refer, metres: along, up.
     pub place: [f64; 2],
     /// Root mean square distance of the face from that place, metres.
     pub radius_m: f64,
-    /// What another normalisation of contrast changes about the shift between the epochs, metres.
+    /// Change of the shift between the epochs under another normalisation of contrast, metres.
     pub apart_m: [f64; 2],
     /// The motion about which patches of the second epoch were taken.
     pub start: FaceMotion,

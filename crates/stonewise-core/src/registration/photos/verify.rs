@@ -35,16 +35,16 @@ pub(super) struct Verification<'a> {
 }
 
 impl Verification<'_> {
-    /// What the match differs by under the other normalisation `others`, cells; `None` where the match fails:
-    /// the way back or the other normalisation lead elsewhere or nowhere.
+    /// Change of the match under the other normalisation (patches `others`), cells; `None` where the match fails
+    /// because the way back or the other normalisation gives a different shift or none.
     pub fn verified(&self, others: [&[Patch]; 2]) -> Option<Vector2<f64>> {
         let way_back = self.way_back()?;
         let other = self.under(others)?;
         (way_back.norm() <= MOST_APART && other.norm() <= MOST_APART).then_some(other)
     }
 
-    /// How far the first epoch's photos lie from their place when they are sought by the mean of the second
-    /// epoch's.
+    /// How far the first epoch's photos are shifted from their matches when they are matched with the mean of
+    /// the second epoch's photos, cells.
     fn way_back(&self) -> Option<Vector2<f64>> {
         let [first, second] = self.patches;
         let template = self.face.mean(second, self.second)?;
