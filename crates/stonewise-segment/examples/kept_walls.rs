@@ -1,5 +1,5 @@
 //! Scores a detector on rendered walls whose seeds are kept apart: `kept_walls [FIRST_SEED COUNT [WEIGHTS
-//! [CLOUD [MIN_SCORE]]]]`, CLOUD: none, terrestrial, drone or stereo. Prints a table by size of the stones,
+//! [CLOUD [MIN_SCORE [dry]]]]]`, CLOUD: none, terrestrial, drone or stereo; dry: the same walls laid dry. Prints a table by size of the stones,
 //! light and contrast of the joints, for docs/src/method/segmentation.md, and on standard error the counts of
 //! each wall, by which two detectors can be compared wall by wall.
 //!
@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, RgbImage};
-use stonewise_segment::synth::{Survey, SurveyKind, surveyed_photo_by};
+use stonewise_segment::synth::{MasonryStyle, Survey, SurveyKind, masonry_photo_of};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
@@ -69,11 +69,17 @@ fn main() {
         "stereo" => Some(SurveyKind::Stereo),
         other => panic!("{other}: none, terrestrial, drone or stereo"),
     };
+    let style = match args.get(5).map(String::as_str) {
+        None => MasonryStyle::random,
+        Some("dry") => MasonryStyle::dry,
+        Some(other) => panic!("{other}: dry, or nothing"),
+    };
     let mut table: BTreeMap<(usize, usize), Score> = BTreeMap::new();
     eprintln!("seed,references,recalled,found,right,iou");
     for seed in first..first + count {
         let survey = kind.map(|kind| Survey::random(kind, seed));
-        let wall = surveyed_photo_by(survey.as_ref(), seed, SIDE_PX, SIDE_PX);
+        let style = style(seed, SIDE_PX, SIDE_PX);
+        let wall = masonry_photo_of(&style, survey.as_ref(), seed, SIDE_PX, SIDE_PX);
         let mut of_wall = BTreeMap::new();
         score(&detector, &wall, &options, &mut of_wall);
         let all: &Score = of_wall.entry((0, 0)).or_default();

@@ -1,11 +1,11 @@
 //! Renders a sheet of the photos that the built-in weights learn from, to look at beside real ones.
 //!
 //! `cargo run --release -p stonewise-segment --example masonry_sheet -- SHEET.png [FIRST_SEED] [COLUMNS]
-//! [ROWS] [SIZE] [overlay]`
+//! [ROWS] [SIZE] [overlay] [dry]`
 
 use std::error::Error;
 use stonewise_segment::Sample;
-use stonewise_segment::synth::masonry_photo;
+use stonewise_segment::synth::{MasonryStyle, masonry_photo_of};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -13,11 +13,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let number = |index: usize, otherwise: u64| arguments.get(index).map_or(Ok(otherwise), |a| a.parse());
     let first = number(1, 0)?;
     let (columns, rows, size) = (number(2, 4)? as u32, number(3, 2)? as u32, number(4, 384)? as u32);
-    let overlay = arguments.get(5).is_some_and(|a| a == "overlay");
+    let has = |word: &str| arguments.iter().skip(5).any(|a| a == word);
+    let overlay = has("overlay");
+    let style = if has("dry") {
+        MasonryStyle::dry
+    } else {
+        MasonryStyle::random
+    };
     let mut sheet = image::RgbImage::new(columns * size, rows * size);
     let start = std::time::Instant::now();
     for tile in 0..columns * rows {
-        let sample = masonry_photo(first + u64::from(tile), size, size);
+        let seed = first + u64::from(tile);
+        let sample = masonry_photo_of(&style(seed, size, size), None, seed, size, size);
         for (i, &colour) in sample.image().data().iter().enumerate() {
             let colour = if overlay {
                 marked(&sample, i, colour)

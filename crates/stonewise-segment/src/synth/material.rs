@@ -76,6 +76,8 @@ pub struct FaceRelief {
     pub margin: f32,
     /// Depth of parallel tool marks, 0 to 0.5 pixels.
     pub tooling_px: f32,
+    /// Slope of the planes of which a broken face consists, 0 (one plane) to 0.7.
+    pub facets: f32,
 }
 
 /// What lies between the stones.
@@ -153,6 +155,7 @@ impl FaceRelief {
             lift: rough * between(rng, 0.0, 0.04),
             margin: sometimes(rng, 0.1, 0.06, 0.14),
             tooling_px: sometimes(rng, 0.2, 0.1, 0.5),
+            facets: 0.0,
         }
     }
 }
@@ -219,6 +222,20 @@ pub(super) fn stone_colour(rng: &mut Rng) -> [f32; 3] {
     })
 }
 
+/// The planes of a broken face: two to four that slope down to different sides.
+fn facets(slope: f32, size: f32, rng: &mut Rng) -> Vec<[f32; 3]> {
+    let first = between(rng, 0.0, std::f32::consts::TAU);
+    let count = 2 + (between(rng, 0.0, 3.0) as usize);
+    (0..count)
+        .map(|k| {
+            let turn = (k as f32 + between(rng, -0.3, 0.3)) / count as f32;
+            let (sin, cos) = (first + std::f32::consts::TAU * turn).sin_cos();
+            let slope = slope * between(rng, 0.2, 1.0);
+            [slope * cos, slope * sin, slope * size * between(rng, -0.25, 0.25)]
+        })
+        .collect()
+}
+
 /// From 1 at 0 to 0 at 1 and beyond, level there.
 fn falling(t: f32) -> f32 {
     let rest = (1.0 - t).max(0.0);
@@ -234,6 +251,8 @@ pub(super) struct Look {
     slope: [f32; 2],
     lift: f32,
     roughness: f32,
+    /// Slopes of the planes of a broken face and their heights in the middle, pixels; the lowest is seen.
+    facets: Vec<[f32; 3]>,
     /// A crack: point, direction and how far it reaches beyond the point.
     crack: Option<[f32; 5]>,
     /// Additional retreat of the outline behind the middle of the joint, in parts of the joint's width.
@@ -297,6 +316,11 @@ impl Surface {
             [from[0], from[1], cos, sin, size * between(rng, 0.0, 0.2)]
         });
         let shade = (0.3 * normal(rng)).exp();
+        let facets = if material.relief.facets > 0.0 {
+            facets(material.relief.facets, size, rng)
+        } else {
+            Vec::new()
+        };
         Look {
             colour,
             accent: [0, 1, 2].map(|c: usize| {
@@ -307,6 +331,7 @@ impl Surface {
             slope: [0, 1].map(|_| material.relief.tilt * normal(rng)),
             lift: material.relief.lift * size * normal(rng),
             roughness: between(rng, 0.4, 1.4),
+            facets,
             crack,
             retreat: self.mortar.width_spread * between(rng, -0.4, 1.0),
         }
@@ -351,6 +376,11 @@ impl Surface {
             + rough
             + relief.bulge * size * (1.0 - falling(depth / (0.45 * size)))
             - relief.worn * size * falling(depth / (0.15 * size));
+        let planes = look.facets.iter();
+        let lowest = planes
+            .map(|p| p[0] * offset[0] + p[1] * offset[1] + p[2])
+            .reduce(f32::min);
+        height += lowest.unwrap_or(0.0);
         if m.bedding > 0.0 {
             let layer = self.bedding.at(x, y);
             tone += m.bedding * layer;

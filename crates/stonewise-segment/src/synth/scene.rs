@@ -115,6 +115,13 @@ impl Layer {
         }
     }
 
+    /// Replaces the wall, if it is one, by one without mortar.
+    pub(super) fn lay_dry(&mut self, rng: &mut Rng) {
+        if let Content::Masonry(masonry) = &mut self.content {
+            masonry.wall.lay_dry(rng);
+        }
+    }
+
     /// Paints the layer.
     pub(super) fn paint(&self, canvas: &mut Canvas, width: u32, height: u32, rng: &mut Rng) {
         let mask = self.region.mask(canvas, rng);

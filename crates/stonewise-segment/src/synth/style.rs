@@ -30,10 +30,25 @@ pub struct MasonryStyle {
 impl MasonryStyle {
     /// A style for a photo of `width` x `height` pixels.
     pub fn random(seed: u64, width: u32, height: u32) -> Self {
+        Self::drawn(seed, width, height, false)
+    }
+
+    /// The same photo with walls laid dry: small rubble without mortar between dark, deep gaps.
+    pub fn dry(seed: u64, width: u32, height: u32) -> Self {
+        Self::drawn(seed, width, height, true)
+    }
+
+    fn drawn(seed: u64, width: u32, height: u32, is_dry: bool) -> Self {
         // A stream apart from that of the single stones.
         let mut rng = stream(seed, 1);
         let viewpoint = Viewpoint::random(&mut rng);
-        let layers = random_layers(viewpoint, width, height, &mut rng);
+        let mut layers = random_layers(viewpoint, width, height, &mut rng);
+        if is_dry {
+            let mut rng = stream(seed, 3);
+            for layer in &mut layers {
+                layer.lay_dry(&mut rng);
+            }
+        }
         let shorter = width.min(height) as f32;
         let smallest_px = layers.iter().map(Layer::stone_px).fold(shorter, f32::min);
         let often = if chance(&mut rng, 0.45) { 0.45 } else { 0.08 };

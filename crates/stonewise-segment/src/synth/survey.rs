@@ -60,8 +60,9 @@ impl Survey {
         Self::drawn(kind, &mut stream(seed, 2))
     }
 
-    /// A survey of a kind drawn at random, in two of five cases none.
-    pub(super) fn sometimes(seed: u64) -> Option<Self> {
+    /// A survey of a kind drawn at random: in two of five cases none, in a quarter a terrestrial scan, in a
+    /// fifth one from a drone, in the others a cloud from stereo photos.
+    pub fn sometimes(seed: u64) -> Option<Self> {
         let mut rng = stream(seed, 2);
         let kind = match between(&mut rng, 0.0, 1.0) {
             p if p < 0.40 => return None,

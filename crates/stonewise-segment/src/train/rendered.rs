@@ -3,7 +3,12 @@
 use super::source::SampleSource;
 use crate::Sample;
 use crate::seed::mix;
-use crate::synth::{masonry_photo, surveyed_photo};
+use crate::synth::{MasonryStyle, Survey, masonry_photo_of};
+
+/// One photo in so many shows walls laid dry.
+const DRY_EVERY: u64 = 4;
+/// Number of the stream of seeds that says which.
+const DRY_STREAM: u64 = 1;
 
 /// Masonry photos without end, rendered when they are needed.
 #[derive(Clone, Copy, Debug)]
@@ -12,7 +17,7 @@ pub struct Rendered {
     pub seed: u64,
     /// Edge of the photos, pixels.
     pub size_px: u32,
-    /// Photos with the relief that a cloud would give them; a third has none.
+    /// Photos with the relief that a cloud would give them; two of five have none.
     pub relief: bool,
 }
 
@@ -30,11 +35,13 @@ impl Rendered {
     }
 
     fn photo(&self, seed: u64) -> Sample {
-        let render = if self.relief {
-            surveyed_photo
+        let survey = self.relief.then(|| Survey::sometimes(seed)).flatten();
+        let style = if mix(seed, DRY_STREAM).is_multiple_of(DRY_EVERY) {
+            MasonryStyle::dry
         } else {
-            masonry_photo
+            MasonryStyle::random
         };
-        render(seed, self.size_px, self.size_px)
+        let size = self.size_px;
+        masonry_photo_of(&style(seed, size, size), survey.as_ref(), seed, size, size)
     }
 }
