@@ -1,7 +1,8 @@
 //! Scores a detector on rendered walls whose seeds are kept apart: `kept_walls [FIRST_SEED COUNT [WEIGHTS
-//! [CLOUD [MIN_SCORE [dry]]]]]`, CLOUD: none, terrestrial, drone or stereo; dry: the same walls laid dry. Prints a table by size of the stones,
-//! light and contrast of the joints, for docs/src/method/segmentation.md, and on standard error the counts of
-//! each wall, by which two detectors can be compared wall by wall.
+//! [CLOUD [MIN_SCORE [dry]]]]]`, CLOUD: none, terrestrial, drone or stereo; dry: the same walls laid dry.
+//! Prints a table by size of the stones, light and contrast of the joints, for
+//! docs/src/method/segmentation.md, and on standard error the counts of each wall, by which two detectors can
+//! be compared wall by wall.
 //!
 //! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other
 //! seeds then, and say so.
@@ -21,7 +22,7 @@ use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
 /// First of the seeds that are kept apart. Training draws 64-bit seeds, the test of the built-in weights uses
-/// 9,000 to 9,011, and 20,000 to 20,059 were used to choose the built-in weights.
+/// 9,000 to 9,011, and 20,000 to 20,059 were used to choose the built-in weights and `min_score`.
 const FIRST_SEED: u64 = 21_000;
 const COUNT: u64 = 60;
 /// Edge of a photo, pixels: several stones of the largest class.

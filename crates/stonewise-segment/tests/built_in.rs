@@ -22,8 +22,8 @@ fn the_built_in_weights_find_the_stones_of_rendered_walls() {
     println!("{score:?}");
     let (f1, iou) = (score.f1.unwrap(), score.mean_iou.unwrap());
     assert!(score.references > 300, "{score:?}");
-    // 0.64 and 0.88 when the weights were built in; dark, blurred and tiny walls are among these.
-    assert!(f1 > 0.6 && iou > 0.8, "{score:?}");
+    // 0.61 and 0.89 when the weights were built in; dark, blurred and tiny walls are among these.
+    assert!(f1 > 0.58 && iou > 0.8, "{score:?}");
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn relief_shows_the_built_in_weights_more_stones() {
         .collect();
     let photos: Vec<Sample> = walls.iter().map(|w| w.clone().with_relief(None)).collect();
     let (with, without) = (f1(&walls), f1(&photos));
-    // 0.73 and 0.64 when the weights were built in.
+    // 0.74 and 0.61 when the weights were built in.
     assert!(with > without + 0.05, "{with} with clouds, {without} without");
 }
 

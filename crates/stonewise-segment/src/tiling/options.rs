@@ -34,7 +34,7 @@ impl Default for TilingOptions {
             overlap_px: 160,
             scales: vec![2.0, 1.0, 0.5, 0.25],
             stone_px: 60.0,
-            min_score: 0.5,
+            min_score: 0.4,
             min_area_px: 40,
             min_new_share: 0.6,
         }
