@@ -64,20 +64,15 @@ fn lower_envelope(f: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The largest outer contour of `values` at `level`, in cell coordinates, counter-clockwise, simple.
+/// The outer contours of `values` at `level`, in cell coordinates, each counter-clockwise and simple, the one
+/// with the largest enclosed area first.
 ///
 /// Marching squares with linear interpolation (Lorensen & Cline 1987, in the plane); where two opposite
-/// corners of a square are inside, they stay apart. "Largest" is by enclosed area. `values` must be below
-/// `level` along the border.
-pub(super) fn trace_largest(
-    values: &[f64],
-    width: usize,
-    height: usize,
-    level: f64,
-) -> Option<Vec<Point2<f64>>> {
+/// corners of a square are inside, they stay apart. `values` must be below `level` along the border.
+pub(super) fn trace(values: &[f64], width: usize, height: usize, level: f64) -> Vec<Vec<Point2<f64>>> {
     let inside = |x: usize, y: usize| values[y * width + x] > level;
     let mut visited = vec![false; width * height];
-    let mut best: Option<(f64, Vec<Point2<f64>>)> = None;
+    let mut found: Vec<(f64, Vec<Point2<f64>>)> = Vec::new();
     for y in 0..height {
         for x in 0..width.saturating_sub(1) {
             // Such an edge, out to in along a row, belongs to exactly one contour.
@@ -86,12 +81,13 @@ pub(super) fn trace_largest(
             }
             let ring = follow(values, width, level, (x, y), &mut visited);
             let area = signed_area(&ring);
-            if area > 0.0 && best.as_ref().is_none_or(|(a, _)| area > *a) {
-                best = Some((area, ring));
+            if area > 0.0 {
+                found.push((area, ring));
             }
         }
     }
-    best.map(|(_, ring)| ring)
+    found.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    found.into_iter().map(|(_, ring)| ring).collect()
 }
 
 /// Walks along one contour with the inside on the left, from the edge between (x, y) and (x + 1, y).
@@ -182,10 +178,10 @@ mod tests {
             for (i, b) in bits.iter().enumerate() {
                 values[(i / 14 + 1) * w + i % 14 + 1] = f64::from(*b);
             }
-            if let Some(ring) = trace_largest(&values, w, h, 0.7) {
-                prop_assert!(crate::geometry::is_simple(&ring));
-                prop_assert!(crate::geometry::signed_area(&ring) > 0.0);
-            }
+            let rings = trace(&values, w, h, 0.7);
+            let areas: Vec<f64> = rings.iter().map(|r| signed_area(r)).collect();
+            prop_assert!(rings.iter().all(|r| crate::geometry::is_simple(r)));
+            prop_assert!(areas.iter().all(|a| *a > 0.0) && areas.is_sorted_by(|a, b| a >= b));
         }
     }
 
@@ -193,8 +189,8 @@ mod tests {
     fn a_single_cell_is_a_diamond() {
         let mut values = vec![0.0; 25];
         values[12] = 1.0;
-        let ring = trace_largest(&values, 5, 5, 0.5).unwrap();
-        assert_eq!(ring.len(), 4);
-        assert!((signed_area(&ring) - 0.5).abs() < 1e-12);
+        let rings = trace(&values, 5, 5, 0.5);
+        assert_eq!((rings.len(), rings[0].len()), (1, 4));
+        assert!((signed_area(&rings[0]) - 0.5).abs() < 1e-12);
     }
 }

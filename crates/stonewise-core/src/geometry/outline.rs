@@ -1,7 +1,7 @@
-//! The outline of a patch of points.
+//! The outlines of a patch of points.
 
-use crate::geometry::ring::{is_simple, signed_area};
-use crate::geometry::{FaceFrame, contour};
+use crate::geometry::ring::{is_simple, ring_contains, signed_area};
+use crate::geometry::{FaceFrame, RingIndex, contour};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -29,17 +29,72 @@ impl Default for OutlineParams {
     }
 }
 
+/// Share of the points that an outline encloses at least, or gaps are closed that are wider.
+const ENCLOSED: f64 = 0.9;
+/// How often the width of the gaps that are closed is doubled at most: up to 24 point spacings on either
+/// side, or a railing's bar of 20 cm in a cloud with a point every 4 mm.
+const DOUBLINGS: u32 = 3;
+/// A piece with a smaller share of the points is a speck: points of another stone or of plants.
+const SPECK: f64 = 0.05;
+
 /// Outline of points in their plane, a simple polygon, counter-clockwise, first vertex not repeated.
 ///
-/// The points grow to discs, the union of the discs shrinks again until the border lies half a point spacing
-/// outside the outermost points (a closing on a distance raster), and the largest piece is traced and
-/// simplified (Douglas & Peucker 1973). Holes are dropped. The point spacing is sqrt(area / n) of the convex
-/// hull. `None` under four points or where they cover no area. Cost: O(n log n + cells).
+/// The largest of the [`outlines`]. If it encloses fewer than nine tenths of the points, because a railing or
+/// a plant in front of the face divides it, wider gaps are closed until it does, up to eight times as wide;
+/// where that is not enough, it is the largest piece all the same. `None` under four points or where they
+/// cover no area. Cost: O(n log n + cells).
 pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Point2<f64>>> {
+    let mut largest = None;
+    for doubling in 0..=DOUBLINGS {
+        let wider = OutlineParams {
+            closing_spacings: params.closing_spacings.max(1.0) * f64::from(1 << doubling),
+            ..params.clone()
+        };
+        let mut pieces = pieces(points, &wider);
+        if pieces.is_empty() {
+            break;
+        }
+        let is_whole = pieces.len() == 1 || share_inside(points, &pieces[0]) >= ENCLOSED;
+        let piece = pieces.swap_remove(0);
+        if is_whole {
+            return Some(piece);
+        }
+        largest.get_or_insert(piece);
+    }
+    largest
+}
+
+/// Outlines of the pieces of a face, largest first: simple polygons beside each other, counter-clockwise, first
+/// vertex not repeated.
+///
+/// The points grow to discs, the union of the discs shrinks again until the border lies half a point spacing
+/// outside the outermost points (a closing on a distance raster), and its pieces are traced and simplified
+/// (Douglas & Peucker 1973). Holes, what lies in them, and pieces with less than a twentieth of the points are
+/// dropped. The point spacing is sqrt(area / n) of the convex hull. Empty under four points or where they
+/// cover no area. Cost: O(n log n + cells).
+pub fn outlines(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>>> {
+    let mut pieces = pieces(points, params);
+    for i in (1..pieces.len()).rev() {
+        let is_in_a_hole = pieces[..i]
+            .iter()
+            .any(|larger| ring_contains(larger, &pieces[i][0]));
+        if is_in_a_hole || share_inside(points, &pieces[i]) < SPECK {
+            pieces.remove(i);
+        }
+    }
+    pieces
+}
+
+fn share_inside(points: &[Point2<f64>], ring: &Vec<Point2<f64>>) -> f64 {
+    let ring = RingIndex::new(std::slice::from_ref(ring));
+    points.iter().filter(|p| ring.contains(p)).count() as f64 / points.len() as f64
+}
+
+fn pieces(points: &[Point2<f64>], params: &OutlineParams) -> Vec<Vec<Point2<f64>>> {
     let hull = convex_hull(points);
     let area = signed_area(&hull);
     if points.len() < 4 || area.is_nan() || area <= 0.0 {
-        return None;
+        return Vec::new();
     }
     let spacing = (area / points.len() as f64).sqrt();
     let radius = params.closing_spacings.max(1.0) * spacing;
@@ -63,9 +118,12 @@ pub fn outline(points: &[Point2<f64>], params: &OutlineParams) -> Option<Vec<Poi
     // points.
     let depth = contour::distance(&outside, width, height);
     let level = ((radius - 0.5 * spacing) / cell).max(0.5);
-    let traced = contour::trace_largest(&depth, width, height, level)?;
-    let ring: Vec<Point2<f64>> = traced.iter().map(|p| origin + p.coords * cell).collect();
-    Some(simplify_ring(ring, params.simplify_spacings * spacing))
+    let in_metres = |ring: Vec<Point2<f64>>| {
+        let ring = ring.iter().map(|p| origin + p.coords * cell).collect();
+        simplify_ring(ring, params.simplify_spacings * spacing)
+    };
+    let traced = contour::trace(&depth, width, height, level);
+    traced.into_iter().map(in_metres).collect()
 }
 
 /// Outline of points on a face, as a polygon in the plane through their mean, counter-clockwise for a viewer
@@ -238,6 +296,38 @@ mod tests {
         );
     }
 
+    /// A face of 1.6 x 1.2, its lower part of `low`, and a bar in front of it.
+    fn face_behind_a_bar(n: usize, bar: f64, low: f64) -> Vec<Point2<f64>> {
+        let behind = |p: &Point2<f64>| (p.y + 0.6 - low).abs() < bar / 2.0;
+        scatter(n, 6, |p| p.x.abs() < 0.8 && p.y.abs() < 0.6 && !behind(p))
+    }
+
+    #[test]
+    fn a_bar_divides_a_face_but_not_its_outline() {
+        let params = OutlineParams::default();
+        for low in [0.3, 0.9] {
+            let points = face_behind_a_bar(8000, 0.2, low);
+            let pieces = outlines(&points, &params);
+            let areas: Vec<f64> = pieces.iter().map(|r| signed_area(r)).collect();
+            assert_eq!(areas.len(), 2);
+            assert!((areas[0] / (1.6 * 0.8) - 1.0).abs() < 0.04, "{areas:?}");
+            assert!((areas[1] / (1.6 * 0.2) - 1.0).abs() < 0.1, "{areas:?}");
+            check(&points, 1.6 * 1.2, 0.03);
+        }
+        // 64 point spacings are too wide to be closed: the larger piece.
+        check(&face_behind_a_bar(80_000, 0.9, 0.65), 1.6 * 0.2, 0.1);
+    }
+
+    #[test]
+    fn what_lies_in_a_hole_is_no_piece_beside() {
+        let points = scatter(8000, 7, |p| {
+            (p.coords.norm() - 0.7).abs() < 0.25 || p.coords.norm() < 0.25
+        });
+        let pieces = outlines(&points, &OutlineParams::default());
+        assert_eq!(pieces.len(), 1);
+        assert!((signed_area(&pieces[0]) / (std::f64::consts::PI * 0.95 * 0.95) - 1.0).abs() < 0.03);
+    }
+
     #[test]
     fn few_points_and_points_on_a_line_have_no_outline() {
         let line: Vec<_> = (0..50)
@@ -246,6 +336,7 @@ mod tests {
         assert!(outline(&line, &OutlineParams::default()).is_none());
         assert!(outline(&line[..2], &OutlineParams::default()).is_none());
         assert!(outline(&[], &OutlineParams::default()).is_none());
+        assert!(outlines(&line, &OutlineParams::default()).is_empty());
         assert!(face_outline(&[], &Vector3::x(), &OutlineParams::default()).is_none());
     }
 

@@ -1,10 +1,11 @@
-//! A closed polygon, indexed for queries about many points.
+//! Closed polygons, indexed for queries about many points.
 
 use super::ring::crosses;
 use nalgebra::Point2;
 use std::ops::RangeInclusive;
 
-/// A polygon whose sides are sorted into bands of y, so that a point is compared with the few sides near it.
+/// Polygons that do not overlap, with their sides sorted into bands of y, so that a point is compared with the
+/// few sides near it.
 #[derive(Clone, Debug)]
 pub struct RingIndex {
     low_y: f64,
@@ -18,17 +19,24 @@ pub struct RingIndex {
 type Side = [Point2<f64>; 2];
 
 impl RingIndex {
-    /// The last side goes back to the first corner. Cost: sides times the bands that they touch.
-    pub fn new(ring: &[Point2<f64>]) -> Self {
-        let low_y = ring.iter().map(|p| p.y).fold(f64::INFINITY, f64::min);
-        let high_y = ring.iter().map(|p| p.y).fold(f64::NEG_INFINITY, f64::max);
-        let count = ring.len().max(1);
+    /// The last side of each ring goes back to its first corner. Cost: sides times the bands that they touch.
+    pub fn new(rings: &[Vec<Point2<f64>>]) -> Self {
+        let low_y = rings.iter().flatten().map(|p| p.y).fold(f64::INFINITY, f64::min);
+        let high_y = rings
+            .iter()
+            .flatten()
+            .map(|p| p.y)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let count = rings.iter().flatten().count().max(1);
         let mut index = Self {
             low_y,
             bands_per_m: count as f64 / (high_y - low_y).max(f64::MIN_POSITIVE),
             bands: vec![Vec::new(); count],
         };
-        for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        let sides = rings
+            .iter()
+            .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)));
+        for (a, b) in sides {
             let touched = index.bands_between(a.y.min(b.y), a.y.max(b.y));
             for band in &mut index.bands[touched] {
                 band.push([*a, *b]);
@@ -37,7 +45,7 @@ impl RingIndex {
         index
     }
 
-    /// Whether a point lies inside: the same answer as [`ring_contains`](super::ring_contains).
+    /// Whether a point lies inside a ring: the same answer as [`ring_contains`](super::ring_contains).
     pub fn contains(&self, p: &Point2<f64>) -> bool {
         let sides = self.bands[self.band_at(p.y)].iter();
         sides.filter(|[a, b]| crosses(p, a, b)).count() % 2 == 1
@@ -90,24 +98,29 @@ mod tests {
     fn answers_are_those_of_all_sides() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let flat = vec![Point2::new(3.0, -2.0); 3];
-        let rings = [
-            (star(3), true),
-            (star(60), true),
-            (flat, false),
+        let beside = [[4.1, -2.5], [4.4, -2.5], [4.4, -1.9]].map(Point2::from);
+        let cases = [
+            (vec![star(3)], true),
+            (vec![star(60), beside.to_vec()], true),
+            (vec![flat], false),
             (Vec::new(), false),
         ];
-        for (ring, has_area) in rings {
-            let index = RingIndex::new(&ring);
+        for (rings, has_area) in cases {
+            let index = RingIndex::new(&rings);
+            let sides: Vec<Side> = rings
+                .iter()
+                .flat_map(|ring| (0..ring.len()).map(|i| [ring[i], ring[(i + 1) % ring.len()]]))
+                .collect();
             let mut inside = 0;
             for k in 0..4000 {
                 let mut p = Point2::new(rng.random_range(1.5..4.5), rng.random_range(-3.5..-0.5));
-                if let Some(corner) = ring.get(k) {
+                if let Some([corner, _]) = sides.get(k) {
                     p.y = corner.y;
                 }
                 // An independent estimate of the distance: the nearest of 1001 points along each side.
-                let nearest = (0..ring.len())
-                    .flat_map(|i| {
-                        let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+                let nearest = sides
+                    .iter()
+                    .flat_map(|[a, b]| {
                         (0..=1000).map(move |t| (a + (b - a) * (f64::from(t) / 1000.0) - p).norm())
                     })
                     .fold(f64::INFINITY, f64::min);
@@ -115,7 +128,8 @@ mod tests {
                 if (nearest - reach).abs() > 1e-3 {
                     assert_eq!(index.passes_within(reach, &p), nearest < reach, "{p}");
                 }
-                assert_eq!(index.contains(&p), ring_contains(&ring, &p), "{p}");
+                let is_inside = rings.iter().any(|ring| ring_contains(ring, &p));
+                assert_eq!(index.contains(&p), is_inside, "{p}");
                 inside += usize::from(index.contains(&p));
             }
             assert_eq!(inside > 100, has_area, "{inside}");

@@ -151,6 +151,31 @@ mod tests {
     }
 
     #[test]
+    fn both_parts_of_a_stone_behind_a_bar_count() {
+        // The photos of the first epoch show more below the bar, those of the second more above it.
+        let shown = |low: f64, high: f64, seed: u64| {
+            let mut near = seen_from(0.0, &Vector3::zeros(), seed);
+            for p in near.iter_mut() {
+                let z = f64::from(p.offset[2]);
+                p.labelled &= z > low && z < high && (z + 0.01).abs() > 0.04;
+            }
+            near
+        };
+        let (first, second) = (shown(-0.2, 0.16, 1), shown(-0.15, 0.2, 2));
+        let found = stone_points([&first, &second], &Vector3::x(), &Vector3::zeros(), 3.0);
+        let heights = |low: f32, high: f32| {
+            let is_there = |p: &&[f32; 3]| p[2] > low && p[2] < high;
+            found.first.iter().filter(is_there).count() as f64 * 0.004 * 0.004 / 0.4
+        };
+        assert!(
+            (heights(-0.2, -0.05) - 0.1).abs() < 0.02,
+            "{}",
+            heights(-0.2, -0.05)
+        );
+        assert!((heights(0.03, 0.2) - 0.13).abs() < 0.02, "{}", heights(0.03, 0.2));
+    }
+
+    #[test]
     fn no_epoch_is_treated_unlike_the_other() {
         let shift = Vector3::new(0.03, 0.01, -0.02);
         let (first, second) = (seen_from(1.0, &Vector3::zeros(), 1), seen_from(-1.0, &shift, 2));

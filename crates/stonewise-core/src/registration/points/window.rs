@@ -1,7 +1,7 @@
 //! The part of a stone's face in which points count.
 
 use crate::cloud::GridIndex;
-use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outline, signed_area};
+use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outlines, signed_area};
 use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 
@@ -25,7 +25,7 @@ const MEDIAN_DIFFERENCE: f64 = 0.954;
 #[derive(Clone, Debug)]
 pub struct Window {
     face_from_world: Matrix3<f64>,
-    /// Outline of each epoch, in the place of the first.
+    /// Outlines of each epoch, in the place of the first: several where a railing divides the face.
     rings: [RingIndex; 2],
     /// Width of the border along the inside of the rings.
     border_m: f64,
@@ -53,7 +53,7 @@ impl Window {
                 first.depth[0].max(second.depth[0]),
                 first.depth[1].min(second.depth[1]),
             ],
-            rings: [&first.ring, &second.ring].map(|ring| RingIndex::new(ring)),
+            rings: [&first.rings, &second.rings].map(|rings| RingIndex::new(rings)),
         })
     }
 
@@ -92,9 +92,9 @@ impl Window {
     }
 }
 
-/// Outline, noise and depth of a stone's labelled points in one epoch.
+/// Outlines, noise and depth of a stone's labelled points in one epoch.
 struct Face {
-    ring: Vec<Point2<f64>>,
+    rings: Vec<Vec<Point2<f64>>>,
     noise_m: f64,
     depth: [f64; 2],
 }
@@ -107,13 +107,17 @@ impl Face {
             .map(|p| place(face_from_world, p) - shift)
             .collect();
         let flat: Vec<Point2<f64>> = local.iter().map(|p| p.xy()).collect();
-        let ring = outline(&flat, &OutlineParams::default())?;
-        let noise_m = noise_m(&local, signed_area(&ring).abs().sqrt());
+        let rings = outlines(&flat, &OutlineParams::default());
+        let area_m2: f64 = rings.iter().map(|ring| signed_area(ring)).sum();
+        if area_m2 <= 0.0 {
+            return None;
+        }
+        let noise_m = noise_m(&local, area_m2.sqrt());
         let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
         heights.sort_by(f64::total_cmp);
         let tail = (DEPTH_TAIL * heights.len() as f64) as usize;
         Some(Self {
-            ring,
+            rings,
             noise_m,
             depth: [
                 heights[tail] - DEPTH_NOISES * noise_m,
