@@ -1,4 +1,5 @@
-//! A stone that the photos of one epoch do not show is measured all the same, where its cloud shows it.
+//! A stone that the photos of one epoch do not show, or show divided, is measured all the same, where its cloud
+//! shows it.
 #![allow(clippy::unwrap_used)]
 
 use nalgebra::{Point3, Vector3};
@@ -7,17 +8,21 @@ use std::path::{Path, PathBuf};
 use stonewise::results::{Status, StoneRow, read_stones};
 use stonewise::simulate::{SurveyParams, write_survey};
 use stonewise::{OutputFolder, Project, Until, run};
+use stonewise_core::geometry::View;
 use stonewise_core::progress::Silent;
+use stonewise_core::raster::RgbImage;
 use stonewise_core::simulate::{PhotoParams, SceneParams, TlsParams, WallMotion, WallParams};
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::image_io::{read_rgb, write_jpeg};
 
 /// How the wall moved, metres.
 const MOTION: [f64; 3] = [0.012, 0.02, -0.01];
+/// Where a line divides stones, metres along the wall.
+const LINE_Y_M: f64 = -0.3;
 
-/// A wall of 1.6 x 0.9 m with masks in the first epoch alone. The photos of the second show its left half
-/// alone.
-fn survey(folder: &Path) -> PathBuf {
+/// A wall of 1.6 x 0.9 m with masks in the first epoch alone; `spoil` changes the photos of the second, given
+/// their number.
+fn survey(folder: &Path, spoil: impl Fn(usize, &View, &mut RgbImage)) -> PathBuf {
     let params = SurveyParams {
         scene: SceneParams {
             wall: WallParams {
@@ -46,17 +51,11 @@ fn survey(folder: &Path) -> PathBuf {
         ..SurveyParams::default()
     };
     let project = write_survey(folder, &params, &Silent).unwrap().project;
-    // The wall stands around the origin; its right half lies at positive y.
-    let middle = Point3::new(0.0, 0.0, 0.45);
     let cameras = read_cameras(&folder.join("epoch2/cameras_metashape.xml")).unwrap();
-    for view in &cameras.views {
+    for (number, view) in cameras.views.iter().enumerate() {
         let path = folder.join("epoch2/images").join(format!("{}.jpg", view.name));
         let mut photo = read_rgb(&path).unwrap();
-        let width = photo.width() as usize;
-        let from = view.project(&middle).unwrap().pixel[0].clamp(0.0, width as f64) as usize;
-        for row in photo.data_mut().chunks_mut(width) {
-            row[from..].fill([0; 3]);
-        }
+        spoil(number, view, &mut photo);
         write_jpeg(&path, &photo, 92).unwrap();
     }
     let text = fs::read_to_string(&project).unwrap();
@@ -81,10 +80,57 @@ fn stones(project: &Path, out: &Path, is_enabled: bool) -> Vec<StoneRow> {
     read_stones(&out.join("stones.parquet")).unwrap()
 }
 
+/// Blackens what lies to the right of the middle; the wall stands around the origin, its right half at
+/// positive y.
+fn right_half_is_dark(_: usize, view: &View, photo: &mut RgbImage) {
+    let width = photo.width() as usize;
+    let middle = view.project(&Point3::new(0.0, 0.0, 0.45)).unwrap();
+    let from = middle.pixel[0].clamp(0.0, width as f64) as usize;
+    for row in photo.data_mut().chunks_mut(width) {
+        row[from..].fill([0; 3]);
+    }
+}
+
+/// Draws a black line up the wall in two of the three photos.
+fn a_line_divides_the_wall(number: usize, view: &View, photo: &mut RgbImage) {
+    if number == 2 {
+        return;
+    }
+    let width = photo.width() as usize;
+    for k in 0..2000 {
+        let place = Point3::new(0.0, LINE_Y_M, f64::from(k) * 0.5e-3);
+        let at = view.project(&place).unwrap().pixel;
+        let (x, y) = (at[0] as usize, at[1] as usize);
+        if let Some(row) = photo.data_mut().chunks_mut(width).nth(y) {
+            row[x - 3..x + 4].fill([0; 3]);
+        }
+    }
+}
+
+#[test]
+fn a_stone_that_one_epoch_shows_divided_is_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = survey(&folder.path().join("survey"), a_line_divides_the_wall);
+    let out = folder.path().join("out");
+    let measured = |is_enabled: bool| -> Vec<StoneRow> {
+        let near = |s: &StoneRow| (s.centroid.y - LINE_Y_M).abs() < 0.1 && s.status == Status::Ok;
+        let found = stones(&project, &out, is_enabled);
+        found.into_iter().filter(near).collect()
+    };
+    let (divided, joined) = (measured(false), measured(true));
+    let audit = fs::read_to_string(out.join("audit_epoch2.csv")).unwrap();
+    assert!(audit.contains("joined_parts"), "{audit}");
+    assert!(joined.len() > divided.len(), "{} {}", joined.len(), divided.len());
+    for stone in joined {
+        let error = (stone.motion.unwrap().displacement - Vector3::from(MOTION)).norm();
+        assert!(error < 0.002, "stone {}: {error}", stone.stone_id);
+    }
+}
+
 #[test]
 fn stones_in_the_dark_are_measured_by_their_surface() {
     let folder = tempfile::tempdir().unwrap();
-    let project = survey(&folder.path().join("survey"));
+    let project = survey(&folder.path().join("survey"), right_half_is_dark);
     let out = folder.path().join("out");
     let lost = stones(&project, &out, false);
     // Relief alone shows the detector some of the stones in the dark.

@@ -37,6 +37,11 @@ pub enum AuditEvent {
         /// Share of its area that it wins.
         share: f64,
     },
+    /// Stones that another epoch shows as one stone became one.
+    JoinedParts {
+        /// They, the one whose number the new stone has first.
+        stones: Vec<StoneId>,
+    },
     /// Points far from the main body of a stone, or cut off from it, lost its label.
     DroppedIslands {
         /// The stone.

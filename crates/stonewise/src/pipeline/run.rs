@@ -25,6 +25,7 @@ use crate::pipeline::steps::carry::{carry, drop_contradictions};
 use crate::pipeline::steps::edit::{Edited, edit};
 use crate::pipeline::steps::evaluate::evaluate;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
+use crate::pipeline::steps::join::join;
 use crate::pipeline::steps::label::{Labelled, label};
 use crate::pipeline::steps::m3c2::{m3c2, with_datum};
 use crate::pipeline::steps::r#match::{Matched, r#match};
@@ -133,6 +134,7 @@ pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
         return Ok(summary(context, Vec::new()));
     }
     let labelled = all_labelled(context, ingested, &photos)?;
+    let labelled = join(context, &photos, labelled)?;
     let (labelled, attempts) = carry(context, &photos, labelled)?;
     write_carry_audit(context, &attempts)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
@@ -281,6 +283,7 @@ pub(super) fn corrected(context: &Context) -> Result<Corrected> {
         .map(|n| ingest(context, n))
         .collect::<Result<Vec<_>>>()?;
     let labelled = all_labelled(context, ingested, &photos)?;
+    let labelled = join(context, &photos, labelled)?;
     let (labelled, _) = carry(context, &photos, labelled)?;
     let (labelled, edited) = edit(context, &photos, labelled)?;
     Ok(Corrected {

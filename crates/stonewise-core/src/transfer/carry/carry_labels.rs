@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Points farther from a stone's surface than this are another object, or the back of the wall, metres. 0.15:
 /// where the transfer takes a step in depth for the silhouette of another object.
-const REACH_M: f64 = 0.15;
+pub(super) const REACH_M: f64 = 0.15;
 /// A point belongs to a surface within this many times the spread of the surface's own points. 3: nearly all
 /// of them.
 const SPREADS: f64 = 3.0;

@@ -3,9 +3,10 @@ use crate::cloud::{Cloud, MemoryTiles};
 use crate::geometry::{Camera, Rigid3, View};
 use crate::id::{ImageId, StoneId};
 use crate::progress::Silent;
+use crate::stone::Stone;
 use crate::transfer::{LabelStore, MemoryLabels, TileLabels};
 use nalgebra::{Point3, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Stones of 0.4 m x 0.3 m on a face that looks along x; joints of 2 cm between them are 2 cm deep. Stone 1
 /// starts at y = 0; stone 2 follows.
@@ -201,4 +202,85 @@ fn a_face_of_a_few_cells_is_not_carried() {
         "{report:?}"
     );
     assert_eq!(target, labels);
+}
+
+/// A stone that photos show, with so many points.
+fn shown(id: u32, points: usize, photos: u32) -> Stone {
+    Stone {
+        id: StoneId(id),
+        centroid: Point3::origin(),
+        normal: Vector3::x(),
+        area_m2: 0.1,
+        points: points as u32,
+        photos,
+        confidence: 1.0,
+    }
+}
+
+/// Joins stones 1 and 2, which another epoch shows as one: in so many photos, and in others not. Stone 1 lies
+/// `step` in front of where it was; returns the parts of new stones and all labels.
+fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport, Vec<u32>, Vec<u32>) {
+    let (tiles, _, mut one) = epoch(Vector3::zeros(), |_| 0.0, |_| true);
+    for stone in one
+        .tiles
+        .iter_mut()
+        .flat_map(|t| &mut t.stone)
+        .filter(|s| **s == 1)
+    {
+        *stone = 2;
+    }
+    let wanted = BTreeMap::from([(StoneId(2), Vector3::x())]);
+    let shapes = stone_shapes(&tiles, &one, &wanted, &Silent).unwrap();
+    let shift = Vector3::new(0.0, 0.3, -0.1);
+    let whole = Whole {
+        placed: PlacedShape {
+            shape: &shapes[&StoneId(2)],
+            shift,
+        },
+        photos,
+        missed,
+    };
+    let (tiles, truth, labels) = epoch(shift, |s| if s == 1 { step } else { 0.0 }, |_| true);
+    let truth = truth.concat();
+    let count = |id: u32| truth.iter().filter(|t| **t == id).count();
+    let stones = [
+        shown(1, count(1), parts[0]),
+        shown(2, count(2), parts[1]),
+        shown(3, count(3), 9),
+    ];
+    let mut target = labels.clone();
+    let wholes = [whole, whole];
+    let report = join_parts(&tiles, &labels, &mut target, &wholes, &stones, 0.25, &Silent).unwrap();
+    let found = target.tiles.iter().flat_map(|t| t.stone.iter().copied());
+    (report, found.collect(), truth)
+}
+
+#[test]
+fn parts_of_a_stone_that_more_photos_show_whole_become_one() {
+    let (report, found, truth) = joined(0.004, [4, 5], [6, 2]);
+    assert_eq!(report.joined.len(), 1, "the second whole finds no parts left");
+    let number = report.joined[0][0].0;
+    assert_eq!(
+        BTreeSet::from([1, 2]),
+        report.joined[0].iter().map(|s| s.0).collect()
+    );
+    assert_eq!(report.tiles.len(), 2);
+    for (found, truth) in found.iter().zip(&truth) {
+        let expected = if matches!(truth, 1 | 2) { number } else { *truth };
+        assert_eq!(*found, expected);
+    }
+}
+
+#[test]
+fn parts_stay_apart_where_as_many_photos_show_them_or_one_moved() {
+    // As many photos; as many with a quarter of those that do not show the whole; one part is 20 mm in front.
+    for (step, parts, votes) in [
+        (0.0, [4, 6], [6, 0]),
+        (0.0, [5, 4], [6, 4]),
+        (0.02, [1, 1], [6, 0]),
+    ] {
+        let (report, found, truth) = joined(step, parts, votes);
+        assert_eq!(report, JoinReport::default());
+        assert_eq!(found, truth);
+    }
 }

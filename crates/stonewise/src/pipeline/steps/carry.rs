@@ -156,16 +156,19 @@ fn backwards(
     let steepest = context.project.settings.label.max_incidence_rad;
     let (first, later) = (&labelled[0].stones, &labelled[number - 1].stones);
     let is_missing = |s: &&Stone| report.unmatched_second.binary_search(&s.id).is_ok();
-    let shift_at = |stone: &Stone| {
-        let apart =
-            |(s, shift): &(&Stone, &Vector3<f64>)| (s.centroid + *shift - stone.centroid).norm_squared();
-        let places = first.iter().zip(&report.local_shifts);
-        places
-            .min_by(|a, b| apart(a).total_cmp(&apart(b)))
-            .map(|(_, shift)| -shift)
+    let wish = |s: &Stone| {
+        let shift = shift_back(first, report, s)?;
+        Some(Wish::new(photos, s, [number, 1], shift, steepest))
     };
-    let wish = |s: &Stone| Some(Wish::new(photos, s, [number, 1], shift_at(s)?, steepest));
     later.iter().filter(is_missing).filter_map(wish).collect()
+}
+
+/// How the surroundings of a stone of a later epoch moved from there to the first.
+pub(super) fn shift_back(first: &[Stone], report: &MatchReport, stone: &Stone) -> Option<Vector3<f64>> {
+    let apart = |(s, shift): &(&Stone, &Vector3<f64>)| (s.centroid + *shift - stone.centroid).norm_squared();
+    let places = first.iter().zip(&report.local_shifts);
+    let nearest = places.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    Some(-nearest.1)
 }
 
 /// Looks for stones of other epochs in one; whether any was found.
@@ -276,7 +279,8 @@ fn look_for(
 ) -> Result<CarryReport> {
     let settings = &context.project.settings;
     let is_elected = |wish: &&Wish| wish.is_elected(settings.label.missed_weight);
-    let shapes = shapes(context, labelled, wishes.iter().filter(is_elected))?;
+    let elected = wishes.iter().filter(is_elected);
+    let shapes = shapes(context, labelled, elected.map(|w| (w.from, w.stone, w.outward)))?;
     let placed = wishes.iter().filter_map(|wish| {
         let shape = shapes.get(&(wish.from, wish.stone))?;
         let shift = wish.shift;
@@ -310,18 +314,16 @@ fn look_for(
     })
 }
 
-/// Shapes of the stones, by the epoch that shows them.
-fn shapes<'w>(
+/// Shapes of stones; `asked`: the epoch that shows each, from 1, its number, and the outward normal of its
+/// face.
+pub(super) fn shapes(
     context: &Context,
     labelled: &[Labelled],
-    wishes: impl Iterator<Item = &'w Wish>,
+    asked: impl Iterator<Item = (usize, StoneId, Vector3<f64>)>,
 ) -> Result<BTreeMap<(usize, StoneId), StoneShape>> {
     let mut wanted: BTreeMap<usize, BTreeMap<StoneId, Vector3<f64>>> = BTreeMap::new();
-    for wish in wishes {
-        wanted
-            .entry(wish.from)
-            .or_default()
-            .insert(wish.stone, wish.outward);
+    for (from, stone, outward) in asked {
+        wanted.entry(from).or_default().insert(stone, outward);
     }
     let mut shapes = BTreeMap::new();
     for (from, stones) in wanted {
