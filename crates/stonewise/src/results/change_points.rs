@@ -16,16 +16,27 @@ pub struct DistancePoint {
     pub distance_m: f64,
     /// 95 % detection limit, metres.
     pub detection_limit_m: f64,
+    /// Points of the later epoch for each of the first in the cylinder; `None` where the file has no counts.
+    pub count_ratio: Option<f64>,
 }
 
-/// Reads an `m3c2.csv`, columns by name, rows without a distance left out; empty where there is no such file.
+/// The core points of an `m3c2.csv`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct CorePoints {
+    /// Those with a distance.
+    pub distances: Vec<DistancePoint>,
+    /// Places of the others, world.
+    pub without_distance: Vec<Point3<f64>>,
+}
+
+/// Reads an `m3c2.csv`, columns by name; empty where there is no such file.
 ///
 /// # Errors
 /// The file cannot be read, lacks a column or holds something that is no number.
-pub(super) fn read_distance_points(path: &Path) -> Result<Vec<DistancePoint>, Error> {
+pub(super) fn read_distance_points(path: &Path) -> Result<CorePoints, Error> {
     let file = match std::fs::File::open(path) {
         Ok(file) => file,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(CorePoints::default()),
         Err(e) => return Err(Error::io("reading the distances", path)(e)),
     };
     let content = |message: String| Error::Results {
@@ -52,7 +63,8 @@ pub(super) fn read_distance_points(path: &Path) -> Result<Vec<DistancePoint>, Er
         find(&["ny", "normaly"]),
         find(&["nz", "normalz"]),
     ];
-    let mut points = Vec::new();
+    let counts = [find(&["m3c2_count1"]), find(&["m3c2_count2"])];
+    let mut points = CorePoints::default();
     for (number, line) in lines.enumerate() {
         let line = line.map_err(Error::io("reading the distances", path))?;
         let cells: Vec<&str> = line.trim().split(',').collect();
@@ -62,16 +74,23 @@ pub(super) fn read_distance_points(path: &Path) -> Result<Vec<DistancePoint>, Er
                 .parse()
                 .map_err(|_| content(format!("line {}: {cell:?} is no number", number + 2))),
         };
+        let position = Point3::new(value(place[0])?, value(place[1])?, value(place[2])?);
         let distance_m = value(distance)?;
         if !distance_m.is_finite() {
+            points.without_distance.push(position);
             continue;
         }
         let normal = match normal {
             [Some(x), Some(y), Some(z)] => Some(Vector3::new(value(x)?, value(y)?, value(z)?)),
             _ => None,
         };
-        points.push(DistancePoint {
-            position: Point3::new(value(place[0])?, value(place[1])?, value(place[2])?),
+        let count_ratio = match counts {
+            [Some(first), Some(later)] => Some(value(later)? / value(first)?),
+            _ => None,
+        };
+        points.distances.push(DistancePoint {
+            position,
+            count_ratio: count_ratio.filter(|r| r.is_finite()),
             normal,
             distance_m,
             detection_limit_m: value(limit)?,
@@ -85,25 +104,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_are_found_by_name_and_empty_distances_left_out() {
+    fn columns_are_found_by_name_and_points_without_distance_kept_apart() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(
-            read_distance_points(&folder.path().join("m3c2.csv"))
-                .unwrap()
-                .is_empty()
-        );
-        let csv = "x,y,z,m3c2_uncertainty,m3c2_distance\n1,2,3,0.001,-0.02\n1,2,3,,\n1,2,3,NaN,nan\n";
+        let missing = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
+        assert_eq!(missing, CorePoints::default());
+        let csv = "x,y,z,m3c2_uncertainty,m3c2_distance\n1,2,3,0.001,-0.02\n4,5,6,,\n7,8,9,NaN,nan\n";
         std::fs::write(folder.path().join("m3c2.csv"), csv).unwrap();
-        let points = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
+        let CorePoints {
+            distances: points,
+            without_distance,
+        } = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
+        assert_eq!(
+            without_distance,
+            [Point3::new(4.0, 5.0, 6.0), Point3::new(7.0, 8.0, 9.0)]
+        );
         assert_eq!(points.len(), 1);
         assert_eq!(
             (
                 points[0].distance_m,
                 points[0].detection_limit_m,
-                points[0].normal
+                points[0].normal,
+                points[0].count_ratio,
             ),
-            (-0.02, 0.001, None)
+            (-0.02, 0.001, None, None)
         );
+        let csv =
+            "x,y,z,m3c2_distance,m3c2_uncertainty,m3c2_count1,m3c2_count2\n1,2,3,0,0,8,6\n1,2,3,0,0,,6\n";
+        std::fs::write(folder.path().join("m3c2.csv"), csv).unwrap();
+        let points = read_distance_points(&folder.path().join("m3c2.csv")).unwrap();
+        let ratios: Vec<_> = points.distances.iter().map(|p| p.count_ratio).collect();
+        assert_eq!(ratios, [Some(0.75), None]);
     }
 
     #[test]

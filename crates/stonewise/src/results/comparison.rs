@@ -1,11 +1,7 @@
 //! Stones against the M3C2 core points on them.
 
-use super::{ResultSet, Sorted, StoneRow};
+use super::{ResultSet, Sorted, Squares, StoneRow};
 use nalgebra::Point2;
-use std::collections::BTreeMap;
-
-/// Edge of the squares that stones are looked up in, metres.
-const SQUARE_M: f64 = 0.5;
 
 /// The same place in both methods.
 pub(crate) struct Comparison {
@@ -16,31 +12,26 @@ pub(crate) struct Comparison {
     pub in_plane: Vec<[f64; 2]>,
 }
 
-/// Compares; empty without core points. A core point belongs to the stone whose outline holds it.
+/// Compares; empty without core points. A core point belongs to the stone whose outline holds it and
+/// whose face is about as deep.
 pub(crate) fn compare(results: &ResultSet) -> Comparison {
-    let mut squares: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+    let mut squares = Squares::default();
     let rings: Vec<Vec<Point2<f64>>> = results.stones.iter().map(|s| results.unrolled(s)).collect();
-    let square = |p: &Point2<f64>| ((p.x / SQUARE_M).floor() as i64, (p.y / SQUARE_M).floor() as i64);
     for (i, ring) in rings.iter().enumerate() {
-        let Some(low) = ring.iter().copied().reduce(|a, b| a.inf(&b)) else {
-            continue;
+        let corner = |of: fn(&Point2<f64>, &Point2<f64>) -> Point2<f64>| {
+            ring.iter().copied().reduce(|a, b| of(&a, &b))
         };
-        let Some(high) = ring.iter().copied().reduce(|a, b| a.sup(&b)) else {
-            continue;
-        };
-        let (from, to) = (square(&low), square(&high));
-        for x in from.0..=to.0 {
-            for y in from.1..=to.1 {
-                squares.entry((x, y)).or_default().push(i);
-            }
+        if let (Some(low), Some(high)) = (corner(Point2::inf), corner(Point2::sup)) {
+            squares.add(i, &low, &high);
         }
     }
     let mut on_stone: Vec<Vec<f64>> = vec![Vec::new(); rings.len()];
     let mut in_plane = Vec::new();
     for point in &results.distances {
         let place = results.facade.place(&point.position);
-        let candidates = squares.get(&square(&place)).into_iter().flatten();
-        if let Some(&i) = candidates.into_iter().find(|&&i| contains(&rings[i], &place)) {
+        let holds =
+            |i: usize| contains(&rings[i], &place) && results.is_at_face(&results.stones[i], &point.position);
+        if let Some(&i) = squares.near(&place).iter().find(|&&i| holds(i)) {
             on_stone[i].push(point.distance_m);
         }
         if let Some(normal) = point.normal {

@@ -15,6 +15,11 @@ use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::stone::NeighbourCovariance;
 
+/// How far a face reaches in front of and behind the plane through its centroid: in sizes of the stone (square
+/// roots of its area), and at least in metres.
+const FACE_DEPTH_SIZES: f64 = 0.5;
+const LEAST_FACE_DEPTH_M: f64 = 0.1;
+
 /// The result files of one pair of epochs, read back; photos and clouds are not needed.
 #[derive(Clone, Debug)]
 pub struct ResultSet {
@@ -26,8 +31,10 @@ pub struct ResultSet {
     pub stones: Vec<StoneRow>,
     /// `outlines.json`, by stone id; empty where the file is missing.
     pub outlines: BTreeMap<u32, StoneOutline>,
-    /// `m3c2.csv`; empty where the file is missing.
+    /// Core points of `m3c2.csv` with a distance; empty where the file is missing.
     pub distances: Vec<DistancePoint>,
+    /// Its core points without one, world: the later epoch has no points in their cylinders.
+    pub without_distance: Vec<Point3<f64>>,
     /// `evaluation.json`, where truth is known.
     pub evaluation: Option<Evaluation>,
     /// `run.json`, where there is one.
@@ -90,6 +97,7 @@ impl ResultSet {
         stones.sort_by_key(|s| s.stone_id);
         let outlines = read_outlines(dir)?;
         let facade: Option<Facade> = read_json(&dir.join(FACADE))?;
+        let core = read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?;
         Ok(Self {
             facade: facade
                 .unwrap_or_else(|| facade_of(stones.iter().map(|s| (s.stone_id, s.centroid)), &outlines)),
@@ -99,7 +107,8 @@ impl ResultSet {
             pairs: (1..)
                 .take_while(|p| dir.join(PairFile::StonesParquet.name(*p)).exists())
                 .count(),
-            distances: read_distance_points(&dir.join(PairFile::M3c2Csv.name(pair)))?,
+            distances: core.distances,
+            without_distance: core.without_distance,
             evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
             run: read_json(&dir.join(RUN))?,
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
@@ -142,6 +151,17 @@ impl ResultSet {
         FaceFrame::from_normal(&self.normal(stone))
             .face_from_world()
             .transpose()
+    }
+
+    /// Whether a point, world, lies about as deep as the stone's face: not on what stands in front of the wall,
+    /// such as a railing, or behind its crest.
+    pub(crate) fn is_at_face(&self, stone: &StoneRow, p: &Point3<f64>) -> bool {
+        let normal = match self.outlines.get(&stone.stone_id) {
+            Some(outline) => outline.normal,
+            None => self.facade.frame_at(&stone.centroid).out,
+        };
+        let reach_m = (FACE_DEPTH_SIZES * stone.area_m2.sqrt()).max(LEAST_FACE_DEPTH_M);
+        normal.dot(&(p - stone.centroid)).abs() <= reach_m
     }
 
     /// Outline of a stone in the unrolled facade, metres; a square of its area where the outline is missing.

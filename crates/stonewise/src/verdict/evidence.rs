@@ -3,19 +3,13 @@
 use super::assess::assess;
 use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
+use super::lost::lost_stones;
 use crate::report_params::Language;
 use crate::results::records::{DatumState, EpochVerdict};
-use crate::results::{Joint, ResultSet, RowMotion, Status, StoneRow, compare, joints};
+use crate::results::{Joint, ResultSet, RowMotion, StoneRow, joints};
 use crate::thresholds::Thresholds;
 use nalgebra::{Point2, Vector3, center};
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
-
-/// A stone is well seen where so many photos and points show it and its points got this share of the votes.
-const WELL_SEEN_PHOTOS: u32 = 2;
-const WELL_SEEN_POINTS: u32 = 100;
-const WELL_SEEN_CONFIDENCE: f64 = 0.6;
-/// A stone whose surface is still within this distance, metres, is there: its mask is missing, not the stone.
-const STILL_THERE_M: f64 = 0.02;
 
 /// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
 /// `epochs`: their names.
@@ -42,12 +36,11 @@ pub(crate) fn verdict_on(
 }
 
 fn stones(results: &ResultSet) -> Vec<StoneCase> {
-    let on_stone = compare(results).on_stone;
     let tested = Tested::of(results);
-    let stone = |(stone, distance): (&StoneRow, &Option<f64>)| StoneCase {
+    let stone = |(stone, lost): (&StoneRow, bool)| StoneCase {
         stone_id: stone.stone_id,
         place: Point2::new(stone.along_m, stone.up_m),
-        lost: is_lost(stone, *distance),
+        lost,
         measured: stone.motion.as_ref().map(|motion| StoneMeasured {
             motion: Estimate {
                 vector: tested.motion(stone, motion),
@@ -62,17 +55,12 @@ fn stones(results: &ResultSet) -> Vec<StoneCase> {
             detection_limit_m: motion.detection_limit_m,
         }),
     };
-    results.stones.iter().zip(&on_stone).map(stone).collect()
-}
-
-/// Whether the first epoch shows the stone well and the later one its place without it; `distance_m`: M3C2 on
-/// the stone.
-fn is_lost(stone: &StoneRow, distance_m: Option<f64>) -> bool {
-    stone.status == Status::UnmatchedLost
-        && stone.photos >= WELL_SEEN_PHOTOS
-        && stone.points_1 >= WELL_SEEN_POINTS
-        && stone.confidence >= WELL_SEEN_CONFIDENCE
-        && distance_m.is_none_or(|d| d.abs() > STILL_THERE_M)
+    results
+        .stones
+        .iter()
+        .zip(lost_stones(results))
+        .map(stone)
+        .collect()
 }
 
 fn joint(results: &ResultSet, joint: &Joint) -> Option<JointCase> {
@@ -137,23 +125,6 @@ mod tests {
     fn judged(results: &ResultSet) -> EpochVerdict {
         let epochs = ["A".to_owned(), "B".to_owned()];
         verdict_on(results, epochs, false, &Thresholds::default(), Language::English)
-    }
-
-    #[test]
-    fn a_stone_is_lost_only_where_it_was_well_seen_and_its_surface_is_gone() {
-        let mut lost = StoneRow {
-            status: Status::UnmatchedLost,
-            photos: 3,
-            points_1: 500,
-            confidence: 0.9,
-            ..StoneRow::default()
-        };
-        assert!(is_lost(&lost, None) && is_lost(&lost, Some(-0.12)));
-        assert!(!is_lost(&lost, Some(0.004)));
-        lost.photos = 1;
-        assert!(!is_lost(&lost, None));
-        (lost.photos, lost.status) = (3, Status::UnmatchedUnseen);
-        assert!(!is_lost(&lost, None));
     }
 
     /// Results whose stones all made one more rigid motion, which the record tells or does not.

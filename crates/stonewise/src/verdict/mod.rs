@@ -11,6 +11,7 @@ mod evidence;
 mod interval;
 mod judged;
 mod limits;
+mod lost;
 mod sentence;
 #[cfg(test)]
 pub(crate) mod testing;
