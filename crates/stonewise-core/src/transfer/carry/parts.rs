@@ -13,9 +13,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Share of the points of a part that lie on the face of the whole, at least: its border lies elsewhere in
 /// every epoch, and a neighbour that reaches into the face is no part.
 const LEAST_SHARE: f64 = 0.6;
-/// Parts whose surfaces moved across the face by more than this against each other are not one stone, metres.
-/// Ten millimetres: two thirds of the typical motion of a loose stone, more than masks and noise shift the
-/// mean height of a part.
+/// Parts whose mean heights above the whole differ by more than this, metres, are not one stone: one of them
+/// moved. Ten millimetres: two thirds of the typical motion of a loose stone, and more than masks and noise
+/// shift the mean height of a part.
 const LARGEST_STEP_M: f64 = 0.01;
 
 /// A stone that may be in parts in another epoch.
@@ -43,7 +43,7 @@ pub struct JoinReport {
 ///
 /// A stone is a part if most of its points lie on the face of the whole. Two or more parts are joined if the
 /// whole is shown by more photos than any of them, the photos of its epoch that do not show it counted
-/// against it with `missed_weight`, and if their surfaces did not move across the face against each other.
+/// against it with `missed_weight`, and if their mean heights above the whole agree.
 /// Of several wholes that claim a part, the first has it. `stones`: those of the epoch.
 ///
 /// Cost: one pass over the tiles and one over those that change.

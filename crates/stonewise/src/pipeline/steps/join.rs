@@ -90,7 +90,7 @@ struct Matching<'a> {
 }
 
 impl Matching<'_> {
-    /// Stones of the first epoch about stones of the later one that have no partner.
+    /// Stones of the first epoch that may be the whole of later stones without a partner.
     fn whole_in_first(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
         let [first, later] = self.labelled;
         let alone = |s: &&Stone| self.report.unmatched_second.binary_search(&s.id).is_ok();
@@ -102,7 +102,7 @@ impl Matching<'_> {
             .collect()
     }
 
-    /// Stones of the later epoch about stones of the first one that have no partner.
+    /// Stones of the later epoch that may be the whole of first stones without a partner.
     fn whole_in_later(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
         let [first, later] = self.labelled;
         let outcomes = first.stones.iter().zip(&self.report.outcomes);
