@@ -15,6 +15,8 @@ const GONE_M: f64 = 0.03;
 /// A cylinder with less than this share of the later points that the wall around leads to expect sees no
 /// surface of its own, only the neighbours'.
 const POINT_SHARE: f64 = 0.5;
+/// One with less than this share only holds stray points, and sees nothing behind the stone's place either.
+const STRAY_SHARE: f64 = 0.1;
 /// Width of the border around a stone whose coverage tells a deep hole from a gap in the later clouds, metres.
 const AROUND_M: f64 = 0.15;
 /// Least share of the core points in this border that see a surface where the clouds have no gap.
@@ -146,27 +148,20 @@ impl Place {
     /// `wall_m`: distance of the wall around; `margin_m`: core points so far inside the outline see the stone
     /// alone; those half as far see it for the most part.
     fn is_empty(&self, wall_m: f64, margin_m: f64) -> bool {
+        // Not the median: a gap may take more than half of the border.
         let ratios = self.around.iter().flatten().map(|seen| seen.count_ratio);
-        let least_ratio = POINT_SHARE * Sorted::new(ratios).median().unwrap_or(0.0);
-        let sees_surface = |seen: &&Seen| seen.count_ratio >= least_ratio;
+        let expected = Sorted::new(ratios).quantile(0.75).unwrap_or(0.0);
+        let holds = |seen: &Seen, share: f64| seen.count_ratio >= share * expected;
+        let is_behind = |seen: &Seen| seen.distance_m < wall_m - GONE_M;
 
         let points = self.inner_points(margin_m);
-        let [all, behind, at_wall] = [
-            points.len(),
-            points
-                .iter()
-                .flatten()
-                .filter(|seen| seen.distance_m < wall_m - GONE_M)
-                .count(),
-            points
-                .iter()
-                .flatten()
-                .filter(|seen| seen.distance_m >= wall_m - GONE_M)
-                .filter(sees_surface)
-                .count(),
-        ];
+        let count = |is: &dyn Fn(&Seen) -> bool| points.iter().flatten().filter(|seen| is(seen)).count();
+        let all = points.len();
+        let behind = count(&|seen| is_behind(seen) && holds(seen, STRAY_SHARE));
+        let at_wall = count(&|seen| !is_behind(seen) && holds(seen, POINT_SHARE));
         let is_seen_through = behind as f64 >= SEEN_THROUGH_SHARE * all as f64;
-        let covered = self.around.iter().flatten().filter(sees_surface).count();
+        let covered = self.around.iter().flatten();
+        let covered = covered.filter(|seen| holds(seen, POINT_SHARE)).count();
         let is_covered = covered > 0 && covered as f64 >= COVERED_SHARE * self.around.len() as f64;
         all > 0 && 2 * at_wall <= all && (is_seen_through || is_covered)
     }
@@ -297,6 +292,13 @@ mod tests {
                 }
             }),
             "a hole beside a gap: the cloud shows what lies behind"
+        );
+        assert!(
+            !is_lost_with(&stones, |along, _| match (-0.1..0.5).contains(&along) {
+                true => Some((-0.04, 3)),
+                false => Some((0.0, 100)),
+            }),
+            "a gap with stray points"
         );
         assert!(!hole(0.0, Some(0.004), 0.0), "its surface is there");
         assert!(
