@@ -1,0 +1,55 @@
+//! What M3C2 shows of the wall as a whole.
+
+use super::place::Seen;
+use crate::results::{ResultSet, Sorted, StoneRow, compare};
+use nalgebra::{Point2, Point3, distance};
+
+/// The stones whose median distance is that of the wall around a place.
+const NEIGHBOURS: usize = 8;
+
+/// The core points of M3C2, world; `None`: one whose cylinder holds nothing of the later epoch.
+pub(super) fn core_points(results: &ResultSet) -> impl Iterator<Item = (Point3<f64>, Option<Seen>)> + '_ {
+    let with = results.distances.iter().map(|p| {
+        let seen = Seen {
+            distance_m: p.distance_m,
+            count_ratio: p.count_ratio.unwrap_or(1.0),
+        };
+        (p.position, Some(seen))
+    });
+    with.chain(results.without_distance.iter().map(|p| (*p, None)))
+}
+
+/// The measured stones with the M3C2 distances on them, and the usual number of later points.
+pub(super) struct Wall {
+    distances: Vec<(Point2<f64>, f64)>,
+    /// Median number of later points in a cylinder for each of the first epoch.
+    pub count_ratio: f64,
+}
+
+impl Wall {
+    pub(super) fn new(results: &ResultSet) -> Self {
+        let on_stone = compare(results).on_stone;
+        let distance = |(stone, distance_m): (&StoneRow, &Option<f64>)| {
+            let motion = stone.motion.as_ref().filter(|m| !m.loose);
+            Some((Point2::new(stone.along_m, stone.up_m), motion.and(*distance_m)?))
+        };
+        let stones = results.stones.iter().zip(&on_stone);
+        let ratios = core_points(results).filter_map(|(_, seen)| Some(seen?.count_ratio));
+        Self {
+            distances: stones.filter_map(distance).collect(),
+            count_ratio: Sorted::new(ratios).median().unwrap_or(0.0),
+        }
+    }
+
+    /// Median distance of the nearest stones, metres; zero where there is none.
+    pub(super) fn distance_m(&self, centre: &Point2<f64>) -> f64 {
+        let mut nearest: Vec<(f64, f64)> = self
+            .distances
+            .iter()
+            .map(|(place, distance_m)| (distance(place, centre), *distance_m))
+            .collect();
+        nearest.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let near = nearest.into_iter().take(NEIGHBOURS);
+        Sorted::new(near.map(|(_, d)| d)).median().unwrap_or(0.0)
+    }
+}
