@@ -1,6 +1,6 @@
 //! What M3C2 shows in a stone's place.
 
-use super::wall::Wall;
+use super::wall::{Seen, Wall};
 use crate::results::{ResultSet, Sorted};
 use nalgebra::{Point2, Vector2};
 use stonewise_core::geometry::RingIndex;
@@ -22,14 +22,6 @@ const SEEN_THROUGH_SHARE: f64 = 0.25;
 const EMPTY_SHARE: f64 = 0.2;
 /// Least share of the core points in the border that hold later points where these tell what to expect.
 const LEAST_AROUND: f64 = 0.25;
-
-/// What the cylinder of a core point holds of the later epoch.
-#[derive(Clone, Copy)]
-pub(super) struct Seen {
-    pub distance_m: f64,
-    /// Points for each of the first epoch.
-    pub count_ratio: f64,
-}
 
 /// What became of a stone's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,11 +1,18 @@
 //! What M3C2 shows of the wall as a whole.
 
-use super::place::Seen;
 use crate::results::{ResultSet, Sorted, StoneRow, compare};
 use nalgebra::{Point2, Point3, distance};
 
 /// The stones whose median distance is that of the wall around a place.
 const NEIGHBOURS: usize = 8;
+
+/// What the cylinder of a core point holds of the later epoch.
+#[derive(Clone, Copy)]
+pub(super) struct Seen {
+    pub distance_m: f64,
+    /// Points for each of the first epoch.
+    pub count_ratio: f64,
+}
 
 /// The core points of M3C2, world; `None`: one whose cylinder holds nothing of the later epoch.
 pub(super) fn core_points(results: &ResultSet) -> impl Iterator<Item = (Point3<f64>, Option<Seen>)> + '_ {
