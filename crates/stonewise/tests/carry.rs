@@ -128,6 +128,27 @@ fn a_stone_that_one_epoch_shows_divided_is_one() {
 }
 
 #[test]
+fn a_stone_that_the_second_of_three_epochs_shows_whole_is_one_in_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let project = survey(&folder.path().join("survey"), a_line_divides_the_wall);
+    let text = fs::read_to_string(&project).unwrap();
+    let mut tables = text.split("[[epochs]]");
+    let [head, whole, divided] = [(); 3].map(|()| tables.next().unwrap());
+    let again = divided.replacen("name = \"", "name = \"again ", 1);
+    let epochs = [head, divided, whole, &again].join("\n[[epochs]]");
+    fs::write(&project, epochs).unwrap();
+    let out = folder.path().join("out");
+    stones(&project, &out, true);
+    let joined_in = |epoch: usize| -> Vec<String> {
+        let audit = fs::read_to_string(out.join(format!("audit_epoch{epoch}.csv"))).unwrap();
+        let lines = audit.lines().filter(|l| l.starts_with("joined_parts"));
+        lines.map(str::to_owned).collect()
+    };
+    assert!(!joined_in(1).is_empty());
+    assert_eq!(joined_in(1), joined_in(3));
+}
+
+#[test]
 fn stones_in_the_dark_are_measured_by_their_surface() {
     let folder = tempfile::tempdir().unwrap();
     let project = survey(&folder.path().join("survey"), right_half_is_dark);

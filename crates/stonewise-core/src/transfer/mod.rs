@@ -40,8 +40,8 @@ mod vote;
 
 pub use audit::AuditEvent;
 pub use carry::{
-    CarriedStone, CarryParams, CarryReport, JoinReport, NotCarried, PlacedShape, StoneShape, Whole,
-    carry_labels, join_parts, photos_facing, stone_shapes,
+    CarriedStone, CarryParams, CarryReport, JoinReport, Joined, NotCarried, PlacedShape, Shown, StoneShape,
+    Whole, carry_labels, join_parts, photos_facing, stone_shapes,
 };
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
 pub use election::Election;

@@ -13,6 +13,6 @@ mod tests;
 
 pub use carry_labels::{CarriedStone, CarryReport, NotCarried, PlacedShape, carry_labels};
 pub use params::CarryParams;
-pub use parts::{JoinReport, Whole, join_parts};
+pub use parts::{JoinReport, Joined, Shown, Whole, join_parts};
 pub use photos_facing::photos_facing;
 pub use stone_shape::{StoneShape, stone_shapes};

@@ -9,7 +9,7 @@ pub struct CarryParams {
     /// Whether stones that one epoch shows are looked for in the clouds of others, where the detector missed
     /// them, and joined, where it divided them. Epochs with masks stay as they are.
     pub enabled: bool,
-    /// Largest mean distance, across the face, between the surfaces of both epochs in a cell of 3 cm, metres,
+    /// Largest mean distance, perpendicular to the face, between the surfaces of both epochs in a cell of 3 cm, metres,
     /// after the motion of the neighbours. 0.03: more than the motion of most loose stones, less than the
     /// depth of the hole that a lost stone leaves.
     pub max_height_m: f64,

@@ -10,30 +10,46 @@ use crate::stone::Stone;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Share of the points of a part that lie on the face of the whole, at least: its border lies elsewhere in
-/// every epoch, and a neighbour that reaches into the face is no part.
+/// Least share of the points of a part that lie on the face of the whole: not all, because outlines differ from
+/// epoch to epoch, and so many that a neighbour that overlaps the face is no part.
 const LEAST_SHARE: f64 = 0.6;
 /// Parts whose mean heights above the whole differ by more than this, metres, are not one stone: one of them
 /// moved. Ten millimetres: two thirds of the typical motion of a loose stone, and more than masks and noise
 /// shift the mean height of a part.
 const LARGEST_STEP_M: f64 = 0.01;
 
+/// How many photos of an epoch show a stone as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Photos that show it.
+    pub photos: u32,
+    /// Photos that face its place and do not show it.
+    pub missed: u32,
+}
+
 /// A stone that may be in parts in another epoch.
 #[derive(Clone, Copy, Debug)]
 pub struct Whole<'a> {
     /// Where the other epoch should have it.
     pub placed: PlacedShape<'a>,
-    /// Photos of its epoch that show it.
-    pub photos: u32,
-    /// Photos of its epoch that face its place and do not show it.
-    pub missed: u32,
+    /// By the photos of its epoch.
+    pub shown: Shown,
+}
+
+/// A stone made of parts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Joined {
+    /// The one with most points on the face first: the stone has its number.
+    pub parts: Vec<StoneId>,
+    /// By the photos of the epoch that shows it as a whole.
+    pub shown: Shown,
 }
 
 /// What was joined in an epoch.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JoinReport {
-    /// The parts of each new stone, the one with most points first: it keeps its number.
-    pub joined: Vec<Vec<StoneId>>,
+    /// The new stones.
+    pub joined: Vec<Joined>,
     /// Tiles whose labels differ now.
     pub tiles: BTreeSet<usize>,
 }
@@ -44,7 +60,7 @@ pub struct JoinReport {
 /// A stone is a part if most of its points lie on the face of the whole. Two or more parts are joined if the
 /// whole is shown by more photos than any of them, the photos of its epoch that do not show it counted
 /// against it with `missed_weight`, and if their mean heights above the whole agree.
-/// Of several wholes that claim a part, the first has it. `stones`: those of the epoch.
+/// A whole that claims a part of an earlier whole joins nothing. `stones`: those of the epoch.
 ///
 /// Cost: one pass over the tiles and one over those that change.
 ///
@@ -68,7 +84,10 @@ pub fn join_parts<T: TileSource, S: LabelStore>(
         let is_taken = parts.iter().any(|p| numbers.contains_key(&p.0));
         if let Some(main) = parts.first().filter(|_| !is_taken) {
             numbers.extend(parts.iter().map(|p| (p.0, main.0)));
-            joined.push(parts);
+            joined.push(Joined {
+                parts,
+                shown: whole.shown,
+            });
         }
     }
     let mut changed = BTreeSet::new();
@@ -163,8 +182,8 @@ fn parts(
         .iter()
         .filter_map(|(id, _)| stones.get(id))
         .map(|s| s.photos);
-    let against = f64::from(most.max().unwrap_or(0)) + missed_weight * f64::from(whole.missed);
-    let is_one = parts.len() >= 2 && high - low <= LARGEST_STEP_M && f64::from(whole.photos) > against;
+    let against = f64::from(most.max().unwrap_or(0)) + missed_weight * f64::from(whole.shown.missed);
+    let is_one = parts.len() >= 2 && high - low <= LARGEST_STEP_M && f64::from(whole.shown.photos) > against;
     match is_one {
         true => parts.iter().map(|(id, _)| **id).collect(),
         false => Vec::new(),

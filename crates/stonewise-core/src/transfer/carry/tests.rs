@@ -237,8 +237,7 @@ fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport
             shape: &shapes[&StoneId(2)],
             shift,
         },
-        photos,
-        missed,
+        shown: Shown { photos, missed },
     };
     let (tiles, truth, labels) = epoch(shift, |s| if s == 1 { step } else { 0.0 }, |_| true);
     let truth = truth.concat();
@@ -259,11 +258,10 @@ fn joined(step: f64, parts: [u32; 2], [photos, missed]: [u32; 2]) -> (JoinReport
 fn parts_of_a_stone_that_more_photos_show_whole_become_one() {
     let (report, found, truth) = joined(0.004, [4, 5], [6, 2]);
     assert_eq!(report.joined.len(), 1, "the second whole finds no parts left");
-    let number = report.joined[0][0].0;
-    assert_eq!(
-        BTreeSet::from([1, 2]),
-        report.joined[0].iter().map(|s| s.0).collect()
-    );
+    let Joined { parts, shown } = &report.joined[0];
+    let number = parts[0].0;
+    assert_eq!(BTreeSet::from([1, 2]), parts.iter().map(|s| s.0).collect());
+    assert_eq!(*shown, Shown { photos: 6, missed: 2 });
     assert_eq!(report.tiles.len(), 2);
     for (found, truth) in found.iter().zip(&truth) {
         let expected = if matches!(truth, 1 | 2) { number } else { *truth };

@@ -19,41 +19,60 @@ use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
 use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
 use stonewise_core::transfer::{
-    AuditEvent, JoinReport, PlacedShape, StoneInstances, Transfer, Whole, join_parts, photos_facing,
+    AuditEvent, JoinReport, Joined, PlacedShape, Shown, StoneInstances, Transfer, Whole, join_parts,
+    photos_facing,
 };
 
 /// What the step says about the stones that it joined.
 const REPORT: &str = "report.json";
 
-/// Joins the parts of stones that another epoch shows whole: first those of the first epoch, then those of
-/// the later ones.
+/// Joins parts in the first epoch, by the stones of later epochs, then in each later epoch, by those of the
+/// first.
 pub fn join(context: &Context, photos: &[Segmented], mut labelled: Vec<Labelled>) -> Result<Vec<Labelled>> {
     let epochs = &context.project.epochs;
     if !context.project.settings.carry.enabled || epochs.iter().all(|e| e.masks.is_some()) {
         return Ok(labelled);
     }
+    let steepest = context.project.settings.label.max_incidence_rad;
     let mut into_first = Vec::new();
-    let mut into_later = Vec::new();
     for number in 2..=labelled.len() {
-        let name = format!("join-match-{number}");
-        let report = match_in(context, &name, &labelled[0], &labelled[number - 1])?;
-        let steepest = context.project.settings.label.max_incidence_rad;
-        let wall = Matching {
-            labelled: [&labelled[0], &labelled[number - 1]],
-            numbers: [1, number],
-            report: &report,
-        };
-        into_first.extend(wall.whole_in_later(&photos[number - 1], steepest));
-        into_later.push((number, wall.whole_in_first(&photos[0], steepest)));
+        let report = match_in(
+            context,
+            &format!("join-match-{number}"),
+            &labelled[0],
+            &labelled[number - 1],
+        )?;
+        let matching = Matching::new(&labelled, number, &report);
+        into_first.extend(matching.whole_in_later(&photos[number - 1], steepest));
     }
-    join_into(context, 1, photos, &mut labelled, into_first)?;
-    for (number, asked) in into_later {
+    let in_first = join_into(context, 1, photos, &mut labelled, into_first)?;
+    // A stone that was divided alike in the first and a later epoch had partners before.
+    let name = match in_first.is_empty() {
+        true => "join-match",
+        false => "join-match-again",
+    };
+    let shown: BTreeMap<StoneId, Shown> = in_first
+        .iter()
+        .filter_map(|joined| Some((*joined.parts.first()?, joined.shown)))
+        .collect();
+    for number in 2..=labelled.len() {
+        let report = match_in(
+            context,
+            &format!("{name}-{number}"),
+            &labelled[0],
+            &labelled[number - 1],
+        )?;
+        let matching = Matching::new(&labelled, number, &report);
+        let mut asked = matching.whole_in_first(&photos[0], steepest);
+        for stone in &mut asked {
+            stone.shown = *shown.get(&stone.stone).unwrap_or(&stone.shown);
+        }
         join_into(context, number, photos, &mut labelled, asked)?;
     }
     Ok(labelled)
 }
 
-/// A stone whose parts are looked for in another epoch.
+/// A stone that another epoch may show in parts.
 #[derive(Clone, Debug, Serialize)]
 struct Asked {
     /// The epoch that shows it, from 1.
@@ -62,9 +81,8 @@ struct Asked {
     outward: Vector3<f64>,
     /// How its surroundings moved from that epoch to the other.
     shift: Vector3<f64>,
-    photos: u32,
-    /// Photos of its epoch that face its place and do not show it.
-    missed: u32,
+    /// By the photos of the epoch that shows it as a whole: that epoch, or the one that it was joined by.
+    shown: Shown,
 }
 
 impl Asked {
@@ -75,8 +93,10 @@ impl Asked {
             stone: stone.id,
             outward: stone.normal,
             shift,
-            photos: stone.photos,
-            missed: facing.saturating_sub(stone.photos),
+            shown: Shown {
+                photos: stone.photos,
+                missed: facing.saturating_sub(stone.photos),
+            },
         }
     }
 }
@@ -89,7 +109,15 @@ struct Matching<'a> {
     report: &'a MatchReport,
 }
 
-impl Matching<'_> {
+impl<'a> Matching<'a> {
+    fn new(labelled: &'a [Labelled], number: usize, report: &'a MatchReport) -> Self {
+        Self {
+            labelled: [&labelled[0], &labelled[number - 1]],
+            numbers: [1, number],
+            report,
+        }
+    }
+
     /// Stones of the first epoch that may be the whole of later stones without a partner.
     fn whole_in_first(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
         let [first, later] = self.labelled;
@@ -121,22 +149,23 @@ impl Matching<'_> {
     }
 }
 
-/// Whether a stone is near enough to be a part of another that moved by `shift`, and smaller.
+/// Whether a stone is near enough to be a part of another that moved by `shift`, and smaller: within 1.4 sizes
+/// (square roots of the area), where the ends of a stone lie that is eight times as long as high.
 fn may_be_part(part: &Stone, whole: &Stone, shift: &Vector3<f64>) -> bool {
     let apart_m = (whole.centroid + shift - part.centroid).norm();
-    part.area_m2 < whole.area_m2 && apart_m * apart_m < whole.area_m2
+    part.area_m2 < whole.area_m2 && apart_m * apart_m < 2.0 * whole.area_m2
 }
 
-/// Joins the parts that an epoch has of stones of other epochs.
+/// Joins the parts that an epoch has of stones of other epochs; returns the new stones.
 fn join_into(
     context: &Context,
     number: usize,
     photos: &[Segmented],
     labelled: &mut Vec<Labelled>,
     asked: Vec<Asked>,
-) -> Result<()> {
+) -> Result<Vec<Joined>> {
     if asked.is_empty() || context.project.epochs[number - 1].masks.is_some() {
-        return Ok(());
+        return Ok(Vec::new());
     }
     let missed_weight = context.project.settings.label.missed_weight;
     let sources: BTreeSet<usize> = asked.iter().map(|a| a.from).collect();
@@ -158,8 +187,7 @@ fn join_into(
             };
             Some(Whole {
                 placed,
-                photos: a.photos,
-                missed: a.missed,
+                shown: a.shown,
             })
         });
         let report = join_parts(
@@ -174,8 +202,8 @@ fn join_into(
         write_json(&step.file(REPORT), &report)
     })?;
     let report: JoinReport = read_json(&step.file(REPORT))?;
-    if report.tiles.is_empty() {
-        return Ok(());
+    if report.joined.is_empty() {
+        return Ok(Vec::new());
     }
     let own = labelled.remove(number - 1);
     let mut store = own.store;
@@ -191,15 +219,15 @@ fn join_into(
     let photos = &photos[number - 1];
     let tabulated = tabulate(context, number, "stones-joined", photos, own.ingested, labels)?;
     labelled.insert(number - 1, tabulated);
-    Ok(())
+    Ok(report.joined)
 }
 
-/// The instances of stones, those of joined parts with the stone that they are now.
+/// The instances of each stone in photos; those of joined parts are those of the new stone.
 fn joined(transfer: Transfer, report: &JoinReport) -> Transfer {
     let new = report
         .joined
         .iter()
-        .filter_map(|parts| Some((parts, *parts.first()?)));
+        .filter_map(|joined| Some((&joined.parts, *joined.parts.first()?)));
     let of_part = new.flat_map(|(parts, number)| parts.iter().map(move |part| (*part, number)));
     let number: BTreeMap<StoneId, StoneId> = of_part.collect();
     let mut instances: BTreeMap<StoneId, Vec<_>> = BTreeMap::new();
@@ -213,8 +241,8 @@ fn joined(transfer: Transfer, report: &JoinReport) -> Transfer {
         StoneInstances { stone, instances }
     });
     let mut audit = transfer.audit;
-    audit.extend(report.joined.iter().map(|parts| AuditEvent::JoinedParts {
-        stones: parts.clone(),
+    audit.extend(report.joined.iter().map(|joined| AuditEvent::JoinedParts {
+        stones: joined.parts.clone(),
     }));
     Transfer {
         stones: stones.collect(),
