@@ -29,10 +29,10 @@ impl Default for OutlineParams {
     }
 }
 
-/// Share of the points that an outline encloses at least, or gaps are closed that are wider.
+/// Share of the points that an outline must enclose; if it encloses fewer, wider gaps are closed.
 const ENCLOSED: f64 = 0.9;
 /// How often the width of the gaps that are closed is doubled at most: up to 24 point spacings on either
-/// side, or a railing's bar of 20 cm in a cloud with a point every 4 mm.
+/// side, or a railing's bar of 19 cm in a cloud with a point every 4 mm.
 const DOUBLINGS: u32 = 3;
 /// A piece with a smaller share of the points is a speck: points of another stone or of plants.
 const SPECK: f64 = 0.05;
@@ -178,8 +178,8 @@ fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     hull
 }
 
-/// The simplest polygon within the tolerance that is still simple; the ring itself where simplifying breaks
-/// it.
+/// The ring simplified by Douglas-Peucker. Where the result crosses itself, the tolerance is halved, up to three
+/// times; the ring itself where that is not enough.
 fn simplify_ring(ring: Vec<Point2<f64>>, tolerance: f64) -> Vec<Point2<f64>> {
     let mut tolerance = tolerance;
     for _ in 0..4 {
@@ -296,17 +296,17 @@ mod tests {
         );
     }
 
-    /// A face of 1.6 x 1.2, its lower part of `low`, and a bar in front of it.
-    fn face_behind_a_bar(n: usize, bar: f64, low: f64) -> Vec<Point2<f64>> {
-        let behind = |p: &Point2<f64>| (p.y + 0.6 - low).abs() < bar / 2.0;
-        scatter(n, 6, |p| p.x.abs() < 0.8 && p.y.abs() < 0.6 && !behind(p))
+    /// A face of 1.6 x 1.2 behind a bar whose middle lies `middle` above its lower edge.
+    fn face_behind_a_bar(n: usize, bar: f64, middle: f64) -> Vec<Point2<f64>> {
+        let is_hidden = |p: &Point2<f64>| (p.y + 0.6 - middle).abs() < bar / 2.0;
+        scatter(n, 6, |p| p.x.abs() < 0.8 && p.y.abs() < 0.6 && !is_hidden(p))
     }
 
     #[test]
     fn a_bar_divides_a_face_but_not_its_outline() {
         let params = OutlineParams::default();
-        for low in [0.3, 0.9] {
-            let points = face_behind_a_bar(8000, 0.2, low);
+        for middle in [0.3, 0.9] {
+            let points = face_behind_a_bar(8000, 0.2, middle);
             let pieces = outlines(&points, &params);
             let areas: Vec<f64> = pieces.iter().map(|r| signed_area(r)).collect();
             assert_eq!(areas.len(), 2);

@@ -11,8 +11,8 @@ use super::wall::Wall;
 const STONE_PX: [f32; 2] = [18.0, 90.0];
 
 impl Wall {
-    /// Takes the mortar out of a wall: fieldstones of one quarry between gaps that are deep and dark. The
-    /// stones of an arch keep their order, other walls mostly become rubble.
+    /// Takes the mortar out of a wall: rough stones that differ little in tone, between deep, dark gaps. The
+    /// stones of an arch keep their order and size; four in five other walls become rubble.
     pub(super) fn lay_dry(&mut self, rng: &mut Rng) {
         if !matches!(self.bond, Bond::Row { .. }) {
             self.stone_px = self.stone_px.min(log_between(rng, STONE_PX[0], STONE_PX[1]));
@@ -28,7 +28,7 @@ impl Wall {
             missing: between(rng, 0.0, 0.03),
             ..StoneShape::random(rng, true)
         };
-        // Soil or nothing lies in the gaps; both are dark.
+        // Soil or nothing lies in the gaps: darker than the stone, and darker still by their depth.
         let stone = self.material.colours.first().copied().unwrap_or([0.3; 3]);
         self.mortar = Mortar {
             colour: scaled(stone, between(rng, 0.3, 0.9)),

@@ -1,4 +1,4 @@
-//! Everything that is drawn for a photo.
+//! Everything that is chosen at random for a photo.
 
 use super::camera::Camera;
 use super::dirt::Dirt;
@@ -9,10 +9,10 @@ use super::scene::{Layer, random_layers};
 use super::view::Viewpoint;
 use std::f32::consts::FRAC_PI_2;
 
-/// Most things in front of a wall.
+/// Largest number of single objects in front of a wall; carvings come on top.
 const MAX_OBJECTS: usize = 4;
 
-/// Everything that is drawn for a photo, but for the single stones and the noise.
+/// Everything that is chosen at random for a photo except the single stones and the noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MasonryStyle {
     /// What is where, from back to front.
@@ -33,7 +33,7 @@ impl MasonryStyle {
         Self::drawn(seed, width, height, false)
     }
 
-    /// The same photo with walls laid dry: small rubble without mortar between dark, deep gaps.
+    /// As [`Self::random`], with the walls laid dry: mostly small rubble without mortar, between dark, deep gaps.
     pub fn dry(seed: u64, width: u32, height: u32) -> Self {
         Self::drawn(seed, width, height, true)
     }

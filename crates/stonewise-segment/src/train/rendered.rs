@@ -5,9 +5,9 @@ use crate::Sample;
 use crate::seed::mix;
 use crate::synth::{MasonryStyle, Survey, masonry_photo_of};
 
-/// One photo in so many shows walls laid dry.
+/// One photo in this many shows walls laid dry.
 const DRY_EVERY: u64 = 4;
-/// Number of the stream of seeds that says which.
+/// Number mixed into a photo's seed to decide whether it is one of them.
 const DRY_STREAM: u64 = 1;
 
 /// Masonry photos without end, rendered when they are needed.
@@ -17,7 +17,7 @@ pub struct Rendered {
     pub seed: u64,
     /// Edge of the photos, pixels.
     pub size_px: u32,
-    /// Photos with the relief that a cloud would give them; two of five have none.
+    /// Whether photos have the relief that a cloud would give them; two in five have none even so.
     pub relief: bool,
 }
 

@@ -43,7 +43,7 @@ pub struct AdjustmentParams {
     /// fewest with a finite variance.
     pub tie_freedom: f64,
     /// Share of a point's noise that no number of points averages away (range bias, drift of a scan line or
-    /// strip): added across the face to every stone's uncertainty. 0.05: 0.1 mm of a scanner's 2 mm.
+    /// strip): added perpendicular to the face to every stone's uncertainty. 0.05: 0.1 mm of a scanner's 2 mm.
     pub systematic_share: f64,
     /// A motion with a direction less certain than this, metres, is reported as not observable. 0.02: more
     /// than loose stones move.

@@ -11,7 +11,7 @@ const NOISE_SAMPLES: usize = 300;
 /// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
 /// mixed pixels and what hangs in front of the stone.
 const DEPTH_TAIL: f64 = 0.02;
-/// Noise levels by which the depth of a stone is widened: the noise of four points in 100,000 is larger.
+/// Noise levels by which the depth of a stone is widened: normal noise exceeds it in three points in 100,000 on either side.
 const DEPTH_NOISES: f64 = 4.0;
 /// How much farther than its neighbours' shift a stone may be followed into points without its label, metres:
 /// twice the typical motion of a loose stone.
@@ -19,9 +19,9 @@ const REACH_M: f64 = 0.03;
 /// The median of |a - b| in standard deviations of a, for two values of a normal variable.
 const MEDIAN_DIFFERENCE: f64 = 0.954;
 
-/// The part of a stone's face that both epochs show, about its centroid in the first. In the second it moves
-/// with the stone: were it put where the stone is thought to be, the points' edge would pull the stone's
-/// motion away from there, by as much as the thought was wrong in noisy clouds.
+/// The part of a stone's face that both epochs show, about its centroid in the first. In the second epoch it
+/// moves with the stone: a window fixed at the predicted place would cut the points there, and the cut edge
+/// would bias the motion, in noisy clouds by as much as the prediction is wrong.
 #[derive(Clone, Debug)]
 pub struct Window {
     face_from_world: Matrix3<f64>,
@@ -29,7 +29,7 @@ pub struct Window {
     rings: [RingIndex; 2],
     /// Width of the border along the inside of the rings.
     border_m: f64,
-    /// Lowest and highest place across the face.
+    /// Lowest and highest place, perpendicular to the face, metres.
     depth: [f64; 2],
 }
 

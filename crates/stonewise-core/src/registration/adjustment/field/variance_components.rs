@@ -13,7 +13,7 @@ pub struct VarianceComponents {
     /// it (tilt). The prior holds for each stone separately: a gradient common to n stones has a standard
     /// deviation of strain / sqrt(n), which is 1.6 mm per metre for a strain of 0.02 and 150 stones.
     pub strain: [f64; 2],
-    /// A stone's own translation beside the common field, across the face, metres.
+    /// A stone's own translation beside the common field, perpendicular to the face, metres.
     pub own_m: f64,
     /// Error of a stone's motion in the face that no number of its points averages away, metres: relief finer
     /// than the points lie, mixed pixels, the mix of stations. Locked stones cannot slide, so what they seem

@@ -1,6 +1,6 @@
 //! Less weight for what a stone's slopes say than for what its heights say.
 //!
-//! A motion across the face is seen by every point; a motion in it only where the face is steep, at rims and
+//! A motion perpendicular to the face is seen by every point; a motion in it only where the face is steep, at rims and
 //! edges, where points err more: mixed pixels, the beam's footprint, relief finer than the cells of the
 //! surface. [`super::correlation`] measures by how much.
 
