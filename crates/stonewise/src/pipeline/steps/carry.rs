@@ -1,6 +1,6 @@
 //! Stones that the detector missed in one epoch, from the epochs that show them.
 //!
-//! A stone that is not detected is not necessarily gone: the detector misses one stone in five. A stone of
+//! A stone that is not detected is not necessarily gone: the detector misses one stone in seven. A stone of
 //! one epoch without a partner in another is therefore looked for in the other's cloud, where its neighbours
 //! predict it. This step comes after the vote of the photos and before edits by hand, which can overrule it.
 //! Epochs with masks stay as they are.
