@@ -17,7 +17,7 @@ before(async () => {
   browser = await launch();
   if (given) return;
   folder = mkdtempSync(join(tmpdir(), "stonewise-report-"));
-  execFileSync("cargo", ["build", "-q", "-p", "stonewise", "--example", "sample_report"], { cwd: root, stdio: "inherit" });
+  execFileSync("cargo", ["build", "-q", "-p", "stonewise-report", "--example", "sample_report"], { cwd: root, stdio: "inherit" });
   const target = process.env["CARGO_TARGET_DIR"] ?? join(root, "target");
   for (const stones of [200, 10_000]) {
     execFileSync(join(target, "debug/examples/sample_report"), [String(stones), join(folder, String(stones))]);

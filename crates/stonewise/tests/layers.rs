@@ -6,22 +6,11 @@
 mod module_graph;
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 9] = [
-    &[
-        "figure",
-        "report_params",
-        "simulate_error",
-        "sources",
-        "stable",
-        "thresholds",
-        "warnings",
-    ],
-    &["error", "settings"],
-    &["address_space", "files", "kept", "limits", "part"],
-    &["init", "results", "storage"],
-    &["edits", "export", "segmentation", "simulate", "texts", "truth"],
-    &["project", "verdict"],
-    &["check", "output", "parameters", "report", "split"],
+const LAYERS: [&[&str]; 6] = [
+    &["kept", "truth"],
+    &["storage"],
+    &["segmentation", "simulate"],
+    &["output"],
     &["pipeline"],
     &["experiment"],
 ];

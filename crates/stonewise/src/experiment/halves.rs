@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::project::{Epoch, Project};
-use crate::split::split;
+use crate::split;
 use crate::storage::step::Key;
 use crate::storage::store::StepStore;
 use stonewise_core::progress::Progress;

@@ -118,7 +118,7 @@ fn push_visibility(table: &mut Table, truths: &[StoneTruth], seen: &[Seen]) -> R
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::testing::check_csv_metadata;
+    use crate::testing::check_csv_metadata;
 
     #[test]
     fn the_metadata_describe_every_column() {

@@ -71,7 +71,7 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::testing::{registration_record, rows};
+    use crate::testing::{registration_record, rows};
     use nalgebra::{Matrix3, Matrix6, Vector3};
     use stonewise_core::geometry::Rigid3;
     use stonewise_core::id::StoneId;

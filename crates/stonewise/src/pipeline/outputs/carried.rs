@@ -76,7 +76,7 @@ fn write_rows(csv: &Path, epochs: &[&str], attempts: &[CarryAttempt]) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::testing::check_csv_metadata;
+    use crate::testing::check_csv_metadata;
     use stonewise_core::id::StoneId;
 
     #[test]

@@ -28,7 +28,7 @@ pub(super) fn mean_motion(adjustment: &AdjustmentRecord, datum: &Datum) -> Strin
 mod tests {
     use super::*;
     use crate::results::records::{DatumState, EstimatorRecord};
-    use crate::results::testing::registration_record;
+    use crate::testing::registration_record;
     use nalgebra::{Matrix6, Point3};
 
     #[test]

@@ -1,0 +1,71 @@
+//! Small files of text and JSON, whole or not at all.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+
+/// Makes the folder for the results, where it is not there yet.
+///
+/// # Errors
+/// It cannot be made.
+pub fn create_results_folder(folder: &Path) -> Result<()> {
+    fs::create_dir_all(folder).map_err(|error| Error::Input {
+        path: folder.to_path_buf(),
+        message: format!("cannot create the results folder ({error}): give another one with --out"),
+    })
+}
+
+/// Writes a text file.
+///
+/// # Errors
+/// It cannot be written.
+pub fn write_text(path: &Path, text: &str) -> Result<()> {
+    stonewise_io::atomic::write_atomically(path, |partial| fs::write(partial, text))
+        .map_err(Error::io("writing", path))
+}
+
+/// Reads a file as it is.
+///
+/// # Errors
+/// It cannot be read.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(Error::io("reading", path))
+}
+
+/// Writes JSON for a later step, in one line.
+///
+/// # Errors
+/// The value is none that JSON can hold; the file cannot be written.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    write_text(path, &serde_json::to_string(value).map_err(no_json(path))?)
+}
+
+/// Writes JSON that people read too.
+///
+/// # Errors
+/// The value is none that JSON can hold; the file cannot be written.
+pub fn write_readable_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(no_json(path))?;
+    write_text(path, &(text + "\n"))
+}
+
+/// Reads what an earlier step wrote.
+///
+/// # Errors
+/// The file cannot be read, or holds something else.
+pub fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T> {
+    let text = fs::read_to_string(path).map_err(Error::io("reading", path))?;
+    serde_json::from_str(&text).map_err(|e| Error::Input {
+        path: path.to_path_buf(),
+        message: format!("damaged ({e}); remove its folder"),
+    })
+}
+
+fn no_json(path: &Path) -> impl FnOnce(serde_json::Error) -> Error {
+    let path = path.to_path_buf();
+    move |e| Error::Input {
+        path,
+        message: format!("cannot be written as JSON ({e})"),
+    }
+}

@@ -1,0 +1,15 @@
+//! What results, report, project and pipeline share: errors, warnings, messages, parameters, small files.
+
+pub mod address_space;
+pub mod error;
+pub mod files;
+pub mod limits;
+pub mod messages;
+mod parameters;
+pub mod part;
+pub mod report_params;
+pub mod settings;
+pub mod simulate_error;
+pub mod stable;
+pub mod thresholds;
+pub mod warnings;

@@ -1,0 +1,15 @@
+//! What a run says, in each language.
+
+mod braces;
+mod doubts;
+pub mod findings;
+mod message;
+pub mod notices;
+mod translation;
+
+pub use braces::fill;
+pub use doubts::{
+    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, STRETCHED, TORN, TURNED,
+};
+pub use message::Message;
+pub use translation::message_in;

@@ -1,0 +1,74 @@
+//! `[report]` of the project file: what the first page of the report says about who measured with what.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// What the first page of the report shows beside the results.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ReportParams {
+    /// Who measured. Default: nothing is shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operator: Option<String>,
+    /// With which instruments. Default: nothing is shown.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instruments: Option<String>,
+    /// Number of the report in the operator's or the authority's files. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_number: Option<String>,
+    /// A PNG or JPEG picture for the first page. Default: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub logo: Option<PathBuf>,
+    /// Language of the verdict and of the first page.
+    pub language: Language,
+}
+
+/// A language of the texts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Language {
+    /// English.
+    #[default]
+    #[serde(rename = "en")]
+    English,
+    /// German.
+    #[serde(rename = "de")]
+    German,
+}
+
+impl Language {
+    /// The tag of BCP 47.
+    pub fn tag(self) -> &'static str {
+        match self {
+            Self::English => "en",
+            Self::German => "de",
+        }
+    }
+}
+
+/// Largest logo, bytes: it is part of every report.
+const MAX_LOGO_BYTES: u64 = 1_000_000;
+
+/// The media type of a logo.
+///
+/// # Errors
+/// It is neither a PNG nor a JPEG, or is too large; the text says what to do.
+pub fn logo_type(path: &Path) -> Result<&'static str, String> {
+    let extension = path
+        .extension()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    let kind = match extension.as_str() {
+        "png" => "image/png",
+        "jpg" | "jpeg" => "image/jpeg",
+        _ => return Err(format!("{} is neither .png nor .jpg", path.display())),
+    };
+    let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+    if bytes > MAX_LOGO_BYTES {
+        return Err(format!(
+            "{} is larger than 1 MB: give a smaller picture",
+            path.display()
+        ));
+    }
+    Ok(kind)
+}

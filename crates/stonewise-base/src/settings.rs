@@ -1,0 +1,151 @@
+//! Every parameter of every step.
+
+use crate::report_params::ReportParams;
+use crate::stable::StableArea;
+use crate::thresholds::Thresholds;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use stonewise_core::change::M3c2Params;
+use stonewise_core::evaluate::EvaluationParams;
+use stonewise_core::matching::MatchParams;
+use stonewise_core::registration::observers::EpochErrorParams;
+use stonewise_core::registration::photos::PhotoParams;
+use stonewise_core::registration::{AdjustmentParams, GicpParams};
+use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
+use stonewise_segment::tiling::TilingOptions;
+
+/// How stones are found in photos without masks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SegmentParams {
+    /// The detector: `built-in`, or a file that `stonewise train` wrote.
+    pub model: PathBuf,
+    /// How photos are cut into tiles.
+    pub tiling: TilingOptions,
+}
+
+impl Default for SegmentParams {
+    fn default() -> Self {
+        Self {
+            model: PathBuf::from("built-in"),
+            tiling: TilingOptions::default(),
+        }
+    }
+}
+
+/// Parameters of all steps, one table each in the project file.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Settings {
+    /// How clouds are cut.
+    #[serde(alias = "tiles")]
+    pub ingest: IngestParams,
+    /// Stones in photos without masks.
+    pub segment: SegmentParams,
+    /// Photo labels to points.
+    #[serde(alias = "transfer")]
+    pub label: TransferParams,
+    /// The table of stones.
+    pub stones: StoneParams,
+    /// Stones that the detector missed in one epoch, from others.
+    pub carry: CarryParams,
+    /// Stones across epochs.
+    #[serde(alias = "matching")]
+    pub r#match: MatchParams,
+    /// One motion per stone.
+    pub registration: RegistrationParams,
+    /// Comparison along normals.
+    pub m3c2: M3c2Params,
+    /// Scoring against a known motion.
+    #[serde(alias = "evaluation")]
+    pub evaluate: EvaluationParams,
+    /// Which motions call for attention, and which for an alarm.
+    pub thresholds: Thresholds,
+    /// The first page of the report.
+    pub report: ReportParams,
+}
+
+/// Tables of the project file by the names that they had, with the names of today; both are read.
+pub const RENAMED: [(&str, &str); 5] = [
+    ("tiles", "ingest"),
+    ("transfer", "label"),
+    ("matching", "match"),
+    ("evaluation", "evaluate"),
+    ("registration.network", "registration.adjustment"),
+];
+
+/// How clouds are cut into tiles.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IngestParams {
+    /// Edge of a tile, metres. 4 m keeps offsets exact to a micrometre and a dense tile under 20 MB.
+    pub size_m: f64,
+}
+
+impl Default for IngestParams {
+    fn default() -> Self {
+        Self { size_m: 4.0 }
+    }
+}
+
+/// How the motion of a stone is measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Estimator {
+    /// All stones together, each sharing with its neighbours as much as the noise demands.
+    #[default]
+    #[serde(alias = "network")]
+    Adjustment,
+    /// Each stone by itself with its surroundings, by plane-to-plane ICP: the paper's way.
+    Gicp,
+}
+
+/// Which estimator measures the stones, and its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegistrationParams {
+    /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move
+    /// singly.
+    pub estimator: Estimator,
+    /// Standard deviation of the registration of an epoch, per axis, metres, as the user states it; 0 states
+    /// that there is none. Absent: not stated, and without stable areas uncertainties hold for motions
+    /// against the common motion of the stones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub epoch_error_m: Option<f64>,
+    /// Areas that did not move between the epochs: what they seem to have done is the error of the epochs'
+    /// registration. It is reported apart and enters absolute uncertainty. Default: none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stable: Vec<StableArea>,
+    /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false, because
+    /// clouds alone do not show whether ground and rock kept their place.
+    pub auto_stable: bool,
+    /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its
+    /// place and not by its label. 3: farther inside, noise does not change a label; with 0 (labels alone)
+    /// the whole wall of a UAV survey seems to move by 1 to 2 mm.
+    pub border_noises: f64,
+    /// Parameters of the adjustment of all stones together.
+    #[serde(alias = "network")]
+    pub adjustment: AdjustmentParams,
+    /// Stones tracked from photo to photo, as part of the adjustment.
+    pub photos: PhotoParams,
+    /// Parameters of plane-to-plane ICP.
+    pub gicp: GicpParams,
+    /// How the errors of stations, strips and whole epochs are found.
+    pub observers: EpochErrorParams,
+}
+
+impl Default for RegistrationParams {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::default(),
+            epoch_error_m: None,
+            stable: Vec::new(),
+            auto_stable: false,
+            border_noises: 3.0,
+            adjustment: AdjustmentParams::default(),
+            photos: PhotoParams::default(),
+            gicp: GicpParams::default(),
+            observers: EpochErrorParams::default(),
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Can the masks be read, and are there some for every photo?
+
+use super::finding::{Finding, Verdict};
+use super::photos::{PosedPhoto, some};
+use crate::Epoch;
+use rayon::prelude::*;
+use stonewise_base::error::{Error, Result};
+use stonewise_base::messages::findings::{BROKEN_MASKS, MASKS, NO_MASK_FITS, WITHOUT_MASKS};
+use stonewise_core::progress::Progress;
+use stonewise_io::masks::MaskSource;
+
+/// What a photo's masks are like.
+enum Masks {
+    There,
+    Missing(String),
+    /// Photo, and why they cannot be used.
+    Broken(String, String),
+}
+
+/// Decodes the masks of every photo that is there, as a run will.
+///
+/// # Errors
+/// The file or folder of masks cannot be read; the caller stopped it.
+pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress) -> Result<Vec<Finding>> {
+    let Some(file) = &epoch.masks else {
+        return Ok(Vec::new());
+    };
+    let source = MaskSource::open(file)?;
+    // That no photo is there is said elsewhere.
+    if photos.is_empty() {
+        return Ok(Vec::new());
+    }
+    let of_photo = |(view, path): &PosedPhoto| {
+        progress.check()?;
+        let size = (view.camera.width, view.camera.height);
+        let masks = match source.labels_for(&path.to_string_lossy(), size.0, size.1) {
+            Ok(Some(_)) => Masks::There,
+            Ok(None) => Masks::Missing(view.name.clone()),
+            Err(error) => Masks::Broken(view.name.clone(), error.to_string()),
+        };
+        Ok::<_, Error>(masks)
+    };
+    let masks = photos.par_iter().map(of_photo).collect::<Result<Vec<_>>>()?;
+    let file = file.to_string_lossy();
+    let finding = |verdict, text| Finding::new(&epoch.name, MASKS.english, verdict, text);
+    let (mut found, mut missing, mut broken) = (Vec::new(), Vec::new(), Vec::new());
+    let mut there = 0;
+    for masks in masks {
+        match masks {
+            Masks::There => there += 1,
+            Masks::Missing(photo) => missing.push(photo),
+            Masks::Broken(photo, reason) => broken.push((photo, reason)),
+        }
+    }
+    if there == 0 && broken.is_empty() {
+        let text = NO_MASK_FITS.say(&[("file", &*file)]);
+        return Ok(vec![finding(Verdict::Unreadable, text)]);
+    }
+    if let Some((_, reason)) = broken.first() {
+        let photos: Vec<String> = broken.iter().map(|(photo, _)| photo.clone()).collect();
+        let text = BROKEN_MASKS.say(&[("photos", &*some(&photos)), ("reason", reason)]);
+        let verdict = match there {
+            0 => Verdict::Unreadable,
+            _ => Verdict::Doubt,
+        };
+        found.push(finding(verdict, text));
+    }
+    if !missing.is_empty() {
+        let text = WITHOUT_MASKS.say(&[("file", &*file), ("photos", &*some(&missing))]);
+        found.push(finding(Verdict::Doubt, text));
+    }
+    if found.is_empty() {
+        found.push(finding(Verdict::Fine, format!("there for every photo ({there})")));
+    }
+    Ok(found)
+}

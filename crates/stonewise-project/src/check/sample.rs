@@ -1,0 +1,142 @@
+//! The clouds of an epoch, as far as a look needs them.
+
+use super::Depth;
+use super::unreadable::Unreadable;
+use crate::Epoch;
+use nalgebra::Point3;
+use std::collections::HashMap;
+use std::path::Path;
+use stonewise_base::error::Result;
+use stonewise_base::messages::findings::CLOUDS;
+use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_io::cloud::{CloudError, cloud_info, read_cloud};
+
+/// Points of an epoch that are looked at, quickly and fully.
+const POINTS: [u64; 2] = [500_000, 6_000_000];
+/// Points read at a time.
+const CHUNK: usize = 250_000;
+/// Edge of the cells in which the density of points is counted, metres.
+const CELL_M: f64 = 0.05;
+
+/// What is known of an epoch's clouds.
+pub(super) struct Sample {
+    /// Box around all points.
+    pub bounds: Option<Bounds>,
+    /// Number of points.
+    pub records: u64,
+    /// The first points of each cloud.
+    pub points: Vec<Point3<f64>>,
+    /// Distance between neighbours on the surface, metres.
+    pub spacing_m: Option<f64>,
+    /// Coordinate systems, as the clouds name them; `None` where one names none.
+    pub crs: Vec<Option<String>>,
+}
+
+impl Sample {
+    /// Whether every point was read.
+    pub fn is_whole(&self) -> bool {
+        self.points.len() as u64 >= self.records
+    }
+
+    /// Adds a cloud and the first `left` of its points.
+    fn add(&mut self, path: &Path, mut left: usize) -> Result<()> {
+        let info = cloud_info(path)?;
+        self.records += info.records;
+        self.crs.push(info.crs);
+        if let Some(bounds) = info.bounds {
+            self.bounds = Some(self.bounds.map_or(bounds, |b| b.union(&bounds)));
+        }
+        let read = read_cloud(path, CHUNK, |chunk| {
+            let taken = left.min(chunk.positions.len());
+            self.points.extend_from_slice(&chunk.positions[..taken]);
+            left -= taken;
+            if left == 0 { Err(Stop::Enough) } else { Ok(()) }
+        });
+        match read {
+            Ok(_) | Err(Stop::Enough) => Ok(()),
+            Err(Stop::Failed(error)) => Err(error.into()),
+        }
+    }
+}
+
+/// Reads what is needed of an epoch's clouds; `None` where one of them cannot be read.
+///
+/// # Errors
+/// At quick depth, a cloud cannot be read.
+pub(super) fn sample(epoch: &Epoch, depth: Depth, unreadable: &mut Unreadable) -> Result<Option<Sample>> {
+    let mut sample = Sample {
+        bounds: None,
+        records: 0,
+        points: Vec::new(),
+        spacing_m: None,
+        crs: Vec::new(),
+    };
+    let points = POINTS[usize::from(depth == Depth::Full)];
+    let share = points / epoch.clouds.len().max(1) as u64;
+    let mut is_whole = true;
+    for path in &epoch.clouds {
+        let read = sample.add(path, share as usize);
+        is_whole &= unreadable.keep(epoch, &CLOUDS, read)?.is_some();
+    }
+    sample.spacing_m = spacing(&sample.points);
+    Ok(is_whole.then_some(sample))
+}
+
+/// Why reading ends before the end of the file.
+enum Stop {
+    Enough,
+    Failed(CloudError),
+}
+
+impl From<CloudError> for Stop {
+    fn from(error: CloudError) -> Self {
+        Self::Failed(error)
+    }
+}
+
+/// Median distance between neighbours on a surface: the root of the area that each point of a cell has for
+/// itself.
+fn spacing(points: &[Point3<f64>]) -> Option<f64> {
+    let mut cell_m = CELL_M;
+    // Sparser clouds are counted in larger cells.
+    for _ in 0..8 {
+        let mut counts: HashMap<[i64; 3], u32> = HashMap::new();
+        for p in points {
+            *counts.entry(cell_of(p, cell_m)).or_default() += 1;
+        }
+        // Sorted, so that the map's order does not matter.
+        let mut counts: Vec<u32> = counts.into_values().collect();
+        counts.sort_unstable();
+        // The cell of the usual point, not the usual cell: sparse surroundings take much room.
+        let half = points.len() as u64 / 2;
+        let mut passed = 0;
+        let median = counts.iter().copied().find(|n| {
+            passed += u64::from(*n);
+            passed >= half
+        })?;
+        if median >= 6 {
+            return Some(cell_m / f64::from(median).sqrt());
+        }
+        cell_m *= 2.0;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spacing_of_a_grid_is_found() {
+        for step in [0.004, 0.011, 0.03] {
+            let side = (2.0 / step) as i32;
+            let grid = (0..side).flat_map(|i| (0..side).map(move |j| (f64::from(i), f64::from(j))));
+            let points: Vec<_> = grid
+                .map(|(i, j)| Point3::new(1.0 + i * step, 0.01, j * step))
+                .collect();
+            let found = spacing(&points).unwrap();
+            assert!((found / step - 1.0).abs() < 0.15, "{step}: {found}");
+        }
+        assert_eq!(spacing(&[]), None);
+    }
+}

@@ -1,0 +1,273 @@
+//! A project file from what lies in a folder.
+
+mod epoch;
+mod listing;
+
+use epoch::{CLOUDS, Found, MASKS, look};
+use listing::{files, folders, is_made_by_stonewise, name};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::{Error, Result};
+use stonewise_base::files::write_text;
+
+/// What [`init()`] wrote, and why.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Initialised {
+    /// The project file.
+    pub path: PathBuf,
+    /// What was chosen for each epoch, and what was left out with the reason, one line each.
+    pub lines: Vec<String>,
+}
+
+/// Names of folders that hold no survey.
+const NO_EPOCHS: [&str; 7] = [
+    "truth",
+    "results",
+    "report",
+    "evidence",
+    "work",
+    "previous",
+    "unfinished",
+];
+
+/// Names of masks in a line at most.
+const NAMES: usize = 4;
+
+/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in
+/// order of name.
+///
+/// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that
+/// stonewise made, and those of truth, are left out. An existing file is not overwritten.
+///
+/// ```
+/// # let survey = tempfile::tempdir()?;
+/// # for epoch in ["2024", "2025"] {
+/// #     std::fs::create_dir(survey.path().join(epoch))?;
+/// #     std::fs::write(survey.path().join(epoch).join("wall.xyz"), "1 2 3\n")?;
+/// # }
+/// let made = stonewise_project::init(survey.path())?;
+/// let text = std::fs::read_to_string(&made.path)?;
+/// assert_eq!(text.matches("[[epochs]]").count(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// There is a project file; no folder holds a cloud; a folder cannot be read.
+pub fn init(dir: &Path) -> Result<Initialised> {
+    let path = dir.join("stonewise.toml");
+    if path.exists() {
+        return Err(Error::Input {
+            path,
+            message: "there is a project file already; remove it to start anew".into(),
+        });
+    }
+    let mut lines = Vec::new();
+    let mut epochs = Vec::new();
+    for folder in folders(dir)? {
+        let folder_name = name(&folder);
+        if folder.ends_with(MASKS) {
+            continue;
+        }
+        if NO_EPOCHS.contains(&folder_name.as_str()) {
+            lines.push(format!("left out: {folder_name}/ (by its name no epoch)"));
+        } else if is_made_by_stonewise(&folder) {
+            lines.push(format!("left out: {folder_name}/ (stonewise made it)"));
+        } else {
+            let found = look(dir, &folder)?;
+            match found.clouds.is_empty() {
+                true => lines.push(format!("left out: {folder_name}/ (no point cloud in it)")),
+                false => epochs.push(found),
+            }
+        }
+    }
+    if epochs.is_empty() {
+        let message = format!(
+            "no folder with a point cloud ({}) in it; make one folder per epoch",
+            CLOUDS.join(", ")
+        );
+        return Err(Error::Input {
+            path: dir.to_path_buf(),
+            message,
+        });
+    }
+    epoch::agree_on_sensor(&mut epochs);
+    for epoch in &epochs {
+        lines.extend(epoch.lines());
+    }
+    lines.extend(unused_masks(dir, &epochs)?);
+    write_text(&path, &project_text(dir, &epochs))?;
+    Ok(Initialised { path, lines })
+}
+
+/// Says which masks beside the epochs were not taken; those of an epoch's name are named with the epoch.
+fn unused_masks(dir: &Path, epochs: &[Found]) -> Result<Option<String>> {
+    let folder = dir.join(MASKS);
+    if !folder.is_dir() {
+        return Ok(None);
+    }
+    let mut unused = [files(&folder)?, folders(&folder)?].concat();
+    unused.retain(|path| !epochs.iter().any(|epoch| epoch.is_mask(path)));
+    let names: Vec<String> = unused.iter().take(NAMES).map(|p| name(p)).collect();
+    let more = match unused.len().saturating_sub(NAMES) {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    let why = "masks/EPOCH.json or masks/EPOCH/ would be taken, with the name of an epoch's folder";
+    Ok((!names.is_empty()).then(|| format!("left out: {}{more} in {MASKS}/ ({why})", names.join(", "))))
+}
+
+fn project_text(dir: &Path, epochs: &[Found]) -> String {
+    let name = dir
+        .canonicalize()
+        .ok()
+        .and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
+    let mut text = String::from("# Paths are relative to this file. Parameters: docs/src/project-file.md.\n");
+    let _ = writeln!(
+        text,
+        "[project]\nname = {}",
+        quoted(&name.unwrap_or_else(|| "dam".into()))
+    );
+    for epoch in epochs {
+        let _ = writeln!(text, "\n[[epochs]]\nname = {}", quoted(&epoch.name));
+        let _ = writeln!(text, "clouds = {}", quoted_list(&epoch.clouds));
+        if !epoch.other_clouds.is_empty() {
+            let others = quoted_list(&epoch.other_clouds);
+            let _ = writeln!(text, "# clouds = {others}   # of another sensor");
+        }
+        for (key, found, what) in [
+            ("images", &epoch.images, "folder of the photos"),
+            (
+                "cameras",
+                &epoch.cameras,
+                "Metashape XML, COLMAP folder or OpenSfM json",
+            ),
+            ("masks", &epoch.masks, "COCO json or folder of 16-bit label PNGs"),
+        ] {
+            let _ = match found {
+                Some(path) => writeln!(text, "{key} = {}", quoted(&path.to_string_lossy())),
+                None => writeln!(text, "# {key} = \"...\"   # not found: {what}"),
+            };
+        }
+    }
+    if epochs.len() == 1 {
+        text.push_str("\n# A second [[epochs]] is needed.\n");
+    }
+    text
+}
+
+/// A TOML string.
+pub(crate) fn quoted(text: &str) -> String {
+    toml::Value::String(text.replace('\\', "/")).to_string()
+}
+
+fn quoted_list(paths: &[PathBuf]) -> String {
+    let all: Vec<String> = paths.iter().map(|p| quoted(&p.to_string_lossy())).collect();
+    format!("[{}]", all.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn survey(files: &[&str]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = dir.path().join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "x").unwrap();
+        }
+        dir
+    }
+
+    fn written(files: &[&str]) -> (String, String) {
+        let dir = survey(files);
+        let done = init(dir.path()).unwrap();
+        (fs::read_to_string(done.path).unwrap(), done.lines.join("\n"))
+    }
+
+    #[test]
+    fn folders_of_results_and_truth_are_no_epochs_and_are_named() {
+        let (text, lines) = written(&[
+            "2024/wall.laz",
+            "2025/wall.laz",
+            "truth/wall.laz",
+            "out/work/marker.json",
+            "out/epoch1/wall.laz",
+            "old/run.json",
+            "old/stones.csv",
+            "old/epoch1/wall.laz",
+            "notes/a.txt.bak",
+        ]);
+        assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
+        for left in [
+            "truth/",
+            "out/ (stonewise made it)",
+            "old/ (stonewise made it)",
+            "notes/ (no point cloud",
+        ] {
+            assert!(lines.contains(&format!("left out: {left}")), "{left}: {lines}");
+        }
+        assert!(lines.contains("2024: clouds 2024/wall.laz"), "{lines}");
+    }
+
+    #[test]
+    fn one_sensor_is_chosen_for_all_epochs_and_the_other_is_offered() {
+        let (text, lines) = written(&[
+            "a/cloud_tls.laz",
+            "a/cloud_uav.laz",
+            "b/cloud_uav.laz",
+            "c/cloud_tls.laz",
+            "c/cloud_uav.laz",
+        ]);
+        assert!(
+            text.contains("\nclouds = [\"a/cloud_uav.laz\"]")
+                && text.contains("# clouds = [\"a/cloud_tls.laz\"]")
+        );
+        assert!(
+            lines.contains("left out: a/cloud_tls.laz (another sensor"),
+            "{lines}"
+        );
+        let (text, _) = written(&["a/cloud_tls.laz", "a/cloud_uav.laz", "b/x_TLS.laz", "b/x_uav.laz"]);
+        assert!(
+            text.contains("\nclouds = [\"a/cloud_tls.laz\"]")
+                && text.contains("\nclouds = [\"b/x_TLS.laz\"]")
+        );
+    }
+
+    #[test]
+    fn two_flights_are_taken_by_the_folder_above_them() {
+        let (text, _) = written(&[
+            "a/photos/flight1/1.jpg",
+            "a/photos/flight2/2.jpg",
+            "a/x.laz",
+            "b/flight/1.jpg",
+            "b/masks/1.png",
+            "b/scans/day 1/x.laz",
+        ]);
+        assert!(text.contains("images = \"a/photos\""), "{text}");
+        assert!(
+            text.contains("images = \"b/flight\"") && text.contains("masks = \"b/masks\""),
+            "{text}"
+        );
+        assert!(text.contains("b/scans/day 1/x.laz"), "{text}");
+    }
+
+    #[test]
+    fn masks_beside_the_epochs_are_found_by_their_name() {
+        let (text, _) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/b/1.png"]);
+        assert!(
+            text.contains("masks = \"masks/a.json\"") && text.contains("masks = \"masks/b\""),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn masks_are_left_out_only_where_no_epoch_took_them() {
+        let (_, lines) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/b/1.png"]);
+        assert!(!lines.contains("left out"), "{lines}");
+        let (text, lines) = written(&["a/x.laz", "b/x.laz", "masks/a.json", "masks/wall_b.json"]);
+        assert!(text.contains("masks = \"masks/a.json\""), "{text}");
+        assert!(lines.contains("left out: wall_b.json in masks/ ("), "{lines}");
+    }
+}

@@ -1,0 +1,14 @@
+//! The project file: which surveys, and every parameter of every step; how it comes about, and whether its surveys are sound.
+
+pub mod check;
+pub mod edits;
+mod init;
+mod project_file;
+mod project_parameters;
+mod project_type;
+pub mod sources;
+mod split;
+
+pub use init::{Initialised, init};
+pub use project_type::{Epoch, Project};
+pub use split::{Halves, SPLIT_FILES, split};

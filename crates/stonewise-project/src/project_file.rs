@@ -1,0 +1,580 @@
+//! How a project file is read and checked.
+
+use super::{Epoch, Project};
+use crate::edits::EditsFile;
+use crate::sources::SourceRule;
+use serde::Deserialize;
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::{Error, Result};
+use stonewise_base::limits::impossible;
+use stonewise_base::report_params::{ReportParams, logo_type};
+use stonewise_base::settings::{IngestParams, RENAMED, RegistrationParams, SegmentParams, Settings};
+use stonewise_base::thresholds::Thresholds;
+use stonewise_core::change::M3c2Params;
+use stonewise_core::evaluate::{EvaluationParams, MotionField};
+use stonewise_core::matching::MatchParams;
+use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
+use stonewise_io::cameras::MapFrame;
+use stonewise_io::crs::MapSystem;
+use stonewise_segment::Weights;
+use toml::Spanned;
+use toml::value::Datetime;
+
+/// What to do about backslashes.
+const SLASHES: &str = "use / or single quotes in paths";
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawProject {
+    project: RawHeader,
+    epochs: Vec<RawEpoch>,
+    #[serde(default, alias = "tiles")]
+    ingest: IngestParams,
+    #[serde(default)]
+    segment: SegmentParams,
+    #[serde(default, alias = "transfer")]
+    label: TransferParams,
+    #[serde(default)]
+    stones: StoneParams,
+    #[serde(default)]
+    carry: CarryParams,
+    #[serde(default, alias = "matching")]
+    r#match: MatchParams,
+    #[serde(default)]
+    registration: RegistrationParams,
+    #[serde(default)]
+    m3c2: M3c2Params,
+    #[serde(default, alias = "evaluation")]
+    evaluate: EvaluationParams,
+    #[serde(default)]
+    thresholds: Thresholds,
+    #[serde(default)]
+    report: ReportParams,
+    edits: Option<RawEdits>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEdits {
+    file: Spanned<PathBuf>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawHeader {
+    name: Spanned<String>,
+    reference: Option<Spanned<String>>,
+    crs: Option<Spanned<String>>,
+    #[serde(default)]
+    false_origin: [f64; 3],
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEpoch {
+    name: Spanned<String>,
+    date: Option<Spanned<Datetime>>,
+    #[serde(default)]
+    conditions: BTreeMap<String, f64>,
+    clouds: Spanned<Vec<Spanned<PathBuf>>>,
+    images: Spanned<PathBuf>,
+    cameras: Spanned<PathBuf>,
+    masks: Option<Spanned<PathBuf>>,
+    motion: Option<MotionField>,
+    #[serde(default)]
+    sources: SourceRule,
+    same_survey_as: Option<Spanned<String>>,
+}
+
+impl Project {
+    /// Reads and checks a project file.
+    ///
+    /// ```
+    /// use stonewise_project::Project;
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("stonewise.toml");
+    /// # for file in ["a.laz", "b.laz", "cameras.xml"] {
+    /// #     std::fs::write(folder.path().join(file), "")?;
+    /// # }
+    /// std::fs::write(&path, r#"
+    ///     [project]
+    ///     name = "Lower dam"
+    ///     [[epochs]]
+    ///     name = "2024"
+    ///     clouds = ["a.laz"]
+    ///     images = "."
+    ///     cameras = "cameras.xml"
+    ///     [[epochs]]
+    ///     name = "2025"
+    ///     clouds = ["b.laz"]
+    ///     images = "."
+    ///     cameras = "cameras.xml"
+    /// "#)?;
+    /// let project = Project::read(&path)?;
+    /// assert_eq!(project.epochs[1].name, "2025");
+    /// assert_eq!(project.settings.ingest.size_m, 4.0);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// With the line: a key that is not known, a file that does not exist, a value that cannot be.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::read_with(path, 2)
+    }
+
+    /// The same for a project that may have a single epoch, which is to be split.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_for_split(path: &Path) -> Result<Self> {
+        Self::read_with(path, 1)
+    }
+
+    fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
+        let path = &project_file(path);
+        let text = project_text(path)?;
+        let source = Source { path, text: &text };
+        let raw: RawProject = toml::from_str(&text).map_err(|e| source.not_toml(&e))?;
+        if raw.epochs.len() < least_epochs {
+            let at = text.find("[[epochs]]").unwrap_or(0);
+            return Err(source.error(
+                at..at,
+                format!("{least_epochs} [[epochs]] at least are needed, in time order"),
+            ));
+        }
+        let settings = Settings {
+            ingest: raw.ingest,
+            segment: source.segment(raw.segment)?,
+            label: raw.label,
+            stones: raw.stones,
+            carry: raw.carry,
+            r#match: raw.r#match,
+            registration: raw.registration,
+            m3c2: raw.m3c2,
+            evaluate: raw.evaluate,
+            thresholds: raw.thresholds,
+            report: source.report(raw.report)?,
+        };
+        source.check_settings(&settings)?;
+        let map = source.map_frame(&raw.project)?;
+        source.check_names(&raw.epochs)?;
+        source.check_dates(&raw.epochs)?;
+        let mut epochs = Vec::new();
+        for epoch in raw.epochs {
+            epochs.push(source.epoch(epoch, &map, &epochs)?);
+        }
+        let mut notes = renamed_keys(&text);
+        if let Some(name) = &raw.project.reference {
+            notes.extend(source.put_reference_first(name, &mut epochs)?);
+        }
+        let edits = raw.edits.map(|edits| source.edits(edits, &epochs)).transpose()?;
+        Ok(Self {
+            path: path.to_path_buf(),
+            name: raw.project.name.into_inner(),
+            epochs,
+            settings,
+            notes,
+            edits,
+            part: None,
+        })
+    }
+
+    /// Name of the structure in a project file that need not be valid otherwise.
+    pub fn name_in(path: &Path) -> Option<String> {
+        let text = fs::read_to_string(path).ok()?;
+        let table: toml::Table = toml::from_str(&text).ok()?;
+        Some(table.get("project")?.get("name")?.as_str()?.to_owned())
+    }
+}
+
+/// One sentence for each table or value that still has its former name.
+fn renamed_keys(text: &str) -> Vec<String> {
+    let Ok(file) = text.parse::<toml::Table>() else {
+        return Vec::new();
+    };
+    let at = |path: &str| {
+        let mut names = path.split('.');
+        let first = file.get(names.next()?)?;
+        names.try_fold(first, |value, name| value.get(name))
+    };
+    let mut notes: Vec<String> = RENAMED
+        .iter()
+        .filter(|(old, _)| at(old).is_some())
+        .map(|(old, new)| format!("[{old}] is now called [{new}]; both names work"))
+        .collect();
+    if at("registration.estimator").and_then(toml::Value::as_str) == Some("network") {
+        notes.push("estimator = \"network\" is now called \"adjustment\"; both names work".to_owned());
+    }
+    notes
+}
+
+/// The project file itself, where a folder is given.
+fn project_file(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join("stonewise.toml")
+    } else {
+        path.to_path_buf()
+    }
+}
+
+/// What the project file holds.
+fn project_text(path: &Path) -> Result<String> {
+    if !path.exists() {
+        return Err(Error::NoProject {
+            path: path.to_path_buf(),
+        });
+    }
+    let bytes = fs::read(path).map_err(Error::io("reading the project file", path))?;
+    String::from_utf8(bytes).map_err(|e| {
+        let (valid, _) = e.as_bytes().split_at(e.utf8_error().valid_up_to());
+        Error::Project {
+            path: path.to_path_buf(),
+            line: valid.iter().filter(|b| **b == b'\n').count() + 1,
+            message: "a character that is not in UTF-8: save the project file as UTF-8".to_owned(),
+        }
+    })
+}
+
+/// The text of a project file, to point into.
+struct Source<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl Source<'_> {
+    fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        let line = self.text.get(..span.start).unwrap_or("").matches('\n').count() + 1;
+        Error::Project {
+            path: self.path.to_path_buf(),
+            line,
+            message: message.into(),
+        }
+    }
+
+    fn map_frame(&self, header: &RawHeader) -> Result<MapFrame> {
+        if let Some(crs) = &header.crs {
+            MapSystem::parse(crs.get_ref()).map_err(|reason| {
+                let message = format!("crs: {reason}; give a WKT or a code such as \"EPSG:25832\"");
+                self.error(crs.span(), message)
+            })?;
+        }
+        Ok(MapFrame {
+            crs: header.crs.as_ref().map(|crs| crs.get_ref().clone()),
+            false_origin: header.false_origin,
+        })
+    }
+
+    /// `earlier`: the epochs before it.
+    fn epoch(&self, raw: RawEpoch, map: &MapFrame, earlier: &[Epoch]) -> Result<Epoch> {
+        if raw.clouds.get_ref().is_empty() {
+            return Err(self.error(raw.clouds.span(), "an epoch needs one cloud at least"));
+        }
+        if raw.name.get_ref().trim().is_empty() {
+            return Err(self.error(raw.name.span(), "an epoch needs a name"));
+        }
+        let clouds = raw.clouds.into_inner();
+        Ok(Epoch {
+            name: raw.name.into_inner(),
+            date: raw.date.map(|d| d.into_inner().to_string()),
+            conditions: raw.conditions,
+            clouds: clouds
+                .into_iter()
+                .map(|c| self.existing(c))
+                .collect::<Result<_>>()?,
+            images: self.existing(raw.images)?,
+            cameras: self.existing(raw.cameras)?,
+            masks: raw.masks.map(|m| self.existing(m)).transpose()?,
+            motion: raw.motion,
+            map: map.clone(),
+            sources: raw.sources,
+            same_survey_as: raw
+                .same_survey_as
+                .map(|name| self.earlier(&name, earlier))
+                .transpose()?,
+        })
+    }
+
+    /// Moves the named epoch to the front; a note where that changes the numbers of epochs.
+    fn put_reference_first(&self, name: &Spanned<String>, epochs: &mut [Epoch]) -> Result<Option<String>> {
+        let Some(at) = epochs.iter().position(|e| e.name == *name.get_ref()) else {
+            let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+            let message = format!("reference must name an epoch: {}", names.join(", "));
+            return Err(self.error(name.span(), message));
+        };
+        for epoch in epochs.iter_mut() {
+            epoch.same_survey_as = epoch.same_survey_as.map(|same| match same.cmp(&at) {
+                Ordering::Less => same + 1,
+                Ordering::Equal => 0,
+                Ordering::Greater => same,
+            });
+        }
+        epochs[..=at].rotate_right(1);
+        // An epoch names an earlier one; the reference now comes before that one.
+        if let Some(same) = epochs[0].same_survey_as.take()
+            && let Some(twin) = epochs.get_mut(same)
+        {
+            twin.same_survey_as = Some(0);
+        }
+        let note = || {
+            let numbered = epochs.iter().zip(1..).map(|(e, n)| format!("{n} {}", e.name));
+            let numbered: Vec<String> = numbered.collect();
+            format!(
+                "motions count from epoch {:?}; in the results the epochs are numbered {}",
+                name.get_ref(),
+                numbered.join(", ")
+            )
+        };
+        Ok((at > 0).then(note))
+    }
+
+    /// The index of the epoch of that name.
+    fn earlier(&self, name: &Spanned<String>, earlier: &[Epoch]) -> Result<usize> {
+        let found = earlier.iter().position(|e| e.name == *name.get_ref());
+        found.ok_or_else(|| {
+            let names: Vec<&str> = earlier.iter().map(|e| e.name.as_str()).collect();
+            let message = format!("same_survey_as must name an earlier epoch: {}", names.join(", "));
+            self.error(name.span(), message)
+        })
+    }
+
+    /// The detector's file, like all paths, is relative to the project file.
+    fn segment(&self, mut params: SegmentParams) -> Result<SegmentParams> {
+        let at = |key: &str| self.text.find(key).unwrap_or(0);
+        if let Weights::File(file) = Weights::named(&params.model) {
+            let start = at("model");
+            params.model = self.existing(Spanned::new(start..start, file))?;
+        }
+        if let Some((key, what)) = params.tiling.impossible() {
+            return Err(self.error(at(key)..at(key), format!("{key} {what}")));
+        }
+        Ok(params)
+    }
+
+    /// The edits by hand, whose file is read at once: a mistake in it is one of the project.
+    fn edits(&self, raw: RawEdits, epochs: &[Epoch]) -> Result<EditsFile> {
+        let edits = EditsFile::read(&self.existing(raw.file)?)?;
+        let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+        edits.check_epochs(&names)?;
+        Ok(edits)
+    }
+
+    /// The logo, like all paths, is relative to the project file.
+    fn report(&self, mut params: ReportParams) -> Result<ReportParams> {
+        if let Some(logo) = params.logo {
+            let start = self.text.find("logo").unwrap_or(0);
+            let path = self.existing(Spanned::new(start..start, logo))?;
+            if let Err(reason) = logo_type(&path) {
+                return Err(self.error(start..start, format!("logo: {reason}")));
+            }
+            params.logo = Some(path);
+        }
+        Ok(params)
+    }
+
+    /// What the reader of TOML says, with the fix where it is a usual slip.
+    fn not_toml(&self, error: &toml::de::Error) -> Error {
+        let span = error.span().unwrap_or(0..0);
+        let message = error.message().trim().replace('\n', "; ");
+        let start = self
+            .text
+            .get(..span.start)
+            .unwrap_or("")
+            .rfind('\n')
+            .map_or(0, |i| i + 1);
+        let line = self.text.get(start..).unwrap_or("").lines().next().unwrap_or("");
+        let fix = match line.split_once('=') {
+            Some((key, value))
+                if message.contains("expected a sequence") && value.trim().starts_with(['"', '\'']) =>
+            {
+                format!(": write it as a list: {} = [{}]", key.trim(), value.trim())
+            }
+            _ if message.contains("escape") => format!(": {SLASHES}"),
+            _ => String::new(),
+        };
+        self.error(span, message + &fix)
+    }
+
+    /// The path relative to the project file, which must exist.
+    fn existing(&self, raw: Spanned<PathBuf>) -> Result<PathBuf> {
+        if raw.get_ref().to_string_lossy().contains(char::is_control) {
+            return Err(self.error(raw.span(), format!("a path with control characters: {SLASHES}")));
+        }
+        let path = self.path.parent().unwrap_or(Path::new("")).join(raw.get_ref());
+        if path.exists() {
+            return Ok(path);
+        }
+        Err(self.error(
+            raw.span(),
+            format!(
+                "no such file or folder: {} (paths are relative to the project file)",
+                path.display()
+            ),
+        ))
+    }
+
+    /// Names of epochs stand in tables and layers: no two may be alike.
+    fn check_names(&self, epochs: &[RawEpoch]) -> Result<()> {
+        for (number, epoch) in epochs.iter().enumerate() {
+            let name = epoch.name.get_ref().trim();
+            if epochs[..number].iter().any(|e| e.name.get_ref().trim() == name) {
+                let message =
+                    format!("two epochs are named {name:?}: give each its own name, such as its date");
+                return Err(self.error(epoch.name.span(), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Epochs must be in time order, because motions count from the first one by default.
+    fn check_dates(&self, epochs: &[RawEpoch]) -> Result<()> {
+        let dated = epochs.iter().filter_map(|epoch| {
+            let date = epoch.date.as_ref()?;
+            Some((epoch, date.span(), date.get_ref().date?))
+        });
+        let dated: Vec<_> = dated.collect();
+        for pair in dated.windows(2) {
+            let [(earlier, _, before), (later, span, after)] = pair else {
+                continue;
+            };
+            if after < before {
+                let [first, second] = [earlier, later].map(|e| e.name.get_ref());
+                let message = format!(
+                    "epochs must be in time order, but {second:?} of {after} stands after {first:?} of {before}: change their \
+                     order; if motions count from an epoch that is not the first, name it in `reference`"
+                );
+                return Err(self.error(span.clone(), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Values that the types do not exclude.
+    fn check_settings(&self, settings: &Settings) -> Result<()> {
+        let Some((key, message)) = impossible(settings) else {
+            return Ok(());
+        };
+        let at = self.text.find(&key).unwrap_or(0);
+        Err(self.error(at..at, message))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stonewise_base::settings::Estimator;
+
+    #[test]
+    fn former_names_are_read_and_noted() {
+        let text = "[registration]\nestimator = \"network\"\n[registration.network]\nmin_points = 30\n[tiles]\nsize_m = 3.0\n";
+        let file: toml::Table = text.parse().unwrap();
+        let former: RegistrationParams = file["registration"].clone().try_into().unwrap();
+        assert_eq!(former.estimator, Estimator::Adjustment);
+        assert_eq!(former.adjustment.min_points, 30);
+        let notes = renamed_keys(text);
+        assert_eq!(notes.len(), 3, "{notes:?}");
+        assert!(notes.iter().any(|n| n.contains("[registration.adjustment]")));
+        let today = text.replace("network", "adjustment").replace("tiles", "ingest");
+        assert!(renamed_keys(&today).is_empty());
+        let written = toml::to_string(&former).unwrap();
+        assert!(written.contains("[adjustment]") && !written.contains("network"));
+    }
+
+    fn with_reference(reference: &str, same: [Option<&str>; 3]) -> Result<Project> {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["cloud.laz", "cameras.xml"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let mut text = format!("[project]\nname = \"wall\"\nreference = \"{reference}\"\n");
+        for (name, same) in ["2024", "2025", "2026"].into_iter().zip(same) {
+            text += &format!(
+                "[[epochs]]\nname = \"{name}\"\nclouds = [\"cloud.laz\"]\nimages = \".\"\ncameras = \"cameras.xml\"\n"
+            );
+            text += &same.map_or(String::new(), |same| format!("same_survey_as = \"{same}\"\n"));
+        }
+        let file = dir.path().join("stonewise.toml");
+        fs::write(&file, text).unwrap();
+        Project::read(&file)
+    }
+
+    #[test]
+    fn epochs_out_of_time_order_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["cloud.laz", "cameras.xml"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let file = dir.path().join("stonewise.toml");
+        let read = |dates: [&str; 3]| {
+            let mut text = "[project]\nname = \"wall\"\n".to_owned();
+            for (name, date) in ["a", "b", "c"].into_iter().zip(dates) {
+                text += &format!(
+                    "[[epochs]]\nname = \"{name}\"\n{date}\nclouds = [\"cloud.laz\"]\nimages = \".\"\ncameras = \"cameras.xml\"\n"
+                );
+            }
+            fs::write(&file, text).unwrap();
+            Project::read(&file).map_err(|e| e.to_string())
+        };
+        for sound in [
+            [
+                "date = 2024-05-01",
+                "date = 2024-05-01",
+                "date = 2025-01-01T08:00:00",
+            ],
+            ["", "date = 2024-05-01", ""],
+        ] {
+            assert!(read(sound).is_ok(), "{sound:?}");
+        }
+        let message = read(["date = 2025-05-01", "", "date = 2024-11-30"]).unwrap_err();
+        assert!(
+            message.contains("\"c\" of 2024-11-30 stands after \"a\" of 2025-05-01: change their order"),
+            "{message}"
+        );
+        assert!(message.contains("stonewise.toml:17: "), "{message}");
+    }
+
+    #[test]
+    fn the_reference_comes_first_and_parts_of_a_survey_stay_together() {
+        let order = |project: &Project| {
+            let one = |e: &Epoch| {
+                (
+                    e.name.clone(),
+                    e.same_survey_as.map(|i| project.epochs[i].name.clone()),
+                )
+            };
+            project.epochs.iter().map(one).collect::<Vec<_>>()
+        };
+        let entry = |name: &str, same: Option<&str>| (name.to_owned(), same.map(str::to_owned));
+        let project = with_reference("2025", [None, Some("2024"), Some("2024")]).unwrap();
+        assert_eq!(
+            order(&project),
+            [
+                entry("2025", None),
+                entry("2024", Some("2025")),
+                entry("2026", Some("2024"))
+            ]
+        );
+        assert!(
+            project.notes[0].contains("1 2025, 2 2024, 3 2026"),
+            "{:?}",
+            project.notes
+        );
+        let unchanged = with_reference("2024", [None, None, Some("2025")]).unwrap();
+        assert_eq!(
+            order(&unchanged),
+            [
+                entry("2024", None),
+                entry("2025", None),
+                entry("2026", Some("2025"))
+            ]
+        );
+        assert!(unchanged.notes.is_empty());
+        let error = with_reference("2023", [None; 3]).unwrap_err().to_string();
+        assert!(
+            error.contains("stonewise.toml:3") && error.contains("2024, 2025, 2026"),
+            "{error}"
+        );
+    }
+}

@@ -1,0 +1,126 @@
+//! A project: which surveys, and every parameter.
+
+use crate::edits::EditsFile;
+use crate::sources::SourceRule;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::Result;
+use stonewise_base::part::Part;
+use stonewise_base::settings::Settings;
+use stonewise_core::change::M3c2Params;
+use stonewise_core::evaluate::MotionField;
+use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
+use stonewise_io::cloud::cloud_crs;
+use stonewise_segment::Weights;
+
+/// A checked project: paths exist, values are possible.
+#[derive(Clone, Debug)]
+pub struct Project {
+    /// The project file itself.
+    pub path: PathBuf,
+    /// Name of the structure.
+    pub name: String,
+    /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in
+    /// time order.
+    pub epochs: Vec<Epoch>,
+    /// Parameters of all steps.
+    pub settings: Settings,
+    /// Notes for the user on how the file was read, one sentence each: keys with a new name, another
+    /// numbering of epochs.
+    pub notes: Vec<String>,
+    /// Corrections by hand; absent where the project names none.
+    pub edits: Option<EditsFile>,
+    /// Which points take part; all where absent. No key of the file: commands set it.
+    pub part: Option<Part>,
+}
+
+/// One survey.
+#[derive(Clone, Debug)]
+pub struct Epoch {
+    /// Name, as reports show it.
+    pub name: String,
+    /// Date of the survey, ISO 8601.
+    pub date: Option<String>,
+    /// Conditions during the survey by name, such as `reservoir_level_m`.
+    pub conditions: BTreeMap<String, f64>,
+    /// Point clouds, all in one frame.
+    pub clouds: Vec<PathBuf>,
+    /// Folder of the photos.
+    pub images: PathBuf,
+    /// Camera file or COLMAP folder.
+    pub cameras: PathBuf,
+    /// COCO json or folder of label PNGs.
+    pub masks: Option<PathBuf>,
+    /// Known motion of the points, applied after labelling.
+    pub motion: Option<MotionField>,
+    /// What counts as one station or strip.
+    pub sources: SourceRule,
+    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same
+    /// error in both.
+    pub same_survey_as: Option<usize>,
+    /// What the project file says about where the clouds lie on the map.
+    pub map: MapFrame,
+}
+
+impl Epoch {
+    /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
+    ///
+    /// # Errors
+    /// A cloud's header or the camera file cannot be read; the system of the cameras is not supported.
+    pub fn read_cameras(&self) -> Result<CameraFile> {
+        let mut map = self.map.clone();
+        for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {
+            map.crs = map.crs.or(cloud_crs(cloud)?);
+        }
+        Ok(read_cameras_on_map(&self.cameras, &map)?)
+    }
+}
+
+impl Project {
+    /// Every file and folder that the project reads, the project file first.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        let mut inputs = vec![self.path.clone()];
+        for epoch in &self.epochs {
+            inputs.extend(epoch.clouds.iter().cloned());
+            inputs.extend([epoch.images.clone(), epoch.cameras.clone()]);
+            inputs.extend(epoch.masks.clone());
+        }
+        if let Weights::File(file) = Weights::named(&self.settings.segment.model) {
+            inputs.push(file);
+        }
+        inputs.extend(self.settings.report.logo.clone());
+        inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
+        // Comparisons of clouds alone have neither photos nor cameras.
+        inputs.retain(|path| !path.as_os_str().is_empty());
+        inputs
+    }
+
+    /// Two clouds without photos, for comparisons of clouds alone.
+    pub fn of_clouds(before: &Path, after: &Path, m3c2: M3c2Params) -> Self {
+        let epoch = |name: &str, cloud: &Path| Epoch {
+            name: name.to_owned(),
+            date: None,
+            conditions: BTreeMap::new(),
+            clouds: vec![cloud.to_path_buf()],
+            images: PathBuf::new(),
+            cameras: PathBuf::new(),
+            masks: None,
+            motion: None,
+            sources: SourceRule::default(),
+            same_survey_as: None,
+            map: MapFrame::default(),
+        };
+        Self {
+            path: before.to_path_buf(),
+            name: "clouds".to_owned(),
+            epochs: vec![epoch("before", before), epoch("after", after)],
+            settings: Settings {
+                m3c2,
+                ..Settings::default()
+            },
+            notes: Vec::new(),
+            edits: None,
+            part: None,
+        }
+    }
+}

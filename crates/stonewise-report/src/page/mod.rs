@@ -1,0 +1,245 @@
+//! The page: what it says, in order.
+
+mod audit;
+mod block;
+mod distributions;
+mod doubts;
+mod evaluation;
+mod excerpts;
+mod explorer;
+mod first_page;
+mod html;
+mod look_first;
+mod maps;
+mod method;
+mod overview;
+mod pair;
+mod survey;
+mod tracked;
+
+use super::summary::Summary;
+use crate::texts::{Texts, fill};
+use html::with_decimals;
+use pair::{epoch_names, known_translation_mm};
+use std::fmt::Write;
+use stonewise_base::error::Error;
+use stonewise_base::report_params::Language;
+use stonewise_figure::escape;
+use stonewise_results::names::PairFile;
+use stonewise_results::records::RunRecord;
+use stonewise_results::{Comparison, Joint, ResultSet, compare, joints};
+
+#[cfg(test)]
+pub(super) use explorer::{SCRIPT, STYLE};
+
+const PAGE_STYLE: &str = include_str!("style.css");
+
+/// Sections in the order of the page.
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 8] {
+    let names = &texts.sections;
+    [
+        ("summary", texts.page.summary),
+        ("maps", names.maps),
+        ("tables", names.tables),
+        ("distributions", names.distributions),
+        ("datum", names.datum),
+        ("evaluation", names.evaluation),
+        ("method", names.method),
+        ("audit", names.audit),
+    ]
+}
+
+/// The whole report as one HTML document. The same results give the same bytes.
+///
+/// A policy in its head (Content Security Policy 3) lets only the embedded program run and nothing be
+/// fetched: markup that a name from an input might smuggle in would stay dead.
+///
+/// # Errors
+/// None in practice: compressing in memory does not fail.
+pub(super) fn page(results: &ResultSet) -> Result<String, Error> {
+    let facts = Summary::new(results);
+    let (compared, joints) = (compare(results), joints(results));
+    let content = content(results, &facts, &compared, &joints, true);
+    let present = sections(facts.texts())
+        .into_iter()
+        .filter(|(id, _)| content.contains(&format!("<section id=\"{id}\">")));
+    let links: String = present
+        .map(|(id, name)| format!("<a href=\"#{id}\">{name}</a>"))
+        .collect();
+    let data = if results.stones.is_empty() {
+        String::new()
+    } else {
+        explorer::data(results, &facts, &compared, &joints)?
+    };
+    let body = format!(
+        "<body>{PATTERNS}{}<nav>{links}</nav>\n<main>\n{content}</main>\n{data}",
+        header(results, &facts)
+    );
+    // Of all that the page holds, so that no input can guess it.
+    let nonce = &blake3::hash(body.as_bytes()).to_hex()[..32];
+    let head = head(
+        &title(results, facts.texts()),
+        facts.texts(),
+        &format!("script-src 'nonce-{nonce}'; "),
+        &format!("{}{}", footer(results, ""), explorer::STYLE),
+    );
+    Ok(format!(
+        "{head}{body}<script nonce=\"{nonce}\">\n{}</script>\n</body></html>\n",
+        explorer::SCRIPT
+    ))
+}
+
+/// The reports on all later epochs as one document for paper, without anything that runs.
+pub(super) fn printed(all: &[&ResultSet], appendix: bool) -> String {
+    let (mut style, mut body) = (String::new(), String::new());
+    let mut texts = Texts::of(Language::default());
+    for (results, number) in all.iter().zip(1..) {
+        let facts = Summary::new(results);
+        let (compared, joints) = (compare(results), joints(results));
+        texts = facts.texts();
+        let content = content(results, &facts, &compared, &joints, appendix);
+        // What is folded on the screen is open on paper.
+        let content = content.replace("<details>", "<details open>");
+        let name = format!("epoch{number}");
+        style.push_str(&footer(results, &name));
+        let _ = write!(
+            body,
+            "<div style=\"page:{name}\">{}<main>\n{content}</main></div>\n",
+            header(results, &facts)
+        );
+    }
+    let title = all.first().map_or(String::new(), |results| title(results, texts));
+    let head = head(&title, texts, "", &style);
+    format!("{head}<body>{PATTERNS}{body}</body></html>\n")
+}
+
+/// The sections in order; the last one can be left out.
+fn content(
+    results: &ResultSet,
+    facts: &Summary,
+    compared: &Comparison,
+    joints: &[Joint],
+    appendix: bool,
+) -> String {
+    let mut body = String::new();
+    body.push_str(&overview::summary(results, facts));
+    if !results.stones.is_empty() {
+        body.push_str(&maps::maps(results, facts, joints));
+        body.push_str(&overview::tables(results, facts));
+    }
+    if !facts.measured.is_empty() {
+        body.push_str(&distributions::distributions(
+            results,
+            facts,
+            compared,
+            known_translation_mm(results),
+        ));
+        body.push_str(&distributions::datum(results, facts));
+    }
+    if let Some(evaluation) = &results.evaluation {
+        body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
+    }
+    body.push_str(&method::method(facts.texts()));
+    if appendix {
+        body.push_str(&audit::audit(results, facts.texts()));
+    }
+    with_decimals(body, facts.texts().decimal)
+}
+
+/// Patterns that the pictures use.
+const PATTERNS: &str = "<svg width=\"0\" height=\"0\" class=\"patterns\"><defs>\
+    <pattern id=\"hatch\" width=\"60\" height=\"60\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+    <path d=\"M0 0V60\" class=\"hatching\"/></pattern><pattern id=\"hatch-fine\" width=\"6\" height=\"6\" patternUnits=\"userSpaceOnUse\" patternTransform=\"rotate(45)\">\
+    <path d=\"M0 0V6\" class=\"hatching fine\"/></pattern></defs></svg>\n";
+
+/// All that stands above the sections.
+fn header(results: &ResultSet, facts: &Summary) -> String {
+    let texts = facts.texts();
+    let warnings = results
+        .run
+        .as_ref()
+        .map_or(&[][..], |run| run.warnings.as_slice());
+    format!(
+        "<header>{}<h1>{}</h1>{}{}{}{}{}</header>\n",
+        first_page::letterhead(results, texts),
+        title(results, texts),
+        first_page::verdict(facts),
+        doubts::doubts(warnings, texts),
+        first_page::datum_warning(results.datum(), facts),
+        first_page::cover(results, facts),
+        cover(results, texts)
+    )
+}
+
+/// The head of a document; `scripts`: what its policy lets run.
+fn head(title: &str, texts: &Texts, scripts: &str, style: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"{}\"><head><meta charset=\"utf-8\">\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; {scripts}\
+         style-src 'unsafe-inline'; img-src blob: data:; base-uri 'none'; form-action 'none'\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta name=\"color-scheme\" content=\"light dark\"><title>{title}: {}</title>\n\
+         <style>\n{PAGE_STYLE}{style}</style></head>\n",
+        texts.tag, texts.sections.title_end
+    )
+}
+
+/// The rule that prints project, epochs and date at the foot of every page of this name; of all pages without
+/// one.
+fn footer(results: &ResultSet, page: &str) -> String {
+    let Some(run) = &results.run else {
+        return String::new();
+    };
+    let epochs = epoch_names(run, results.pair).map_or(String::new(), |[a, b]| format!(", {a} \u{2192} {b}"));
+    let text = format!("{}{epochs}, {}", run.project.name, run.finished_at.minute());
+    // Every other character as its number (CSS Syntax 3, 4.3.7), so that no name can end the string.
+    let quoted: String = text
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() {
+                c.to_string()
+            } else {
+                format!("\\{:x} ", u32::from(c))
+            }
+        })
+        .collect();
+    format!("@media print{{@page {page}{{@bottom-left{{content:\"{quoted}\"}}}}}}\n")
+}
+
+/// Name of the structure.
+fn title(results: &ResultSet, texts: &Texts) -> String {
+    let name = results.run.as_ref().map(|run| run.project.name.as_str());
+    escape(name.filter(|n| !n.is_empty()).unwrap_or(texts.sections.survey))
+}
+
+/// Names of the first and of the compared epoch as one line of HTML.
+fn epochs(run: &RunRecord, pair: usize) -> Option<String> {
+    epoch_names(run, pair).map(|[first, second]| format!("{} \u{2192} {}", escape(&first), escape(&second)))
+}
+
+/// Epochs, version and time of the run, and the way to the reports on other epochs.
+fn cover(results: &ResultSet, texts: &Texts) -> String {
+    let run = results.run.as_ref();
+    let line = |pair: usize| run.and_then(|run| epochs(run, pair));
+    let mut facts: Vec<String> = Vec::new();
+    if let Some(run) = run {
+        facts.push(format!(
+            "{} <b>{}</b>",
+            texts.page.finished,
+            run.finished_at.minute()
+        ));
+        facts.push(format!("stonewise <b>{}</b>", escape(&run.version)));
+    }
+    let others = (1..=results.pairs).filter(|p| *p != results.pair);
+    facts.extend(others.map(|pair| {
+        let name =
+            line(pair).unwrap_or_else(|| fill(texts.sections.epoch, &[("n", &(pair + 1).to_string())]));
+        format!("<a href=\"{}\">{name}</a>", PairFile::ReportPage.name(pair))
+    }));
+    let line = if facts.is_empty() {
+        String::new()
+    } else {
+        format!("<p class=\"cover\">{}</p>", facts.join(" \u{b7} "))
+    };
+    format!("{line}{}", survey::survey(results, texts))
+}

@@ -1,0 +1,492 @@
+//! The report file.
+
+use super::page::page;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::Error;
+use stonewise_io::atomic::write_atomically;
+use stonewise_results::ResultSet;
+use stonewise_results::names::{PairFile, REPORT_DIR};
+
+/// Makes `report/index.html` from the result files in `dir` alone and returns its path.
+///
+/// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of
+/// the third against the first is `report/index_2.html`, and so on; each links to the others. The same
+/// results give the same bytes.
+///
+/// # Errors
+/// `dir` has no stone table, a result file is damaged, or the report cannot be written.
+pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
+    let results = ResultSet::read(dir)?;
+    let folder = dir.join(REPORT_DIR);
+    std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))?;
+    let write = |results: &ResultSet| {
+        let path = folder.join(PairFile::ReportPage.name(results.pair));
+        let page = page(results)?;
+        write_atomically(&path, |partial| std::fs::write(partial, page))
+            .map_err(Error::io("writing the report", &path))?;
+        Ok(path)
+    };
+    for pair in 2..=results.pairs {
+        write(&ResultSet::read_pair(dir, pair)?)?;
+    }
+    write(&results)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{folder, outlines, registration_record, rows, run_record};
+    use stonewise_base::files::write_json;
+    use stonewise_base::report_params::Language;
+    use stonewise_base::warnings::Warning;
+    use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
+    use stonewise_results::names::RUN;
+    use stonewise_results::records::{Datum, EstimatorRecord, RegistrationRecord, RunRecord, StepTime};
+    use stonewise_results::{Status, StoneRow, write_logo, write_outlines, write_stones};
+
+    /// Result files with these rows and this run.json, and the report made of them.
+    fn report(rows: &[StoneRow], run: Option<&RunRecord>) -> String {
+        let folder = tempfile::tempdir().unwrap();
+        write_stones(folder.path(), 1, rows).unwrap();
+        write_outlines(folder.path(), &outlines()).unwrap();
+        if let Some(run) = run {
+            write_json(&folder.path().join(RUN), run).unwrap();
+        }
+        let points = "x,y,z,nx,ny,nz,m3c2_distance,m3c2_uncertainty\n100,200.4,50.25,1,0,0,0.004,0.001\n";
+        std::fs::write(folder.path().join("m3c2.csv"), points).unwrap();
+        let evaluation = Evaluation::new("a <known> motion", &EvaluationParams::default());
+        let evaluation = Evaluation {
+            stones: Some(score_motions(&[], 3, &EvaluationParams::default())),
+            ..evaluation
+        };
+        let json = serde_json::to_string(&evaluation).unwrap();
+        std::fs::write(folder.path().join("evaluation.json"), json).unwrap();
+        let decisions = "event,photo,instance\nmerged_instance,<script>.jpg,4\nmerged_instance,b.jpg,5\n";
+        std::fs::write(folder.path().join("audit_epoch1.csv"), decisions).unwrap();
+        write_json(&folder.path().join("registration.json"), &registration_record()).unwrap();
+        let path = write_report(folder.path()).unwrap();
+        let html = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap(),
+            html,
+            "bytes differ"
+        );
+        html
+    }
+
+    /// The page without the embedded program and its style, whose texts are not the report's.
+    fn written(html: &str) -> String {
+        use crate::page::{SCRIPT, STYLE};
+        html.replace(SCRIPT, "").replace(STYLE, "")
+    }
+
+    /// Every opened element is closed, in order.
+    fn check_nesting(html: &str) {
+        let void = ["meta", "path", "rect", "i", "input", "br", "img", "wbr"];
+        let mut open: Vec<&str> = Vec::new();
+        let body = &html[html.find("<header>").unwrap()..html.find("</main>").unwrap() + 7];
+        for tag in body.split('<').skip(1) {
+            let name = tag
+                .trim_start_matches('/')
+                .split([' ', '>', '\n', '/'])
+                .next()
+                .unwrap();
+            if tag.starts_with('/') {
+                if !void.contains(&name) {
+                    assert_eq!(open.pop(), Some(name), "before </{tag}");
+                }
+            } else if !void.contains(&name) {
+                open.push(name);
+            }
+        }
+        assert!(open.is_empty(), "{open:?}");
+    }
+
+    #[test]
+    fn where_no_stone_is_measured_the_scale_is_that_of_the_m3c2_distances() {
+        let mut rows = rows();
+        for row in &mut rows {
+            row.status = Status::UnmatchedLost;
+            row.motion = None;
+        }
+        // The one distance is 4 mm.
+        let html = report(&rows, Some(&run_record("Test wall", &["A", "B"])));
+        assert!(html.contains("\"component\":5.0"));
+    }
+
+    #[test]
+    fn it_says_what_moved_and_shows_it() {
+        let html = report(&rows(), Some(&run_record("Test wall", &["A", "B"])));
+        check_nesting(&html);
+        for id in [
+            "summary",
+            "maps",
+            "tables",
+            "distributions",
+            "datum",
+            "evaluation",
+            "method",
+            "audit",
+        ] {
+            assert!(html.contains(&format!("<section id=\"{id}\">")), "{id}");
+        }
+        assert!(html.contains("<b>20 <small>83\u{a0}%</small></b><span>of 24 stones measured"));
+        assert!(
+            html.contains("<div class=\"verdict cannot-tell\"")
+                && html.contains("Cannot tell: the adjustment did not converge")
+        );
+        // Nothing below contradicts that.
+        assert!(html.contains("<p class=\"hedge\">All numbers below are as computed"));
+        assert!(html.contains("<b>\u{2013}</b><span>which stones moved or are loose cannot be told"));
+        assert!(html.contains("<b>Detection limit: cannot be stated for results in doubt</b>"));
+        let text = written(&html);
+        for claim in [
+            "false discovery rate",
+            "Largest motions",
+            "Loose stones",
+            "moved 20",
+            "class=\"loose\"",
+        ] {
+            assert!(!text.contains(claim), "{claim}");
+        }
+        assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
+        assert_eq!(
+            html.matches("<svg role=\"img\"").count(),
+            8 + 3 + 3,
+            "maps, histograms, scatter plots"
+        );
+        assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
+        assert!(html.contains(
+            "Registration error between the surveys: the stable areas show a registration error of 3.2\u{a0}mm."
+        ));
+        assert!(
+            html.contains("finished <b>2026-04-30 12:00 UTC</b>")
+                && html.contains("temperature 9.5\u{a0}\u{b0}C")
+        );
+        assert!(html.contains("x 1.2 \u{b1} 1.0 mm, y 0.0 \u{b1} 2.0 mm, z \u{2212}3.0 \u{b1} 1.0 mm"));
+        assert!(html.contains("class=\"hatch\""));
+        let html = written(&html);
+        assert!(
+            !html.contains("NaN") && !html.contains("inf"),
+            "a value that is no number"
+        );
+    }
+
+    #[test]
+    fn it_needs_no_network_and_names_from_files_are_harmless() {
+        let mut run = run_record("</title><script>alert(1)</script>", &["\" onload=\"x", "<b>"]);
+        run.steps = vec![StepTime {
+            step: "<i>".to_owned(),
+            seconds: 1.234_567_89,
+            processor_seconds: Some(2.5),
+            resumed: false,
+            peak_memory_bytes: None,
+        }];
+        run.warnings = vec![Warning {
+            step: "label".to_owned(),
+            subject: "<script>.jpg".to_owned(),
+            message: "'&'".to_owned(),
+            skipped_input: true,
+            doubt: false,
+        }];
+        let html = report(&rows(), Some(&run));
+        check_nesting(&html);
+        assert!(
+            !html.contains("<script>alert") && !html.contains("<script>.jpg") && !html.contains("<known>")
+        );
+        assert!(html.contains("<td>&lt;i&gt;</td><td class=\"n\">1.2</td><td class=\"n\">2.5</td>"));
+        assert!(html.contains("&lt;script&gt;.jpg") && html.contains("left out"));
+        assert_eq!(
+            html.matches("</script").count(),
+            5,
+            "document, three blocks, program"
+        );
+        assert!(html.contains("default-src 'none'; script-src 'nonce-"));
+        let html = written(&html);
+        for door in ["http://", "https://", "src=", "@import", "url(//"] {
+            assert!(!html.contains(door), "{door}");
+        }
+    }
+
+    #[test]
+    fn a_run_without_matches_or_without_stones_has_a_report() {
+        let mut unmatched = rows();
+        for row in &mut unmatched {
+            (row.motion, row.status) = (None, Status::UnmatchedUnseen);
+        }
+        let html = report(&unmatched, None);
+        check_nesting(&html);
+        assert!(html.contains("No stone was measured.") && html.contains("class=\"hatch\""));
+        check_nesting(&report(&[], None));
+    }
+
+    #[test]
+    fn values_that_are_no_numbers_do_not_spoil_it() {
+        let mut odd = rows();
+        odd[0].centroid.x = f64::NAN;
+        odd[1].motion.as_mut().unwrap().face.x = f64::NAN;
+        odd[4].motion.as_mut().unwrap().detection_limit_m = f64::INFINITY;
+        odd[5].area_m2 = 0.0;
+        let html = written(&report(&odd, None));
+        check_nesting(&html);
+        for word in ["NaN", "inf"] {
+            let at = html.find(word).unwrap_or(0);
+            assert_eq!(at, 0, "{}", &html[at.saturating_sub(200)..at + 20]);
+        }
+    }
+
+    #[test]
+    fn every_later_epoch_has_its_report_and_links_to_the_others() {
+        let folder = tempfile::tempdir().unwrap();
+        write_stones(folder.path(), 1, &rows()).unwrap();
+        write_stones(folder.path(), 2, &rows()[..20]).unwrap();
+        write_json(&folder.path().join(RUN), &run_record("Wall", &["A", "B", "<C>"])).unwrap();
+        write_report(folder.path()).unwrap();
+        let page = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+        assert!(page("index.html").contains("of 24 stones") && page("index_2.html").contains("of 20 stones"));
+        assert!(page("index.html").contains("<a href=\"index_2.html\">A \u{2192} &lt;C&gt;</a>"));
+        assert!(page("index_2.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
+    }
+
+    #[test]
+    fn an_unknown_datum_is_the_first_thing_said() {
+        let folder = folder(&rows());
+        let unknown = Datum::unknown(&nalgebra::Point3::origin(), "unknown".to_owned());
+        let mut registration = RegistrationRecord {
+            datum: unknown,
+            observers: None,
+            ..registration_record()
+        };
+        if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+            adjustment.converged = true;
+        }
+        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        let first = html.split("<ul class=\"findings\"><li>").nth(1).unwrap();
+        assert!(
+            first.starts_with("Registration error between the surveys is unknown and is <b>not</b> included")
+        );
+        let header = html.split("</header>").next().unwrap();
+        assert!(header.contains("<p class=\"datum\">Registration error between the surveys is unknown"));
+        assert!(html.contains("<b>Detection limit against the common motion: "));
+    }
+
+    #[test]
+    fn a_run_in_doubt_gives_no_limits_and_no_intervals() {
+        let page = |converged: bool| {
+            let folder = folder(&rows());
+            let mut registration = registration_record();
+            if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+                adjustment.converged = converged;
+            }
+            write_json(&folder.path().join("registration.json"), &registration).unwrap();
+            let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+            // The terms are explained in either case.
+            let body = html.split("<body>").nth(1).unwrap();
+            body.split("<section id=\"method\">").next().unwrap().to_owned()
+        };
+        let [sound, doubtful] = [true, false].map(page);
+        for claim in [
+            "LoD95",
+            "95 % limit",
+            "class=\"faded\"",
+            "elow their limit",
+            "(95\u{a0}%: ",
+        ] {
+            assert!(sound.contains(claim) && !doubtful.contains(claim), "{claim}");
+        }
+        assert!(
+            doubtful.contains("Detection limit: cannot be stated")
+                && doubtful.contains("motions as computed")
+        );
+    }
+
+    /// The report of a wall that settled, of which nothing moved but the stones of these ids.
+    fn settled(moving: &[u32], params: &stonewise_base::report_params::ReportParams) -> String {
+        let mut stones = rows();
+        for stone in &mut stones {
+            if let Some(motion) = stone
+                .motion
+                .as_mut()
+                .filter(|_| !moving.contains(&stone.stone_id))
+            {
+                motion.displacement *= 0.01;
+                motion.relative *= 0.01;
+                (motion.significant, motion.loose) = (false, false);
+            }
+            // Stone 3 is not lost: no photo shows its place.
+            if stone.status == Status::UnmatchedLost {
+                stone.status = Status::UnmatchedUnseen;
+            }
+        }
+        let folder = folder(&stones);
+        let mut registration = registration_record();
+        if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {
+            adjustment.converged = true;
+        }
+        write_json(&folder.path().join("registration.json"), &registration).unwrap();
+        let mut run = run_record("Wall", &["A", "B"]);
+        run.parameters.report = params.clone();
+        write_json(&folder.path().join(RUN), &run).unwrap();
+        write_logo(folder.path(), &folder.path().join(RUN), "image/png").unwrap();
+        let html = std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        check_nesting(&html);
+        html
+    }
+
+    #[test]
+    fn a_still_wall_is_fine_and_the_page_never_says_that_a_stone_moved() {
+        let html = settled(&[], &stonewise_base::report_params::ReportParams::default());
+        assert!(
+            html.contains("<div class=\"verdict fine\"")
+                && html.contains("Fine: no motion is shown; detection limit: 1.4\u{a0}mm (median)")
+        );
+        assert!(!html.contains("<p class=\"hedge\">"));
+        assert!(html.contains("<b>0 <small>0\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)"));
+        assert!(
+            html.contains("No stone calls for a closer look.")
+                && html.contains("<span>no motion is shown</span>")
+        );
+        let html = written(&html);
+        for claim in ["moved significantly", "significant motion", "Largest motions"] {
+            assert!(!html.contains(claim), "{claim}");
+        }
+    }
+
+    #[test]
+    fn the_first_page_names_who_measured_and_what_to_look_at_in_both_languages() {
+        let params = stonewise_base::report_params::ReportParams {
+            operator: Some("River <Authority>".to_owned()),
+            instruments: Some("Scanner X".to_owned()),
+            reference_number: Some("T-17".to_owned()),
+            logo: None,
+            language: Language::English,
+        };
+        let html = settled(&[8, 15], &params);
+        assert!(html.contains("Attention: 2 of 20 measured stones moved; the largest motion is 20."));
+        for words in [
+            "<dt>Reference number</dt><dd>T-17</dd>",
+            "River &lt;Authority&gt;",
+            "temperature 9.5\u{a0}\u{b0}C",
+            "<a data-stone=\"15\">Stone 15</a>, 0.80\u{a0}m along, 0.50\u{a0}m up: moved 20.4\u{a0}mm",
+            "4 of 24 stones were not measured",
+            "Detection limit: 1.4\u{a0}mm (median), 1.4\u{a0}mm (90th percentile)",
+            "<p>Signature</p>",
+            "src=\"data:image/png;base64,",
+            // Two stones moved by 2 cm; the others are far below their limit of 1.4 mm.
+            "<b>2 <small>10\u{a0}%</small></b><span>moved (false discovery rate 5\u{a0}%)",
+            "Largest motions",
+            "class=\"loose\"",
+        ] {
+            assert!(html.contains(words), "{words}");
+        }
+        let german = stonewise_base::report_params::ReportParams {
+            language: Language::German,
+            ..params
+        };
+        let html = settled(&[8, 15], &german);
+        assert!(html.starts_with("<!DOCTYPE html>\n<html lang=\"de\">"));
+        for words in [
+            "Achtung: 2 von 20 gemessenen Steinen haben sich bewegt",
+            "Temperatur 9,5",
+            "<p>Unterschrift</p>",
+            "Nachweisgrenze: 1,4\u{a0}mm",
+        ] {
+            assert!(html.contains(words), "{words}");
+        }
+    }
+
+    /// What stands in all elements of a name, without markup inside it.
+    fn inside(html: &str, name: &str) -> Vec<String> {
+        let (start, end) = (format!("<{name}"), format!("</{name}>"));
+        let parts = html.split(&start).skip(1);
+        parts
+            .filter_map(|part| {
+                let content = part.split_once('>')?.1.split(&end).next()?;
+                let text: String = content
+                    .split('<')
+                    .map(|t| t.split_once('>').map_or(t, |t| t.1))
+                    .collect();
+                Some(text)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_german_report_has_no_english_heading() {
+        let german = stonewise_base::report_params::ReportParams {
+            language: Language::German,
+            ..stonewise_base::report_params::ReportParams::default()
+        };
+        let languages = [stonewise_base::report_params::ReportParams::default(), german];
+        let in_doubt = languages.each_ref().map(|params| {
+            let mut run = run_record("Wall", &["A", "B"]);
+            run.parameters.report = params.clone();
+            written(&report(&rows(), Some(&run)))
+        });
+        let sound = languages
+            .each_ref()
+            .map(|params| written(&settled(&[8, 15], params)));
+        check_headings(&in_doubt);
+        check_headings(&sound);
+        // Numbers of tables and pictures.
+        assert!(
+            sound[1].contains("<td class=\"n\">20,4</td>") && !sound[1].contains("<td class=\"n\">20.4</td>")
+        );
+    }
+
+    /// Every heading of the second page, which is German, differs from that of the first, which is English.
+    fn check_headings(both: &[String; 2]) {
+        // Names that are the same in both languages.
+        let shared = [
+            "Datum",
+            "Parameter",
+            "M3C2",
+            "LoD95",
+            "LoD95 mm",
+            "NMAD mm",
+            "RMSE mm",
+            "3D mm",
+            "status",
+        ];
+        for name in [
+            "h2",
+            "h3",
+            "h4",
+            "figcaption",
+            "summary",
+            "nav",
+            "title",
+            "th",
+            "dt",
+        ] {
+            let [english, german] = both.each_ref().map(|html| {
+                // The audit lists keys of run.json as they are.
+                let listed = html.split("<section id=\"audit\">").next().unwrap();
+                inside(
+                    if ["th", "dt"].contains(&name) {
+                        listed
+                    } else {
+                        html
+                    },
+                    name,
+                )
+            });
+            assert_eq!(english.len(), german.len(), "{name}");
+            for (e, g) in english.iter().zip(&german) {
+                let is_shared = shared.iter().any(|word| g.eq_ignore_ascii_case(word)) || g.len() < 3;
+                let is_key = g
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+                assert!(e != g || is_shared || (name == "dt" && is_key), "{name}: {g}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_folder_without_results_says_what_to_give() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = write_report(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("stonewise run"), "{message}");
+    }
+}

@@ -1,0 +1,68 @@
+//! What the verdict is drawn from.
+
+use super::interval::Estimate;
+use nalgebra::Point2;
+use stonewise_results::records::DatumState;
+
+/// What is known of one pair of epochs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Case {
+    /// Names of the first and of the later epoch.
+    pub epochs: [String; 2],
+    /// What the registration is known from.
+    pub datum: Option<DatumState>,
+    /// The estimate stopped before it settled.
+    pub not_converged: bool,
+    /// There is a doubt about the run as a whole.
+    pub in_doubt: bool,
+    /// The stones of the first epoch.
+    pub stones: Vec<StoneCase>,
+    /// The joints whose stones were both measured.
+    pub joints: Vec<JointCase>,
+}
+
+/// What is known of a stone.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct StoneCase {
+    pub stone_id: u32,
+    /// Place (along, up) in the facade frame, metres.
+    pub place: Point2<f64>,
+    /// The first epoch shows it well, and the later one shows its place without it.
+    pub lost: bool,
+    /// What was measured.
+    pub measured: Option<StoneMeasured>,
+}
+
+/// The measured motion of a stone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StoneMeasured {
+    /// The motion that is tested, see the stone table.
+    pub motion: Estimate,
+    /// The motion against the neighbours.
+    pub neighbours: Estimate,
+    pub above_limit: bool,
+    pub loose: bool,
+    pub detection_limit_m: f64,
+}
+
+/// What is known of a joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointCase {
+    pub stones: [u32; 2],
+    /// Its middle (along, up) in the facade frame, metres.
+    pub place: Point2<f64>,
+    pub opening_m: f64,
+    pub sigma_m: f64,
+}
+
+impl Case {
+    /// Whether the results can be relied on as a whole.
+    pub(super) fn is_sound(&self) -> bool {
+        !self.not_converged && !self.in_doubt
+    }
+
+    /// Whether intervals hold the registration error, so that they say something about the wall as a whole.
+    pub(super) fn has_datum(&self) -> bool {
+        self.datum.is_some_and(|d| d != DatumState::Unknown)
+    }
+}

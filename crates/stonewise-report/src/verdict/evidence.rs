@@ -1,0 +1,169 @@
+//! What the verdict needs, from result files.
+
+use super::assess::assess;
+use super::case::{Case, JointCase, StoneCase, StoneMeasured};
+use super::interval::Estimate;
+use super::lost::lost_stones;
+use nalgebra::{Point2, Vector3, center};
+use stonewise_base::report_params::Language;
+use stonewise_base::thresholds::Thresholds;
+use stonewise_core::geometry::{DisplacementSample, SmallMotion};
+use stonewise_results::records::{DatumState, EpochVerdict};
+use stonewise_results::{Joint, ResultSet, RowMotion, StoneRow, joints};
+
+/// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
+/// `epochs`: their names.
+pub fn verdict_on(
+    results: &ResultSet,
+    epochs: [String; 2],
+    in_doubt: bool,
+    thresholds: &Thresholds,
+    language: Language,
+) -> EpochVerdict {
+    let converged = results
+        .registration
+        .as_ref()
+        .is_none_or(|r| r.estimator.converged());
+    let case = Case {
+        epochs,
+        datum: results.datum().map(|d| d.state),
+        not_converged: !converged,
+        in_doubt,
+        stones: stones(results),
+        joints: joints(results).iter().filter_map(|j| joint(results, j)).collect(),
+    };
+    assess(&case, thresholds, language)
+}
+
+fn stones(results: &ResultSet) -> Vec<StoneCase> {
+    let tested = Tested::of(results);
+    let stone = |(stone, lost): (&StoneRow, bool)| StoneCase {
+        stone_id: stone.stone_id,
+        place: Point2::new(stone.along_m, stone.up_m),
+        lost,
+        measured: stone.motion.as_ref().map(|motion| StoneMeasured {
+            motion: Estimate {
+                vector: tested.motion(stone, motion),
+                covariance: motion.covariance,
+            },
+            neighbours: Estimate {
+                vector: motion.relative,
+                covariance: motion.relative_covariance,
+            },
+            above_limit: motion.significant,
+            loose: motion.loose,
+            detection_limit_m: motion.detection_limit_m,
+        }),
+    };
+    results
+        .stones
+        .iter()
+        .zip(lost_stones(results))
+        .map(stone)
+        .collect()
+}
+
+fn joint(results: &ResultSet, joint: &Joint) -> Option<JointCase> {
+    let motion = joint.motion?;
+    let [a, b] = joint.line;
+    Some(JointCase {
+        stones: joint.stones.map(|i| results.stones[i].stone_id),
+        place: center(&a, &b),
+        opening_m: motion.opening_m,
+        sigma_m: motion.opening_sigma_m,
+    })
+}
+
+/// What the motions are tested against.
+enum Tested<'a> {
+    /// The ground.
+    Absolute,
+    /// The common motion of the wall, from registration.json.
+    Recorded(&'a ResultSet),
+    /// The same from the stones, where the record of an earlier version does not have it.
+    Fitted(Box<SmallMotion>),
+}
+
+impl<'a> Tested<'a> {
+    fn of(results: &'a ResultSet) -> Self {
+        let Some(datum) = results.datum().filter(|d| d.state == DatumState::Unknown) else {
+            return Self::Absolute;
+        };
+        if datum.common_motion.is_some() {
+            return Self::Recorded(results);
+        }
+        let sample = |(stone, motion): (&StoneRow, &RowMotion)| {
+            (!motion.loose).then_some(DisplacementSample {
+                place: stone.centroid,
+                displacement: motion.displacement,
+                covariance: motion.covariance,
+            })
+        };
+        let samples: Vec<_> = results.measured().into_iter().filter_map(sample).collect();
+        SmallMotion::fit(&samples).map_or(Self::Absolute, |common| Self::Fitted(Box::new(common)))
+    }
+
+    fn motion(&self, stone: &StoneRow, motion: &RowMotion) -> Vector3<f64> {
+        let common = match self {
+            Self::Absolute => None,
+            Self::Recorded(results) => results.datum().and_then(|d| d.common_motion_at(&stone.centroid)),
+            Self::Fitted(common) => Some(common.at(&stone.centroid)),
+        };
+        motion.displacement - common.unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{folder, registration_record, rows};
+    use nalgebra::Vector6;
+    use stonewise_base::files::write_json;
+    use stonewise_core::geometry::lever;
+    use stonewise_results::records::{Datum, RegistrationRecord};
+
+    fn judged(results: &ResultSet) -> EpochVerdict {
+        let epochs = ["A".to_owned(), "B".to_owned()];
+        verdict_on(results, epochs, false, &Thresholds::default(), Language::English)
+    }
+
+    /// Results whose stones all made one more rigid motion, which the record tells or does not.
+    fn swept(recorded: bool) -> EpochVerdict {
+        let common = Vector6::new(0.01, -0.02, 0.005, 1e-4, 2e-4, -1e-4);
+        let mut stones = rows();
+        let centre = stones[0].centroid;
+        for stone in &mut stones {
+            let motion = lever(&(stone.centroid - centre)) * common;
+            if let Some(own) = &mut stone.motion {
+                own.displacement += motion;
+            }
+        }
+        let folder = folder(&stones);
+        let mut datum = Datum::unknown(&centre, "unknown".to_owned());
+        datum.common_motion = recorded.then(|| common.into());
+        let record = RegistrationRecord {
+            datum,
+            ..registration_record()
+        };
+        write_json(&folder.path().join("registration.json"), &record).unwrap();
+        judged(&ResultSet::read_measured(folder.path(), 1).unwrap())
+    }
+
+    #[test]
+    fn where_the_datum_is_unknown_motions_are_those_against_the_common_motion() {
+        let folder = folder(&rows());
+        let still = judged(&ResultSet::read_measured(folder.path(), 1).unwrap());
+        let moved = |v: &EpochVerdict| -> Vec<u32> {
+            v.stones.iter().filter(|s| s.moved).map(|s| s.stone_id).collect()
+        };
+        assert_eq!(moved(&still), [8, 15]);
+        let recorded = swept(true);
+        for (a, b) in still.stones.iter().zip(&recorded.stones) {
+            let difference = a.length_mm.unwrap_or(0.0) - b.length_mm.unwrap_or(0.0);
+            assert!(difference.abs() < 0.002, "{a:?} {b:?}");
+        }
+        assert_eq!(moved(&recorded), [8, 15]);
+        // Records of earlier versions: the common motion is fitted to all stones but the loose one.
+        assert!(moved(&swept(false)).contains(&8));
+    }
+}

@@ -1,0 +1,256 @@
+//! The verdict in words.
+
+use super::case::Case;
+use super::judged::{Judged, JudgedStone, Level};
+use super::limits::{Compared, Quantity, in_words};
+use crate::texts::{Texts, counted, fill};
+use stonewise_base::report_params::Language;
+use stonewise_base::thresholds::{Levels, Thresholds};
+use stonewise_figure::count;
+use stonewise_results::records::{Area, Largest, Reason, ReasonCode, State};
+
+/// What the clauses are made from.
+struct Speaker<'a> {
+    case: &'a Case,
+    thresholds: &'a Thresholds,
+    judged: &'a Judged,
+    wall: &'a Area,
+    texts: &'static Texts,
+}
+
+/// The sentence on the wall: its state, why, and the most important numbers. `apparent`: stones beyond the
+/// alarm threshold if the run were sound.
+pub(super) fn sentence(
+    case: &Case,
+    thresholds: &Thresholds,
+    judged: &Judged,
+    wall: &Area,
+    apparent: usize,
+    language: Language,
+) -> String {
+    let speaker = Speaker {
+        case,
+        thresholds,
+        judged,
+        wall,
+        texts: Texts::of(language),
+    };
+    let mut clauses: Vec<String> = speaker.deciding().iter().map(|r| speaker.clause(*r)).collect();
+    clauses.extend(speaker.numbers(apparent));
+    format!("{}: {}.", speaker.texts.state(wall.state), clauses.join("; "))
+}
+
+/// Every reason in words.
+pub(super) fn reasons(
+    case: &Case,
+    thresholds: &Thresholds,
+    judged: &Judged,
+    wall: &Area,
+    language: Language,
+) -> Vec<Reason> {
+    let speaker = Speaker {
+        case,
+        thresholds,
+        judged,
+        wall,
+        texts: Texts::of(language),
+    };
+    let reason = |code: &ReasonCode| Reason {
+        code: *code,
+        text: speaker.clause(*code),
+    };
+    wall.reasons.iter().map(reason).collect()
+}
+
+impl Speaker<'_> {
+    /// The reasons that the sentence names: those that give the state; of several doubts the first.
+    fn deciding(&self) -> Vec<ReasonCode> {
+        use ReasonCode as R;
+        let wanted = |r: &R| match self.wall.state {
+            State::Alarm => matches!(
+                r,
+                R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::StonesLost
+            ),
+            State::Attention => matches!(
+                r,
+                R::LengthAttention
+                    | R::NeighboursAttention
+                    | R::JointsAttention
+                    | R::StonesLost
+                    | R::MotionShown
+            ),
+            State::CannotTell | State::Fine => true,
+        };
+        let most = if matches!(self.wall.state, State::CannotTell | State::Fine) {
+            1
+        } else {
+            4
+        };
+        self.wall
+            .reasons
+            .iter()
+            .copied()
+            .filter(wanted)
+            .take(most)
+            .collect()
+    }
+
+    fn clause(&self, reason: ReasonCode) -> String {
+        use ReasonCode as R;
+        let c = &self.texts.clauses;
+        let wall = self.wall;
+        match reason {
+            R::NotConverged => c.not_converged.to_owned(),
+            R::InDoubt => c.in_doubt.to_owned(),
+            R::LengthAlarm => self.beyond(c.moved_alarm, Quantity::Length, Level::Alarm),
+            R::LengthAttention => self.beyond(c.moved_attention, Quantity::Length, Level::Attention),
+            R::NeighboursAlarm => self.beyond(c.neighbours_alarm, Quantity::Neighbours, Level::Alarm),
+            R::NeighboursAttention => {
+                self.beyond(c.neighbours_attention, Quantity::Neighbours, Level::Attention)
+            }
+            R::JointsAlarm => self.beyond(c.joints_alarm, Quantity::Joints, Level::Alarm),
+            R::JointsAttention => self.beyond(c.joints_attention, Quantity::Joints, Level::Attention),
+            R::StonesLost => counted(c.lost, wall.lost, &[]),
+            R::MotionShown if wall.moved > 0 => {
+                let text = if self.case.has_datum() {
+                    c.moved
+                } else {
+                    c.moved_common
+                };
+                counted(text, wall.moved, &[("m", &count(wall.measured))])
+            }
+            R::MotionShown => counted(c.loose, wall.loose, &[]),
+            R::NothingMeasured => c.nothing_measured.to_owned(),
+            R::FewMeasured => counted(c.few_measured, wall.measured, &[("m", &count(wall.stones))]),
+            R::DatumUnknown => c.datum_unknown.to_owned(),
+            R::IntervalReachesThreshold => self.reaching(),
+            R::BelowThresholds => self.below(),
+            R::NoMotionShown => c.none_shown.to_owned(),
+        }
+    }
+
+    fn stones(&self, keep: impl Fn(&JudgedStone) -> bool) -> Vec<Option<usize>> {
+        let kept = self.judged.stones.iter().filter(|s| keep(s));
+        kept.map(|s| s.zone).collect()
+    }
+
+    /// Zones of the stones or joints of which a quantity lies at this level.
+    fn at(&self, quantity: Quantity, level: Level) -> Compared {
+        let zones = match quantity {
+            Quantity::Length => self.stones(|s| s.length == level),
+            Quantity::Neighbours => self.stones(|s| s.neighbours == level),
+            Quantity::Joints => {
+                let joints = self.judged.joints.iter().filter(|j| j.opening == level);
+                joints.map(|j| j.zone).collect()
+            }
+        };
+        Compared { quantity, zones }
+    }
+
+    fn beyond(&self, text: [&'static str; 2], quantity: Quantity, level: Level) -> String {
+        let threshold = match level {
+            Level::Alarm => Levels::alarm_m,
+            _ => Levels::attention_m,
+        };
+        let compared = self.at(quantity, level);
+        let n = compared.zones.len();
+        let t = in_words(self.thresholds, &[compared], threshold, self.texts);
+        counted(text, n, &[("t", &t)])
+    }
+
+    fn reaching(&self) -> String {
+        let c = &self.texts.clauses;
+        let compared = Quantity::ALL.map(|quantity| self.at(quantity, Level::Reaches));
+        let reaches = |level: Level| level == Level::Reaches;
+        let stones = self.stones(|s| reaches(s.length) || reaches(s.neighbours)).len();
+        let joints = compared[2].zones.len();
+        let text = match (stones, joints) {
+            (_, 0) => c.reaches,
+            (0, _) => c.joints_reach,
+            _ => c.stones_or_joints_reach,
+        };
+        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
+        counted(text, stones + joints, &[("t", &t)])
+    }
+
+    fn below(&self) -> String {
+        let c = &self.texts.clauses;
+        let everywhere = self.stones(|_| true);
+        let compared = Quantity::ALL.map(|quantity| Compared {
+            quantity,
+            zones: everywhere.clone(),
+        });
+        let asked = self.judged.joints.iter().any(|j| j.opening > Level::NotAsked);
+        let text = if asked { c.below_with_joints } else { c.below };
+        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
+        counted(text, self.wall.measured, &[("t", &t)])
+    }
+
+    /// Clauses with numbers that belong to the state.
+    fn numbers(&self, apparent: usize) -> Vec<String> {
+        let c = &self.texts.clauses;
+        let mut out = Vec::new();
+        match self.wall.state {
+            State::Alarm | State::Attention => {
+                out.extend(self.largest());
+                if self.wall.reasons.contains(&ReasonCode::DatumUnknown) {
+                    out.push(c.datum_unknown.to_owned());
+                }
+            }
+            State::CannotTell if self.case.not_converged || self.case.in_doubt => {
+                if apparent > 0 {
+                    out.push(counted(c.apparent, apparent, &[]));
+                }
+            }
+            State::CannotTell => {
+                let only_datum = self.wall.reasons == [ReasonCode::DatumUnknown];
+                match self.largest() {
+                    Some(largest) => out.push(largest),
+                    None if only_datum => out.push(c.none_against_common.to_owned()),
+                    None => {}
+                }
+                out.extend(self.limit());
+            }
+            State::Fine => out.extend(self.limit()),
+        }
+        out
+    }
+
+    fn largest(&self) -> Option<String> {
+        let Largest {
+            stone_id,
+            length_mm,
+            interval_mm: [low, high],
+        } = self.wall.largest?;
+        let c = &self.texts.clauses;
+        let says_what_moved = self.deciding().contains(&ReasonCode::MotionShown) && self.wall.moved > 0;
+        let text = match self.case.has_datum() {
+            true => c.largest,
+            false if says_what_moved => c.largest_of_these,
+            false => c.largest_common,
+        };
+        let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
+        Some(fill(
+            text,
+            &[
+                ("length", &mm(length_mm)),
+                ("low", &mm(low)),
+                ("high", &mm(high)),
+                ("id", &stone_id.to_string()),
+            ],
+        ))
+    }
+
+    fn limit(&self) -> Option<String> {
+        let limit = self.wall.detection_limit?;
+        let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
+        let values = [
+            ("median", &*mm(limit.median_mm)),
+            ("high", &*mm(limit.percentile_90_mm)),
+        ];
+        Some(fill(
+            self.texts.clauses.detection_limit(self.case.has_datum()),
+            &values,
+        ))
+    }
+}

@@ -1,0 +1,113 @@
+//! Writes every layer from result files.
+
+use super::face_mesh::face_mesh;
+use super::layers::layers;
+use super::polygons::{centroids, face_polygons};
+use crate::ResultSet;
+use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE};
+use crate::records::Timestamp;
+use std::path::Path;
+use stonewise_base::error::Error;
+use stonewise_io::layers::{write_geojson, write_geopackage, write_vtp};
+use stonewise_io::mesh_ply::write_coloured_mesh;
+
+/// Makes `stones.gpkg`, `stones.geojson`, `stones.vtp`, `displacements.vtp` and `stones.ply` from the result
+/// files in `dir`.
+///
+/// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
+/// displacements as exaggerated lines in both (`displacements`, `displacements_facade`), and the joints
+/// between them (`joints`, `joints_facade`), each with styles for QGIS. The VTK files hold the stones as
+/// polygons and their centroids with the displacements as vectors, for ParaView. The PLY is a mesh of the
+/// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than
+/// two epochs, the GeoPackage has the layers of the third against the first as `stones_2` and so on; the
+/// other files are of the second epoch. Its time stamps are the date of the latest survey, so that the same
+/// inputs give the same bytes; 1 January 1970 where the project states no date.
+///
+/// # Errors
+/// `dir` has no stone table, a result file is damaged, or a file cannot be written.
+pub fn write_layers(dir: &Path) -> Result<(), Error> {
+    let results = ResultSet::read(dir)?;
+    let mut layers = layers(&results)?;
+    for pair in 2..=results.pairs {
+        let later = ResultSet::read_pair(dir, pair)?;
+        layers.extend(self::layers(&later)?);
+    }
+    write_geopackage(&dir.join(GEOPACKAGE), &layers, &surveyed(&results).to_string())?;
+    if let Some(world) = layers.first() {
+        write_geojson(&dir.join(GEOJSON), world)?;
+    }
+    for (name, data) in [
+        (FACES_VTP, face_polygons(&results)),
+        (DISPLACEMENTS_VTP, centroids(&results)),
+    ] {
+        let path = dir.join(name);
+        write_vtp(&path, &data).map_err(Error::io("writing polygons", &path))?;
+    }
+    let mesh = dir.join(FACES_PLY);
+    write_coloured_mesh(&mesh, &face_mesh(&results)).map_err(Error::io("writing the mesh", &mesh))?;
+    Ok(())
+}
+
+/// Midnight of the latest date that the project states.
+fn surveyed(results: &ResultSet) -> Timestamp {
+    let dates = results
+        .run
+        .iter()
+        .flat_map(|run| &run.epochs)
+        .filter_map(|e| e.date.as_deref());
+    let latest = dates
+        .max()
+        .and_then(|day| format!("{day}T00:00:00.000Z").parse().ok());
+    latest.unwrap_or(Timestamp::EPOCH)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{folder, rows};
+    use crate::{STONE_COLUMNS, write_stones};
+    use serde_json::Value;
+
+    #[test]
+    fn all_layers_are_written_again_with_the_same_bytes() {
+        let folder = folder(&rows());
+        let names = [
+            "stones.gpkg",
+            "stones.geojson",
+            "stones.ply",
+            "stones.csv-metadata.json",
+            "stones.vtp",
+            "displacements.vtp",
+        ];
+        let bytes = || {
+            write_layers(folder.path()).unwrap();
+            names.map(|n| std::fs::read(folder.path().join(n)).unwrap())
+        };
+        let first = bytes();
+        assert!(first == bytes(), "bytes differ");
+        let json: Value = serde_json::from_slice(&first[1]).unwrap();
+        assert_eq!(json["features"].as_array().unwrap().len(), 24);
+        assert_eq!(json["features"][2]["properties"]["status"], "unmatched_lost");
+        assert_eq!(json["features"][2]["properties"]["d_out"], Value::Null);
+        let notes: Value = serde_json::from_slice(&first[3]).unwrap();
+        assert_eq!(
+            notes["tableSchema"]["columns"].as_array().unwrap().len(),
+            STONE_COLUMNS.len()
+        );
+    }
+
+    #[test]
+    fn a_run_without_stones_or_motions_has_layers_too() {
+        write_layers(folder(&[]).path()).unwrap();
+        let mut unmatched = rows();
+        unmatched.iter_mut().for_each(|r| r.motion = None);
+        write_layers(folder(&unmatched).path()).unwrap();
+    }
+
+    #[test]
+    fn further_epochs_are_written_too() {
+        let folder = folder(&rows());
+        write_stones(folder.path(), 2, &rows()).unwrap();
+        write_layers(folder.path()).unwrap();
+    }
+}

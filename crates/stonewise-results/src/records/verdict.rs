@@ -1,0 +1,442 @@
+//! `verdict.json`: the state of the wall, its zones and its stones, with the numbers behind it.
+
+use super::DatumState;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use stonewise_base::thresholds::Thresholds;
+
+/// Version of the file's layout.
+pub const VERDICT_VERSION: u32 = 1;
+
+/// State of a wall, a zone or a stone, from the best to the worst.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum State {
+    /// Nothing reaches the threshold of attention; without thresholds: no motion is shown.
+    #[serde(rename = "fine")]
+    Fine,
+    /// The results cannot tell.
+    #[default]
+    #[serde(rename = "cannot tell")]
+    CannotTell,
+    /// A motion lies beyond the threshold of attention, or stones are lost; without thresholds: motion is
+    /// shown.
+    #[serde(rename = "attention")]
+    Attention,
+    /// A motion lies beyond the alarm threshold.
+    #[serde(rename = "alarm")]
+    Alarm,
+}
+
+impl State {
+    /// Every state, the worst first.
+    pub const WORST_FIRST: [Self; 4] = [Self::Alarm, Self::Attention, Self::CannotTell, Self::Fine];
+
+    /// The word in files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Fine => "fine",
+            Self::CannotTell => "cannot tell",
+            Self::Attention => "attention",
+            Self::Alarm => "alarm",
+        }
+    }
+}
+
+impl fmt::Display for State {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+/// The verdict of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Version of the file's layout.
+    pub version: u32,
+    /// The worst of the states of all later epochs: alarm, attention, cannot tell, fine.
+    pub state: State,
+    /// The sentence of that epoch.
+    pub sentence: String,
+    /// The thresholds that were applied.
+    pub thresholds: Thresholds,
+    /// Every later epoch against the first, in time order.
+    pub epochs: Vec<EpochVerdict>,
+}
+
+/// The verdict in a word and a sentence, as `run.json` holds it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Headline {
+    /// The state of the wall.
+    pub state: State,
+    /// The same with the most important numbers.
+    pub sentence: String,
+}
+
+/// Headlines of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Headlines {
+    /// The worst of all later epochs.
+    #[serde(flatten)]
+    pub worst: Headline,
+    /// Each later epoch by its name.
+    pub epochs: BTreeMap<String, Headline>,
+}
+
+/// The verdict on one later epoch against the first.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EpochVerdict {
+    /// Name of the later epoch.
+    pub epoch: String,
+    /// Name of the epoch that motions count from.
+    pub reference: String,
+    /// What the registration of the epoch is known from; absent where nothing was registered.
+    pub datum: Option<DatumState>,
+    /// State of the wall.
+    pub state: State,
+    /// The same in one sentence.
+    pub sentence: String,
+    /// Why the wall has this state, the most important first.
+    pub reasons: Vec<Reason>,
+    /// Numbers of the wall.
+    pub wall: Area,
+    /// Zones with their numbers, in the order of the project file.
+    pub zones: Vec<ZoneVerdict>,
+    /// Every stone of the first epoch.
+    pub stones: Vec<StoneVerdict>,
+    /// Joints that opened, closed or may have opened beyond a threshold; empty where no joint has a
+    /// threshold.
+    pub joints: Vec<JointVerdict>,
+}
+
+impl EpochVerdict {
+    /// Whether the registration error of the epoch is known; without, lengths are those against the common
+    /// motion of the measured stones.
+    pub fn has_datum(&self) -> bool {
+        self.datum.is_some_and(|d| d != DatumState::Unknown)
+    }
+
+    /// Whether the results as a whole can be relied on; without, which stones moved or are loose cannot be
+    /// told, and the counts of such stones are only what was computed.
+    pub fn is_sound(&self) -> bool {
+        !self
+            .reasons
+            .iter()
+            .any(|r| matches!(r.code, ReasonCode::NotConverged | ReasonCode::InDoubt))
+    }
+}
+
+/// Why something has its state.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reason {
+    /// For programs.
+    pub code: ReasonCode,
+    /// For people, in the language of the report.
+    pub text: String,
+}
+
+/// Reasons, for programs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReasonCode {
+    /// The adjustment did not converge.
+    NotConverged,
+    /// The results as a whole are in doubt for another reason.
+    InDoubt,
+    /// A stone moved beyond its alarm threshold.
+    LengthAlarm,
+    /// A stone moved against its neighbours beyond the alarm threshold.
+    NeighboursAlarm,
+    /// A joint opened beyond the alarm threshold.
+    JointsAlarm,
+    /// A stone moved beyond the threshold of attention.
+    LengthAttention,
+    /// A stone moved against its neighbours beyond the threshold of attention.
+    NeighboursAttention,
+    /// A joint opened beyond the threshold of attention.
+    JointsAttention,
+    /// Stones that the first epoch shows well are missing in the later one.
+    StonesLost,
+    /// Motion is shown, and there are no thresholds.
+    MotionShown,
+    /// No stone, or no stone of the zone, was measured.
+    NothingMeasured,
+    /// Fewer than half of the stones were measured.
+    FewMeasured,
+    /// The registration error of the epochs is unknown, and a motion of the wall as a whole would matter.
+    DatumUnknown,
+    /// An interval reaches the threshold of attention without lying beyond it.
+    IntervalReachesThreshold,
+    /// No interval reaches the threshold of attention.
+    BelowThresholds,
+    /// No motion is shown, and there are no thresholds.
+    NoMotionShown,
+}
+
+/// Numbers of the wall or of a zone. Lengths are millimetres.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Area {
+    /// Its state.
+    pub state: State,
+    /// Why, the most important first.
+    pub reasons: Vec<ReasonCode>,
+    /// Stones of the first epoch in it.
+    pub stones: usize,
+    /// Those that were measured.
+    pub measured: usize,
+    /// Measured stones above their own 95 % limit, of which chance alone gives 5 % on a still wall.
+    pub above_limit: usize,
+    /// Stones that moved: with the false discovery rate over all stones of the wall controlled at 5 %. Of a
+    /// run that is in doubt, like all numbers here, only what was computed.
+    pub moved: usize,
+    /// Stones that move unlike their neighbours, with the false discovery rate controlled.
+    pub loose: usize,
+    /// Stones that the first epoch shows well and the later one does not have.
+    pub lost: usize,
+    /// Number of stones by state.
+    pub by_state: BTreeMap<String, usize>,
+    /// Smallest q value of a stone.
+    pub smallest_q: Option<f64>,
+    /// The largest motion of a stone that moved.
+    pub largest: Option<Largest>,
+    /// The largest motion against the neighbours of a loose stone.
+    pub largest_against_neighbours: Option<Largest>,
+    /// The joint that opened most among those that opened significantly.
+    pub largest_opening: Option<JointVerdict>,
+    /// Detection limits of the measured stones.
+    pub detection_limit: Option<DetectionLimit>,
+}
+
+/// A length with its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Largest {
+    /// The stone.
+    pub stone_id: u32,
+    /// The length, millimetres.
+    pub length_mm: f64,
+    /// Its 95 % interval, millimetres.
+    pub interval_mm: [f64; 2],
+}
+
+/// Order statistics of the detection limits, millimetres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DetectionLimit {
+    /// Half of the stones have a smaller limit.
+    pub median_mm: f64,
+    /// Nine tenths of the stones have a smaller limit.
+    pub percentile_90_mm: f64,
+}
+
+/// A zone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ZoneVerdict {
+    /// Its name.
+    pub name: String,
+    /// Its numbers.
+    #[serde(flatten)]
+    pub area: Area,
+}
+
+/// A stone. Lengths are millimetres; what was not measured is null.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StoneVerdict {
+    /// Stone of the first epoch.
+    pub stone_id: u32,
+    /// The zone that it lies in; null outside all zones.
+    pub zone: Option<String>,
+    /// Its state.
+    pub state: State,
+    /// Whether it moved, with the false discovery rate over all stones of the wall controlled at 5 %.
+    pub moved: bool,
+    /// Whether its motion is above its own 95 % limit (`significant` in the stone table).
+    pub above_limit: bool,
+    /// Whether it moves unlike its neighbours.
+    pub loose: bool,
+    /// Whether the first epoch shows it well and the later one does not have it.
+    pub lost: bool,
+    /// The smallest false discovery rate at which it counts as moved.
+    pub q: Option<f64>,
+    /// Length of the motion: absolute, or against the common motion of the wall where the datum is unknown.
+    pub length_mm: Option<f64>,
+    /// 95 % interval of the true length; null where the covariance allows none.
+    pub interval_mm: Option<[f64; 2]>,
+    /// Length of the motion against the neighbours.
+    pub neighbours_mm: Option<f64>,
+    /// 95 % interval of its true length.
+    pub neighbours_interval_mm: Option<[f64; 2]>,
+}
+
+/// A joint.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointVerdict {
+    /// The stones on its two sides.
+    pub stones: [u32; 2],
+    /// Its state.
+    pub state: State,
+    /// Opening, millimetres; negative: it closes.
+    pub opening_mm: f64,
+    /// Its 95 % interval.
+    pub interval_mm: [f64; 2],
+    /// The smallest false discovery rate at which it counts as opened or closed.
+    pub q: f64,
+}
+
+impl Verdict {
+    /// The verdict on these epochs.
+    pub fn new(thresholds: &Thresholds, epochs: Vec<EpochVerdict>) -> Self {
+        // Of equal states the newest epoch speaks.
+        let worst = epochs.iter().max_by_key(|e| e.state);
+        Self {
+            version: VERDICT_VERSION,
+            state: worst.map_or(State::CannotTell, |e| e.state),
+            sentence: worst.map_or(String::new(), |e| e.sentence.clone()),
+            thresholds: thresholds.clone(),
+            epochs,
+        }
+    }
+
+    /// State and sentence of the run and of every later epoch.
+    pub fn headlines(&self) -> Headlines {
+        let headline = |e: &EpochVerdict| Headline {
+            state: e.state,
+            sentence: e.sentence.clone(),
+        };
+        Headlines {
+            worst: Headline {
+                state: self.state,
+                sentence: self.sentence.clone(),
+            },
+            epochs: self
+                .epochs
+                .iter()
+                .map(|e| (e.epoch.clone(), headline(e)))
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+    use std::collections::BTreeSet;
+
+    fn keys(object: &Value) -> BTreeSet<String> {
+        object.as_object().unwrap().keys().cloned().collect()
+    }
+
+    fn words(list: &Value) -> BTreeSet<String> {
+        list.as_array()
+            .unwrap()
+            .iter()
+            .filter_map(|v| Some(v.as_str()?.to_owned()))
+            .collect()
+    }
+
+    /// A verdict in which nothing is missing.
+    fn sample() -> Verdict {
+        let joint = JointVerdict {
+            stones: [1, 2],
+            state: State::Fine,
+            opening_mm: 1.0,
+            interval_mm: [0.5, 1.5],
+            q: 0.01,
+        };
+        let largest = Largest {
+            stone_id: 1,
+            length_mm: 2.0,
+            interval_mm: [1.0, 3.0],
+        };
+        let area = Area {
+            reasons: vec![ReasonCode::LengthAlarm],
+            largest: Some(largest),
+            largest_opening: Some(joint),
+            detection_limit: Some(DetectionLimit {
+                median_mm: 0.2,
+                percentile_90_mm: 0.3,
+            }),
+            ..Area::default()
+        };
+        let epoch = EpochVerdict {
+            reasons: vec![Reason {
+                code: ReasonCode::LengthAlarm,
+                text: "moved".to_owned(),
+            }],
+            wall: area.clone(),
+            zones: vec![ZoneVerdict {
+                name: "crest".to_owned(),
+                area,
+            }],
+            stones: vec![StoneVerdict::default()],
+            joints: vec![joint],
+            ..EpochVerdict::default()
+        };
+        Verdict::new(&Thresholds::default(), vec![epoch])
+    }
+
+    #[test]
+    fn the_schema_in_the_docs_names_every_key_and_word() {
+        let docs = include_str!("../../../../docs/src/verdict.md");
+        let block = docs
+            .rsplit("```json")
+            .next()
+            .unwrap()
+            .split("```")
+            .next()
+            .unwrap();
+        let schema: Value = serde_json::from_str(block).unwrap();
+        let of = |name: &str| schema["$defs"][name].clone();
+        let verdict = serde_json::to_value(sample()).unwrap();
+        let epoch = &verdict["epochs"][0];
+        let checks = [
+            (schema.clone(), &verdict),
+            (of("epoch"), epoch),
+            (of("area"), &epoch["wall"]),
+            (of("stone"), &epoch["stones"][0]),
+            (of("joint"), &epoch["joints"][0]),
+            (of("largest"), &epoch["wall"]["largest"]),
+        ];
+        for (schema, value) in checks {
+            assert_eq!(keys(&schema["properties"]), keys(value));
+            assert_eq!(words(&schema["required"]), keys(value));
+        }
+        let states = State::WORST_FIRST.map(|s| serde_json::to_value(s).unwrap());
+        assert_eq!(words(&of("state")["enum"]), words(&Value::from(states.to_vec())));
+        for word in words(&of("code")["enum"]) {
+            assert!(serde_json::from_value::<ReasonCode>(Value::from(word)).is_ok());
+        }
+        assert_eq!(
+            words(&of("code")["enum"]).len(),
+            ReasonCode::NoMotionShown as usize + 1
+        );
+    }
+
+    #[test]
+    fn the_worst_epoch_speaks_and_of_equals_the_newest() {
+        let epoch = |name: &str, state| EpochVerdict {
+            epoch: name.to_owned(),
+            sentence: name.to_owned(),
+            state,
+            ..EpochVerdict::default()
+        };
+        let of = |states: &[State]| {
+            let epochs = states
+                .iter()
+                .zip(["B", "C", "D"])
+                .map(|(s, name)| epoch(name, *s));
+            Verdict::new(&Thresholds::default(), epochs.collect())
+        };
+        let verdict = of(&[State::Alarm, State::Alarm, State::Fine]);
+        assert_eq!((verdict.state, verdict.sentence.as_str()), (State::Alarm, "C"));
+        assert_eq!(verdict.headlines().epochs["D"].state, State::Fine);
+        assert_eq!(of(&[State::Fine, State::CannotTell]).state, State::CannotTell);
+        assert_eq!(of(&[State::CannotTell, State::Attention]).state, State::Attention);
+        assert_eq!(of(&[]).state, State::CannotTell);
+    }
+
+    #[test]
+    fn it_comes_back_as_it_was_written() {
+        let text = serde_json::to_string(&sample()).unwrap();
+        assert_eq!(serde_json::from_str::<Verdict>(&text).unwrap(), sample());
+    }
+}
