@@ -8,12 +8,13 @@
 //! A module uses only those before it, and those in braces never each other:
 //!
 //! ```text
-//! id < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
+//! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
 //!    < {transfer | matching | registration | change} < evaluate < simulate
 //! ```
 
 pub mod change;
 pub mod cloud;
+pub mod epoch;
 pub mod evaluate;
 pub mod geometry;
 pub mod id;

@@ -7,7 +7,7 @@ mod module_graph;
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 8] = [
-    &["id", "statistics", "linalg", "progress", "parallel"],
+    &["id", "epoch", "statistics", "linalg", "progress", "parallel"],
     &["geometry"],
     &["raster"],
     &["cloud"],

@@ -111,7 +111,7 @@ fn read_truth(path: &Path) -> Result<Vec<TrueStone>> {
                 Ok::<_, Error>(Vector3::new(value(x, absent)?, value(y, 0.0)?, value(z, 0.0)?))
             };
             Ok(TrueStone {
-                stone_id: value("stone_id", 0.0)? as u32,
+                stone_id: StoneId(value("stone_id", 0.0)? as u32),
                 centroid: vector("cx", "cy", "cz", 0.0)?.into(),
                 normal: vector("nx", "ny", "nz", 1.0)?,
                 displacement: vector("dx", "dy", "dz", 0.0)?,

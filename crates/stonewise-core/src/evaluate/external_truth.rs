@@ -4,6 +4,7 @@ use crate::change::ChangeField;
 use crate::cloud::GridIndex;
 use crate::evaluate::detection::share;
 use crate::evaluate::{EvaluationParams, MotionSample, MotionScore, StoneOutcome, score_motions};
+use crate::id::StoneId;
 use nalgebra::{Point3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrueStone {
     /// Number of the stone in the truth.
-    pub stone_id: u32,
+    pub stone_id: StoneId,
     /// Centroid in epoch 1, world frame, metres.
     pub centroid: Point3<f64>,
     /// Outward normal of the wall's face.
@@ -30,7 +31,7 @@ pub struct TrueStone {
 }
 
 /// True stone that a result belongs to; `None` where there is none.
-pub type Owner = Option<u32>;
+pub type Owner = Option<StoneId>;
 
 /// Results against truth, missing stones included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,9 +43,9 @@ pub struct TruthScore {
     /// `found` / `countable`.
     pub found_share: Option<f64>,
     /// Countable stones to which no result row belongs.
-    pub without_row: Vec<u32>,
+    pub without_row: Vec<StoneId>,
     /// Countable stones whose row has no displacement.
-    pub without_motion: Vec<u32>,
+    pub without_motion: Vec<StoneId>,
     /// Further rows of stones that have one already; the row nearest to the true centroid counts.
     pub duplicate_rows: usize,
     /// Rows that belong to no true stone.
@@ -78,7 +79,7 @@ pub fn owners_by_labels(
     centroids
         .iter()
         .map(|c| labelled.nearest(c, params.owner_reach_m))
-        .map(|hit| hit.map(|(i, _)| labels[i]).filter(|&id| id != 0))
+        .map(|hit| hit.map(|(i, _)| labels[i]).filter(|&id| id != 0).map(StoneId))
         .collect()
 }
 
@@ -111,7 +112,7 @@ pub fn score_against_truth(
         duplicates: duplicate_rows,
         foreign: foreign_rows,
     } = Rows::new(outcomes, owners, stones);
-    let by_id: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
+    let by_id: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let countable: Vec<&TrueStone> = by_id.into_values().filter(|s| s.is_countable(params)).collect();
     let (mut without_row, mut without_motion, mut samples) = (Vec::new(), Vec::new(), Vec::new());
     for stone in &countable {
@@ -140,7 +141,7 @@ pub fn score_against_truth(
 /// Which row of the results counts for each true stone.
 pub(super) struct Rows<'a> {
     /// By number of the true stone: the row whose centroid is nearest to the true one.
-    pub of_stone: BTreeMap<u32, &'a StoneOutcome>,
+    pub of_stone: BTreeMap<StoneId, &'a StoneOutcome>,
     /// Further rows of these stones.
     duplicates: usize,
     /// Rows that belong to no true stone.
@@ -150,7 +151,7 @@ pub(super) struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// `owners` runs parallel to `outcomes`.
     pub(super) fn new(outcomes: &'a [StoneOutcome], owners: &[Owner], stones: &[TrueStone]) -> Self {
-        let by_id: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
+        let by_id: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
         let mut rows = Self {
             of_stone: BTreeMap::new(),
             duplicates: 0,
@@ -188,7 +189,7 @@ pub fn score_change_against_truth(
     stones: &[TrueStone],
     params: &EvaluationParams,
 ) -> MotionScore {
-    let countable: BTreeMap<u32, &TrueStone> = stones
+    let countable: BTreeMap<StoneId, &TrueStone> = stones
         .iter()
         .filter(|s| s.is_countable(params))
         .map(|s| (s.stone_id, s))
@@ -212,11 +213,10 @@ pub fn score_change_against_truth(
 mod tests {
     use super::*;
     use crate::change::ChangePoint;
-    use crate::id::StoneId;
 
     fn stone(stone_id: u32, y: f64) -> TrueStone {
         TrueStone {
-            stone_id,
+            stone_id: StoneId(stone_id),
             centroid: Point3::new(0.0, y, 0.0),
             normal: Vector3::x(),
             displacement: Vector3::new(0.01, 0.0, 0.0),
@@ -225,6 +225,11 @@ mod tests {
             edge: stone_id == 4,
             visible_share: if stone_id == 5 { 0.2 } else { 0.9 },
         }
+    }
+
+    /// 0: none.
+    fn owner(id: u32) -> Owner {
+        (id != 0).then_some(StoneId(id))
     }
 
     fn row(y: f64, displacement: Option<Vector3<f64>>) -> StoneOutcome {
@@ -266,10 +271,13 @@ mod tests {
         ];
         let centroids: Vec<_> = rows.iter().map(|r| r.centroid).collect();
         let owners = owners_by_centroid(&centroids, &stones, &params);
-        assert_eq!(owners, vec![Some(1), Some(1), Some(2), Some(3), Some(4), None]);
+        assert_eq!(owners, [1, 1, 2, 3, 4, 0].map(owner));
         let score = score_against_truth(&rows, &owners, &stones, &params);
         assert_eq!((score.countable, score.found), (4, 2));
-        assert_eq!((score.without_row, score.without_motion), (vec![6], vec![3]));
+        assert_eq!(
+            (score.without_row, score.without_motion),
+            (vec![StoneId(6)], vec![StoneId(3)])
+        );
         assert_eq!((score.duplicate_rows, score.foreign_rows), (1, 1));
         let loose = score.motions.loose.unwrap();
         assert_eq!((loose.reported, loose.truly_loose, loose.right), (2, 1, 1));
@@ -299,7 +307,7 @@ mod tests {
                 point(7.0, Some(1.0)),
             ],
         };
-        let owners = [Some(1), Some(2), Some(4), Some(5), None];
+        let owners = [1, 2, 4, 5, 0].map(owner);
         let score = score_change_against_truth(&field, &owners, &stones, &params);
         assert_eq!((score.expected, score.estimated), (2, 1));
         assert!(score.errors.out_of_plane.unwrap().rmse_m < 1e-15);
@@ -315,6 +323,6 @@ mod tests {
         let index = GridIndex::new(&points, 0.1);
         let centroids = [0.11, 0.29, 0.52, 3.0].map(|y| Point3::new(0.0, y, 0.0));
         let owners = owners_by_labels(&centroids, &index, &labels, &EvaluationParams::default());
-        assert_eq!(owners, vec![Some(1), None, Some(2), None]);
+        assert_eq!(owners, [1, 0, 2, 0].map(owner));
     }
 }

@@ -22,17 +22,17 @@ pub struct MatchScore {
     pub unknown: usize,
 }
 
-/// Scores matches by the true stone that each side stands for (`LabelConfusion::one_to_one`).
+/// Scores matches by the true stone that each side stands for.
 pub fn score_matches(
     matches: &[(StoneId, StoneId)],
-    first: &BTreeMap<u32, u32>,
-    second: &BTreeMap<u32, u32>,
-    reference: &BTreeSet<u32>,
+    first: &BTreeMap<StoneId, StoneId>,
+    second: &BTreeMap<StoneId, StoneId>,
+    reference: &BTreeSet<StoneId>,
 ) -> MatchScore {
     let mut right = BTreeSet::new();
     let (mut known, mut wrong, mut unknown) = (0, 0, 0);
     for (a, b) in matches {
-        match (first.get(&a.0), second.get(&b.0)) {
+        match (first.get(a), second.get(b)) {
             (Some(t1), Some(t2)) => {
                 known += 1;
                 if t1 != t2 {
@@ -60,10 +60,16 @@ mod tests {
 
     #[test]
     fn right_wrong_and_unknown_matches_are_told_apart() {
-        let first = BTreeMap::from([(1, 101), (2, 102), (3, 103), (5, 105)]);
-        let second = BTreeMap::from([(11, 101), (12, 103), (13, 102), (15, 105)]);
-        let pairs = [(1, 11), (2, 12), (4, 13), (5, 15)].map(|(a, b)| (StoneId(a), StoneId(b)));
-        let score = score_matches(&pairs, &first, &second, &BTreeSet::from([101, 102, 103, 104]));
+        let ids = |pairs: [(u32, u32); 4]| pairs.map(|(a, b)| (StoneId(a), StoneId(b)));
+        let first = BTreeMap::from(ids([(1, 101), (2, 102), (3, 103), (5, 105)]));
+        let second = BTreeMap::from(ids([(11, 101), (12, 103), (13, 102), (15, 105)]));
+        let pairs = ids([(1, 11), (2, 12), (4, 13), (5, 15)]);
+        let score = score_matches(
+            &pairs,
+            &first,
+            &second,
+            &BTreeSet::from([101, 102, 103, 104].map(StoneId)),
+        );
         assert_eq!(
             (score.reference, score.right, score.wrong, score.unknown),
             (4, 1, 1, 1)

@@ -30,7 +30,7 @@ pub fn score_neighbours(
     neighbours: &[NeighbourCovariance],
     params: &EvaluationParams,
 ) -> Option<NeighbourScore> {
-    let true_stones: BTreeMap<u32, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
+    let true_stones: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let known: BTreeMap<StoneId, (&StoneOutcome, &TrueStone)> = outcomes
         .iter()
         .zip(owners)
@@ -88,7 +88,7 @@ mod tests {
             loose: None,
         };
         let stone = |k: u32| TrueStone {
-            stone_id: k + 10,
+            stone_id: StoneId(k + 10),
             centroid: Point3::new(0.0, f64::from(k), 0.0),
             normal: Vector3::x(),
             displacement: Vector3::zeros(),
@@ -99,7 +99,7 @@ mod tests {
         };
         let outcomes: Vec<StoneOutcome> = (0..3).map(outcome).collect();
         let stones: Vec<TrueStone> = (0..3).map(stone).collect();
-        let owners: Vec<Owner> = (0..3).map(|k| Some(k + 10)).collect();
+        let owners: Vec<Owner> = (0..3).map(|k| Some(StoneId(k + 10))).collect();
         let pair = |a: u32, b: u32| NeighbourCovariance {
             stones: [StoneId(a), StoneId(b)],
             covariance: Matrix3::identity() * 1e-6,

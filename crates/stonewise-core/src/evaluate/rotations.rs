@@ -192,7 +192,7 @@ mod tests {
     fn stone(stone_id: u32, rotation: Vector3<f64>) -> TrueStone {
         let y = f64::from(stone_id);
         TrueStone {
-            stone_id,
+            stone_id: StoneId(stone_id),
             centroid: Point3::new(0.0, y, (5.0 * y).sin()),
             normal: Vector3::x(),
             displacement: Vector3::zeros(),
@@ -207,7 +207,7 @@ mod tests {
     fn row(stone: &TrueStone, rotation: Vector3<f64>, displacement: Vector3<f64>) -> StoneOutcome {
         let covariance = Matrix3::identity() * 1e-6;
         StoneOutcome {
-            stone: StoneId(stone.stone_id),
+            stone: stone.stone_id,
             centroid: stone.centroid,
             normal: stone.normal,
             displacement: Some(displacement),

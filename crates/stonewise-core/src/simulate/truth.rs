@@ -185,7 +185,7 @@ impl StoneTruth {
     /// The form in which results are scored. `visible_share`: of its face, measured in both epochs.
     pub fn to_true_stone(&self, visible_share: f64) -> TrueStone {
         TrueStone {
-            stone_id: self.id.0,
+            stone_id: self.id,
             centroid: self.centroid,
             normal: self.normal,
             displacement: self.displacement,
