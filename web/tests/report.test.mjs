@@ -17,13 +17,13 @@ before(async () => {
   browser = await launch();
   if (given) return;
   folder = mkdtempSync(join(tmpdir(), "stonewise-report-"));
-  execFileSync("cargo", ["build", "-q", "-p", "stonewise-report", "--example", "sample_report"], { cwd: root, stdio: "inherit" });
+  execFileSync("cargo", ["build", "-q", "-p", "stonewise-lab"], { cwd: root, stdio: "inherit" });
   const target = process.env["CARGO_TARGET_DIR"] ?? join(root, "target");
   for (const stones of [200, 10_000]) {
-    execFileSync(join(target, "debug/examples/sample_report"), [String(stones), join(folder, String(stones))]);
+    execFileSync(join(target, "debug/lab"), ["sample-report", String(stones), join(folder, String(stones))]);
   }
-  execFileSync(join(target, "debug/examples/sample_report"), ["200", join(folder, "german"), "moved", "de"]);
-  execFileSync(join(target, "debug/examples/sample_report"), ["200", join(folder, "doubt"), "unconverged"]);
+  execFileSync(join(target, "debug/lab"), ["sample-report", "200", join(folder, "german"), "moved", "de"]);
+  execFileSync(join(target, "debug/lab"), ["sample-report", "200", join(folder, "doubt"), "unconverged"]);
 });
 
 after(async () => {

@@ -138,7 +138,7 @@ pub enum Error {
     Image(#[from] stonewise_io::image_io::ImageIoError),
     /// A simulated survey could not be made.
     #[error(transparent)]
-    Simulate(crate::simulate_error::SimulateError),
+    Simulate(Box<dyn std::error::Error + Send + Sync>),
     /// Labels could not be transferred to a cloud.
     #[error(transparent)]
     Transfer(TransferError),
@@ -190,15 +190,6 @@ impl From<TransferError> for Error {
         match error {
             TransferError::Interrupted(_) => Self::Interrupted,
             error => Self::Transfer(error),
-        }
-    }
-}
-
-impl From<crate::simulate_error::SimulateError> for Error {
-    fn from(error: crate::simulate_error::SimulateError) -> Self {
-        match error {
-            crate::simulate_error::SimulateError::Interrupted(_) => Self::Interrupted,
-            error => Self::Simulate(error),
         }
     }
 }

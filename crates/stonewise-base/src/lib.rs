@@ -9,7 +9,6 @@ mod parameters;
 pub mod part;
 pub mod report_params;
 pub mod settings;
-pub mod simulate_error;
 pub mod stable;
 pub mod thresholds;
 pub mod warnings;

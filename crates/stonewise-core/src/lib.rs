@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
-//!    < {transfer | matching | registration | change} < evaluate < simulate
+//!    < {transfer | matching | registration | change} < evaluate
 //! ```
 
 pub mod change;
@@ -24,7 +24,6 @@ pub mod parallel;
 pub mod progress;
 pub mod raster;
 pub mod registration;
-pub mod simulate;
 pub mod statistics;
 pub mod stone;
 pub mod transfer;

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use std::f64::consts::TAU;
 
 /// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
 /// of its size; below, it is sought numerically, which takes longer.
@@ -61,6 +62,15 @@ pub fn split_mix(counter: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
+}
+
+/// Two standard normal numbers, independent of each other, from two that are uniform in 0..1.
+///
+/// Source: Box & Muller 1958.
+pub fn normal_pair([u, v]: [f64; 2]) -> [f64; 2] {
+    let size = (-2.0 * (1.0 - u).ln()).sqrt();
+    let (sin, cos) = (TAU * v).sin_cos();
+    [size * cos, size * sin]
 }
 
 /// The smallest false discovery rate at which each test counts as a discovery, in the order given; p values

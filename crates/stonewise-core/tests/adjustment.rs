@@ -14,6 +14,7 @@ use stonewise_core::registration::{
     AdjustError, AdjustmentParams, AdjustmentReport, MemoryPairs, PairPoints, PairSource, adjust,
 };
 use stonewise_core::stone::{MotionFailure, PairResult, StoneMotion};
+use stonewise_testing::normal;
 
 /// A wall of stones facing x (radius: of its plan, infinite where flat), its sensor and its motion.
 struct Wall {
@@ -42,11 +43,6 @@ impl Default for Wall {
 
 const PITCH: f64 = 0.25;
 const SIDE: f64 = 0.2;
-
-fn gauss(rng: &mut ChaCha8Rng) -> f64 {
-    let (a, b): (f64, f64) = (rng.random_range(1e-12..1.0), rng.random_range(0.0..1.0));
-    (-2.0 * a.ln()).sqrt() * (std::f64::consts::TAU * b).cos()
-}
 
 impl Wall {
     /// Place on the wall of a point (along, up, out) of its unrolled face.
@@ -106,7 +102,7 @@ impl Wall {
                         .iter()
                         .map(|w| w[3] * (w[0] * a + w[1] * u + w[2]).sin())
                         .sum();
-                    self.place(a0 + a, u0 + u, h + self.noise_m * gauss(&mut rng))
+                    self.place(a0 + a, u0 + u, h + self.noise_m * normal(&mut rng))
                 })
                 .collect()
         };
@@ -442,13 +438,7 @@ fn threads_do_not_change_a_bit() {
         ..Wall::default()
     };
     let pairs = wall.pairs(|_, c| (smooth(c), Vector3::zeros()));
-    let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| run(pairs.clone()).results)
-    };
+    let with = |threads: usize| stonewise_testing::on_threads(threads, || run(pairs.clone()).results);
     assert_eq!(with(1), with(3));
 }
 

@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use stonewise_core::change::{ChangeField, M3c2Params, OutwardReference, m3c2_survey};
 use stonewise_core::cloud::{Cloud, MemoryTiles};
 use stonewise_core::evaluate::{EvaluationParams, MotionField, MotionScore, MovedTiles, score_change};
@@ -58,11 +58,9 @@ fn score(folder: &Path, motion: &MotionField) -> MotionScore {
 
 #[test]
 fn m3c2_sees_a_bulge_but_not_a_shift_in_the_plane() {
-    let folder: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/dam_small/split");
-    if !folder.exists() {
-        println!("skipped: {} is absent", folder.display());
+    let Some(folder) = stonewise_testing::survey("dam_small/split") else {
         return;
-    }
+    };
     let shift = MotionField::translation(Vector3::new(0.0, 0.02, 0.05)).unwrap();
     let shifted = score(&folder, &shift);
     let in_plane = shifted.errors.in_plane_2d.unwrap();

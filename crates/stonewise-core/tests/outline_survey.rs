@@ -2,16 +2,14 @@
 
 use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 use stonewise_core::geometry::{FaceFrame, OutlineParams, face_outline};
 
 #[test]
 fn outlines_of_scanned_stones_have_the_true_area() {
-    let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/dam_small/combo/truth");
-    let Ok(table) = std::fs::read_to_string(truth.join("stones.csv")) else {
-        println!("skipped: no survey data");
+    let Some(truth) = stonewise_testing::survey("dam_small/combo/truth") else {
         return;
     };
+    let table = std::fs::read_to_string(truth.join("stones.csv")).unwrap();
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     let scan = las::Reader::from_path(truth.join("epoch1_cloud_tls_truth.laz"))
         .unwrap()

@@ -202,7 +202,7 @@ fn pairs() -> MemoryPairs {
                         0.008 * f64::from(i / 30) - 0.084,
                     );
                     let relief = 0.004 * ((31.0 * (y + 0.1 * k as f64)).sin() + (37.0 * z).cos());
-                    let noise: f64 = (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+                    let noise = stonewise_testing::normal(&mut rng);
                     centre(k) + shift + Vector3::new(relief * 0.1 + 0.006 * noise, y, z)
                 })
                 .collect();

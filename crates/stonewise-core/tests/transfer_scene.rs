@@ -435,13 +435,7 @@ fn labels_do_not_depend_on_the_number_of_threads() {
     let (points, _) = scan(&[]);
     let views = views();
     let masks = imperfect(&views);
-    let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| run(&points, &views, &masks).labels)
-    };
+    let with = |threads| stonewise_testing::on_threads(threads, || run(&points, &views, &masks).labels);
     assert!(with(1) == with(4));
 }
 

@@ -6,11 +6,9 @@
     reason = "helpers of tests"
 )]
 
-mod common;
-
-use common::survey;
 use nalgebra::Point3;
 use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
+use stonewise_testing::survey;
 
 /// Largest distance, pixels, between where two files put the same points.
 fn largest_difference(a: &CameraFile, b: &CameraFile, points: impl Fn(usize) -> Point3<f64>) -> f64 {

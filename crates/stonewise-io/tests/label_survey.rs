@@ -22,16 +22,13 @@ use stonewise_core::transfer::{
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::cloud::{CloudError, read_cloud};
 use stonewise_io::masks::{MaskError, MaskSource};
+use stonewise_testing::survey;
 
 const TILE_M: f64 = 4.0;
 
 fn data() -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if path.join("dam_small").exists() && path.join("fountain").exists() {
-        return Some(path);
-    }
-    println!("skipped: the sample surveys are not at hand");
-    None
+    survey("fountain")?;
+    survey("dam_small")?.parent().map(Path::to_path_buf)
 }
 
 /// A cloud in tiles, with one number a point in the same order.

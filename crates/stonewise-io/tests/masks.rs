@@ -6,12 +6,10 @@
     reason = "helpers of tests"
 )]
 
-mod common;
-
-use common::survey;
 use std::collections::BTreeMap;
 use stonewise_io::image_io::image_size;
 use stonewise_io::masks::MaskSource;
+use stonewise_testing::survey;
 
 #[test]
 fn coco_and_label_png_of_the_dam_are_the_same_pixels() {

@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a test may stop at the first surprise
 
-mod common;
-
-use common::survey;
 use std::time::Instant;
+use stonewise_testing::survey;
 
 use nalgebra::Vector3;
 use stonewise_core::geometry::Bounds;

@@ -1,9 +1,5 @@
 //! Keeps the modules of the project in their order: a module uses only those below it, and no files use each
 //! other in a circle.
-#![allow(clippy::unwrap_used, clippy::panic)] // a test that cannot read the sources must stop
-
-#[path = "../../../testing/module_graph.rs"]
-mod module_graph;
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 3] = [
@@ -14,5 +10,5 @@ const LAYERS: [&[&str]; 3] = [
 
 #[test]
 fn modules_use_only_those_below_them_and_never_in_a_circle() {
-    module_graph::assert_layers(env!("CARGO_MANIFEST_DIR"), &LAYERS);
+    stonewise_testing::assert_layers(env!("CARGO_MANIFEST_DIR"), &LAYERS);
 }

@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail here")]
 
-use std::path::Path;
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::{CocoMasks, ValidRegions};
@@ -85,11 +84,9 @@ fn a_plain_image_has_no_stones() {
 /// A real photo, where the surveys with truth lie beside the checkout.
 #[test]
 fn the_built_in_weights_find_the_stones_of_a_real_wall() {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/masks_real/chambord");
-    if !data.exists() {
-        println!("skipped: {} does not exist", data.display());
+    let Some(data) = stonewise_testing::survey("masks_real/chambord") else {
         return;
-    }
+    };
     let masks = CocoMasks::open(&data.join("instances.json")).unwrap();
     let listed = masks.photos().next().unwrap();
     let (name, width, height) = (listed.file_name.to_owned(), listed.width, listed.height);

@@ -117,8 +117,7 @@ fn the_same_seed_gives_the_same_losses_and_the_same_gradients() {
             model.losses(&sample, 6).total().into_scalar(),
         )
     };
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one.install(run), run());
+    assert_eq!(stonewise_testing::on_threads(1, run), run());
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Relief beside colour: weights of colour alone do what they did, and relief can be learnt.
 #![allow(clippy::unwrap_used)]
 
-#[path = "../../../testing/narrow_model.rs"]
 mod narrow_model;
 
 use burn::backend::{Autodiff, Flex};

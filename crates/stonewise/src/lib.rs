@@ -5,7 +5,6 @@ mod kept;
 mod output;
 mod pipeline;
 pub mod segmentation;
-pub mod simulate;
 mod storage;
 #[cfg(test)]
 #[path = "../../../testing/results.rs"]
@@ -13,14 +12,14 @@ mod testing;
 mod truth;
 
 use stonewise_base::{
-    address_space, error, files, limits, messages as texts, part, report_params, settings, simulate_error,
-    stable, thresholds, warnings,
+    address_space, error, files, limits, messages as texts, part, report_params, settings, stable,
+    thresholds, warnings,
 };
 use stonewise_figure as figure;
 use stonewise_project::sources;
 use stonewise_report::verdict;
 
-pub use address_space::require_start;
+pub use address_space::{require as require_memory, require_start};
 pub use error::{Error, Result};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;

@@ -6,14 +6,15 @@ use nalgebra::{Point3, Vector3};
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise::results::{Status, StoneRow, read_stones};
-use stonewise::simulate::{SurveyParams, write_survey};
 use stonewise::{OutputFolder, Project, Until, run};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::RgbImage;
-use stonewise_core::simulate::{PhotoParams, SceneParams, TlsParams, WallMotion, WallParams};
 use stonewise_io::cameras::read_cameras;
 use stonewise_io::image_io::{read_rgb, write_jpeg};
+use stonewise_simulate::{
+    PhotoParams, SceneParams, SurveyParams, TlsParams, WallMotion, WallParams, write_survey,
+};
 
 /// How the wall moved, metres.
 const MOTION: [f64; 3] = [0.012, 0.02, -0.01];

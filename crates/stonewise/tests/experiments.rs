@@ -12,11 +12,12 @@ use std::path::Path;
 use stonewise::experiment::{
     Influence, PaperOptions, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
 };
-use stonewise::simulate::{SurveyParams, write_survey};
 use stonewise::{OutputFolder, Part, Project, Until, run};
 use stonewise_core::evaluate::MotionField;
 use stonewise_core::progress::Silent;
-use stonewise_core::simulate::{PhotoParams, SceneParams, SurroundingsParams, TlsParams, WallParams};
+use stonewise_simulate::{
+    PhotoParams, SceneParams, SurroundingsParams, SurveyParams, TlsParams, WallParams, write_survey,
+};
 use tempfile::TempDir;
 
 fn survey() -> (TempDir, Project) {

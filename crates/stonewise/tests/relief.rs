@@ -4,15 +4,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise::segmentation::{FolderJob, segment_folder};
-use stonewise::simulate::{SurveyParams, write_survey};
 use stonewise::{OutputFolder, Project, Until, run};
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::LabelImage;
-use stonewise_core::simulate::{PhotoParams, SceneParams, TlsParams, WallParams};
 use stonewise_io::masks::read_label_png;
 use stonewise_segment::Weights;
 use stonewise_segment::tiling::TilingOptions;
 use stonewise_segment::train::{Rendered, Run, Schedule, Session, Start, Total, TrainParams, model_path};
+use stonewise_simulate::{PhotoParams, SceneParams, SurveyParams, TlsParams, WallParams, write_survey};
 
 /// One photo an epoch of a wall of 1.2 x 0.9 m, without masks.
 fn survey(folder: &Path) -> PathBuf {

@@ -2,7 +2,7 @@
 //! resuming and threads can be seen.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on must stop")]
 
-#[path = "../../../testing/narrow_model.rs"]
+#[path = "../../stonewise-segment/tests/narrow_model/mod.rs"]
 mod narrow_model;
 
 use std::fs;
@@ -113,11 +113,7 @@ fn the_result_is_the_same_for_any_number_of_threads() {
     let (photos, weights) = input(dir.path());
     let labels = |threads: usize| {
         let out = dir.path().join(format!("out{threads}"));
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| segment(&photos, &out, &weights, None));
+        stonewise_testing::on_threads(threads, || segment(&photos, &out, &weights, None));
         fs::read(out.join("masks.json")).unwrap()
     };
     assert!(labels(1) == labels(4));

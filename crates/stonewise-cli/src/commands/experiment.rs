@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use stonewise::experiment::{
     PaperOptions, PaperSurvey, SensitivityOptions, paper as run_paper, sensitivity as run_sensitivity,
 };
-use stonewise::simulate::SurveyParams;
 use stonewise::{OutputFolder, Owner, Project};
+use stonewise_simulate::SurveyParams;
 
 /// Runs an experiment.
 pub fn experiment(which: &ExperimentCommand, force: bool, printer: &Printer) -> Result<Outcome> {

@@ -7,8 +7,11 @@ use crate::printer::Printer;
 use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::segmentation;
-use stonewise::simulate::{SurveyParams, require_memory, write_survey};
-use stonewise::{OutputFolder, Owner, Project, Until};
+use stonewise::{OutputFolder, Owner, Project, Until, require_memory};
+use stonewise_simulate::{SurveyParams, write_survey};
+
+/// The work in messages about memory.
+const THIS: &str = "this simulation";
 
 /// Makes a small survey, runs it and scores it against its truth.
 pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> {
@@ -16,7 +19,7 @@ pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     params.scene.seed = args.seed;
     params.scene.wall.seed = args.seed;
     if !force {
-        require_memory(&params)?;
+        require_memory(params.memory_bytes(), THIS)?;
         segmentation::require_memory()?;
     }
     let survey = args.out.join("survey");
@@ -46,13 +49,8 @@ pub fn make_once(path: &Path, params: &SurveyParams, force: bool, printer: &Prin
 
 /// The folder of the survey with these parameters.
 fn claim(path: &Path, params: &SurveyParams, force: bool) -> Result<OutputFolder> {
-    Ok(OutputFolder::of_inputs(
-        path,
-        &Owner::survey(params),
-        &[],
-        &[],
-        force,
-    )?)
+    let owner = Owner::survey(params.scene.seed, &toml::to_string(params)?);
+    Ok(OutputFolder::of_inputs(path, &owner, &[], &[], force)?)
 }
 
 /// Makes a simulated survey.
@@ -70,7 +68,7 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
         params = params.seeded(seed);
     }
     if !force {
-        require_memory(&params)?;
+        require_memory(params.memory_bytes(), THIS)?;
     }
     let folder = claim(&args.out, &params, force)?;
     let summary = write_survey(folder.path(), &params, printer)?;

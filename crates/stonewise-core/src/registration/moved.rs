@@ -27,12 +27,9 @@ pub fn moved_stones(motions: &[Option<(Vector3<f64>, Matrix3<f64>)>], rate: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
-
-    fn normal(rng: &mut ChaCha8Rng) -> f64 {
-        (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0
-    }
+    use stonewise_testing::normal;
 
     /// Share of still walls with a stone called moved: with the rate controlled, and stone by stone.
     fn alarms(shared: f64, own: f64) -> [f64; 2] {

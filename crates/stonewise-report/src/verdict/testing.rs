@@ -1,10 +1,10 @@
 //! Random numbers for tests.
 
 use nalgebra::Vector3;
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Standard normal numbers (Box & Muller 1958).
+/// Standard normal numbers.
 pub(crate) struct Normal(ChaCha8Rng);
 
 impl Normal {
@@ -13,8 +13,7 @@ impl Normal {
     }
 
     pub(crate) fn number(&mut self) -> f64 {
-        let (u, v): (f64, f64) = (self.0.random(), self.0.random());
-        (-2.0 * (1.0 - u).ln()).sqrt() * (2.0 * std::f64::consts::PI * v).cos()
+        stonewise_testing::normal(&mut self.0)
     }
 
     pub(crate) fn vector(&mut self) -> Vector3<f64> {

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use stonewise_core::raster::{Raster, RgbImage};
-use stonewise_core::simulate::normal;
+use stonewise_core::statistics::normal_pair;
 
 /// Qualities of JPEG files, from and to.
 const JPEG_QUALITY: [f64; 2] = [35.0, 95.0];
@@ -32,7 +32,9 @@ pub fn recolour(image: &RgbImage, params: &AugmentParams, rng: &mut ChaCha8Rng) 
         blur(&mut pixels, size, rng.random::<f64>() * params.blur_px);
     }
     let noise = rng.random::<f64>().powi(2) * params.noise;
-    let byte = |value: f64, rng: &mut ChaCha8Rng| ((value + noise * normal(rng)) * 255.0).round() as u8;
+    let byte = |value: f64, rng: &mut ChaCha8Rng| {
+        ((value + noise * normal_pair([rng.random(), rng.random()])[0]) * 255.0).round() as u8
+    };
     let bytes = pixels.iter().map(|p| p.map(|v| byte(v, rng))).collect();
     let image = Raster::from_vec(size[0], size[1], bytes).unwrap_or_else(|| image.clone());
     if rng.random::<f64>() < params.jpeg_share {

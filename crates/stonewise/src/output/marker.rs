@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::files::write_readable_json;
 use crate::project::Project;
 use crate::results::names::WORK_DIR;
-use crate::simulate::SurveyParams;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs;
@@ -41,12 +40,11 @@ impl Owner {
     }
 
     /// A simulated survey; another seed, or another size, is another survey.
-    pub fn survey(params: &SurveyParams) -> Self {
-        let text = toml::to_string(params).unwrap_or_default();
+    pub fn survey(seed: u64, parameters: &str) -> Self {
         Self {
             kind: "survey".to_owned(),
-            identity: blake3::hash(text.as_bytes()).to_hex().to_string(),
-            what: format!("the simulated survey of seed {}", params.scene.seed),
+            identity: blake3::hash(parameters.as_bytes()).to_hex().to_string(),
+            what: format!("the simulated survey of seed {seed}"),
         }
     }
 
@@ -170,30 +168,22 @@ fn is_empty(folder: &Path) -> Result<bool> {
     })
 }
 
-/// Whether version 1, which wrote no markers, made the folder for this owner: `run.json` of the same project,
-/// or `simulation.toml` with the same parameters.
+/// Whether version 1, which wrote no markers, made the folder for this owner: `run.json` of the same project.
 fn of_first_version(folder: &Path, owner: &Owner) -> bool {
-    match owner.kind.as_str() {
-        "project" => {
-            let text = fs::read_to_string(folder.join("run.json")).unwrap_or_default();
-            let run: Value = serde_json::from_str(&text).unwrap_or_default();
-            let Some(file) = run["project"]["file"].as_str().map(Path::new) else {
-                return false;
-            };
-            // A path that was relative to a working folder of then may lead nowhere now.
-            let project = Path::new(&owner.identity);
-            resolved(file) == project
-                || (!file.exists()
-                    && file.file_name() == project.file_name()
-                    && Project::name_in(project).as_deref() == run["project"]["name"].as_str())
-        }
-        "survey" => {
-            let text = fs::read_to_string(folder.join("simulation.toml")).unwrap_or_default();
-            let params: Option<SurveyParams> = toml::from_str(&text).ok();
-            !text.is_empty() && params.is_some_and(|p| Owner::survey(&p) == *owner)
-        }
-        _ => false,
+    if owner.kind != "project" {
+        return false;
     }
+    let text = fs::read_to_string(folder.join("run.json")).unwrap_or_default();
+    let run: Value = serde_json::from_str(&text).unwrap_or_default();
+    let Some(file) = run["project"]["file"].as_str().map(Path::new) else {
+        return false;
+    };
+    // A path that was relative to a working folder of then may lead nowhere now.
+    let project = Path::new(&owner.identity);
+    resolved(file) == project
+        || (!file.exists()
+            && file.file_name() == project.file_name()
+            && Project::name_in(project).as_deref() == run["project"]["name"].as_str())
 }
 
 #[cfg(test)]
@@ -228,14 +218,9 @@ mod tests {
     fn seeds_and_sizes_are_told_apart() {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir_all(dir.path().join(WORK_DIR)).unwrap();
-        let seven = SurveyParams::demo().seeded(7);
-        write(dir.path(), &Owner::survey(&seven)).unwrap();
-        assert!(ours(dir.path(), &Owner::survey(&seven)));
-        assert!(!ours(dir.path(), &Owner::survey(&seven.clone().seeded(8))));
-        assert!(!ours(
-            dir.path(),
-            &Owner::survey(&SurveyParams::default().seeded(7))
-        ));
+        write(dir.path(), &Owner::survey(7, "width_m = 3.0")).unwrap();
+        assert!(ours(dir.path(), &Owner::survey(7, "width_m = 3.0")));
+        assert!(!ours(dir.path(), &Owner::survey(7, "width_m = 4.0")));
     }
 
     #[test]
@@ -257,12 +242,6 @@ mod tests {
             fs::write(results.join("run.json"), run.to_string()).unwrap();
             assert_eq!(ours(&results, &owner), expected, "{file} {name}");
         }
-        let survey = dir.path().join("survey");
-        fs::create_dir(&survey).unwrap();
-        let params = SurveyParams::demo();
-        fs::write(survey.join("simulation.toml"), toml::to_string(&params).unwrap()).unwrap();
-        assert!(ours(&survey, &Owner::survey(&params)));
-        assert!(!ours(&survey, &Owner::survey(&params.seeded(99))));
     }
 
     #[test]

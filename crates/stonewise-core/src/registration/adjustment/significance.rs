@@ -117,14 +117,14 @@ fn within_error_rate(p_error: &[Option<f64>], rate: f64) -> Vec<bool> {
 mod tests {
     use super::*;
     use nalgebra::{Matrix6, Vector6};
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     /// P-values of stones whose observations follow the model, and whose faces bend by `bending` in any
     /// direction.
     fn simulated(bending_per_m: f64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
-        let mut normal = || (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+        let mut normal = || stonewise_testing::normal(&mut rng);
         let own: [f64; 9] = [1e-8, 1e-8, 4e-8, 1e-6, 1e-6, 1e-6, 1e-4, 1e-4, 1e-4];
         let mut root = Matrix9::from_fn(|_, _| normal());
         let sd = [4e-4, 4e-4, 2e-4, 4e-3, 4e-3, 8e-3, 0.05, 0.05, 0.05];

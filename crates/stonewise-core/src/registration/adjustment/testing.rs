@@ -25,7 +25,7 @@ pub(super) fn wall(rows: u32, noise_m: [f64; 2], motion: impl Fn(u32) -> Vector3
                 rng.random_range(-HALF_M[0]..HALF_M[0]),
                 rng.random_range(-HALF_M[1]..HALF_M[1]),
             );
-            let noise = noise_m * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+            let noise = noise_m * stonewise_testing::normal(&mut rng);
             let phase = f64::from(stone);
             let x = 0.004 * ((50.0 * y + phase).sin() + (43.0 * z + 2.0 * phase).cos());
             (Vector3::new(x + noise, y, z) + shift).cast::<f32>().into()

@@ -149,11 +149,7 @@ fn the_answer_does_not_depend_on_threads() {
         .map(|i| Point3::new(0.05 * f64::from(i), 0.0, 0.0))
         .collect();
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| measure(&first, &second, &centres, &narrow()))
+        stonewise_testing::on_threads(threads, || measure(&first, &second, &centres, &narrow()))
     };
     assert_eq!(with(1), with(4));
 }

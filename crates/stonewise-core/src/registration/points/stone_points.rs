@@ -81,7 +81,7 @@ fn labelled(near: &[NearPoint]) -> Vec<[f32; 3]> {
 mod tests {
     use super::*;
     use nalgebra::Point3;
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const NOISE_M: f64 = 0.01;
@@ -92,7 +92,7 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..150 * 150)
             .map(|i| {
-                let noise = NOISE_M * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                let noise = NOISE_M * stonewise_testing::normal(&mut rng);
                 let (y, z) = (f64::from(i % 150) * 0.004 - 0.3, f64::from(i / 150) * 0.004 - 0.3);
                 let p = Vector3::new(noise, y, z) + shift;
                 NearPoint {

@@ -1,10 +1,10 @@
 //! What is varied, one thing at a time.
 
-use crate::simulate::{MaskFiles, SurveyParams};
 use serde::Serialize;
 use std::str::FromStr;
-use stonewise_core::simulate::{
-    MaskError, PhotoParams, SceneParams, SurroundingsParams, TlsParams, UavParams, WallMotion, WallParams,
+use stonewise_simulate::{
+    MaskError, MaskFiles, PhotoParams, SceneParams, SurroundingsParams, SurveyParams, TlsParams, UavParams,
+    WallMotion, WallParams,
 };
 
 /// What the results may depend on.

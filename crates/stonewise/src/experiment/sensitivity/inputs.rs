@@ -4,16 +4,18 @@ use super::cases::{Change, Variant, changed};
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::project::Project;
-use crate::simulate::{SurveyParams, write_survey};
 use crate::storage::step::Key;
 use crate::storage::store::StepStore;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_core::simulate::{MaskError, disturb_views, mean_iou, spoil_masks};
+
 use stonewise_io::cameras::{read_cameras, write_metashape};
 use stonewise_io::masks::{MaskSource, write_label_png};
+use stonewise_simulate::{
+    MaskError, PhotoParams, SimulateError, SurveyParams, disturb_views, mean_iou, spoil_masks, write_survey,
+};
 
 /// What a variant is measured on.
 pub(super) struct Inputs {
@@ -35,8 +37,9 @@ pub(super) fn inputs(
     let params = changed(base, variant.change);
     let key = Key::new("survey", &params, &[]);
     let (survey, _) = store.step("survey", key, &[], |dir| {
-        write_survey(&dir.file("survey"), &params, progress)?;
-        Ok(())
+        write_survey(&dir.file("survey"), &params, progress)
+            .map(|_| ())
+            .map_err(not_simulated)
     })?;
     let folder = survey.file("survey");
     let mut projects = vec![("TLS", Project::read(&folder.join("stonewise.toml"))?)];
@@ -79,6 +82,13 @@ pub(super) fn inputs(
     })
 }
 
+fn not_simulated(error: SimulateError) -> Error {
+    match error {
+        SimulateError::Interrupted(_) => Error::Interrupted,
+        error => Error::Simulate(error.into()),
+    }
+}
+
 fn cameras_name(number: u64) -> String {
     format!("cameras_{number}.xml")
 }
@@ -91,7 +101,7 @@ fn other_views(
     number: u64,
 ) -> Result<Vec<View>> {
     if let Change::Pose(pose_noise_px) = change {
-        let photos = stonewise_core::simulate::PhotoParams {
+        let photos = PhotoParams {
             pose_noise_px,
             ..params.photos.clone()
         };

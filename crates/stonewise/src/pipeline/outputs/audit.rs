@@ -128,7 +128,7 @@ impl AuditRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::check_csv_metadata;
+    use stonewise_testing::check_csv_metadata;
 
     #[test]
     fn the_metadata_describe_every_column() {

@@ -76,8 +76,8 @@ fn write_rows(csv: &Path, epochs: &[&str], attempts: &[CarryAttempt]) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::check_csv_metadata;
     use stonewise_core::id::StoneId;
+    use stonewise_testing::check_csv_metadata;
 
     #[test]
     fn a_carried_stone_has_a_number_and_another_one_a_reason() {

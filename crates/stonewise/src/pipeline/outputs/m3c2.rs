@@ -103,7 +103,7 @@ fn write_cloud(path: &Path, crs: Option<&Crs>, field: &ChangeField) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::check_csv_metadata;
+    use stonewise_testing::check_csv_metadata;
 
     #[test]
     fn the_metadata_describe_every_column() {

@@ -301,7 +301,7 @@ mod tests {
     #[test]
     fn components_from_which_a_survey_was_drawn_are_found() {
         let mut rng = ChaCha8Rng::seed_from_u64(8);
-        let mut gauss = || (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+        let mut gauss = || stonewise_testing::normal(&mut rng);
         let truth = VarianceComponents {
             drift: [1.6e-2, 3e-2],
             own_m: 2e-3,

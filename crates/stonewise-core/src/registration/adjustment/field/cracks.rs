@@ -187,7 +187,7 @@ mod tests {
     use crate::registration::adjustment::field::testing::SmallWall;
     use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
     use nalgebra::Point3;
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     /// Ten by six stones, each observed to 1 mm, on either side of a leaning line.
@@ -198,7 +198,7 @@ mod tests {
         let side: Vec<bool> = wall.graph.nodes.iter().map(|n| is_right(&n.centroid)).collect();
         for (i, equations) in wall.equations.iter_mut().enumerate() {
             let frame = wall.graph.nodes[i].face_from_world;
-            let mut noise = || 1e-3 * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+            let mut noise = || 1e-3 * stonewise_testing::normal(&mut rng);
             let noise = Vector3::new(noise(), noise(), noise());
             let seen = frame * (if side[i] { jump } else { Vector3::zeros() }) + noise;
             let weights = [1e6, 1e6, 1e6, 1e3, 1e3, 1e3, 0.0, 0.0, 0.0];

@@ -90,7 +90,7 @@ mod tests {
     use crate::registration::points::PairPoints;
     use crate::registration::points::{NearPoint, stone_points};
     use nalgebra::{Point3, Vector3};
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use std::sync::Arc;
 
@@ -114,8 +114,7 @@ mod tests {
         (0..81 * 81)
             .map(|i| {
                 let (y, z) = (place(i % 81), place(i / 81));
-                let noise =
-                    NOISE.sigma_m[0] * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                let noise = NOISE.sigma_m[0] * stonewise_testing::normal(&mut rng);
                 let p = Vector3::new(0.006 * ((50.0 * y).sin() + (40.0 * z).cos()), y, z);
                 let q = p + moved(&p);
                 NearPoint {

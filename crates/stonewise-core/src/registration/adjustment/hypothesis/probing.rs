@@ -101,7 +101,7 @@ mod tests {
         let mut scan = |[du, dv]: [f64; 2]| {
             let point = |_| {
                 let (u, v) = (rng.random_range(-0.1..0.1), rng.random_range(-0.1..0.1));
-                let noise = NOISE_M * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                let noise = NOISE_M * stonewise_testing::normal(&mut rng);
                 let height: f64 = 0.006 * ((50.0_f64 * u).sin() + (41.0_f64 * v).cos());
                 [u + du, v + dv, height + noise]
             };

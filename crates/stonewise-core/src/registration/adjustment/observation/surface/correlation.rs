@@ -127,17 +127,14 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-    fn gauss(rng: &mut ChaCha8Rng) -> f64 {
-        (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0
-    }
+    use stonewise_testing::normal;
 
     /// Stones whose squared differences in small and large cells are `factors` times chi-square with one
     /// degree of freedom.
     fn stones(factors: [f64; 2], seed: u64) -> Vec<Equations> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut squares =
-            |count: usize, factor: f64| (0..count).map(|_| factor * gauss(&mut rng).powi(2)).collect();
+            |count: usize, factor: f64| (0..count).map(|_| factor * normal(&mut rng).powi(2)).collect();
         (0..300)
             .map(|_| Equations {
                 differences: squares(40, factors[0]),
@@ -204,7 +201,7 @@ mod tests {
                 for scatter in &mut stone.slopes {
                     for _ in 0..25 {
                         let weight: f64 = rng.random_range(1e5..1e7);
-                        scatter.add(0.01 + gauss(&mut rng) * (1.8 / weight).sqrt(), weight);
+                        scatter.add(0.01 + normal(&mut rng) * (1.8 / weight).sqrt(), weight);
                     }
                 }
                 stone

@@ -244,7 +244,7 @@ mod tests {
             (0..400)
                 .map(|_| {
                     let (u, v) = (from + rng.random_range(-0.1..0.1), rng.random_range(-0.08..0.08));
-                    let noise = sigma * ((0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0);
+                    let noise = sigma * stonewise_testing::normal(&mut rng);
                     [u, v, 0.002 * (40.0 * u).sin() + 0.001 * (55.0 * v).cos() + noise]
                 })
                 .collect::<Vec<_>>()

@@ -148,7 +148,7 @@ mod tests {
         (0..700)
             .map(|_| {
                 let (u, v): (f64, f64) = (rng.random_range(-0.1..0.1), rng.random_range(-0.08..0.08));
-                let noise = (0..12).map(|_| rng.random_range(0.0..1.0)).sum::<f64>() - 6.0;
+                let noise = stonewise_testing::normal(rng);
                 [
                     u,
                     v,

@@ -1,0 +1,13 @@
+//! What the tests of several crates share. It knows none of them, so that unit tests of all can use it.
+
+mod csv_metadata;
+mod module_graph;
+mod normal;
+mod surveys;
+mod threads;
+
+pub use csv_metadata::check_csv_metadata;
+pub use module_graph::assert_layers;
+pub use normal::normal;
+pub use surveys::survey;
+pub use threads::on_threads;

@@ -1,0 +1,48 @@
+//! Programs that produce the figures of docs/, and what tests of other languages need; README.md lists them.
+
+mod adjustment;
+mod coverage;
+mod detector;
+mod epoch_errors;
+mod figures;
+mod photo_curves;
+mod sample_report;
+mod speed;
+mod survey;
+mod table;
+mod words;
+
+use words::Words;
+
+/// What a program says in the end.
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+/// Name and start of a program.
+type Program = (&'static str, fn(&Words) -> Outcome);
+
+const PROGRAMS: [Program; 13] = [
+    ("adjustment", adjustment::run),
+    ("coverage", coverage::run),
+    ("epoch-errors", epoch_errors::run),
+    ("photo-curves", photo_curves::run),
+    ("kept-walls", detector::kept_walls::run),
+    ("masonry-sheet", detector::masonry_sheet::run),
+    ("overfit", detector::overfit::run),
+    ("step-time", detector::step_time::run),
+    ("instances", detector::instances::run),
+    ("comparisons", speed::comparisons::run),
+    ("tiles", speed::tiles::run),
+    ("clouds", speed::clouds::run),
+    ("sample-report", sample_report::run),
+];
+
+fn main() -> Outcome {
+    let (name, words) = Words::of_this_program();
+    match PROGRAMS.iter().find(|program| program.0 == name) {
+        Some((_, run)) => run(&words),
+        None => {
+            let names = PROGRAMS.map(|program| program.0).join(", ");
+            Err(format!("name one of the programs {names}; lab/README.md says what each does").into())
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Surveys whose stones are known, ready to be measured.
+
+mod dam_small;
+mod points;
+
+pub use dam_small::{read_points, read_stones};
+pub use points::{LEAST_POINTS, Places, Points, SurveyPoint, mean, pairs, places, seen_stone};

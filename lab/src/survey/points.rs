@@ -1,0 +1,155 @@
+//! Points by their true stone, and what the estimators take of them.
+
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use stonewise_core::cloud::Cloud;
+use stonewise_core::geometry::{Bounds, Plane};
+use stonewise_core::id::StoneId;
+use stonewise_core::registration::observers::{SeenStone, SourcePoints};
+use stonewise_core::registration::{NearPoint, PairPoints, local_shifts, stone_points};
+
+/// Points that a stone needs in each epoch.
+pub const LEAST_POINTS: usize = 10;
+/// Around a stone, metres: points of others at its border.
+const AROUND_M: f64 = 0.02;
+
+/// A measured point.
+pub struct SurveyPoint {
+    pub place: Point3<f64>,
+    /// Station or strip, as the survey numbers them.
+    pub source: usize,
+    pub time_s: f64,
+}
+
+/// Points by stone; 0 holds what is no stone.
+pub type Points = BTreeMap<u32, Vec<SurveyPoint>>;
+/// The same without sources and times, world frame.
+pub type Places = BTreeMap<u32, Vec<Point3<f64>>>;
+
+/// The places of these stones.
+pub fn places(points: &Points, stones: &[u32]) -> Places {
+    let of = |id: &u32| (*id, points[id].iter().map(|p| p.place).collect());
+    stones.iter().map(of).collect()
+}
+
+/// Centre of gravity.
+pub fn mean(points: &[Point3<f64>]) -> Point3<f64> {
+    (points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len().max(1) as f64).into()
+}
+
+/// Normal of the plane through points, on the side of `outward`.
+pub fn face_normal(points: &[Point3<f64>], outward: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let normal = Plane::fit(points)?.normal;
+    Some(normal * normal.dot(outward).signum())
+}
+
+/// Pairs of the same stone in both epochs, for the estimators.
+///
+/// `outward`: roughly the normal of a stone; `None` leaves it out. Near the border of a stone points are chosen
+/// as in a run, within `border_noises` noise levels.
+pub fn pairs(
+    epochs: &[Places; 2],
+    outward: impl Fn(u32) -> Option<Vector3<f64>> + Sync,
+    border_noises: f64,
+) -> Vec<PairPoints> {
+    let [first, second] = epochs;
+    let ids: Vec<u32> = first
+        .keys()
+        .copied()
+        .filter(|id| *id > 0 && second.contains_key(id))
+        .collect();
+    let centroids: Vec<Point3<f64>> = ids.iter().map(|id| mean(&first[id])).collect();
+    let moved: Vec<Vector3<f64>> = ids
+        .iter()
+        .zip(&centroids)
+        .map(|(id, c)| mean(&second[id]) - c)
+        .collect();
+    let shifts = local_shifts(&centroids, &moved);
+    let surroundings = Surroundings::new(epochs);
+    ids.par_iter()
+        .zip(&centroids)
+        .zip(&shifts)
+        .filter_map(|((&id, &centroid), shift)| {
+            let (points, other) = (&first[&id], &second[&id]);
+            if points.len().min(other.len()) < LEAST_POINTS {
+                return None;
+            }
+            let normal = face_normal(points, &outward(id)?)?;
+            let one = surroundings.near(0, id, &centroid, &Vector3::zeros());
+            let two = surroundings.near(1, id, &centroid, shift);
+            let chosen = stone_points([&one, &two], &normal, shift, border_noises);
+            Some(PairPoints {
+                first: StoneId(id),
+                second: StoneId(id),
+                centroid,
+                centroid_second: mean(other),
+                normal,
+                points_first: Cloud::new(centroid, chosen.first),
+                points_second: Cloud::new(centroid, chosen.second),
+                nearby_second: Cloud::new(centroid, chosen.nearby_second),
+                window: chosen.window.map(Arc::new),
+            })
+        })
+        .collect()
+}
+
+/// Points in and around stones.
+struct Surroundings<'a> {
+    epochs: &'a [Places; 2],
+    bounds: [BTreeMap<u32, Bounds>; 2],
+}
+
+impl<'a> Surroundings<'a> {
+    fn new(epochs: &'a [Places; 2]) -> Self {
+        let bounds = epochs.each_ref().map(|stones| {
+            let of = |(id, points): (&u32, &Vec<_>)| Some((*id, Bounds::of(points.iter().copied())?));
+            stones.iter().filter_map(of).collect()
+        });
+        Self { epochs, bounds }
+    }
+
+    /// A stone's points, and those of others at its place, moved by `shift`.
+    fn near(&self, epoch: usize, id: u32, centroid: &Point3<f64>, shift: &Vector3<f64>) -> Vec<NearPoint> {
+        let place = self.bounds[0][&id].grown(AROUND_M).moved(shift);
+        self.epochs[epoch]
+            .iter()
+            .filter(|(k, _)| **k == id || self.bounds[epoch][*k].intersects(&place))
+            .flat_map(|(k, points)| points.iter().map(move |p| (*k == id, p)))
+            .filter(|(own, p)| *own || place.contains(p))
+            .map(|(labelled, p)| NearPoint {
+                offset: (p - centroid).cast::<f32>().into(),
+                labelled,
+            })
+            .collect()
+    }
+}
+
+/// A stone as the sources of both epochs show it. `number`: of a source among all, from its epoch and its own.
+pub fn seen_stone(
+    epochs: &[Points; 2],
+    id: u32,
+    outward: &Vector3<f64>,
+    number: impl Fn(usize, usize) -> usize,
+) -> Option<SeenStone> {
+    let first: Vec<Point3<f64>> = epochs[0][&id].iter().map(|p| p.place).collect();
+    let centroid = mean(&first);
+    let mut sights: BTreeMap<usize, Vec<&SurveyPoint>> = BTreeMap::new();
+    for (epoch, points) in epochs.iter().enumerate() {
+        for p in &points[&id] {
+            sights.entry(number(epoch, p.source)).or_default().push(p);
+        }
+    }
+    let sight = |(source, points): (usize, Vec<&SurveyPoint>)| SourcePoints {
+        source,
+        count: points.len() as u64,
+        time_s: points.iter().map(|p| p.time_s).sum::<f64>() / points.len() as f64,
+        points: Cloud::from_world(centroid, points.iter().map(|p| p.place)),
+    };
+    Some(SeenStone {
+        centroid,
+        normal: face_normal(&first, outward)?,
+        sights: sights.into_iter().map(sight).collect(),
+    })
+}

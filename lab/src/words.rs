@@ -1,0 +1,55 @@
+//! The words of a command line.
+
+use std::str::FromStr;
+
+/// Words in their order: names, and `KEY=VALUE`.
+#[derive(Clone, Debug)]
+pub struct Words(Vec<String>);
+
+impl Words {
+    /// The name of the program that is to be run, and what follows it.
+    pub fn of_this_program() -> (String, Self) {
+        let mut words = std::env::args().skip(1);
+        (words.next().unwrap_or_default(), Self(words.collect()))
+    }
+
+    pub fn as_slice(&self) -> &[String] {
+        &self.0
+    }
+
+    pub fn has(&self, word: &str) -> bool {
+        self.0.iter().any(|w| w == word)
+    }
+
+    /// What stands behind `KEY=`, or another prefix.
+    pub fn after(&self, prefix: &str) -> Option<&str> {
+        self.0.iter().find_map(|w| w.strip_prefix(prefix))
+    }
+
+    /// The number behind a prefix.
+    pub fn number<T: FromStr>(&self, prefix: &str) -> Option<T> {
+        Some(parsed(self.after(prefix)?))
+    }
+
+    /// The word at a place as a number.
+    pub fn number_at<T: FromStr>(&self, place: usize) -> Option<T> {
+        self.0.get(place).map(|word| parsed(word))
+    }
+
+    /// The list behind a prefix, or the default.
+    pub fn list(&self, prefix: &str, default: &str) -> Vec<String> {
+        let list = self.after(prefix).unwrap_or(default);
+        list.split(',').map(str::to_owned).collect()
+    }
+
+    /// The names that are among the words; all where none is.
+    pub fn chosen<'a>(&self, names: &[&'a str]) -> Vec<&'a str> {
+        let some: Vec<&str> = names.iter().copied().filter(|n| self.has(n)).collect();
+        if some.is_empty() { names.to_vec() } else { some }
+    }
+}
+
+fn parsed<T: FromStr>(word: &str) -> T {
+    word.parse()
+        .unwrap_or_else(|_| panic!("{word} is not such a number"))
+}
