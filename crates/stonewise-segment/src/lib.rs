@@ -15,7 +15,6 @@ mod sample;
 mod seed;
 mod segmentation;
 mod stone_finder;
-pub mod synth;
 pub mod tiling;
 pub mod train;
 

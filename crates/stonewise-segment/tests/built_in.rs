@@ -6,9 +6,9 @@
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::{CocoMasks, ValidRegions};
-use stonewise_segment::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
 use stonewise_segment::tiling::TilingOptions;
 use stonewise_segment::train::evaluate_samples;
+use stonewise_segment::train::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
 use stonewise_segment::{Detector, Sample, StoneFinder, Weights};
 
 /// Seeds kept for this test; training draws 64-bit numbers.

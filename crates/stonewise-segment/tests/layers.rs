@@ -12,7 +12,7 @@ const LAYERS: [&[&str]; 6] = [
         "seed",
         "segmentation",
     ],
-    &["evaluation", "model", "synth", "tiling"],
+    &["evaluation", "model", "tiling"],
     &["built_in", "onnx"],
     &["stone_finder", "augment"],
     &["train"],

@@ -12,7 +12,7 @@ use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
 use stonewise_segment::model::{
     MaskRcnn, MaskRcnnConfig, Precision, config_from_bytes, model_from_bytes, weights_to_bytes,
 };
-use stonewise_segment::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
+use stonewise_segment::train::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
 use stonewise_segment::{Sample, Weights};
 
 const SIDE: u32 = 160;

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use stonewise_core::raster::connected_components;
 use stonewise_segment::Sample;
-use stonewise_segment::synth::{Bond, Content, MasonryStyle, Region, Wall, masonry_photo, masonry_photo_of};
+use stonewise_segment::train::synth::{
+    Bond, Content, MasonryStyle, Region, Wall, masonry_photo, masonry_photo_of,
+};
 
 /// Photo of one wall without anything beside or before it; `None` where the style has no wall.
 fn wall_alone(seed: u64, size: u32) -> Option<Sample> {

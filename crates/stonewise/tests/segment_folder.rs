@@ -15,8 +15,8 @@ use stonewise_segment::Weights;
 use stonewise_segment::backend::{Compute, device};
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::model::{MaskRcnn, Precision, save_model};
-use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::tiling::TilingOptions;
+use stonewise_segment::train::synth::masonry_photo;
 
 fn weights(path: &Path) -> Weights {
     let model = MaskRcnn::<Compute>::init(&narrow_model::narrow(8), 3, &device()).unwrap();

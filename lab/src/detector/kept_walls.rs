@@ -14,8 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, RgbImage};
-use stonewise_segment::synth::{MasonryStyle, Survey, SurveyKind, masonry_photo_of};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
+use stonewise_segment::train::synth::{MasonryStyle, Survey, SurveyKind, masonry_photo_of};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
 /// First of the seeds that are kept apart. Training draws 64-bit seeds, the test of the built-in weights uses

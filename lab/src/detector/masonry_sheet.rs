@@ -6,7 +6,7 @@
 use crate::Outcome;
 use crate::words::Words;
 use stonewise_segment::Sample;
-use stonewise_segment::synth::{MasonryStyle, masonry_photo_of};
+use stonewise_segment::train::synth::{MasonryStyle, masonry_photo_of};
 
 pub fn run(words: &Words) -> Outcome {
     let path = words.as_slice().first().ok_or("say where to write the sheet")?;

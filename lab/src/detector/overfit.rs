@@ -14,8 +14,8 @@ use stonewise_core::progress::Silent;
 use stonewise_segment::Sample;
 use stonewise_segment::evaluation::{MaskScore, pair_masks};
 use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig, StoneDetector};
-use stonewise_segment::synth::masonry_photo;
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
+use stonewise_segment::train::synth::masonry_photo;
 use stonewise_segment::{Weights, open_model};
 
 /// Photos that a step learns from.

@@ -14,6 +14,7 @@ mod schedule;
 mod session;
 mod source;
 mod start;
+pub mod synth;
 mod trainer;
 
 pub use checkpoint::checkpoint_path;

@@ -1,9 +1,9 @@
 //! Rendered photos as training images.
 
 use super::source::SampleSource;
+use super::synth::{MasonryStyle, Survey, masonry_photo_of};
 use crate::Sample;
 use crate::seed::mix;
-use crate::synth::{MasonryStyle, Survey, masonry_photo_of};
 
 /// One photo in this many shows walls laid dry.
 const DRY_EVERY: u64 = 4;

@@ -289,8 +289,8 @@ impl Bend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::layout::{Bond, BrickPattern};
-    use crate::synth::stone::StoneShape;
+    use crate::train::synth::layout::{Bond, BrickPattern};
+    use crate::train::synth::stone::StoneShape;
     use nalgebra::{Rotation3, Vector3};
     use rand::SeedableRng;
     use stonewise_core::raster::fill_polygon;
