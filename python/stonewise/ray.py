@@ -126,7 +126,6 @@ class _Cluster:
     retries: int
     cores: float = 1.0
     memory: float = 0.0
-    gpus: float = 0.0
     task: Any = None
     waiting: dict[Any, tuple[str, str]] = field(default_factory=dict)
 
@@ -136,7 +135,7 @@ class _Cluster:
         def most(what: str) -> float:
             return max((float(m.get(what, 0.0)) for m in machines), default=0.0)
 
-        self.cores, self.memory, self.gpus = max(most("CPU"), 1.0), most("memory"), most("GPU")
+        self.cores, self.memory = max(most("CPU"), 1.0), most("memory")
         self.task = ray.remote(_do)
 
     def do(
@@ -177,8 +176,6 @@ class _Cluster:
                 "memory": min(float(unit["memory_bytes"]), self.memory),
                 "max_retries": self.retries,
             }
-            if unit["gpu"] and self.gpus >= 1:
-                options["num_gpus"] = 1
             before = [references[need] for need in unit["needs"] if need in references]
             reference = self.task.options(**options).remote(out, unit["id"], int(cores), *before)
             references[unit["id"]] = reference

@@ -1,7 +1,6 @@
 //! The detector that comes with the program.
 
-use crate::model::{MaskRcnn, ModelBackend, WeightsError, config_from_bytes, model_from_bytes};
-use burn::tensor::Device;
+use crate::model::{MaskRcnn, WeightsError, config_from_bytes, model_from_bytes};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -62,26 +61,12 @@ impl Weights {
     }
 }
 
-/// The detector, ready to run.
+/// The detector of these weights. With `relief`, weights that were trained on colour alone get input channels
+/// for it.
 ///
 /// # Errors
-/// The file cannot be read or does not fit.
-pub fn open_model<B: ModelBackend>(
-    weights: &Weights,
-    device: &Device<B>,
-) -> Result<MaskRcnn<B>, WeightsError> {
-    open_model_with(weights, false, device)
-}
-
-/// The same; with `relief`, weights that were trained on colour alone get input channels for it.
-///
-/// # Errors
-/// As [`open_model`]; or the model cannot take relief.
-pub(crate) fn open_model_with<B: ModelBackend>(
-    weights: &Weights,
-    relief: bool,
-    device: &Device<B>,
-) -> Result<MaskRcnn<B>, WeightsError> {
+/// The file cannot be read or does not fit, or the model cannot take relief.
+pub fn open_model(weights: &Weights, relief: bool) -> Result<MaskRcnn, WeightsError> {
     let (bytes, name) = weights.named_bytes()?;
-    model_from_bytes(&bytes, &name, relief, device)
+    model_from_bytes(&bytes, &name, relief)
 }

@@ -1,15 +1,13 @@
 //! Finds the stones of masonry in photos: Mask R-CNN (He et al. 2017), its training and its evaluation.
 
 pub mod augment;
-pub mod backend;
 mod built_in;
 pub mod dataset;
 mod detection;
+mod engine;
 pub mod evaluation;
 mod jpeg;
 pub mod model;
-#[cfg(feature = "onnx")]
-pub mod onnx;
 mod relief;
 mod sample;
 mod seed;

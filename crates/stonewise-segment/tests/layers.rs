@@ -4,8 +4,8 @@
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 6] = [
     &[
-        "backend",
         "detection",
+        "engine",
         "jpeg",
         "relief",
         "sample",
@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 6] = [
         "segmentation",
     ],
     &["evaluation", "model", "tiling"],
-    &["built_in", "onnx"],
+    &["built_in"],
     &["stone_finder", "augment"],
     &["train"],
     &["dataset"],

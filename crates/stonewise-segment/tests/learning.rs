@@ -1,17 +1,13 @@
 //! A detector learns, repeats itself, and goes to a file and back.
 #![allow(clippy::unwrap_used)]
 
-use burn::backend::{Autodiff, Flex};
-use burn::module::AutodiffModule;
-use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
 use stonewise_core::raster::{LabelImage, Raster, RgbImage};
 use stonewise_segment::model::{
     BackboneConfig, MaskRcnn, MaskRcnnConfig, Norm, Precision, ResnetDepth, RoiConfig, SamplingConfig,
-    StoneDetector, WeightsError, load_weights, save_weights, weights_from_bytes,
+    WeightsError, load_weights, save_weights, weights_from_bytes,
 };
-use stonewise_segment::{Detector, Sample};
-
-type Train = Autodiff<Flex>;
+use stonewise_segment::train::{AdamW, AdamWParams};
+use stonewise_segment::{Detector, Sample, StoneFinder};
 
 /// Left, top, right, bottom of the stones of a picture of 128 x 96 pixels.
 const STONES: [[u32; 4]; 5] = [
@@ -45,8 +41,8 @@ fn small() -> MaskRcnnConfig {
     }
 }
 
-fn model(seed: u64) -> MaskRcnn<Train> {
-    MaskRcnn::init(&small(), seed, &Default::default()).unwrap()
+fn model(seed: u64) -> MaskRcnn {
+    MaskRcnn::init(&small(), seed).unwrap()
 }
 
 fn picture() -> Sample {
@@ -65,18 +61,15 @@ fn picture() -> Sample {
 fn a_picture_is_learnt_by_heart() {
     let sample = [picture()];
     let mut model = model(1);
-    let mut optimizer = AdamWConfig::new().with_epsilon(1e-8).init();
+    let mut optimizer = AdamW::new(AdamWParams::default());
     let mut totals = Vec::new();
     for step in 0..120 {
-        let total = model.losses(&sample, step).total();
-        let gradients = GradientsParams::from_grads(total.backward(), &model);
-        totals.push(total.into_scalar());
-        model = optimizer.step(3e-3, model, gradients);
+        let (losses, gradients) = model.gradients(&sample, step);
+        totals.push(losses.total());
+        optimizer.step(&mut model, gradients, 3e-3);
     }
     assert!(totals[119] < 0.2 * totals[0], "{totals:?}");
-    let found = StoneDetector::new(model.valid())
-        .detect(sample[0].image(), None)
-        .unwrap();
+    let found = StoneFinder::new(model).detect(sample[0].image(), None).unwrap();
     for (stone, bounds) in STONES.iter().enumerate() {
         let overlap = |patch: &stonewise_segment::Patch| {
             let mut both = 0;
@@ -108,14 +101,10 @@ fn a_picture_is_learnt_by_heart() {
 fn the_same_seed_gives_the_same_losses_and_the_same_gradients() {
     let sample = [picture()];
     let run = || {
-        let model = model(3);
-        let total = model.losses(&sample, 5).total();
-        let gradients = GradientsParams::from_grads(total.backward(), &model);
-        let model = AdamWConfig::new().init().step(1e-3, model, gradients);
-        (
-            total.into_scalar(),
-            model.losses(&sample, 6).total().into_scalar(),
-        )
+        let mut model = model(3);
+        let (losses, gradients) = model.gradients(&sample, 5);
+        AdamW::new(AdamWParams::default()).step(&mut model, gradients, 1e-3);
+        (losses, model.losses(&sample, 6))
     };
     assert_eq!(stonewise_testing::on_threads(1, run), run());
 }
@@ -127,20 +116,18 @@ fn where_nothing_is_known_there_is_no_background() {
     let nothing = Raster::filled(128, 96, 0);
     let unknown = Sample::new(picture.image().clone(), nothing.clone(), all.clone()).unwrap();
     let losses = model(1).losses(&[unknown], 1);
-    assert_eq!(losses.rpn_objectness.into_scalar(), 0.0);
-    assert_eq!(losses.class.into_scalar(), 0.0);
+    assert_eq!(losses.rpn_objectness, 0.0);
+    assert_eq!(losses.class, 0.0);
     let bare = Sample::new(picture.image().clone(), nothing, Raster::filled(128, 96, false)).unwrap();
-    assert!(model(1).losses(&[bare], 1).rpn_objectness.into_scalar() > 0.1);
+    assert!(model(1).losses(&[bare], 1).rpn_objectness > 0.1);
     // Known stones count within, too.
     let known = Sample::new(picture.image().clone(), picture.labels().clone(), all).unwrap();
-    assert!(model(1).losses(&[known], 1).mask.into_scalar() > 0.1);
+    assert!(model(1).losses(&[known], 1).mask > 0.1);
 }
 
 #[test]
 fn weights_come_back_from_a_file() {
-    let device = Default::default();
-    let trained = MaskRcnn::<Flex>::init(&small(), 1, &device).unwrap();
-    let other = || MaskRcnn::<Flex>::init(&small(), 2, &device).unwrap();
+    let (trained, other) = (model(1), || model(2));
     let folder = tempfile::tempdir().unwrap();
     let picture = picture();
     for (precision, tolerance) in [(Precision::Single, 0.0), (Precision::Half, 0.02)] {
@@ -155,8 +142,7 @@ fn weights_come_back_from_a_file() {
 
 #[test]
 fn weights_of_another_network_are_refused_by_name() {
-    let device = Default::default();
-    let init = |config: &MaskRcnnConfig| MaskRcnn::<Flex>::init(config, 1, &device).unwrap();
+    let init = |config: &MaskRcnnConfig| MaskRcnn::init(config, 1).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("small.safetensors");
     save_weights(&init(&small()), &path, Precision::Half).unwrap();

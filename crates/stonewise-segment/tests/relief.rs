@@ -3,9 +3,6 @@
 
 mod narrow_model;
 
-use burn::backend::{Autodiff, Flex};
-use burn::module::AutodiffModule;
-use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
 use safetensors::SafeTensors;
 use std::collections::HashMap;
 use stonewise_core::raster::{LabelImage, Raster, ReliefMap, RgbImage};
@@ -13,6 +10,7 @@ use stonewise_segment::model::{
     MaskRcnn, MaskRcnnConfig, Precision, config_from_bytes, model_from_bytes, weights_to_bytes,
 };
 use stonewise_segment::train::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
+use stonewise_segment::train::{AdamW, AdamWParams};
 use stonewise_segment::{Sample, Weights};
 
 const SIDE: u32 = 160;
@@ -34,8 +32,8 @@ fn of_colour_alone() -> Vec<u8> {
     safetensors::serialize(of_colour, Some(metadata)).unwrap()
 }
 
-fn opened(bytes: &[u8], relief: bool) -> MaskRcnn<Flex> {
-    model_from_bytes(bytes, "weights", relief, &Default::default()).unwrap()
+fn opened(bytes: &[u8], relief: bool) -> MaskRcnn {
+    model_from_bytes(bytes, "weights", relief).unwrap()
 }
 
 #[test]
@@ -140,15 +138,14 @@ fn hidden_squares() -> Sample {
 fn stones_that_only_relief_shows_are_learnt() {
     let config = narrow_model::narrow(16).with_relief();
     let sample = hidden_squares();
-    let mut model = MaskRcnn::<Autodiff<Flex>>::init(&config, 1, &Default::default()).unwrap();
-    let mut optimizer = AdamWConfig::new().with_epsilon(1e-8).init();
+    let mut model = MaskRcnn::init(&config, 1).unwrap();
+    let mut optimizer = AdamW::new(AdamWParams::default());
     let batch = [sample];
     for step in 0..80 {
-        let total = model.losses(&batch, step).total();
-        let gradients = GradientsParams::from_grads(total.backward(), &model);
-        model = optimizer.step(3e-3, model, gradients);
+        let (_, gradients) = model.gradients(&batch, step);
+        optimizer.step(&mut model, gradients, 3e-3);
     }
-    let found = model.valid().detect(batch[0].image(), batch[0].relief());
+    let found = model.detect(batch[0].image(), batch[0].relief());
     // The most probable four are the four squares; a few parts of squares may follow.
     let square_of = |bounds: [f32; 4]| {
         SQUARES.iter().position(|square| {

@@ -1,7 +1,6 @@
 //! The same weights and image give the same objects here and in torchvision (testdata/mask_rcnn).
 #![allow(clippy::unwrap_used)]
 
-use burn::backend::Flex;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -131,8 +130,8 @@ fn image(width: u32, height: u32) -> RgbImage {
 }
 
 /// A model whose every parameter follows from its name in torchvision.
-fn model(depth: ResnetDepth) -> MaskRcnn<Flex> {
-    let model = MaskRcnn::<Flex>::zeros(&config(depth), &Default::default()).unwrap();
+fn model(depth: ResnetDepth) -> MaskRcnn {
+    let model = MaskRcnn::zeros(&config(depth)).unwrap();
     let bytes = weights_to_bytes(&model, Precision::Single).unwrap();
     let file = SafeTensors::deserialize(&bytes).unwrap();
     let tensors: Vec<(String, Vec<usize>, Vec<u8>)> = file
@@ -151,7 +150,7 @@ fn model(depth: ResnetDepth) -> MaskRcnn<Flex> {
     weights_from_bytes(model, &bytes, "formula").unwrap()
 }
 
-fn compare(model: &MaskRcnn<Flex>, expected: &[Object]) {
+fn compare(model: &MaskRcnn, expected: &[Object]) {
     let found = model.instances(&image(150, 110), None);
     assert_eq!(found.len(), expected.len());
     for (found, expected) in found.iter().zip(expected) {

@@ -10,7 +10,9 @@ use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::read_label_png;
 use stonewise_segment::Weights;
 use stonewise_segment::tiling::TilingOptions;
-use stonewise_segment::train::{Rendered, Run, Schedule, Session, Start, Total, TrainParams, model_path};
+use stonewise_segment::train::{
+    Rendered, Run, Schedule, Start, Total, TrainParams, model_path, open_training,
+};
 use stonewise_simulate::{PhotoParams, SceneParams, SurveyParams, TlsParams, WallParams, write_survey};
 
 /// One photo an epoch of a wall of 1.2 x 0.9 m, without masks.
@@ -79,7 +81,7 @@ fn model(folder: &Path, steps: u64) -> PathBuf {
         ..TrainParams::fine_tuning()
     };
     let start = Start::Weights(Weights::File(blind(folder)));
-    let mut session = Session::open(&out, &start, Some(params), Some(Total::Steps(steps)), None).unwrap();
+    let mut trainer = open_training(&out, &start, Some(params), Some(Total::Steps(steps)), None).unwrap();
     let source = Rendered {
         seed: 1,
         size_px: 96,
@@ -93,7 +95,7 @@ fn model(folder: &Path, steps: u64) -> PathBuf {
         threads: 1,
         progress: &Silent,
     };
-    session.train(&run).unwrap();
+    run.train(&mut trainer).unwrap();
     model_path(&out)
 }
 

@@ -12,14 +12,13 @@ use stonewise_core::progress::Silent;
 use stonewise_io::image_io::write_png_rgb;
 use stonewise_io::masks::{MaskSource, read_label_png};
 use stonewise_segment::Weights;
-use stonewise_segment::backend::{Compute, device};
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::model::{MaskRcnn, Precision, save_model};
 use stonewise_segment::tiling::TilingOptions;
 use stonewise_segment::train::synth::masonry_photo;
 
 fn weights(path: &Path) -> Weights {
-    let model = MaskRcnn::<Compute>::init(&narrow_model::narrow(8), 3, &device()).unwrap();
+    let model = MaskRcnn::init(&narrow_model::narrow(8), 3).unwrap();
     save_model(&model, path, Precision::Half).unwrap();
     Weights::File(path.to_owned())
 }

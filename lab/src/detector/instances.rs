@@ -3,7 +3,6 @@
 
 use crate::Outcome;
 use crate::words::Words;
-use burn::backend::Flex;
 use std::path::Path;
 use std::time::Instant;
 use stonewise_core::raster::Raster;
@@ -15,8 +14,7 @@ pub fn run(words: &Words) -> Outcome {
     };
     let mut config = MaskRcnnConfig::torchvision_r50();
     config.backbone.norm = Norm::FrozenBatch { epsilon: 1e-5 };
-    let model = MaskRcnn::<Flex>::zeros(&config, &Default::default())?;
-    let model = load_weights(model, Path::new(weights))?.for_inference();
+    let model = load_weights(MaskRcnn::zeros(&config)?, Path::new(weights))?.for_inference();
     let mut photos = Vec::new();
     for path in images {
         let image = read(Path::new(path))?;

@@ -4,19 +4,16 @@
 
 use crate::Outcome;
 use crate::words::Words;
-use burn::backend::{Autodiff, Flex};
-use burn::grad_clipping::GradientClippingConfig;
-use burn::module::AutodiffModule;
-use burn::optim::{AdamWConfig, GradientsParams, Optimizer};
 use std::collections::BTreeMap;
 use std::time::Instant;
 use stonewise_core::progress::Silent;
 use stonewise_segment::Sample;
 use stonewise_segment::evaluation::{MaskScore, pair_masks};
-use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig, StoneDetector};
+use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::train::synth::masonry_photo;
-use stonewise_segment::{Weights, open_model};
+use stonewise_segment::train::{AdamW, AdamWParams};
+use stonewise_segment::{StoneFinder, Weights, open_model};
 
 /// Photos that a step learns from.
 const BATCH: usize = 1;
@@ -27,44 +24,27 @@ pub fn run(words: &Words) -> Outcome {
     let samples: Vec<Sample> = (0..photos)
         .map(|seed| known(&masonry_photo(u64::from(seed), side, side)))
         .collect();
-    let device = Default::default();
-    let mut model: MaskRcnn<Autodiff<Flex>> = match words.as_slice().get(3).map(String::as_str) {
-        None | Some("none") => MaskRcnn::init(&MaskRcnnConfig::light(), 1, &device)?,
-        Some(weights) => open_model(&Weights::named(weights.as_ref()), &device)?,
+    let mut model = match words.as_slice().get(3).map(String::as_str) {
+        None | Some("none") => MaskRcnn::init(&MaskRcnnConfig::light(), 1)?,
+        Some(weights) => open_model(&Weights::named(weights.as_ref()), false)?,
     };
-    let mut optimizer = AdamWConfig::new()
-        .with_epsilon(1e-8)
-        .with_grad_clipping(Some(GradientClippingConfig::Norm(1.0)))
-        .init();
+    let mut optimizer = AdamW::new(AdamWParams::default());
     let start = Instant::now();
     for step in 0..steps as usize {
         let chosen: Vec<Sample> = (0..BATCH)
             .map(|i| samples[(step * BATCH + i) % samples.len()].clone())
             .collect();
-        let losses = model.losses(&chosen, step as u64);
-        let total = losses.total();
-        let gradients = GradientsParams::from_grads(total.backward(), &model);
+        let (losses, gradients) = model.gradients(&chosen, step as u64);
         let progress = (step as f64 + 1.0) / f64::from(steps);
         let rate =
             5e-4 * (step as f64 / 20.0).min(1.0) * (0.5 + 0.5 * (std::f64::consts::PI * progress).cos());
-        model = optimizer.step(rate, model, gradients);
+        optimizer.step(&mut model, gradients, rate);
         if step % 20 == 0 {
-            let parts = [
-                losses.rpn_objectness,
-                losses.rpn_box,
-                losses.class,
-                losses.box_regression,
-                losses.mask,
-            ];
-            let parts = parts.map(|part| format!("{:.3}", part.into_scalar())).join(" ");
-            println!(
-                "{step}: {:.3} = {parts}, {:.0?}",
-                total.into_scalar(),
-                start.elapsed()
-            );
+            let parts = losses.parts().map(|part| format!("{part:.3}")).join(" ");
+            println!("{step}: {:.3} = {parts}, {:.0?}", losses.total(), start.elapsed());
         }
     }
-    let detector = StoneDetector::new(model.valid());
+    let detector = StoneFinder::new(model);
     let pairs: Vec<_> = samples
         .iter()
         .map(|sample| {

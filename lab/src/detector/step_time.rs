@@ -2,13 +2,11 @@
 
 use crate::Outcome;
 use crate::words::Words;
-use burn::backend::{Autodiff, Flex};
-use burn::module::AutodiffModule;
-use burn::optim::{GradientsParams, Optimizer, SgdConfig};
 use std::time::Instant;
 use stonewise_core::raster::{LabelImage, Raster, RgbImage};
 use stonewise_segment::Sample;
 use stonewise_segment::model::{MaskRcnn, MaskRcnnConfig};
+use stonewise_segment::train::{AdamW, AdamWParams};
 
 /// Blocks with rounded corners in courses, about 60 of them.
 fn wall(side: u32, seed: u32) -> Sample {
@@ -41,26 +39,21 @@ fn wall(side: u32, seed: u32) -> Sample {
 pub fn run(words: &Words) -> Outcome {
     let [side, steps] = [(0, 384), (1, 4)].map(|(place, or)| words.number_at::<u32>(place).unwrap_or(or));
     let config = MaskRcnnConfig::light();
-    let mut model = MaskRcnn::<Autodiff<Flex>>::init(&config, 1, &Default::default())?;
-    println!("{} parameters", burn::module::Module::num_params(&model));
-    let mut optimizer = SgdConfig::new().init();
+    let mut model = MaskRcnn::init(&config, 1)?;
+    let mut optimizer = AdamW::new(AdamWParams::default());
     for step in 0..steps {
         let sample = [wall(side, step)];
         let start = Instant::now();
-        let losses = model.losses(&sample, u64::from(step));
-        let total = losses.total();
-        let forward = start.elapsed();
-        let gradients = total.backward();
-        let backward = start.elapsed() - forward;
-        let gradients = GradientsParams::from_grads(gradients, &model);
-        model = optimizer.step(1e-3, model, gradients);
-        let update = start.elapsed() - forward - backward;
+        let (losses, gradients) = model.gradients(&sample, u64::from(step));
+        let computed = start.elapsed();
+        optimizer.step(&mut model, gradients, 1e-3);
+        let update = start.elapsed() - computed;
         println!(
-            "step {step}: loss {:.3}, forward {forward:.2?}, backward {backward:.2?}, update {update:.2?}",
-            total.into_scalar()
+            "step {step}: loss {:.3}, gradients {computed:.2?}, update {update:.2?}",
+            losses.total()
         );
     }
-    let model = model.valid().for_inference();
+    let model = model.for_inference();
     for step in 0..2 {
         let start = Instant::now();
         let found = model.detect(wall(side, step).image(), None);

@@ -11,7 +11,7 @@ use stonewise::{OutputFolder, Owner};
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::model::MaskRcnnConfig;
 use stonewise_segment::train::{
-    Rendered, Run, SampleSource, Session, Start, Stop, Total, TrainParams, model_path,
+    Rendered, Run, SampleSource, Start, Stop, Total, TrainParams, model_path, open_training,
 };
 use stonewise_segment::{Sample, Weights};
 
@@ -51,8 +51,8 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
     let owner = Owner::inputs("training", &inputs);
     let _folder = OutputFolder::of_inputs(&args.out, &owner, &inputs, &[], force)?;
     let total = args.total_minutes.map(Total::Minutes);
-    let mut session = Session::open(&args.out, &start, config.training, total, args.minutes)?;
-    let elapsed = session.elapsed();
+    let mut trainer = open_training(&args.out, &start, config.training, total, args.minutes)?;
+    let elapsed = trainer.elapsed();
     if elapsed.steps > 0 {
         let minutes = elapsed.seconds / 60.0;
         printer.log(&format!(
@@ -60,7 +60,7 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
             counted(elapsed.steps, "step")
         ));
     }
-    let training = session.config().training.clone();
+    let training = trainer.config().training.clone();
     let (photos, source): (LabelledPhotos, PhotoCrops);
     let rendered = Rendered {
         seed: training.seed,
@@ -85,8 +85,8 @@ pub fn train(args: &TrainArgs, force: bool, printer: &Printer) -> Result<Outcome
         threads: 1,
         progress: printer,
     };
-    let stop = session.train(&run)?;
-    let elapsed = session.elapsed();
+    let stop = run.train(&mut trainer)?;
+    let elapsed = trainer.elapsed();
     printer.log(&format!(
         "{}, {:.1} minutes; the detector: {}",
         counted(elapsed.steps, "step"),

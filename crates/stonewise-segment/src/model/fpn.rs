@@ -2,23 +2,19 @@
 
 use super::config::Norm;
 use super::init::Init;
-use super::kernels::ModelBackend;
 use super::layers::{ConvBlock, Spread};
-use burn::module::Module;
-use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
-use burn::tensor::module::{interpolate, max_pool2d};
-use burn::tensor::ops::{InterpolateMode, InterpolateOptions};
+use super::parameter::{Parameters, part};
+use crate::engine::Tensor;
 
 /// Brings all levels of a backbone to the same channels, coarse levels added to the finer ones.
-#[derive(Module, Debug)]
-pub struct Fpn<B: Backend> {
-    inner_blocks: Vec<ConvBlock<B>>,
-    layer_blocks: Vec<ConvBlock<B>>,
+#[derive(Clone, Debug)]
+pub struct Fpn {
+    inner_blocks: Vec<ConvBlock>,
+    layer_blocks: Vec<ConvBlock>,
 }
 
-impl<B: ModelBackend> Fpn<B> {
-    pub fn new(init: &mut Init<B>, inputs: [usize; 4], channels: usize, norm: Option<Norm>) -> Self {
+impl Fpn {
+    pub fn new(init: &mut Init, inputs: [usize; 4], channels: usize, norm: Option<Norm>) -> Self {
         let mut block =
             |inputs, size| ConvBlock::new(init, [inputs, channels], size, Spread::KaimingUniform, norm);
         Self {
@@ -29,29 +25,37 @@ impl<B: ModelBackend> Fpn<B> {
 
     /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
-        self.layer_blocks.iter_mut().for_each(ConvBlock::prepare);
+        let blocks = self.inner_blocks.iter_mut().chain(&mut self.layer_blocks);
+        blocks.for_each(ConvBlock::prepare);
     }
 
     /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32.
-    pub fn forward(&self, features: [Tensor<B, 4>; 4]) -> Vec<Tensor<B, 4>> {
+    pub fn forward(&self, features: &[Tensor; 4]) -> Vec<Tensor> {
         let mut levels = Vec::with_capacity(5);
-        let mut above: Option<Tensor<B, 4>> = None;
+        let mut above: Option<Tensor> = None;
         let blocks = self.inner_blocks.iter().zip(&self.layer_blocks);
-        for (feature, (inner, layer)) in features.into_iter().zip(blocks).rev() {
+        for (feature, (inner, layer)) in features.iter().zip(blocks).rev() {
             let lateral = inner.forward(feature);
             let merged = match above {
-                Some(above) => {
-                    let [_, _, rows, columns] = lateral.dims();
-                    let options = InterpolateOptions::new(InterpolateMode::Nearest).with_align_corners(false);
-                    lateral + interpolate(above, [rows, columns], options)
-                }
+                Some(above) => lateral.plus_doubled(&above),
                 None => lateral,
             };
-            levels.insert(0, layer.forward(merged.clone()));
+            levels.insert(0, layer.forward(&merged));
             above = Some(merged);
         }
-        let coarsest = levels[levels.len() - 1].clone();
-        levels.push(max_pool2d(coarsest, [1; 2], [2; 2], [0; 2], [1; 2], false));
+        levels.push(levels[levels.len() - 1].every_second());
         levels
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        for (list, blocks) in [
+            ("inner_blocks", &mut self.inner_blocks),
+            ("layer_blocks", &mut self.layer_blocks),
+        ] {
+            for (place, block) in blocks.iter_mut().enumerate() {
+                block.numbered_parameters(&part(&part(name, list), place), found);
+            }
+        }
     }
 }

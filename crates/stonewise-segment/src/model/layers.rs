@@ -1,11 +1,9 @@
 //! Layers with the parameters that torchvision gives them.
 
 use super::config::Norm as NormConfig;
-use super::init::Init;
-use super::kernels::{Filters, ModelBackend, float, primitive};
-use burn::module::{Module, Param};
-use burn::tensor::Tensor;
-use burn::tensor::backend::Backend;
+use super::init::{Init, constant};
+use super::parameter::{Param, Parameters, part};
+use crate::engine::{Filters, Tensor};
 
 /// How a layer's weights are drawn.
 #[derive(Clone, Copy, Debug)]
@@ -16,27 +14,24 @@ pub enum Spread {
     KaimingUniform,
     /// Normal with this standard deviation.
     Normal(f32),
-    /// Uniform within one over the root of an output's inputs.
-    Default,
     /// All zero: an input that makes no difference before it has been learnt.
     Zero,
 }
 
 /// Convolution: weight [out, in, size, size].
-#[derive(Module, Debug)]
-pub struct Conv<B: Backend> {
-    pub weight: Param<Tensor<B, 4>>,
-    pub bias: Option<Param<Tensor<B, 1>>>,
+#[derive(Clone, Debug)]
+pub struct Conv {
+    weight: Param,
+    bias: Option<Param>,
     stride: usize,
     /// The weights in the form that is fastest in use.
-    #[module(skip)]
     filters: Option<Filters>,
 }
 
-impl<B: ModelBackend> Conv<B> {
+impl Conv {
     /// A square kernel of odd size, padded so that stride 1 keeps the size of the image.
     pub fn new(
-        init: &mut Init<B>,
+        init: &mut Init,
         channels: [usize; 2],
         size: usize,
         stride: usize,
@@ -44,204 +39,235 @@ impl<B: ModelBackend> Conv<B> {
         bias: bool,
     ) -> Self {
         let [inputs, outputs] = channels;
-        let shape = [outputs, inputs, size, size];
+        let shape = &[outputs, inputs, size, size];
         let fan_in = (inputs * size * size) as f32;
         let fan_out = (outputs * size * size) as f32;
         let weight = match spread {
             Spread::KaimingNormal => init.normal(shape, (2.0 / fan_out).sqrt()),
             Spread::KaimingUniform => init.uniform(shape, (3.0 / fan_in).sqrt()),
             Spread::Normal(std) => init.normal(shape, std),
-            Spread::Default => init.uniform(shape, 1.0 / fan_in.sqrt()),
-            Spread::Zero => init.constant(shape, 0.0),
+            Spread::Zero => constant(shape, 0.0),
         };
         Self {
             weight,
-            bias: bias.then(|| init.constant([outputs], 0.0)),
+            bias: bias.then(|| constant(&[outputs], 0.0)),
             stride,
             filters: None,
         }
     }
 
     /// [batch, in, rows, columns] to [batch, out, rows / stride, columns / stride], rounded up.
-    pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        let bias = self.bias.as_ref().map(|bias| primitive(bias.val()));
-        let (x, weight) = (primitive(x), primitive(self.weight.val()));
-        float(match &self.filters {
-            Some(filters) => B::convolve_filtered(x, (weight, filters), bias),
-            None => B::convolve(x, weight, bias, self.stride),
-        })
+    pub fn forward(&self, x: &Tensor) -> Tensor {
+        let weight = &self.weight.tensor;
+        let bias = self.bias.as_ref().map(|bias| &bias.tensor);
+        match &self.filters {
+            Some(filters) => x.filtered(weight, filters, bias),
+            None => x.convolved(weight, bias, self.stride),
+        }
+    }
+
+    /// Multiplies every output by a scale and adds a shift.
+    fn scale(&mut self, scale: &[f32], shift: Vec<f32>) {
+        let weight = self.weight.tensor.values_mut();
+        let size = (weight.len() / scale.len().max(1)).max(1);
+        for (weight, scale) in weight.chunks_mut(size).zip(scale) {
+            weight.iter_mut().for_each(|weight| *weight *= scale);
+        }
+        let bias = self.bias.get_or_insert_with(|| constant(&[scale.len()], 0.0));
+        let pairs = scale.iter().zip(shift);
+        for (bias, (scale, shift)) in bias.tensor.values_mut().iter_mut().zip(pairs) {
+            *bias = *bias * scale + shift;
+        }
     }
 
     /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
-        self.filters = B::filters(primitive(self.weight.val()), self.stride);
+        if self.stride == 1 && self.weight.tensor.shape()[2] == 3 {
+            self.filters = Some(Filters::new(self.weight.tensor.values()));
+        }
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        found.push((part(name, "weight"), &mut self.weight));
+        found.extend(self.bias.as_mut().map(|bias| (part(name, "bias"), bias)));
     }
 }
 
 /// Transposed convolution that doubles an image: weight [in, out, 2, 2], stride 2.
-#[derive(Module, Debug)]
-pub struct Doubling<B: Backend> {
-    pub weight: Param<Tensor<B, 4>>,
-    pub bias: Param<Tensor<B, 1>>,
+#[derive(Clone, Debug)]
+pub struct Doubling {
+    weight: Param,
+    bias: Param,
 }
 
-impl<B: ModelBackend> Doubling<B> {
-    pub fn new(init: &mut Init<B>, [inputs, outputs]: [usize; 2]) -> Self {
+impl Doubling {
+    pub fn new(init: &mut Init, [inputs, outputs]: [usize; 2]) -> Self {
         Self {
-            weight: init.normal([inputs, outputs, 2, 2], (2.0 / (inputs * 4) as f32).sqrt()),
-            bias: init.constant([outputs], 0.0),
+            weight: init.normal(&[inputs, outputs, 2, 2], (2.0 / (inputs * 4) as f32).sqrt()),
+            bias: constant(&[outputs], 0.0),
         }
     }
 
     /// [batch, in, rows, columns] to the four pixels that each becomes: [4 batch, out, rows, columns], those
     /// of an image one after another, row by row. Nothing overlaps: operations on single pixels may
     /// come before [`assembled`].
-    pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        let [inputs, outputs, ..] = self.weight.dims();
+    pub fn forward(&self, x: &Tensor) -> Tensor {
+        let [inputs, outputs] = self.weight.tensor.dims();
         let [batch, _, rows, columns] = x.dims();
-        let weight = self.weight.val().permute([2, 3, 1, 0]);
-        let weight = weight.reshape([4 * outputs, inputs, 1, 1]);
+        // From input, output, pixel to pixel, output, input.
+        let weight = self.weight.tensor.clone().reshaped([1, inputs, 4 * outputs]);
+        let weight = weight.exchanged().reshaped([4 * outputs, inputs]);
+        let pixel_first = (0..4 * outputs).map(|place| place % outputs * 4 + place / outputs);
+        let weight = weight.selected(pixel_first.collect());
+        let weight = weight.reshaped([4 * outputs, inputs, 1, 1]);
         let bias = self
             .bias
-            .val()
-            .unsqueeze_dim::<2>(0)
-            .repeat_dim(0, 4)
-            .flatten::<1>(0, 1);
-        let x = float::<B, 4>(B::convolve(
-            primitive(x),
-            primitive(weight),
-            Some(primitive(bias)),
-            1,
-        ));
-        x.reshape([4 * batch, outputs, rows, columns])
+            .tensor
+            .selected((0..4 * outputs).map(|place| place % outputs).collect());
+        let y = x.convolved(&weight, Some(&bias), 1);
+        y.reshaped([4 * batch, outputs, rows, columns])
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        found.push((part(name, "weight"), &mut self.weight));
+        found.push((part(name, "bias"), &mut self.bias));
     }
 }
 
 /// Assembles images [batch, channels, 2 rows, 2 columns] from the four pixels of each [4 batch, channels, rows,
 /// columns].
-pub fn assembled<B: Backend>(x: Tensor<B, 4>) -> Tensor<B, 4> {
+pub fn assembled(x: &Tensor) -> Tensor {
     let [fours, channels, rows, columns] = x.dims();
-    let batch = fours / 4;
-    x.reshape([batch, 2, 2, channels, rows, columns])
-        .permute([0, 3, 4, 1, 5, 2])
-        .reshape([batch, channels, 2 * rows, 2 * columns])
+    let mut places = Vec::with_capacity(x.values().len());
+    for image in 0..fours / 4 {
+        for (channel, row) in (0..channels).flat_map(|channel| (0..2 * rows).map(move |row| (channel, row))) {
+            let pixel = |column: usize| 4 * image + row % 2 * 2 + column % 2;
+            let line = |column| (pixel(column) * channels + channel) * rows + row / 2;
+            places.extend((0..2 * columns).map(|column| line(column) * columns + column / 2));
+        }
+    }
+    let values = x.clone().reshaped([x.values().len()]);
+    values
+        .selected(places)
+        .reshaped([fours / 4, channels, 2 * rows, 2 * columns])
 }
 
 /// Fully connected layer: weight [out, in].
-#[derive(Module, Debug)]
-pub struct Linear<B: Backend> {
-    pub weight: Param<Tensor<B, 2>>,
-    pub bias: Param<Tensor<B, 1>>,
+#[derive(Clone, Debug)]
+pub struct Linear {
+    weight: Param,
+    bias: Param,
 }
 
-impl<B: ModelBackend> Linear<B> {
-    pub fn new(init: &mut Init<B>, [inputs, outputs]: [usize; 2]) -> Self {
+impl Linear {
+    pub fn new(init: &mut Init, [inputs, outputs]: [usize; 2]) -> Self {
         let bound = 1.0 / (inputs as f32).sqrt();
         Self {
-            weight: init.uniform([outputs, inputs], bound),
-            bias: init.uniform([outputs], bound),
+            weight: init.uniform(&[outputs, inputs], bound),
+            bias: init.uniform(&[outputs], bound),
         }
     }
 
     /// [batch, in] to [batch, out].
-    pub fn forward(&self, x: Tensor<B, 2>) -> Tensor<B, 2> {
-        x.matmul(self.weight.val().transpose()) + self.bias.val().unsqueeze()
+    pub fn forward(&self, x: &Tensor) -> Tensor {
+        x.linear(&self.weight.tensor, &self.bias.tensor)
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        found.push((part(name, "weight"), &mut self.weight));
+        found.push((part(name, "bias"), &mut self.bias));
     }
 }
 
 /// Normalisation of channels, then a scale and a shift of each: over stored statistics where there are such,
 /// else over groups of channels of each image.
-#[derive(Module, Debug)]
-pub struct Norm<B: Backend> {
-    pub weight: Param<Tensor<B, 1>>,
-    pub bias: Param<Tensor<B, 1>>,
-    pub running_mean: Option<Param<Tensor<B, 1>>>,
-    pub running_var: Option<Param<Tensor<B, 1>>>,
+#[derive(Clone, Debug)]
+pub struct Norm {
+    weight: Param,
+    bias: Param,
+    /// Mean and variance of each channel.
+    statistics: Option<[Param; 2]>,
     groups: usize,
-    epsilon: f64,
+    epsilon: f32,
 }
 
 /// Added to the variance of a group (Wu & He 2018).
-const GROUP_EPSILON: f64 = 1e-5;
+const GROUP_EPSILON: f32 = 1e-5;
 
-impl<B: ModelBackend> Norm<B> {
+impl Norm {
     /// `scale`: the first value of every channel's scale.
-    pub fn new(init: &mut Init<B>, config: NormConfig, channels: usize, scale: f32) -> Self {
-        let (groups, epsilon, frozen) = match config {
-            NormConfig::FrozenBatch { epsilon } => (1, epsilon, true),
+    pub fn new(config: NormConfig, channels: usize, scale: f32) -> Self {
+        let (groups, epsilon, is_fixed) = match config {
+            NormConfig::FrozenBatch { epsilon } => (1, epsilon as f32, true),
             NormConfig::Group { groups } => (groups, GROUP_EPSILON, false),
         };
-        let mut fixed = |value: f32| init.constant([channels], value).set_require_grad(!frozen);
+        let param = |value| Param {
+            is_fixed,
+            ..constant(&[channels], value)
+        };
         Self {
-            weight: fixed(scale),
-            bias: fixed(0.0),
-            running_mean: frozen.then(|| fixed(0.0)),
-            running_var: frozen.then(|| fixed(1.0)),
+            weight: param(scale),
+            bias: param(0.0),
+            statistics: is_fixed.then(|| [param(0.0), param(1.0)]),
             groups,
             epsilon,
         }
     }
 
     /// [batch, channels, rows, columns], the same shape.
-    pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        match self.frozen() {
-            Some([scale, shift]) => x * per_channel(scale) + per_channel(shift),
-            None => {
-                let (scale, shift) = (primitive(self.weight.val()), primitive(self.bias.val()));
-                float(B::group_norm(
-                    primitive(x),
-                    scale,
-                    shift,
-                    self.groups,
-                    self.epsilon,
-                ))
-            }
+    pub fn forward(&self, x: Tensor) -> Tensor {
+        match self.stored() {
+            Some([scale, shift]) => x.scaled(scale, &shift),
+            None => x.group_normalised(&self.weight.tensor, &self.bias.tensor, self.groups, self.epsilon),
         }
     }
 
     /// Scale and shift of each channel where the statistics are stored.
-    fn frozen(&self) -> Option<[Tensor<B, 1>; 2]> {
-        let (mean, variance) = (
-            self.running_mean.as_ref()?.val(),
-            self.running_var.as_ref()?.val(),
-        );
-        let scale = self.weight.val() / (variance + self.epsilon).sqrt();
-        let shift = self.bias.val() - mean * scale.clone();
+    fn stored(&self) -> Option<[Vec<f32>; 2]> {
+        let [mean, variance] = self
+            .statistics
+            .as_ref()?
+            .each_ref()
+            .map(|param| param.tensor.values());
+        let [weight, bias] = [&self.weight, &self.bias].map(|param| param.tensor.values());
+        let scale = weight
+            .iter()
+            .zip(variance)
+            .map(|(w, v)| w / (v + self.epsilon).sqrt());
+        let scale: Vec<f32> = scale.collect();
+        let shift = bias
+            .iter()
+            .zip(mean.iter().zip(&scale))
+            .map(|(b, (m, s))| b - m * s);
+        let shift = shift.collect();
         Some([scale, shift])
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        found.push((part(name, "weight"), &mut self.weight));
+        found.push((part(name, "bias"), &mut self.bias));
+        if let Some([mean, variance]) = &mut self.statistics {
+            found.push((part(name, "running_mean"), mean));
+            found.push((part(name, "running_var"), variance));
+        }
     }
 }
 
-fn per_channel<B: Backend>(values: Tensor<B, 1>) -> Tensor<B, 4> {
-    let channels = values.dims()[0];
-    values.reshape([1, channels, 1, 1])
-}
-
-/// Moves a normalisation over stored statistics into the convolution before it.
-pub fn fold<B: ModelBackend>(conv: &mut Conv<B>, norm: &mut Option<Norm<B>>) {
-    let Some([scale, shift]) = norm.as_ref().and_then(Norm::frozen) else {
-        return;
-    };
-    let outputs = scale.dims()[0];
-    let bias = match &conv.bias {
-        Some(bias) => bias.val() * scale.clone() + shift,
-        None => shift,
-    };
-    conv.weight = Param::from_tensor(conv.weight.val() * scale.reshape([outputs, 1, 1, 1]));
-    conv.bias = Some(Param::from_tensor(bias));
-    *norm = None;
-}
-
 /// A convolution and perhaps a normalisation.
-#[derive(Module, Debug)]
-pub struct ConvBlock<B: Backend> {
-    pub conv: Conv<B>,
-    pub norm: Option<Norm<B>>,
+#[derive(Clone, Debug)]
+pub struct ConvBlock {
+    pub conv: Conv,
+    pub norm: Option<Norm>,
 }
 
-impl<B: ModelBackend> ConvBlock<B> {
+impl ConvBlock {
     /// A convolution of stride 1 with a bias, or with a normalisation instead.
     pub fn new(
-        init: &mut Init<B>,
+        init: &mut Init,
         channels: [usize; 2],
         size: usize,
         spread: Spread,
@@ -249,25 +275,38 @@ impl<B: ModelBackend> ConvBlock<B> {
     ) -> Self {
         Self {
             conv: Conv::new(init, channels, size, 1, spread, norm.is_none()),
-            norm: norm.map(|norm| Norm::new(init, norm, channels[1], 1.0)),
+            norm: norm.map(|norm| Norm::new(norm, channels[1], 1.0)),
         }
     }
 
-    pub fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
-        normalised(&self.conv, &self.norm, x)
+    pub fn forward(&self, x: &Tensor) -> Tensor {
+        let x = self.conv.forward(x);
+        match &self.norm {
+            Some(norm) => norm.forward(x),
+            None => x,
+        }
     }
 
-    /// Prepares the weights for inference, which is then faster; they must not change afterwards.
+    /// Prepares the weights for inference, which is then faster; they must not change afterwards. A
+    /// normalisation over stored statistics becomes part of the convolution.
     pub fn prepare(&mut self) {
+        if let Some([scale, shift]) = self.norm.as_ref().and_then(Norm::stored) {
+            self.conv.scale(&scale, shift);
+            self.norm = None;
+        }
         self.conv.prepare();
     }
-}
 
-/// A convolution, then its normalisation where it has one.
-pub fn normalised<B: ModelBackend>(conv: &Conv<B>, norm: &Option<Norm<B>>, x: Tensor<B, 4>) -> Tensor<B, 4> {
-    let x = conv.forward(x);
-    match norm {
-        Some(norm) => norm.forward(x),
-        None => x,
+    /// Its parameters under the names of convolution and normalisation.
+    pub fn parameters<'a>(&'a mut self, [conv, norm]: [&str; 2], found: &mut Parameters<'a>) {
+        self.conv.parameters(conv, found);
+        if let Some(layer) = &mut self.norm {
+            layer.parameters(norm, found);
+        }
+    }
+
+    /// The same in a list of torchvision's, which numbers both.
+    pub fn numbered_parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        self.parameters([&part(name, 0), &part(name, 1)], found);
     }
 }

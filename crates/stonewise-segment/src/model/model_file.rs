@@ -1,10 +1,8 @@
 //! Model files that state their configuration.
 
 use super::config::MaskRcnnConfig;
-use super::kernels::ModelBackend;
 use super::mask_rcnn::MaskRcnn;
 use super::weights::{CONFIG_KEY, Precision, WeightsError, weights_from_bytes, weights_to_bytes};
-use burn::tensor::Device;
 use safetensors::tensor::SafeTensors;
 use std::path::Path;
 use stonewise_io::atomic::write_atomically;
@@ -13,11 +11,7 @@ use stonewise_io::atomic::write_atomically;
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn save_model<B: ModelBackend>(
-    model: &MaskRcnn<B>,
-    path: &Path,
-    precision: Precision,
-) -> Result<(), WeightsError> {
+pub fn save_model(model: &MaskRcnn, path: &Path, precision: Precision) -> Result<(), WeightsError> {
     let bytes = weights_to_bytes(model, precision)?;
     write_atomically(path, |partial| std::fs::write(partial, bytes)).map_err(|source| WeightsError::File {
         path: path.to_owned(),
@@ -25,32 +19,15 @@ pub fn save_model<B: ModelBackend>(
     })
 }
 
-/// Reads a model that [`save_model`] wrote.
-///
-/// # Errors
-/// The file cannot be read, or does not state the configuration of its model.
-pub fn load_model<B: ModelBackend>(path: &Path, device: &Device<B>) -> Result<MaskRcnn<B>, WeightsError> {
-    let bytes = std::fs::read(path).map_err(|source| WeightsError::File {
-        path: path.to_owned(),
-        source,
-    })?;
-    model_from_bytes(&bytes, &path.display().to_string(), false, device)
-}
-
 /// A model from the bytes of its file; `name` stands for it in errors. `relief`: it takes relief, with
 /// weights of zero where the file has none.
 ///
 /// # Errors
-/// As [`load_model`].
-pub fn model_from_bytes<B: ModelBackend>(
-    bytes: &[u8],
-    name: &str,
-    relief: bool,
-    device: &Device<B>,
-) -> Result<MaskRcnn<B>, WeightsError> {
+/// The file cannot be read, or does not state the configuration of its model.
+pub fn model_from_bytes(bytes: &[u8], name: &str, relief: bool) -> Result<MaskRcnn, WeightsError> {
     let config = config_from_bytes(bytes, name)?;
     let config = if relief { config.with_relief() } else { config };
-    let model = MaskRcnn::init(&config, 0, device).map_err(|e| config_error(name, &e))?;
+    let model = MaskRcnn::zeros(&config).map_err(|e| config_error(name, &e))?;
     weights_from_bytes(model, bytes, name)
 }
 

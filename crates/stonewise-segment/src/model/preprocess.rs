@@ -1,9 +1,8 @@
 //! From photos to the model's input.
 
 use super::config::{MaskRcnnConfig, Resize};
+use crate::engine::Tensor;
 use crate::relief::resampled;
-use burn::tensor::backend::Backend;
-use burn::tensor::{Tensor, TensorData};
 use rayon::prelude::*;
 use stonewise_core::raster::{RELIEF_CHANNELS, ReliefMap, RgbImage};
 
@@ -46,12 +45,7 @@ impl Seen {
 }
 
 /// Images [batch, 3, rows, columns] with zero mean and unit spread, enlarged with zeros to a common size.
-pub fn batch<B: Backend>(
-    images: &[&RgbImage],
-    seen: &[Seen],
-    config: &MaskRcnnConfig,
-    device: &B::Device,
-) -> Tensor<B, 4> {
+pub fn batch(images: &[&RgbImage], seen: &[Seen], config: &MaskRcnnConfig) -> Tensor {
     let common = |axis: usize| {
         let longest = seen.iter().map(|seen| seen.size[axis]).max().unwrap_or(1);
         longest.next_multiple_of(STRIDE).max(STRIDE)
@@ -67,17 +61,16 @@ pub fn batch<B: Backend>(
                 |value: f32| (value / 255.0 - config.pixel_mean[channel]) / config.pixel_std[channel];
             fill(values, width, images[image], seen[image].size, channel, normalise);
         });
-    Tensor::from_data(TensorData::new(values, [images.len(), 3, height, width]), device)
+    Tensor::new([images.len(), 3, height, width], values)
 }
 
 /// Relief [batch, channels, rows, columns] of a batch of images that has so many columns and rows, zeros
 /// where an image has none; `None` where no image has any.
-pub fn relief_batch<B: Backend>(
+pub fn relief_batch(
     reliefs: &[Option<&ReliefMap>],
     seen: &[Seen],
     [width, height]: [usize; 2],
-    device: &B::Device,
-) -> Option<Tensor<B, 4>> {
+) -> Option<Tensor> {
     reliefs.iter().flatten().next()?;
     let mut values = vec![0.0f32; reliefs.len() * RELIEF_CHANNELS * height * width];
     for ((values, relief), seen) in values
@@ -93,8 +86,10 @@ pub fn relief_batch<B: Backend>(
             }
         }
     }
-    let shape = [reliefs.len(), RELIEF_CHANNELS, height, width];
-    Some(Tensor::from_data(TensorData::new(values, shape), device))
+    Some(Tensor::new(
+        [reliefs.len(), RELIEF_CHANNELS, height, width],
+        values,
+    ))
 }
 
 /// One channel of an image, resampled bilinearly between pixel centres.
@@ -144,7 +139,6 @@ fn neighbours(new: usize, old: usize) -> Vec<(usize, usize, f32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use burn::backend::Flex;
     use stonewise_core::raster::Raster;
 
     fn ramp(width: u32, height: u32) -> RgbImage {
@@ -166,9 +160,9 @@ mod tests {
         };
         let seen = Seen::new(&image, config.resize);
         assert_eq!(seen.size, [70, 52]);
-        let tensor = batch::<Flex>(&[&image], &[seen], &config, &Default::default());
-        assert_eq!(tensor.dims(), [1, 3, 64, 96]);
-        let values: Vec<f32> = tensor.into_data().to_vec().unwrap();
+        let tensor = batch(&[&image], &[seen], &config);
+        assert_eq!(tensor.shape(), [1, 3, 64, 96]);
+        let values = tensor.values();
         let at = |channel: usize, row: usize, column: usize| values[(channel * 64 + row) * 96 + column];
         assert!((at(0, 20, 33) - 2.0 * (33.5 * 40.0 / 70.0 - 0.5)).abs() < 1e-3);
         assert!((at(1, 20, 33) - 3.0 * (20.5 * 30.0 / 52.0 - 0.5)).abs() < 1e-3);

@@ -3,115 +3,93 @@
 
 use super::config::{BackboneConfig, ResnetDepth};
 use super::init::Init;
-use super::kernels::{ModelBackend, float, primitive};
-use super::layers::{Conv, ConvBlock, Norm, Spread, fold, normalised};
-use burn::module::Module;
-use burn::tensor::Tensor;
-use burn::tensor::activation::relu;
-use burn::tensor::backend::Backend;
+use super::layers::{Conv, ConvBlock, Norm, Spread};
+use super::parameter::{Parameters, part};
+use crate::engine::Tensor;
 
 /// Two 3 x 3 convolutions, or a 3 x 3 between two 1 x 1, around which the input is passed.
-#[derive(Module, Debug)]
-struct Block<B: Backend> {
-    conv1: Conv<B>,
-    bn1: Option<Norm<B>>,
-    conv2: Conv<B>,
-    bn2: Option<Norm<B>>,
-    conv3: Option<Conv<B>>,
-    bn3: Option<Norm<B>>,
-    downsample: Option<ConvBlock<B>>,
+#[derive(Clone, Debug)]
+struct Block {
+    layers: Vec<ConvBlock>,
+    downsample: Option<ConvBlock>,
 }
 
-impl<B: ModelBackend> Block<B> {
-    fn new(init: &mut Init<B>, config: &BackboneConfig, inputs: usize, width: usize, stride: usize) -> Self {
-        let conv = |init: &mut Init<B>, channels, size, stride| {
-            Conv::new(init, channels, size, stride, Spread::KaimingNormal, false)
-        };
-        let norm = |init: &mut Init<B>, channels, scale| Some(Norm::new(init, config.norm, channels, scale));
+impl Block {
+    fn new(init: &mut Init, config: &BackboneConfig, inputs: usize, width: usize, stride: usize) -> Self {
         let outputs = width * expansion(config.depth);
-        let is_basic = expansion(config.depth) == 1;
-        let (first_size, strides) = if is_basic {
-            (3, [stride, 1])
-        } else {
-            (1, [1, stride])
+        let mut layer = |channels: [usize; 2], size, stride, scale| ConvBlock {
+            conv: Conv::new(init, channels, size, stride, Spread::KaimingNormal, false),
+            norm: Some(Norm::new(config.norm, channels[1], scale)),
         };
         // A block begins as the identity (Goyal et al. 2017, section 5.1).
-        let (scale2, scale3) = if is_basic { (0.0, 1.0) } else { (1.0, 0.0) };
+        let layers = if expansion(config.depth) == 1 {
+            vec![
+                layer([inputs, width], 3, stride, 1.0),
+                layer([width, width], 3, 1, 0.0),
+            ]
+        } else {
+            vec![
+                layer([inputs, width], 1, 1, 1.0),
+                layer([width, width], 3, stride, 1.0),
+                layer([width, outputs], 1, 1, 0.0),
+            ]
+        };
+        let downsample = stride != 1 || inputs != outputs;
         Self {
-            conv1: conv(init, [inputs, width], first_size, strides[0]),
-            bn1: norm(init, width, 1.0),
-            conv2: conv(init, [width, width], 3, strides[1]),
-            bn2: norm(init, width, scale2),
-            conv3: (!is_basic).then(|| conv(init, [width, outputs], 1, 1)),
-            bn3: if is_basic {
-                None
-            } else {
-                norm(init, outputs, scale3)
-            },
-            downsample: (stride != 1 || inputs != outputs).then(|| ConvBlock {
-                conv: conv(init, [inputs, outputs], 1, stride),
-                norm: norm(init, outputs, 1.0),
-            }),
+            layers,
+            downsample: downsample.then(|| layer([inputs, outputs], 1, stride, 1.0)),
         }
     }
 
-    fn forward(&self, x: Tensor<B, 4>) -> Tensor<B, 4> {
+    fn forward(&self, x: &Tensor) -> Tensor {
         let shortcut = match &self.downsample {
-            Some(downsample) => downsample.forward(x.clone()),
+            Some(downsample) => downsample.forward(x),
             None => x.clone(),
         };
-        let x = relu(normalised(&self.conv1, &self.bn1, x));
-        let x = normalised(&self.conv2, &self.bn2, x);
-        let x = match &self.conv3 {
-            Some(conv3) => normalised(conv3, &self.bn3, relu(x)),
-            None => x,
-        };
-        relu(x + shortcut)
-    }
-
-    fn fold(&mut self) {
-        fold(&mut self.conv1, &mut self.bn1);
-        fold(&mut self.conv2, &mut self.bn2);
-        if let Some(conv3) = &mut self.conv3 {
-            fold(conv3, &mut self.bn3);
+        let mut y = self.layers[0].forward(x);
+        for layer in &self.layers[1..] {
+            y = layer.forward(&y.relu());
         }
-        if let Some(downsample) = &mut self.downsample {
-            fold(&mut downsample.conv, &mut downsample.norm);
-        }
+        y.plus(&shortcut).relu()
     }
 
     fn prepare(&mut self) {
-        self.conv1.prepare();
-        self.conv2.prepare();
-        if let Some(conv3) = &mut self.conv3 {
-            conv3.prepare();
+        let layers = self.layers.iter_mut().chain(&mut self.downsample);
+        layers.for_each(ConvBlock::prepare);
+    }
+
+    fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        for (place, layer) in self.layers.iter_mut().enumerate() {
+            let names = ["conv", "bn"].map(|kind| part(name, format!("{kind}{}", place + 1)));
+            layer.parameters([&names[0], &names[1]], found);
+        }
+        if let Some(downsample) = &mut self.downsample {
+            downsample.numbered_parameters(&part(name, "downsample"), found);
         }
     }
 }
 
 /// A residual network without its classifier.
-#[derive(Module, Debug)]
-pub struct Resnet<B: Backend> {
-    conv1: Conv<B>,
-    bn1: Option<Norm<B>>,
-    layer1: Vec<Block<B>>,
-    layer2: Vec<Block<B>>,
-    layer3: Vec<Block<B>>,
-    layer4: Vec<Block<B>>,
-    relief: Option<Conv<B>>,
+#[derive(Clone, Debug)]
+pub struct Resnet {
+    stem: ConvBlock,
+    stages: [Vec<Block>; 4],
+    relief: Option<Conv>,
 }
 
-impl<B: ModelBackend> Resnet<B> {
+impl Resnet {
     /// `relief`: channels beside colour; their weights begin as zeros.
-    pub fn new(init: &mut Init<B>, config: &BackboneConfig, relief: usize) -> Self {
+    pub fn new(init: &mut Init, config: &BackboneConfig, relief: usize) -> Self {
         let blocks = match config.depth {
             ResnetDepth::R18 => [2, 2, 2, 2],
             ResnetDepth::R34 | ResnetDepth::R50 => [3, 4, 6, 3],
         };
-        let conv1 = Conv::new(init, [3, config.width], 7, 2, Spread::KaimingNormal, false);
-        let bn1 = Some(Norm::new(init, config.norm, config.width, 1.0));
+        let stem = ConvBlock {
+            conv: Conv::new(init, [3, config.width], 7, 2, Spread::KaimingNormal, false),
+            norm: Some(Norm::new(config.norm, config.width, 1.0)),
+        };
         let mut inputs = config.width;
-        let mut stage = |stage: usize| -> Vec<Block<B>> {
+        let stages = [0, 1, 2, 3].map(|stage| {
             let width = config.width << stage;
             let block = |place: usize| {
                 let stride = if place == 0 && stage > 0 { 2 } else { 1 };
@@ -120,18 +98,9 @@ impl<B: ModelBackend> Resnet<B> {
                 block
             };
             (0..blocks[stage]).map(block).collect()
-        };
-        let [layer1, layer2, layer3, layer4] = [0, 1, 2, 3].map(&mut stage);
+        });
         let relief = (relief > 0).then(|| Conv::new(init, [relief, config.width], 7, 2, Spread::Zero, false));
-        Self {
-            conv1,
-            bn1,
-            layer1,
-            layer2,
-            layer3,
-            layer4,
-            relief,
-        }
+        Self { stem, stages, relief }
     }
 
     /// Whether relief makes a difference.
@@ -141,20 +110,20 @@ impl<B: ModelBackend> Resnet<B> {
 
     /// Features at strides 4, 8, 16 and 32 of an image batch [batch, 3, rows, columns] and, where there is
     /// any, its relief [batch, relief, rows, columns].
-    pub fn forward(&self, x: Tensor<B, 4>, relief: Option<Tensor<B, 4>>) -> [Tensor<B, 4>; 4] {
-        let colour = self.conv1.forward(x);
+    pub fn forward(&self, x: &Tensor, relief: Option<&Tensor>) -> [Tensor; 4] {
+        let colour = self.stem.conv.forward(x);
         let x = match (&self.relief, relief) {
-            (Some(conv), Some(relief)) => colour + conv.forward(relief),
+            (Some(conv), Some(relief)) => colour.plus(&conv.forward(relief)),
             _ => colour,
         };
-        let x = relu(match &self.bn1 {
+        let x = match &self.stem.norm {
             Some(norm) => norm.forward(x),
             None => x,
-        });
-        let mut x = float(B::halved(primitive(x)));
-        [&self.layer1, &self.layer2, &self.layer3, &self.layer4].map(|layer| {
-            for block in layer {
-                x = block.forward(x.clone());
+        };
+        let mut x = x.relu().halved();
+        self.stages.each_ref().map(|stage| {
+            for block in stage {
+                x = block.forward(&x);
             }
             x.clone()
         })
@@ -163,17 +132,22 @@ impl<B: ModelBackend> Resnet<B> {
     /// Moves stored statistics into the convolutions and makes these faster as long as the weights stay as
     /// they are.
     pub fn prepare(&mut self) {
-        fold(&mut self.conv1, &mut self.bn1);
-        for layer in [
-            &mut self.layer1,
-            &mut self.layer2,
-            &mut self.layer3,
-            &mut self.layer4,
-        ] {
-            for block in layer {
-                block.fold();
-                block.prepare();
+        self.stem.prepare();
+        self.stages.iter_mut().flatten().for_each(Block::prepare);
+    }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        self.stem
+            .parameters([&part(name, "conv1"), &part(name, "bn1")], found);
+        for (stage, blocks) in self.stages.iter_mut().enumerate() {
+            let name = part(name, format!("layer{}", stage + 1));
+            for (place, block) in blocks.iter_mut().enumerate() {
+                block.parameters(&part(&name, place), found);
             }
+        }
+        if let Some(relief) = &mut self.relief {
+            relief.parameters(&part(name, "relief"), found);
         }
     }
 }

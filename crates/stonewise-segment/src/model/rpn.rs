@@ -3,81 +3,79 @@
 use super::boxes::{Bounds, PROPOSAL_WEIGHTS, clip, decode, is_large};
 use super::config::{Norm, ProposalConfig};
 use super::init::Init;
-use super::kernels::ModelBackend;
 use super::layers::{Conv, ConvBlock, Spread};
 use super::nms::suppress;
-use burn::module::Module;
-use burn::tensor::Tensor;
-use burn::tensor::activation::relu;
-use burn::tensor::backend::Backend;
+use super::parameter::{Parameters, part};
+use crate::engine::Tensor;
 
 /// Shorter sides make no proposal, pixels.
 const MIN_SIDE: f32 = 1e-3;
 
 /// The part of the model that scores and shifts reference boxes.
-#[derive(Module, Debug)]
-pub struct Rpn<B: Backend> {
-    head: Head<B>,
-}
-
-#[derive(Module, Debug)]
-struct Head<B: Backend> {
-    hidden: Vec<ConvBlock<B>>,
-    cls_logits: Conv<B>,
-    bbox_pred: Conv<B>,
+#[derive(Clone, Debug)]
+pub struct Rpn {
+    hidden: ConvBlock,
+    cls_logits: Conv,
+    bbox_pred: Conv,
 }
 
 /// Scores and shifts of every reference box of a batch.
 #[derive(Clone, Debug)]
-pub struct AnchorScores<B: Backend> {
+pub struct AnchorScores {
     /// Logit of holding something: [batch, boxes].
-    pub objectness: Tensor<B, 2>,
-    /// Offsets to it: [batch, boxes, 4].
-    pub offsets: Tensor<B, 3>,
+    pub objectness: Tensor,
+    /// Offsets to it: [batch, 4 boxes], those of a box one after another.
+    pub offsets: Tensor,
 }
 
-impl<B: ModelBackend> Rpn<B> {
+impl Rpn {
     /// `shapes`: reference boxes at a place.
-    pub fn new(init: &mut Init<B>, channels: usize, shapes: usize, norm: Option<Norm>) -> Self {
+    pub fn new(init: &mut Init, channels: usize, shapes: usize, norm: Option<Norm>) -> Self {
         let spread = Spread::Normal(0.01);
-        let hidden = vec![ConvBlock::new(init, [channels; 2], 3, spread, norm)];
+        let hidden = ConvBlock::new(init, [channels; 2], 3, spread, norm);
         let mut conv = |outputs| Conv::new(init, [channels, outputs], 1, 1, spread, true);
         Self {
-            head: Head {
-                hidden,
-                cls_logits: conv(shapes),
-                bbox_pred: conv(4 * shapes),
-            },
+            hidden,
+            cls_logits: conv(shapes),
+            bbox_pred: conv(4 * shapes),
         }
     }
 
     /// Prepares the weights for inference, which is then faster; they must not change afterwards.
     pub fn prepare(&mut self) {
-        self.head.hidden.iter_mut().for_each(ConvBlock::prepare);
+        self.hidden.prepare();
     }
 
     /// Scores in the order of [`anchors`](super::anchors::anchors).
-    pub fn forward(&self, levels: &[Tensor<B, 4>]) -> AnchorScores<B> {
+    pub fn forward(&self, levels: &[Tensor]) -> AnchorScores {
         let mut objectness = Vec::with_capacity(levels.len());
         let mut offsets = Vec::with_capacity(levels.len());
         for level in levels {
-            let hidden = self
-                .head
-                .hidden
-                .iter()
-                .fold(level.clone(), |x, block| relu(block.forward(x)));
-            let scores = self.head.cls_logits.forward(hidden.clone());
-            let [batch, shapes, rows, columns] = scores.dims();
-            let boxes = rows * columns * shapes;
-            objectness.push(scores.permute([0, 2, 3, 1]).reshape([batch, boxes]));
-            let shifts = self.head.bbox_pred.forward(hidden);
-            offsets.push(shifts.permute([0, 2, 3, 1]).reshape([batch, boxes, 4]));
+            let hidden = self.hidden.forward(level).relu();
+            objectness.push(by_place(self.cls_logits.forward(&hidden)));
+            offsets.push(by_place(self.bbox_pred.forward(&hidden)));
         }
         AnchorScores {
-            objectness: Tensor::cat(objectness, 1),
-            offsets: Tensor::cat(offsets, 1),
+            objectness: Tensor::joined(&objectness),
+            offsets: Tensor::joined(&offsets),
         }
     }
+
+    /// Its parameters under its name.
+    pub fn parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
+        let name = &part(name, "head");
+        self.hidden
+            .numbered_parameters(&part(&part(name, "conv"), 0), found);
+        self.cls_logits.parameters(&part(name, "cls_logits"), found);
+        self.bbox_pred.parameters(&part(name, "bbox_pred"), found);
+    }
+}
+
+/// [batch, channels, rows, columns] to [batch, values], the channels of a place one after another.
+fn by_place(x: Tensor) -> Tensor {
+    let [batch, channels, rows, columns] = x.dims();
+    let x = x.reshaped([batch, channels, rows * columns]).exchanged();
+    x.reshaped([batch, rows * columns * channels])
 }
 
 /// The best boxes of one image, best first: of each level the best reference boxes, shifted, inside the

@@ -1,13 +1,10 @@
 //! Weights as safetensors with torchvision's names, in single or half precision.
 
-use super::kernels::ModelBackend;
 use super::mask_rcnn::MaskRcnn;
-use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
-use burn::tensor::backend::Backend;
-use burn::tensor::{Tensor, TensorData};
+use crate::engine::Tensor;
 use half::{bf16, f16};
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 /// Key of the model's configuration in a file's metadata.
@@ -104,7 +101,7 @@ pub enum WeightsError {
 ///
 /// # Errors
 /// The file cannot be read, lacks a parameter, has one too many or one of another shape.
-pub fn load_weights<B: ModelBackend>(model: MaskRcnn<B>, path: &Path) -> Result<MaskRcnn<B>, WeightsError> {
+pub fn load_weights(model: MaskRcnn, path: &Path) -> Result<MaskRcnn, WeightsError> {
     let bytes = std::fs::read(path).map_err(|source| WeightsError::File {
         path: path.to_owned(),
         source,
@@ -116,11 +113,7 @@ pub fn load_weights<B: ModelBackend>(model: MaskRcnn<B>, path: &Path) -> Result<
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn save_weights<B: ModelBackend>(
-    model: &MaskRcnn<B>,
-    path: &Path,
-    precision: Precision,
-) -> Result<(), WeightsError> {
+pub fn save_weights(model: &MaskRcnn, path: &Path, precision: Precision) -> Result<(), WeightsError> {
     let bytes = weights_to_bytes(model, precision)?;
     std::fs::write(path, bytes).map_err(|source| WeightsError::File {
         path: path.to_owned(),
@@ -133,11 +126,7 @@ pub fn save_weights<B: ModelBackend>(
 ///
 /// # Errors
 /// As [`load_weights`].
-pub fn weights_from_bytes<B: ModelBackend>(
-    model: MaskRcnn<B>,
-    bytes: &[u8],
-    name: &str,
-) -> Result<MaskRcnn<B>, WeightsError> {
+pub fn weights_from_bytes(mut model: MaskRcnn, bytes: &[u8], name: &str) -> Result<MaskRcnn, WeightsError> {
     let file = SafeTensors::deserialize(bytes).map_err(|source| WeightsError::Format {
         name: name.to_owned(),
         source,
@@ -148,40 +137,47 @@ pub fn weights_from_bytes<B: ModelBackend>(
             tensors.insert(current_name(&key), view);
         }
     }
-    let mut reader = Reader {
-        path: Vec::new(),
-        tensors,
-        used: BTreeSet::new(),
-        name,
-        error: None,
-    };
-    let model = model.map(&mut reader);
-    if let Some(error) = reader.error {
-        return Err(error);
+    for (key, param) in model.parameters() {
+        let shape = param.tensor.shape().to_vec();
+        let values = match tensors.remove(&key) {
+            Some(view) => values_of(&view, name, key, &shape)?,
+            // Weights that have not learnt relief: it makes no difference.
+            None if key == RELIEF_KEY => vec![0.0; shape.iter().product()],
+            None => {
+                return Err(WeightsError::Missing {
+                    name: name.to_owned(),
+                    key,
+                });
+            }
+        };
+        param.tensor = Tensor::new(shape, values);
     }
-    if let Some(key) = reader.tensors.keys().find(|key| !reader.used.contains(*key)) {
-        return Err(WeightsError::Unknown {
+    match tensors.into_keys().next() {
+        None => Ok(model),
+        Some(key) => Err(WeightsError::Unknown {
             name: name.to_owned(),
-            key: key.clone(),
-        });
+            key,
+        }),
     }
-    Ok(model)
 }
 
 /// All parameters of a model as a safetensors file.
 ///
 /// # Errors
 /// The format cannot hold them.
-pub fn weights_to_bytes<B: ModelBackend>(
-    model: &MaskRcnn<B>,
-    precision: Precision,
-) -> Result<Vec<u8>, WeightsError> {
-    let mut writer = Writer {
-        path: Vec::new(),
-        precision,
-        tensors: BTreeMap::new(),
-    };
-    model.visit(&mut writer);
+pub fn weights_to_bytes(model: &MaskRcnn, precision: Precision) -> Result<Vec<u8>, WeightsError> {
+    let mut copy = model.clone();
+    let tensors = copy.parameters().into_iter().map(|(key, param)| {
+        let values = param.tensor.values().iter();
+        let bytes: Vec<u8> = match precision {
+            Precision::Single => values.flat_map(|value| value.to_le_bytes()).collect(),
+            Precision::Half => values
+                .flat_map(|value| f16::from_f32(*value).to_le_bytes())
+                .collect(),
+        };
+        (key, (param.tensor.shape().to_vec(), bytes))
+    });
+    let tensors: BTreeMap<_, _> = tensors.collect();
     let dtype = match precision {
         Precision::Single => Dtype::F32,
         Precision::Half => Dtype::F16,
@@ -190,8 +186,7 @@ pub fn weights_to_bytes<B: ModelBackend>(
         name: "the model".to_owned(),
         source,
     };
-    let views = writer
-        .tensors
+    let views = tensors
         .iter()
         .map(|(key, (shape, bytes))| Ok((key, TensorView::new(dtype, shape.clone(), bytes)?)))
         .collect::<Result<Vec<_>, SafeTensorError>>()
@@ -202,17 +197,6 @@ pub fn weights_to_bytes<B: ModelBackend>(
     })?;
     let metadata = HashMap::from([(CONFIG_KEY.to_owned(), config)]);
     safetensors::serialize(views, Some(metadata)).map_err(format)
-}
-
-/// torchvision's name of a parameter: its lists hold (convolution, normalisation) pairs without names.
-fn key_of(path: &[String]) -> String {
-    let part = |part: &String| match part.as_str() {
-        "conv" => "0".to_owned(),
-        "norm" => "1".to_owned(),
-        "hidden" => "conv".to_owned(),
-        _ => part.clone(),
-    };
-    path.iter().map(part).collect::<Vec<_>>().join(".")
 }
 
 /// Today's name for a parameter under the name that torchvision's released files of before 2022 give it.
@@ -236,108 +220,26 @@ fn current_name(key: &str) -> String {
     key.to_owned()
 }
 
-struct Writer {
-    path: Vec<String>,
-    precision: Precision,
-    tensors: BTreeMap<String, (Vec<usize>, Vec<u8>)>,
-}
-
-impl<B: Backend> ModuleVisitor<B> for Writer {
-    fn enter_module(&mut self, name: &str, _: &str) {
-        self.path.push(name.to_owned());
+/// The values of a file's tensor; `name` and `key` stand for both in errors.
+fn values_of(view: &TensorView, name: &str, key: String, shape: &[usize]) -> Result<Vec<f32>, WeightsError> {
+    let name = name.to_owned();
+    if view.shape() != shape {
+        return Err(WeightsError::Shape {
+            name,
+            key,
+            found: view.shape().to_vec(),
+            expected: shape.to_vec(),
+        });
     }
-
-    fn exit_module(&mut self, _: &str, _: &str) {
-        self.path.pop();
-    }
-
-    fn visit_float<const D: usize>(&mut self, param: &Param<Tensor<B, D>>) {
-        let values = param.val().into_data();
-        let bytes = match self.precision {
-            Precision::Single => values.iter::<f32>().flat_map(f32::to_le_bytes).collect(),
-            Precision::Half => values
-                .iter::<f32>()
-                .flat_map(|value| f16::from_f32(value).to_le_bytes())
-                .collect(),
-        };
-        let shape = param.val().dims().to_vec();
-        self.tensors.insert(key_of(&self.path), (shape, bytes));
-    }
-}
-
-struct Reader<'a> {
-    path: Vec<String>,
-    tensors: BTreeMap<String, TensorView<'a>>,
-    used: BTreeSet<String>,
-    name: &'a str,
-    error: Option<WeightsError>,
-}
-
-impl Reader<'_> {
-    /// The values that the file has for the parameter at the present path.
-    fn values(&mut self, expected: Vec<usize>) -> Result<TensorData, WeightsError> {
-        let key = key_of(&self.path);
-        let name = self.name.to_owned();
-        let Some(view) = self.tensors.get(&key) else {
-            if key == RELIEF_KEY {
-                // Weights that have not learnt relief: it makes no difference.
-                let count = expected.iter().product();
-                return Ok(TensorData::new(vec![0.0f32; count], expected));
-            }
-            return Err(WeightsError::Missing { name, key });
-        };
-        if view.shape() != expected {
-            let found = view.shape().to_vec();
-            return Err(WeightsError::Shape {
-                name,
-                key,
-                found,
-                expected,
-            });
-        }
-        let bytes = view.data();
-        let pairs = bytes.as_chunks::<2>().0.iter();
-        let values: Vec<f32> = match view.dtype() {
-            Dtype::F32 => bytes
-                .as_chunks()
-                .0
-                .iter()
-                .map(|&bytes| f32::from_le_bytes(bytes))
-                .collect(),
-            Dtype::F16 => pairs.map(|&bytes| f16::from_le_bytes(bytes).to_f32()).collect(),
-            Dtype::BF16 => pairs.map(|&bytes| bf16::from_le_bytes(bytes).to_f32()).collect(),
-            found => return Err(WeightsError::Kind { name, key, found }),
-        };
-        self.used.insert(key);
-        Ok(TensorData::new(values, expected))
-    }
-}
-
-impl<B: Backend> ModuleMapper<B> for Reader<'_> {
-    fn enter_module(&mut self, name: &str, _: &str) {
-        self.path.push(name.to_owned());
-    }
-
-    fn exit_module(&mut self, _: &str, _: &str) {
-        self.path.pop();
-    }
-
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<B, D>>) -> Param<Tensor<B, D>> {
-        if self.error.is_some() {
-            return param;
-        }
-        let expected = param.val().dims().to_vec();
-        match self.values(expected) {
-            Ok(values) => param.map(|tensor| {
-                let trained = tensor.is_require_grad();
-                Tensor::from_data(values, &tensor.device()).set_require_grad(trained)
-            }),
-            Err(error) => {
-                self.error = Some(error);
-                param
-            }
-        }
-    }
+    let bytes = view.data();
+    let fours = bytes.as_chunks::<4>().0.iter();
+    let pairs = bytes.as_chunks::<2>().0.iter();
+    Ok(match view.dtype() {
+        Dtype::F32 => fours.map(|&bytes| f32::from_le_bytes(bytes)).collect(),
+        Dtype::F16 => pairs.map(|&bytes| f16::from_le_bytes(bytes).to_f32()).collect(),
+        Dtype::BF16 => pairs.map(|&bytes| bf16::from_le_bytes(bytes).to_f32()).collect(),
+        found => return Err(WeightsError::Kind { name, key, found }),
+    })
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Everything a training needs to go on, in one file.
 
 use super::error::TrainError;
+use super::optimizer::Moments;
 use super::schedule::Elapsed;
-use burn::tensor::TensorData;
+use crate::engine::Tensor;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -15,7 +16,7 @@ pub fn checkpoint_path(out: &Path) -> PathBuf {
 }
 
 /// Version of the file's layout.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 /// Key of the state in the file's metadata.
 const STATE: &str = "stonewise_training";
 /// Beginnings of the tensors' names.
@@ -30,10 +31,10 @@ pub struct Checkpoint<C> {
     pub elapsed: Elapsed,
     /// How it is configured.
     pub config: C,
-    /// Parameters of the model by path.
-    pub parameters: BTreeMap<String, TensorData>,
-    /// Running means of gradients and of their squares by path of the parameter.
-    pub moments: BTreeMap<String, [TensorData; 2]>,
+    /// Parameters of the model by name.
+    pub parameters: BTreeMap<String, Tensor>,
+    /// State of the optimiser by name of the parameter.
+    pub moments: BTreeMap<String, Moments>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -57,16 +58,20 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
         };
         let state = serde_json::to_string(&state).map_err(|e| broken(path, e))?;
         let mut tensors: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
-        let mut add = |name: String, data: &TensorData| {
-            let bytes = data.iter::<f32>().flat_map(f32::to_le_bytes).collect();
-            tensors.push((name, data.shape.to_vec(), bytes));
+        let mut add = |name: String, shape: &[usize], values: &[f32]| {
+            let bytes = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+            tensors.push((name, shape.to_vec(), bytes));
         };
-        for (name, data) in &self.parameters {
-            add(format!("{PARAMETER}{name}"), data);
+        for (name, tensor) in &self.parameters {
+            add(format!("{PARAMETER}{name}"), tensor.shape(), tensor.values());
         }
-        for (name, [mean, square]) in &self.moments {
-            add(format!("{MEAN}{name}"), mean);
-            add(format!("{SQUARE}{name}"), square);
+        for (name, moments) in &self.moments {
+            add(format!("{MEAN}{name}"), &[moments.mean.len()], &moments.mean);
+            add(
+                format!("{SQUARE}{name}"),
+                &[moments.square.len()],
+                &moments.square,
+            );
         }
         let mut views = Vec::new();
         for (name, shape, bytes) in &tensors {
@@ -105,19 +110,18 @@ impl<C: Serialize + for<'de> Deserialize<'de>> Checkpoint<C> {
                 .iter()
                 .map(|b| f32::from_le_bytes(*b))
                 .collect();
-            let data = TensorData::new(values, view.shape().to_vec());
             if let Some(name) = name.strip_prefix(PARAMETER) {
-                parameters.insert(name.to_owned(), data);
+                parameters.insert(name.to_owned(), Tensor::new(view.shape(), values));
             } else if let Some(name) = name.strip_prefix(MEAN) {
-                means.insert(name.to_owned(), data);
+                means.insert(name.to_owned(), values);
             } else if let Some(name) = name.strip_prefix(SQUARE) {
-                squares.insert(name.to_owned(), data);
+                squares.insert(name.to_owned(), values);
             }
         }
         let pairs = means.into_iter().map(|(name, mean)| {
             let square = squares.remove(&name);
             let square = square.ok_or_else(|| broken(path, format!("{SQUARE}{name} is missing")))?;
-            Ok((name, [mean, square]))
+            Ok((name, Moments { mean, square }))
         });
         let moments = pairs.collect::<Result<_, TrainError>>()?;
         Ok(Self {
@@ -144,15 +148,19 @@ mod tests {
     fn a_checkpoint_comes_back_as_it_was() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("checkpoint.safetensors");
-        let data = |values: Vec<f32>| TensorData::new(values, [1, 2]);
+        let weight = Tensor::new([1, 2], vec![0.1, f32::MIN_POSITIVE]);
+        let moments = Moments {
+            mean: vec![1.0, 2.0],
+            square: vec![3.0, 4.0],
+        };
         let checkpoint = Checkpoint {
             elapsed: Elapsed {
                 steps: 7,
                 seconds: 1.5,
             },
             config: "any".to_owned(),
-            parameters: BTreeMap::from([("a.b".to_owned(), data(vec![0.1, f32::MIN_POSITIVE]))]),
-            moments: BTreeMap::from([("a.b".to_owned(), [data(vec![1.0, 2.0]), data(vec![3.0, 4.0])])]),
+            parameters: BTreeMap::from([("a.b".to_owned(), weight)]),
+            moments: BTreeMap::from([("a.b".to_owned(), moments)]),
         };
         checkpoint.write(&path).unwrap();
         assert_eq!(Checkpoint::read(&path).unwrap(), checkpoint);

@@ -8,9 +8,9 @@ use super::plot::draw_curves;
 use super::source::{Prefetch, SampleSource};
 use super::trainer::{StepFigures, Trainer};
 use crate::evaluation::{MaskScore, pair_masks};
-use crate::model::{Precision, StoneDetector, TrainBackend, save_model};
+use crate::model::{Precision, save_model};
 use crate::tiling::{TilingError, TilingOptions, segment_photo};
-use crate::{Detector, Sample};
+use crate::{Detector, Sample, StoneFinder};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stonewise_core::progress::{Progress, Silent};
@@ -56,7 +56,7 @@ impl Run<'_> {
     ///
     /// # Errors
     /// The loss diverges, an image cannot be made, a file cannot be written.
-    pub fn train<B: TrainBackend>(&self, trainer: &mut Trainer<B>) -> Result<Stop, TrainError> {
+    pub fn train(&self, trainer: &mut Trainer) -> Result<Stop, TrainError> {
         let mut curves = Curves::open(self.out, trainer.elapsed().steps)?;
         let per_step = trainer.config().training.images_per_step();
         let first = trainer.elapsed().steps * per_step as u64;
@@ -66,9 +66,9 @@ impl Run<'_> {
         })
     }
 
-    fn steps<B: TrainBackend>(
+    fn steps(
         &self,
-        trainer: &mut Trainer<B>,
+        trainer: &mut Trainer,
         feed: &mut Prefetch,
         curves: &mut Curves,
     ) -> Result<Stop, TrainError> {
@@ -122,15 +122,15 @@ impl Run<'_> {
     /// Units of progress of a whole training.
     const PARTS: u64 = 1000;
 
-    fn save<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<(), TrainError> {
+    fn save(&self, trainer: &Trainer) -> Result<(), TrainError> {
         trainer.save(&checkpoint_path(self.out))?;
-        save_model(&trainer.detector(), &model_path(self.out), Precision::Half)?;
+        save_model(trainer.model(), &model_path(self.out), Precision::Half)?;
         let [loss, validation, picture] = [LOSS, VALIDATION, "curves.svg"].map(|name| self.out.join(name));
         draw_curves(&loss, &validation, &picture)
     }
 
-    fn evaluate<B: TrainBackend>(&self, trainer: &Trainer<B>) -> Result<MaskScore, TrainError> {
-        let detector = StoneDetector::new(trainer.detector());
+    fn evaluate(&self, trainer: &Trainer) -> Result<MaskScore, TrainError> {
+        let detector = StoneFinder::new(trainer.model().clone());
         evaluate_samples(&detector, self.validation).map_err(|e| TrainError::Data(e.to_string()))
     }
 }
@@ -171,12 +171,7 @@ impl Curves {
         })
     }
 
-    fn step<B: TrainBackend>(
-        &mut self,
-        trainer: &Trainer<B>,
-        figures: &StepFigures,
-        waited: Duration,
-    ) -> Result<(), TrainError> {
+    fn step(&mut self, trainer: &Trainer, figures: &StepFigures, waited: Duration) -> Result<(), TrainError> {
         let elapsed = trainer.elapsed();
         let mut row = vec![
             elapsed.seconds,
@@ -189,11 +184,7 @@ impl Curves {
         self.loss.add(elapsed.steps, &row)
     }
 
-    fn validation<B: TrainBackend>(
-        &mut self,
-        trainer: &Trainer<B>,
-        score: &MaskScore,
-    ) -> Result<(), TrainError> {
+    fn validation(&mut self, trainer: &Trainer, score: &MaskScore) -> Result<(), TrainError> {
         let elapsed = trainer.elapsed();
         let figures = [
             score.precision,

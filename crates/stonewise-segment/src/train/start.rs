@@ -5,10 +5,8 @@ use super::error::TrainError;
 use super::params::{TrainConfig, TrainParams};
 use super::schedule::Total;
 use super::trainer::Trainer;
-use crate::Weights;
-use crate::built_in::open_model_with;
-use crate::model::{MaskRcnn, MaskRcnnConfig, TrainBackend};
-use burn::tensor::Device;
+use crate::built_in::{Weights, open_model};
+use crate::model::{MaskRcnn, MaskRcnnConfig};
 use std::path::Path;
 
 /// What a training starts from.
@@ -32,17 +30,16 @@ const DEFAULT_MINUTES: f64 = 30.0;
 /// # Errors
 /// The folder holds a training with other parameters, the weights cannot be read, or a parameter is
 /// impossible.
-pub fn open_training<B: TrainBackend>(
+pub fn open_training(
     out: &Path,
     start: &Start,
     params: Option<TrainParams>,
     total: Option<Total>,
     minutes: Option<f64>,
-    device: &Device<B>,
-) -> Result<Trainer<B>, TrainError> {
+) -> Result<Trainer, TrainError> {
     let path = checkpoint_path(out);
     if path.exists() {
-        let mut trainer = Trainer::resume(&path, device)?;
+        let mut trainer = Trainer::resume(&path)?;
         if params.is_some_and(|p| p != trainer.config().training) {
             return Err(TrainError::Checkpoint {
                 path,
@@ -71,9 +68,9 @@ pub fn open_training<B: TrainBackend>(
             } else {
                 config
             };
-            MaskRcnn::init(&config, training.seed, device)?
+            MaskRcnn::init(&config, training.seed)?
         }
-        Start::Weights(weights) => open_model_with(weights, training.relief, device)?,
+        Start::Weights(weights) => open_model(weights, training.relief)?,
     };
     let config = TrainConfig {
         model: model.config().clone(),

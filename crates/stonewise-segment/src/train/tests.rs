@@ -3,12 +3,9 @@
 use super::*;
 use crate::Sample;
 use crate::model::{BackboneConfig, MaskRcnnConfig, Norm, RoiConfig};
-use burn::backend::{Autodiff, Flex};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::Raster;
-
-type B = Autodiff<Flex>;
 
 fn config() -> MaskRcnnConfig {
     let light = MaskRcnnConfig::light();
@@ -55,11 +52,10 @@ fn square(number: u64) -> Result<Sample, String> {
     Sample::new(image, labels, Raster::filled(64, 64, false)).map_err(|e| e.to_string())
 }
 
-fn train(out: &Path, total: u64, until: u64) -> (Stop, Trainer<B>) {
+fn train(out: &Path, total: u64, until: u64) -> (Stop, Trainer) {
     let start = Start::Nothing(Box::new(config()));
     let total = Some(Total::Steps(total));
-    let mut trainer =
-        open_training::<B>(out, &start, Some(params()), total, None, &Default::default()).unwrap();
+    let mut trainer = open_training(out, &start, Some(params()), total, None).unwrap();
     // The source ends the training where a user would press Ctrl-C.
     let stopper = StopAfter {
         steps: std::sync::atomic::AtomicU64::new(until + 1 - trainer.elapsed().steps),
@@ -142,7 +138,7 @@ fn other_parameters_do_not_continue_a_training() {
     train(out.path(), 1, 100);
     let other = TrainParams { seed: 9, ..params() };
     let start = Start::Nothing(Box::new(config()));
-    let opened = open_training::<B>(out.path(), &start, Some(other), None, None, &Default::default());
+    let opened = open_training(out.path(), &start, Some(other), None, None);
     assert!(opened.err().unwrap().to_string().contains("other parameters"));
 }
 
@@ -159,8 +155,7 @@ fn a_training_that_diverges_stops_and_says_so() {
     };
     let start = Start::Nothing(Box::new(config()));
     let total = Some(Total::Steps(20));
-    let mut trainer =
-        open_training::<B>(out.path(), &start, Some(wild), total, None, &Default::default()).unwrap();
+    let mut trainer = open_training(out.path(), &start, Some(wild), total, None).unwrap();
     let run = Run {
         source: &square,
         validation: &[],

@@ -3,22 +3,19 @@
 use super::checkpoint::Checkpoint;
 use super::error::TrainError;
 use super::optimizer::AdamW;
-use super::parameters::{Gradients, parameters, with_parameters};
 use super::params::TrainConfig;
 use super::schedule::Elapsed;
 use crate::Sample;
-use crate::model::{Losses, MaskRcnn, TrainBackend};
-use burn::module::AutodiffModule;
-use burn::tensor::{Device, Tensor};
+use crate::model::{Gradients, Losses, MaskRcnn};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::path::Path;
 
 /// A detector in training.
-pub struct Trainer<B: TrainBackend> {
+pub struct Trainer {
     config: TrainConfig,
     elapsed: Elapsed,
-    model: MaskRcnn<B>,
-    optimizer: AdamW<B::InnerBackend>,
+    model: MaskRcnn,
+    optimizer: AdamW,
     pools: Vec<ThreadPool>,
 }
 
@@ -43,15 +40,12 @@ impl StepFigures {
     }
 }
 
-/// Losses of a batch, and their gradients.
-type BatchResult<B> = (Vec<f64>, Gradients<B>);
-
-impl<B: TrainBackend> Trainer<B> {
+impl Trainer {
     /// Starts a training of a detector that was made as `config.model` says.
     ///
     /// # Errors
     /// No threads can be started.
-    pub fn new(config: TrainConfig, model: MaskRcnn<B>) -> Result<Self, TrainError> {
+    pub fn new(config: TrainConfig, model: MaskRcnn) -> Result<Self, TrainError> {
         Ok(Self {
             optimizer: AdamW::new(config.training.optimizer),
             pools: pools(config.training.accumulate)?,
@@ -65,18 +59,24 @@ impl<B: TrainBackend> Trainer<B> {
     ///
     /// # Errors
     /// The file cannot be read, is no checkpoint, or was made by another version of the detector.
-    pub fn resume(path: &Path, device: &Device<B>) -> Result<Self, TrainError> {
-        let checkpoint: Checkpoint<TrainConfig> = Checkpoint::read(path)?;
+    pub fn resume(path: &Path) -> Result<Self, TrainError> {
+        let mut checkpoint: Checkpoint<TrainConfig> = Checkpoint::read(path)?;
         let config = checkpoint.config;
-        let model = MaskRcnn::init(&config.model, config.training.seed, device)?;
-        let model =
-            with_parameters(model, &checkpoint.parameters).map_err(|name| TrainError::Checkpoint {
-                path: path.to_owned(),
-                problem: format!("parameter {name} is missing or has another shape"),
-            })?;
+        let mut model = MaskRcnn::zeros(&config.model)?;
+        for (name, param) in model.parameters() {
+            match checkpoint.parameters.remove(&name) {
+                Some(tensor) if tensor.shape() == param.tensor.shape() => param.tensor = tensor,
+                _ => {
+                    return Err(TrainError::Checkpoint {
+                        path: path.to_owned(),
+                        problem: format!("parameter {name} is missing or has another shape"),
+                    });
+                }
+            }
+        }
         let steps = i32::try_from(checkpoint.elapsed.steps).unwrap_or(i32::MAX);
         Ok(Self {
-            optimizer: AdamW::from_state(config.training.optimizer, checkpoint.moments, steps, device),
+            optimizer: AdamW::from_state(config.training.optimizer, checkpoint.moments, steps),
             pools: pools(config.training.accumulate)?,
             elapsed: checkpoint.elapsed,
             config,
@@ -89,11 +89,15 @@ impl<B: TrainBackend> Trainer<B> {
     /// # Errors
     /// The file cannot be written.
     pub fn save(&self, path: &Path) -> Result<(), TrainError> {
+        let mut model = self.model.clone();
+        let parameters = model.parameters().into_iter();
         let checkpoint = Checkpoint {
             elapsed: self.elapsed,
             config: self.config.clone(),
-            parameters: parameters(&self.model),
-            moments: self.optimizer.state(),
+            parameters: parameters
+                .map(|(name, param)| (name, param.tensor.clone()))
+                .collect(),
+            moments: self.optimizer.moments().clone(),
         };
         checkpoint.write(path)
     }
@@ -114,25 +118,18 @@ impl<B: TrainBackend> Trainer<B> {
         };
         let batches = self.batches(images);
         let count = batches.len() as f64;
-        let mut sum: Option<Gradients<B::InnerBackend>> = None;
+        let mut sum = Gradients::default();
         for (losses, gradients) in batches {
-            for (mean, loss) in figures.losses.iter_mut().zip(losses) {
-                *mean += loss / count;
+            for (mean, loss) in figures.losses.iter_mut().zip(losses.parts()) {
+                *mean += f64::from(loss) / count;
             }
-            match &mut sum {
-                Some(sum) => sum.add(gradients),
-                None => sum = Some(gradients),
-            }
+            sum.add(gradients);
         }
         if !figures.total().is_finite() {
             return Err(self.diverged("the loss", figures.total(), rate));
         }
-        let Some(mut gradients) = sum else {
-            return Ok(figures);
-        };
-        gradients.scale(1.0 / count);
-        let (model, norm) = self.optimizer.step::<B, _>(self.model.clone(), gradients, rate);
-        self.model = model;
+        sum.scale(1.0 / count as f32);
+        let norm = self.optimizer.step(&mut self.model, sum, rate);
         if !norm.is_finite() {
             return Err(self.diverged("the gradient", norm, rate));
         }
@@ -143,20 +140,14 @@ impl<B: TrainBackend> Trainer<B> {
 
     /// Losses and gradients of every batch of a step, each computed by threads of its own: one image is too
     /// little work to share.
-    fn batches(&self, images: &[Sample]) -> Vec<BatchResult<B::InnerBackend>> {
+    fn batches(&self, images: &[Sample]) -> Vec<(Losses, Gradients)> {
         std::thread::scope(|scope| {
             let batches = images.chunks(self.config.training.batch.max(1)).enumerate();
             let mut running = Vec::new();
             for ((index, batch), pool) in batches.zip(self.pools.iter().cycle()) {
-                // A graph of its own for every thread, over the same weights.
-                let model = MaskRcnn::<B>::from_inner(self.model.valid());
-                let seed = self.batch_seed(index);
-                let compute = move || {
-                    let losses = model.losses(batch, seed);
-                    let gradients = losses.total().backward();
-                    (values(&losses), Gradients::of::<B, _>(&model, &gradients))
-                };
-                running.push(scope.spawn(|| pool.install(compute)));
+                let (model, seed) = (&self.model, self.batch_seed(index));
+                let compute = move || model.gradients(batch, seed);
+                running.push(scope.spawn(move || pool.install(compute)));
             }
             running
                 .into_iter()
@@ -189,9 +180,9 @@ impl<B: TrainBackend> Trainer<B> {
         &self.config
     }
 
-    /// The detector as it is now, to be used.
-    pub fn detector(&self) -> MaskRcnn<B::InnerBackend> {
-        self.model.valid()
+    /// The detector as it is now.
+    pub fn model(&self) -> &MaskRcnn {
+        &self.model
     }
 
     /// Seeds the draws of a batch: the same when a step is done again.
@@ -217,18 +208,4 @@ fn pools(count: usize) -> Result<Vec<ThreadPool>, TrainError> {
     (0..count.max(1))
         .map(|_| pool().map_err(|e| TrainError::Data(format!("cannot start threads: {e}"))))
         .collect()
-}
-
-/// Values of the parts of a loss, fetched from the device at once.
-fn values<B: TrainBackend>(losses: &Losses<B>) -> Vec<f64> {
-    let parts = [
-        &losses.rpn_objectness,
-        &losses.rpn_box,
-        &losses.class,
-        &losses.box_regression,
-        &losses.mask,
-    ];
-    let parts = parts.map(|part| part.clone().inner()).to_vec();
-    let data = Tensor::cat(parts, 0).into_data();
-    data.iter::<f64>().collect()
 }

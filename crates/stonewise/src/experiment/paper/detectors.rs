@@ -12,7 +12,7 @@ use stonewise_io::image_io::image_size;
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::evaluation::{MaskScore, PhotoPairs, pair_masks};
 use stonewise_segment::tiling::segment_photo;
-use stonewise_segment::train::{Run, Session, Start, Total, TrainParams, model_path};
+use stonewise_segment::train::{Run, Start, Total, TrainParams, model_path, open_training};
 use stonewise_segment::{StoneFinder, Weights};
 
 /// The step that measures a detector.
@@ -138,19 +138,20 @@ impl DetectorTraining<'_> {
         create_results_folder(folder)?;
         let start = Start::Weights(Weights::named(&self.params.model));
         let total = Total::Minutes(self.minutes);
-        let mut session = Session::open(folder, &start, None, Some(total), None)?;
-        if total.share_done(session.elapsed()) < 1.0 || !model_path(folder).exists() {
-            session.train(&Run {
+        let mut trainer = open_training(folder, &start, None, Some(total), None)?;
+        if total.share_done(trainer.elapsed()) < 1.0 || !model_path(folder).exists() {
+            let run = Run {
                 source: crops,
                 validation: &crops.validation()?,
                 out: folder,
                 minutes: None,
                 threads: 1,
                 progress,
-            })?;
+            };
+            run.train(&mut trainer)?;
             progress.check()?;
         }
-        let elapsed = session.elapsed();
+        let elapsed = trainer.elapsed();
         Ok(format!(
             "trained on nine tenths of each photo ({} step{} in {:.1} min)",
             elapsed.steps,

@@ -76,8 +76,6 @@ pub struct Unit {
     pub cores: u32,
     /// Memory that it may take, bytes: estimated from the numbers of points and pixels.
     pub memory_bytes: u64,
-    /// Whether a GPU makes it faster, in this build.
-    pub gpu: bool,
     /// Whether it was done when the plan was made.
     pub done: bool,
 }
@@ -197,7 +195,6 @@ impl List {
             output: receipt_file(&id),
             cores: work.cores,
             memory_bytes: BASE_BYTES + work.bytes,
-            gpu: false,
             done: false,
             id,
         });
@@ -215,10 +212,7 @@ impl List {
             let needs = takes_relief.then(|| format!("ingest-{n}"));
             let work = Work::of(needs.as_slice(), 4, bytes).reading(&inputs);
             self.push(id.clone(), Stage::SegmentPhoto, Some(n), work);
-            self.last(|unit| {
-                (unit.part, unit.parts) = (Some(photo), Some(count));
-                unit.gpu = stonewise_segment::backend::can_use_gpu();
-            });
+            self.last(|unit| (unit.part, unit.parts) = (Some(photo), Some(count)));
             photos.push(id);
         }
         let inputs = [epoch.cameras.clone()].into_iter().chain(epoch.masks.clone());

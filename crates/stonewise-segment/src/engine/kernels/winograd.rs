@@ -5,9 +5,8 @@
 //! rows; between the transforms, each of the 36 places is a product of matrices of its own. The result
 //! differs from that of [`convolution`](super::convolution) by rounding, at most 1e-4 of its spread.
 
-use super::Filters;
 use super::convolution::Geometry;
-use super::filters::{CELL, PLACES, SIDE};
+use super::filters::{CELL, Filters, PLACES, SIDE};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
 use pulp::{Arch, Simd, WithSimd};

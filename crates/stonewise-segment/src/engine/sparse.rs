@@ -32,11 +32,6 @@ impl SparseMatrix {
         self.starts.len() - 1
     }
 
-    /// Number of columns.
-    pub fn columns(&self) -> usize {
-        self.columns
-    }
-
     /// Entries (column, value) of a row.
     pub fn row(&self, row: usize) -> &[(u32, f32)] {
         &self.entries[self.range(row)]
@@ -82,7 +77,7 @@ mod tests {
         matrix.push_row([]);
         matrix.push_row([(0, -1.0)]);
         let transposed = matrix.transposed();
-        assert_eq!((transposed.rows(), transposed.columns()), (4, 3));
+        assert_eq!((transposed.rows(), transposed.columns), (4, 3));
         assert_eq!(transposed.row(0), [(0, 2.0), (2, -1.0)]);
         assert_eq!(transposed.row(3), [(0, 1.0), (0, 0.5)]);
         assert!(transposed.row(1).is_empty());

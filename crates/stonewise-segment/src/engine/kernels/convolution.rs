@@ -23,10 +23,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    #[cfg(test)]
     pub fn input_shape(&self) -> [usize; 4] {
         [self.batch, self.inputs, self.rows, self.columns]
     }
 
+    #[cfg(test)]
     pub fn weight_shape(&self) -> [usize; 4] {
         [self.outputs, self.inputs, self.size, self.size]
     }

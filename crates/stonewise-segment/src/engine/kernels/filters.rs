@@ -1,8 +1,4 @@
 //! Weights of a convolution of 3 x 3 as Winograd's minimal filtering takes them.
-#![cfg_attr(
-    not(feature = "flex"),
-    allow(dead_code, reason = "other backends have their own ways")
-)]
 
 use std::sync::Arc;
 

@@ -1,0 +1,12 @@
+//! The operations that take the time, and their derivatives, on slices.
+
+pub mod convolution;
+pub mod exchange;
+mod filters;
+pub mod group_norm;
+pub mod pool;
+pub mod product;
+pub mod sparse_product;
+pub mod winograd;
+
+pub use filters::Filters;
