@@ -30,17 +30,17 @@ impl Fpn {
     }
 
     /// Levels of strides 4, 8, 16, 32 and 64, finest first. The image's sides must be multiples of 32.
-    pub fn forward(&self, features: &[Tensor; 4]) -> Vec<Tensor> {
+    pub fn forward(&self, features: [Tensor; 4]) -> Vec<Tensor> {
         let mut levels = Vec::with_capacity(5);
         let mut above: Option<Tensor> = None;
         let blocks = self.inner_blocks.iter().zip(&self.layer_blocks);
-        for (feature, (inner, layer)) in features.iter().zip(blocks).rev() {
+        for (feature, (inner, layer)) in features.into_iter().zip(blocks).rev() {
             let lateral = inner.forward(feature);
             let merged = match above {
                 Some(above) => lateral.plus_doubled(&above),
                 None => lateral,
             };
-            levels.insert(0, layer.forward(&merged));
+            levels.insert(0, layer.forward(merged.clone()));
             above = Some(merged);
         }
         levels.push(levels[levels.len() - 1].every_second());

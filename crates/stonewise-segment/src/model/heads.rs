@@ -59,8 +59,8 @@ impl RoiHeads {
         let x = self
             .mask_head
             .iter()
-            .fold(regions, |x, block| block.forward(&x).relu());
-        let x = self.conv5_mask.forward(&x).relu();
+            .fold(regions, |x, block| block.forward(x).relu());
+        let x = self.conv5_mask.forward(x).relu();
         assembled(&self.mask_fcn_logits.forward(&x))
     }
 

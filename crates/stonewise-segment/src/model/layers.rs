@@ -112,7 +112,7 @@ impl Doubling {
     /// [batch, in, rows, columns] to the four pixels that each becomes: [4 batch, out, rows, columns], those
     /// of an image one after another, row by row. Nothing overlaps: operations on single pixels may
     /// come before [`assembled`].
-    pub fn forward(&self, x: &Tensor) -> Tensor {
+    pub fn forward(&self, x: Tensor) -> Tensor {
         let [inputs, outputs] = self.weight.tensor.dims();
         let [batch, _, rows, columns] = x.dims();
         // From input, output, pixel to pixel, output, input.
@@ -279,11 +279,13 @@ impl ConvBlock {
         }
     }
 
-    pub fn forward(&self, x: &Tensor) -> Tensor {
-        let x = self.conv.forward(x);
+    pub fn forward(&self, x: Tensor) -> Tensor {
+        let y = self.conv.forward(&x);
+        // Its memory is free before the normalisation takes some.
+        drop(x);
         match &self.norm {
-            Some(norm) => norm.forward(x),
-            None => x,
+            Some(norm) => norm.forward(y),
+            None => y,
         }
     }
 

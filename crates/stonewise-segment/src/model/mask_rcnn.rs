@@ -190,7 +190,7 @@ impl MaskRcnn {
         } else {
             None
         };
-        let levels = self.fpn.forward(&self.body.forward(images, relief.as_ref()));
+        let levels = self.fpn.forward(self.body.forward(images, relief.as_ref()));
         let grid = |level: &Tensor| {
             let [_, _, rows, columns] = level.dims();
             [columns, rows]

@@ -43,12 +43,12 @@ impl Block {
 
     fn forward(&self, x: &Tensor) -> Tensor {
         let shortcut = match &self.downsample {
-            Some(downsample) => downsample.forward(x),
+            Some(downsample) => downsample.forward(x.clone()),
             None => x.clone(),
         };
-        let mut y = self.layers[0].forward(x);
+        let mut y = self.layers[0].forward(x.clone());
         for layer in &self.layers[1..] {
-            y = layer.forward(&y.relu());
+            y = layer.forward(y.relu());
         }
         y.plus(&shortcut).relu()
     }

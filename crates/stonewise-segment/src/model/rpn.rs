@@ -51,7 +51,7 @@ impl Rpn {
         let mut objectness = Vec::with_capacity(levels.len());
         let mut offsets = Vec::with_capacity(levels.len());
         for level in levels {
-            let hidden = self.hidden.forward(level).relu();
+            let hidden = self.hidden.forward(level.clone()).relu();
             objectness.push(by_place(self.cls_logits.forward(&hidden)));
             offsets.push(by_place(self.bbox_pred.forward(&hidden)));
         }
