@@ -20,7 +20,7 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 13] = [
+const PROGRAMS: [Program; 14] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("epoch-errors", epoch_errors::run),
@@ -29,6 +29,7 @@ const PROGRAMS: [Program; 13] = [
     ("masonry-sheet", detector::masonry_sheet::run),
     ("overfit", detector::overfit::run),
     ("step-time", detector::step_time::run),
+    ("training-crops", detector::training_crops::run),
     ("instances", detector::instances::run),
     ("comparisons", speed::comparisons::run),
     ("tiles", speed::tiles::run),

@@ -7,6 +7,7 @@
 //! Whoever chooses thresholds, tiles or training by these walls makes them development walls: take other
 //! seeds then, and say so.
 
+use super::survey_kind;
 use crate::Outcome;
 use crate::table::Table;
 use crate::words::Words;
@@ -15,7 +16,7 @@ use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, RgbImage};
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
-use stonewise_segment::train::synth::{MasonryStyle, Survey, SurveyKind, masonry_photo_of};
+use stonewise_segment::train::synth::{MasonryStyle, Survey, masonry_photo_of};
 use stonewise_segment::{Sample, StoneFinder, Weights};
 
 /// First of the seeds that are kept apart. Training draws 64-bit seeds, the test of the built-in weights uses
@@ -56,13 +57,7 @@ pub fn run(words: &Words) -> Outcome {
     let mut options = TilingOptions::default();
     options.min_score = words.number_at(4).unwrap_or(options.min_score);
     let detector = StoneFinder::open(&weights, options.min_score as f32)?;
-    let kind = match word(3).unwrap_or("none") {
-        "none" => None,
-        "terrestrial" => Some(SurveyKind::Terrestrial),
-        "drone" => Some(SurveyKind::Drone),
-        "stereo" => Some(SurveyKind::Stereo),
-        other => panic!("{other}: none, terrestrial, drone or stereo"),
-    };
+    let kind = survey_kind(word(3).unwrap_or("none"));
     let style = match word(5) {
         None => MasonryStyle::random,
         Some("dry") => MasonryStyle::dry,
