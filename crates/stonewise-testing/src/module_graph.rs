@@ -43,7 +43,8 @@ impl ModuleGraph {
             .collect();
         let uses = paths.iter().map(|(module, list)| {
             let used = list.iter().filter_map(|path| owner(module, path, &paths));
-            let mut used: Vec<Module> = used.filter(|used| used != module).collect();
+            // What the root itself holds are re-exports of other crates.
+            let mut used: Vec<Module> = used.filter(|used| used != module && !used.is_empty()).collect();
             used.sort();
             used.dedup();
             (module.clone(), used)

@@ -1,7 +1,7 @@
 //! The verdict on a run: the state of the wall, its zones and its stones, and one sentence that says it
 //! everywhere.
 //!
-//! [`assess`] is a pure function of what was measured, of how sound the run is and of the thresholds;
+//! `assess` is a pure function of what was measured, of how sound the run is and of the thresholds;
 //! `evidence` takes what it needs from result files.
 
 mod area;
