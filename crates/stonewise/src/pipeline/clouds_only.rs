@@ -7,17 +7,19 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Run, Task};
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
-use crate::pipeline::steps::ingest::INGEST;
+use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::m3c2::{change_field, m3c2};
 use crate::pipeline::until::Until;
 use crate::project::Project;
-use nalgebra::{Point3, Vector3};
+use crate::warnings::Warning;
+use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_io::cloud::{Dimension, ExtraColumn, read_mesh, write_points_laz};
+use stonewise_core::surface::{Outside, orient, surface_cells};
+use stonewise_io::cloud::{Dimension, ExtraColumn, cloud_info, read_mesh, write_points_laz};
 
 /// Name of the comparison along normals, which a run of the project finds.
 const M3C2: &str = "m3c2-2";
@@ -26,6 +28,9 @@ const C2C: &str = "c2c";
 const C2M: &str = "c2m";
 const C2C_DISTANCE: Dimension = Dimension::new("c2c_distance", "m", "distance to nearest point");
 const C2M_DISTANCE: Dimension = Dimension::new("c2m_distance", "m", "distance to the mesh");
+
+/// Edge of the cells in which the outside of a surface is found, metres: about a stone with its joints.
+const CELL_M: f64 = 0.25;
 
 /// What to compare with what.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +54,8 @@ pub enum Comparison<'a> {
 
 /// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed.
 ///
-/// M3C2's normals point at the cameras of the first epoch where it has any, else upwards.
+/// M3C2's normals point at the cameras of the first epoch where it has any. Else they point outside as scanner
+/// positions or the surface itself say; the returned warnings hold a doubt where these do not say it clearly.
 ///
 /// # Errors
 /// A cloud, the mesh or a camera file cannot be read; a result cannot be written; interruption.
@@ -58,7 +64,7 @@ pub fn compare_clouds(
     what: Comparison,
     folder: &OutputFolder,
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<Vec<Warning>> {
     let later = EpochId::at(1);
     let mut context = Context::new(project, folder, progress)?;
     context.agenda = match what {
@@ -71,15 +77,19 @@ pub fn compare_clouds(
     let out = folder.path();
     match what {
         Comparison::M3c2 => {
-            run.clouds(later)?;
+            let clouds = run.clouds(later)?;
             let views = views_of(project)?;
             let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
-            let outward = match centres.as_slice() {
-                [] => OutwardReference::Direction(Vector3::z()),
-                centres => OutwardReference::Towards(centres),
+            let outside = match centres.is_empty() {
+                true => Some(outside_of(&context, &clouds.first)?),
+                false => None,
+            };
+            let outward = match &outside {
+                Some(outside) => OutwardReference::Surface(outside),
+                None => OutwardReference::Towards(&centres),
             };
             let change = change_field(&context.in_line(M3C2, || m3c2(&run, later, &outward))?)?;
-            write_m3c2(out, later, coordinate_system(project)?.as_ref(), &change)
+            write_m3c2(out, later, coordinate_system(project)?.as_ref(), &change)?;
         }
         Comparison::C2c { max_m } => {
             let Pair { first, later } = run.clouds(later)?;
@@ -87,7 +97,7 @@ pub fn compare_clouds(
                 let measure = |sink: Sink| c2c_survey(&first.tiles, &later.tiles, max_m, progress, sink);
                 Distances::collect(measure)?.write(project, &out.join("c2c.laz"), C2C_DISTANCE)
             };
-            context.in_line(C2C, || context.timed(C2C, compare))
+            context.in_line(C2C, || context.timed(C2C, compare))?;
         }
         Comparison::C2m { mesh, max_m } => {
             let later = run.ingested(later)?;
@@ -96,9 +106,46 @@ pub fn compare_clouds(
                 let measure = |sink: Sink| c2m_survey(&index, &later.tiles, max_m, progress, sink);
                 Distances::collect(measure)?.write(project, &out.join("c2m.laz"), C2M_DISTANCE)
             };
-            context.in_line(C2M, || context.timed(C2M, compare))
+            context.in_line(C2M, || context.timed(C2M, compare))?;
         }
     }
+    Ok(context.warnings.sorted())
+}
+
+/// The outside of the first epoch's surface; tells what it follows from, and notes a doubt where that is weak.
+fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
+    let epoch = &context.project.epochs[EpochId::REFERENCE];
+    let mut scanners = Vec::new();
+    for cloud in &epoch.clouds {
+        scanners.extend(
+            cloud_info(cloud)?
+                .scans
+                .into_iter()
+                .filter_map(|scan| scan.origin),
+        );
+    }
+    let cells = surface_cells::<_, Error>(&first.tiles.surveyed, CELL_M, context.progress)?;
+    let found = orient(cells, &scanners);
+    let evidence = found.evidence;
+    let reason = match scanners.len() {
+        0 => format!(
+            "no camera or scanner position says which side is outside; level surfaces, joints and batter do by {:.1}, {:.1} and \
+             {:.1} standard deviations",
+            evidence.level, evidence.joints, evidence.batter
+        ),
+        1 => "normals point to the side of the scanner".to_owned(),
+        n => format!("normals point to the side of the {n} scanner positions"),
+    };
+    if found.is_sure() {
+        context.progress.note(&reason);
+    } else {
+        let message = format!(
+            "{reason}: all distances may have the wrong sign. Compare the normals in m3c2.laz with the wall, or give a project \
+             with cameras"
+        );
+        context.warnings.doubt("m3c2", &epoch.name, message);
+    }
+    Ok(Outside::of(&found.cells))
 }
 
 /// The clouds of these epochs are cut into tiles, then comes a step of this name.
