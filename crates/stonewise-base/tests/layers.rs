@@ -5,7 +5,7 @@
 const LAYERS: [&[&str]; 4] = [
     &["report_params", "stable", "thresholds", "warnings"],
     &["error", "messages", "settings"],
-    &["address_space", "files", "limits", "part"],
+    &["address_space", "files", "part"],
     &["parameters"],
 ];
 

@@ -8,7 +8,7 @@
 //! A module uses only those before it, and those in braces never each other:
 //!
 //! ```text
-//! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
+//! id < epoch < statistics < linalg < progress < parallel < params < geometry < raster < cloud < stone
 //!    < {transfer | matching | registration | change} < evaluate
 //! ```
 
@@ -21,6 +21,7 @@ pub mod id;
 mod linalg;
 pub mod matching;
 pub mod parallel;
+pub mod params;
 pub mod progress;
 pub mod raster;
 pub mod registration;

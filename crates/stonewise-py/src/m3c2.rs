@@ -10,6 +10,7 @@ use stonewise_core::change::{
     ChangePoint, M3c2Params, OutwardReference, estimate_normals, m3c2 as compare, thin_to_voxels,
 };
 use stonewise_core::cloud::GridIndex;
+use stonewise_core::params::Params;
 use stonewise_core::progress::{Interrupted, Progress};
 
 /// Core points between two looks whether to stop.

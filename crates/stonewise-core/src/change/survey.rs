@@ -1,11 +1,11 @@
 //! Comparing whole surveys, one tile of the first (or compared) cloud at a time.
 
 use crate::change::{
-    ChangeField, M3c2Params, M3c2ParamsError, MeshIndex, OutwardReference, c2c, c2m, estimate_normals, m3c2,
-    thin_to_voxels,
+    ChangeField, M3c2Params, MeshIndex, OutwardReference, c2c, c2m, estimate_normals, m3c2, thin_to_voxels,
 };
 use crate::cloud::{GridIndex, TileSource};
 use crate::geometry::Bounds;
+use crate::params::{ParamError, Params};
 use crate::progress::{Interrupted, Progress};
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -28,7 +28,7 @@ pub enum SurveyError {
     Interrupted(#[from] Interrupted),
     /// Parameters that cannot work.
     #[error(transparent)]
-    Params(#[from] M3c2ParamsError),
+    Params(#[from] ParamError),
 }
 
 /// M3C2 of two surveys at core points thinned from the first one; hands each tile's results to `sink`, in
