@@ -3,84 +3,82 @@
 use super::message::{Message, messages};
 
 messages! {
-    DOUBTS {
-        NOT_CONVERGED:
-            "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
-            on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
-            pictures",
-            "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert, auf ihre Bewegungen und deren Intervalle ist kein \
-            Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
-            die Bilder ansehen";
+    NOT_CONVERGED:
+        "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
+        on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
+        pictures",
+        "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert, auf ihre Bewegungen und deren Intervalle ist kein \
+        Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
+        die Bilder ansehen";
 
-        BESIDE_COMPARED:
-            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
-            so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
-            clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
-            "die Punktwolke liegt, verglichen mit der Epoche {first}, {length} mm ({along} längs, {up} hoch) neben den Steinen, die \
-            die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
-            Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+    BESIDE_COMPARED:
+        "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
+        so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
+        clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
+        "die Punktwolke liegt, verglichen mit der Epoche {first}, {length} mm ({along} längs, {up} hoch) neben den Steinen, die \
+        die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
+        Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-        BESIDE:
-            "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
-            cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
-            `stonewise check` shows the edges of the cloud over a photo",
-            "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen; Steine sind also \
-            neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
-            System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+    BESIDE:
+        "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
+        cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
+        `stonewise check` shows the edges of the cloud over a photo",
+        "die Punktwolke liegt {length} mm ({along} längs, {up} hoch) neben den Steinen, die die Fotos zeigen; Steine sind also \
+        neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
+        System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-        TORN:
-            "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, so \
-            stones are cut out of the cloud beside their place, and their motions must not be relied on. \
-            Cameras and clouds do not fit each other (frame, direction of an axis, focal length), or the masks are poor; \
-            `stonewise check` shows the edges of the cloud over a photo",
-            "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
-            Fotos zu seinen Punkten; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
-            ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
-            die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+    TORN:
+        "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, so \
+        stones are cut out of the cloud beside their place, and their motions must not be relied on. \
+        Cameras and clouds do not fit each other (frame, direction of an axis, focal length), or the masks are poor; \
+        `stonewise check` shows the edges of the cloud over a photo",
+        "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
+        Fotos zu seinen Punkten; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
+        ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
+        die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-        MISREGISTERED_EPOCH:
-            "{cells} pieces of plane surfaces off the wall appear shifted by {shown} mm (x, y, z) against the first epoch. The stations \
-            and strips alone give a shift of {found} mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
-            motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
-            [[registration.stable]]. If they did move, state the registration error as epoch_error_m",
-            "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um {shown} mm (x, y, z) verschoben. Aus \
-            den Standpunkten und Streifen allein folgt eine Verschiebung von {found} mm mit einer Standardabweichung von {sd} mm. \
-            Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: die Flächen mit auto_stable = true \
-            verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
-            epoch_error_m angeben";
+    MISREGISTERED_EPOCH:
+        "{cells} pieces of plane surfaces off the wall appear shifted by {shown} mm (x, y, z) against the first epoch. The stations \
+        and strips alone give a shift of {found} mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
+        motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
+        [[registration.stable]]. If they did move, state the registration error as epoch_error_m",
+        "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um {shown} mm (x, y, z) verschoben. Aus \
+        den Standpunkten und Streifen allein folgt eine Verschiebung von {found} mm mit einer Standardabweichung von {sd} mm. \
+        Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: die Flächen mit auto_stable = true \
+        verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
+        epoch_error_m angeben";
 
-        FEW_MEASURED:
-            "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
-            the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
-            `stonewise check` on the project and look at its pictures",
-            "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
-            anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. Meist passen die Punktwolken einer \
-            Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen";
+    FEW_MEASURED:
+        "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
+        the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
+        `stonewise check` on the project and look at its pictures",
+        "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
+        anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. Meist passen die Punktwolken einer \
+        Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen";
 
-        BLIND:
-            "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
-            of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
-            `stonewise check` on the project",
-            "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
-            Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
-            wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden";
+    BLIND:
+        "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
+        of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
+        `stonewise check` on the project",
+        "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
+        Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
+        wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden";
 
-        STRETCHED:
-            "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
-            changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
-            has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
-            block, and the map projection with its scale factor, in both epochs",
-            "die Wand hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
-            {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
-            Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
-            den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
+    STRETCHED:
+        "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
+        changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
+        has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
+        block, and the map projection with its scale factor, in both epochs",
+        "die Wand hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
+        {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
+        Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
+        den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
 
-        TURNED:
-            "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
-            are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
-            those of the first, with their photos, and run again",
-            "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
-            sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten. Die Punktwolken dieser Epoche \
-            samt ihren Fotos auf die der ersten registrieren und neu rechnen";
-    }
+    TURNED:
+        "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
+        are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
+        those of the first, with their photos, and run again",
+        "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
+        sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten. Die Punktwolken dieser Epoche \
+        samt ihren Fotos auf die der ersten registrieren und neu rechnen";
 }

@@ -5,11 +5,12 @@ mod doubts;
 pub mod findings;
 mod message;
 pub mod notices;
-mod translation;
+mod remarks;
+mod said;
 
 pub use braces::fill;
 pub use doubts::{
     BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, STRETCHED, TORN, TURNED,
 };
 pub use message::Message;
-pub use translation::message_in;
+pub use said::Said;

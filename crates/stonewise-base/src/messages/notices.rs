@@ -3,146 +3,114 @@
 use super::message::{Message, messages};
 
 messages! {
-    NOTICES {
-        INVALID_POINTS:
-            "points without finite coordinates, left out: {n}",
-            "Punkte ohne endliche Koordinaten, weggelassen: {n}";
+    INVALID_POINTS:
+        "points without finite coordinates, left out: {n}",
+        "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
-        AUTO_STABLE:
-            "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
-            "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";
+    AUTO_STABLE:
+        "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
+        "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";
 
-        COMPONENT_AT_BOUND:
-            "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
-            masonry. Most often the clouds of the epochs do not fit each other or their photos",
-            "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
-            zu erwarten sind. Meist passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Fotos";
+    COMPONENT_AT_BOUND:
+        "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
+        masonry. Most often the clouds of the epochs do not fit each other or their photos",
+        "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
+        zu erwarten sind. Meist passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Fotos";
 
-        COULD_BE_STABLE:
-            "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \
-            [[registration.stable]] those that you know did not move, such as corners = {corners}",
-            "Flächen neben der Mauer sind in beiden Epochen zu sehen und könnten deren Registrierung zeigen ({count} gefunden): auto_stable = true \
-            verwendet alle, [[registration.stable]] die, von denen Sie wissen, dass sie sich nicht bewegt haben, zum Beispiel \
-            corners = {corners}";
+    COULD_BE_STABLE:
+        "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \
+        [[registration.stable]] those that you know did not move, such as corners = {corners}",
+        "Flächen neben der Mauer sind in beiden Epochen zu sehen und könnten deren Registrierung zeigen ({count} gefunden): auto_stable = true \
+        verwendet alle, [[registration.stable]] die, von denen Sie wissen, dass sie sich nicht bewegt haben, zum Beispiel \
+        corners = {corners}";
 
-        MEAN_MOTION:
-            "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations with the error of the \
-            epochs' registration)",
-            "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen mit dem \
-            Registrierungsfehler der Epochen)";
+    MEAN_MOTION:
+        "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations with the error of the \
+        epochs' registration)",
+        "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen mit dem \
+        Registrierungsfehler der Epochen)";
 
-        MEAN_MOTION_OF_UNKNOWN_DATUM:
-            "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations without the error of the \
-            epochs' registration, which is unknown)",
-            "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen ohne den \
-            Registrierungsfehler der Epochen, der unbekannt ist)";
+    MEAN_MOTION_OF_UNKNOWN_DATUM:
+        "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations without the error of the \
+        epochs' registration, which is unknown)",
+        "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen ohne den \
+        Registrierungsfehler der Epochen, der unbekannt ist)";
 
-        STABLE_MOVED:
-            "[[registration.stable]] number {n} moved against the other stable areas and is left out",
-            "[[registration.stable]] Nummer {n} hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
+    STABLE_MOVED:
+        "[[registration.stable]] number {n} moved against the other stable areas and is left out",
+        "[[registration.stable]] Nummer {n} hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
 
-        OFF_WALL_MOVED:
-            "auto_stable: the area off the wall around ({place}) moved against the other stable areas and is left out",
-            "auto_stable: die Fläche neben der Mauer um ({place}) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
+    OFF_WALL_MOVED:
+        "auto_stable: the area off the wall around ({place}) moved against the other stable areas and is left out",
+        "auto_stable: die Fläche neben der Mauer um ({place}) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
 
-        STABLE_TOO_FEW:
-            "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
-            taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m",
-            "[[registration.stable]] zeigt die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in beiden Epochen zu \
-            sehen; sie gilt als unbekannt. Flächen mit Punkten in beiden Epochen und mit Seiten in drei Richtungen nennen, oder \
-            epoch_error_m angeben";
+    STABLE_TOO_FEW:
+        "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
+        taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m",
+        "[[registration.stable]] zeigt die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in beiden Epochen zu \
+        sehen; sie gilt als unbekannt. Flächen mit Punkten in beiden Epochen und mit Seiten in drei Richtungen nennen, oder \
+        epoch_error_m angeben";
 
-        OFF_WALL_TOO_FEW:
-            "auto_stable: surfaces off the wall do not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs",
-            "auto_stable: Flächen neben der Mauer zeigen die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in \
-            beiden Epochen zu sehen";
+    OFF_WALL_TOO_FEW:
+        "auto_stable: surfaces off the wall do not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs",
+        "auto_stable: Flächen neben der Mauer zeigen die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in \
+        beiden Epochen zu sehen";
 
-        REGISTRATION_UNKNOWN:
-            "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \
-            common rigid motion of the measured stones",
-            "der Registrierungsfehler der Epochen ist unbekannt: Grenzen, Intervalle und Signifikanz gelten für Bewegungen gegen die \
-            gemeinsame starre Bewegung der gemessenen Steine";
+    REGISTRATION_UNKNOWN:
+        "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \
+        common rigid motion of the measured stones",
+        "der Registrierungsfehler der Epochen ist unbekannt: Grenzen, Intervalle und Signifikanz gelten für Bewegungen gegen die \
+        gemeinsame starre Bewegung der gemessenen Steine";
 
-        DATUM_STABLE:
-            "the stable areas show a registration error of {error_mm} mm at the middle of the wall: it is taken off the motions, and what \
-            stays uncertain of it is in limits and intervals",
-            "die stabilen Flächen zeigen in der Mitte der Mauer einen Registrierungsfehler von {error_mm} mm: er ist von den Bewegungen \
-            abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
+    DATUM_STABLE:
+        "the stable areas show a registration error of {error_mm} mm at the middle of the wall: it is taken off the motions, and what \
+        stays uncertain of it is in limits and intervals",
+        "die stabilen Flächen zeigen in der Mitte der Mauer einen Registrierungsfehler von {error_mm} mm: er ist von den Bewegungen \
+        abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
 
-        DATUM_STATED:
-            "the project states a registration error of {error_mm} mm per axis and epoch; limits and intervals hold it",
-            "das Projekt gibt einen Registrierungsfehler von {error_mm} mm je Achse und Epoche an; Grenzen und Intervalle enthalten ihn";
+    DATUM_STATED:
+        "the project states a registration error of {error_mm} mm per axis and epoch; limits and intervals hold it",
+        "das Projekt gibt einen Registrierungsfehler von {error_mm} mm je Achse und Epoche an; Grenzen und Intervalle enthalten ihn";
 
-        DATUM_ONE_SURVEY:
-            "both epochs are parts of one survey: there is no registration error between them",
-            "beide Epochen sind Teile einer Aufnahme: zwischen ihnen gibt es keinen Registrierungsfehler";
+    DATUM_ONE_SURVEY:
+        "both epochs are parts of one survey: there is no registration error between them",
+        "beide Epochen sind Teile einer Aufnahme: zwischen ihnen gibt es keinen Registrierungsfehler";
 
-        DATUM_SOURCES:
-            "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {error_mm} mm \
-            per axis that all sources of an epoch share; limits and intervals hold both",
-            "der Registrierungsfehler folgt daraus, wie sich Standpunkte und Streifen jeder Epoche unterscheiden, und aus einem angenommenen \
-            Fehler von {error_mm} mm je Achse, den alle Quellen einer Epoche teilen; Grenzen und Intervalle enthalten beides";
+    DATUM_SOURCES:
+        "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {error_mm} mm \
+        per axis that all sources of an epoch share; limits and intervals hold both",
+        "der Registrierungsfehler folgt daraus, wie sich Standpunkte und Streifen jeder Epoche unterscheiden, und aus einem angenommenen \
+        Fehler von {error_mm} mm je Achse, den alle Quellen einer Epoche teilen; Grenzen und Intervalle enthalten beides";
 
-        NO_MASKS:
-            "no masks for this photo in {file}",
-            "keine Masken für dieses Foto in {file}";
+    NO_MASKS:
+        "no masks for this photo in {file}",
+        "keine Masken für dieses Foto in {file}";
 
-        NO_CAMERA:
-            "no camera in {file}; the photo is left out",
-            "keine Kamera in {file}; das Foto ist weggelassen";
+    NO_CAMERA:
+        "no camera in {file}; the photo is left out",
+        "keine Kamera in {file}; das Foto ist weggelassen";
 
-        UNUSABLE_CAMERA:
-            "its camera cannot be used ({reason}) in {file}; the photo is left out",
-            "seine Kamera in {file} ist nicht zu verwenden ({reason}); das Foto ist weggelassen";
+    UNUSABLE_CAMERA:
+        "its camera cannot be used ({reason}) in {file}; the photo is left out",
+        "seine Kamera in {file} ist nicht zu verwenden ({reason}); das Foto ist weggelassen";
 
-        NO_SUCH_PHOTO:
-            "camera not used: no such photo in {folder}",
-            "Kamera nicht verwendet: kein solches Foto in {folder}";
+    NO_SUCH_PHOTO:
+        "camera not used: no such photo in {folder}",
+        "Kamera nicht verwendet: kein solches Foto in {folder}";
 
-        CAMERA_NOT_USED:
-            "camera not used: {reason}",
-            "Kamera nicht verwendet: {reason}";
+    CAMERA_NOT_USED:
+        "camera not used: {reason}",
+        "Kamera nicht verwendet: {reason}";
 
-        // Reasons as `stonewise-io` gives them.
-        NOT_ALIGNED:
-            "not aligned",
-            "nicht ausgerichtet";
+    PHOTO_NOT_TRACKED:
+        "{error}: it does not help to measure stones",
+        "{error}: es hilft nicht, Steine zu messen";
 
-        DISABLED:
-            "disabled in Metashape",
-            "in Metashape abgeschaltet";
+    PHOTO_NOT_SHOWN:
+        "the photo cannot be shown in the report: {error}",
+        "das Foto ist im Bericht nicht zu zeigen: {error}";
 
-        PHOTO_NOT_TRACKED:
-            "{error}: it does not help to measure stones",
-            "{error}: es hilft nicht, Steine zu messen";
-
-        PHOTO_NOT_SHOWN:
-            "the photo cannot be shown in the report: {error}",
-            "das Foto ist im Bericht nicht zu zeigen: {error}";
-
-        PHOTO_SIZE:
-            "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: give the photo as it was posed",
-            "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: das Foto so geben, wie es orientiert wurde";
-
-        // What `stonewise-io` notes about a camera file.
-        SMALLER_RECONSTRUCTION:
-            "in a separate, smaller reconstruction",
-            "in einer getrennten, kleineren Rekonstruktion";
-
-        SEVERAL_RECONSTRUCTIONS:
-            "{n} reconstructions in the file; only the largest was read",
-            "{n} Rekonstruktionen in der Datei; nur die größte wurde gelesen";
-
-        CHUNK_DISABLED:
-            "chunk {chunk} is disabled and was not read",
-            "Chunk {chunk} ist abgeschaltet und wurde nicht gelesen";
-
-        CHUNK_NOT_READ:
-            "chunk {chunk} was not read, only {used}, the first with aligned cameras",
-            "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras";
-
-        ROLLING_SHUTTER:
-            "the camera's rolling shutter is not corrected when stones are transferred from photos to clouds: points may be assigned to places a few pixels off in the photo",
-            "der Rolling Shutter der Kamera wird nicht korrigiert, wenn Steine aus den Fotos in die Punktwolken übertragen werden: Punkte können im Foto um einige Pixel versetzt liegen";
-    }
+    PHOTO_SIZE:
+        "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: give the photo as it was posed",
+        "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: das Foto so geben, wie es orientiert wurde";
 }

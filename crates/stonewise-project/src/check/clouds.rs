@@ -4,12 +4,12 @@ use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::{Epoch, Project};
 use nalgebra::Vector3;
-use stonewise_base::messages::Message;
 use stonewise_base::messages::findings::{
     CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
     NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS,
     THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
 };
+use stonewise_base::messages::{Message, Said};
 use stonewise_core::geometry::Bounds;
 use stonewise_io::crs::{Crs, is_in_feet};
 
@@ -49,7 +49,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         let Some(bounds) = bounds else { continue };
         let names = [project.epochs[0].name.as_str(), epoch.name.as_str()];
         match unit_ratio(&first, bounds) {
-            Some(why) => found.push(Finding::new(names[1], UNITS.english, Verdict::Wrong, why)),
+            Some(why) => found.push(Finding::new(names[1], &UNITS, Verdict::Wrong, why)),
             None => found.push(overlap(names, &first, bounds)),
         }
     }
@@ -72,7 +72,7 @@ fn size(bounds: &Bounds) -> Vector3<f64> {
 
 fn extent(name: &str, survey: &Sample) -> Finding {
     let Some(bounds) = &survey.bounds else {
-        return Finding::new(name, EXTENT.english, Verdict::Wrong, NO_POINTS.say(&[]));
+        return Finding::new(name, &EXTENT, Verdict::Wrong, NO_POINTS.say(&[]));
     };
     let size = size(bounds);
     let [x, y, z] = [size.x, size.y, size.z].map(|m| format!("{m:.1}"));
@@ -84,21 +84,24 @@ fn extent(name: &str, survey: &Sample) -> Finding {
     } else if longest < SMALLEST_M {
         (Verdict::Doubt, TOO_SMALL.say(&values))
     } else {
-        (Verdict::Fine, format!("{x} x {y} x {z} m, {points} points"))
+        (
+            Verdict::Fine,
+            format!("{x} x {y} x {z} m, {points} points").into(),
+        )
     };
-    Finding::new(name, EXTENT.english, verdict, text)
+    Finding::new(name, &EXTENT, verdict, text)
 }
 
 fn spacing(name: &str, survey: &Sample) -> Finding {
     let (verdict, text) = match survey.spacing_m {
-        Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m)),
+        Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m).into()),
         Some(m) => {
             let spacing = format!("{:.0}", 1e3 * m);
             (Verdict::Doubt, SPACING_WIDE.say(&[("spacing", &*spacing)]))
         }
         None => (Verdict::Doubt, SPACING_UNKNOWN.say(&[])),
     };
-    Finding::new(name, SPACING.english, verdict, text)
+    Finding::new(name, &SPACING, verdict, text)
 }
 
 /// A coordinate system whose unit is not the metre.
@@ -127,8 +130,8 @@ fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
         }
     };
     let unit: &Message = survey.crs.iter().flatten().filter_map(unit).next()?;
-    let text = SYSTEM_UNIT.say(&[("unit", unit.english)]);
-    Some(Finding::new(name, UNITS.english, Verdict::Wrong, text))
+    let text = SYSTEM_UNIT.say_with(&[], &[("unit", &unit.into())]);
+    Some(Finding::new(name, &UNITS, Verdict::Wrong, text))
 }
 
 /// One system for all clouds.
@@ -146,7 +149,7 @@ fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
             }
         }
     }
-    let topic = SYSTEM.english;
+    let topic = &SYSTEM;
     match codes.as_slice() {
         [] => Finding::new("", topic, Verdict::Fine, "none named: a local frame"),
         [(code, _)] if named == all => Finding::new("", topic, Verdict::Fine, format!("EPSG:{code}")),
@@ -167,7 +170,7 @@ fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
 }
 
 /// Says so where one epoch is as much larger than the other as one unit than another.
-fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<String> {
+fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<Said> {
     let mut axes: Vec<(f64, f64)> = size(first)
         .iter()
         .copied()
@@ -183,12 +186,10 @@ fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<String> {
             () => return None,
         };
         let [found, ratio] = [ratios[0], ratio].map(|r| format!("{r:.3}"));
-        Some(UNIT_RATIO.say(&[
-            ("found", &*found),
-            ("ratio", &*ratio),
-            ("which", which.english),
-            ("unit", unit.english),
-        ]))
+        Some(UNIT_RATIO.say_with(
+            &[("found", &*found), ("ratio", &*ratio)],
+            &[("which", &which.into()), ("unit", &(*unit).into())],
+        ))
     })
 }
 
@@ -207,7 +208,7 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
             ("first_low", &*first_low),
             ("first_high", &*first_high),
         ]);
-        return Finding::new(other, OVERLAP.english, Verdict::Wrong, text);
+        return Finding::new(other, &OVERLAP, Verdict::Wrong, text);
     }
     // A wall is thin in one direction: the two longer ones count.
     let face = |v: Vector3<f64>| v.x * v.y + v.y * v.z + v.z * v.x;
@@ -225,10 +226,10 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
         ),
         false => (
             Verdict::Fine,
-            format!("{percent} % of the smaller epoch with {one}"),
+            format!("{percent} % of the smaller epoch with {one}").into(),
         ),
     };
-    Finding::new(other, OVERLAP.english, verdict, text)
+    Finding::new(other, &OVERLAP, verdict, text)
 }
 
 /// Two epochs that read the same cloud show no motion.
@@ -244,7 +245,7 @@ fn same_file(project: &Project) -> Option<Finding> {
             if let Some(twice) = epoch.clouds.iter().find(|c| files.contains(&canonical(c))) {
                 let (file, name) = (twice.display().to_string(), format!("{:?}", earlier.name));
                 let text = SAME_FILE.say(&[("file", &*file), ("first", &*name)]);
-                return Some(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
+                return Some(Finding::new(&epoch.name, &CLOUDS, Verdict::Doubt, text));
             }
         }
     }
@@ -271,12 +272,14 @@ mod tests {
             assert!(
                 unit_ratio(&metres, &other)
                     .unwrap()
+                    .english
                     .contains(&format!("this epoch is in {name}")),
                 "{name}"
             );
             assert!(
                 unit_ratio(&other, &metres)
                     .unwrap()
+                    .english
                     .contains(&format!("first epoch is in {name}")),
                 "{name}"
             );

@@ -88,7 +88,7 @@ pub(super) fn look(
         })
         .collect::<Result<Vec<_>>>()?;
     let (flat, photos): (Vec<Seen>, Vec<Seen>) = photos.into_iter().flatten().partition(|seen| seen.is_flat);
-    let doubt = |text| Finding::new(&epoch.name, PHOTOS.english, Verdict::Doubt, text);
+    let doubt = |text| Finding::new(&epoch.name, &PHOTOS, Verdict::Doubt, text);
     let names = |photos: &[&Seen]| some(&photos.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
     let mut found = Vec::new();
     if !flat.is_empty() {
@@ -114,11 +114,11 @@ pub(super) fn look(
                 "unlike the few photos that see the same points (correlation {least:.2}), which may be wrong themselves: {}",
                 names(&unlike)
             );
-            found.push(Finding::new(&epoch.name, PHOTOS.english, Verdict::Note, text));
+            found.push(Finding::new(&epoch.name, &PHOTOS, Verdict::Note, text));
         }
         (Judgement::Sound, Some(least)) => {
             let text = format!("each shows the same as another (correlation {least:.2} or more)");
-            found.push(Finding::new(&epoch.name, PHOTOS.english, Verdict::Fine, text));
+            found.push(Finding::new(&epoch.name, &PHOTOS, Verdict::Fine, text));
         }
         (Judgement::AllUnlike, _) => found.push(doubt(UNLIKE_ALL.say(&[]))),
         (Judgement::Outliers(which), _) => {

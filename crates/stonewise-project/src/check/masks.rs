@@ -5,6 +5,7 @@ use super::photos::{PosedPhoto, some};
 use crate::Epoch;
 use rayon::prelude::*;
 use stonewise_base::error::{Error, Result};
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{BROKEN_MASKS, MASKS, NO_MASK_FITS, WITHOUT_MASKS};
 use stonewise_core::progress::Progress;
 use stonewise_io::masks::MaskSource;
@@ -42,7 +43,7 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
     };
     let masks = photos.par_iter().map(of_photo).collect::<Result<Vec<_>>>()?;
     let file = file.to_string_lossy();
-    let finding = |verdict, text| Finding::new(&epoch.name, MASKS.english, verdict, text);
+    let finding = |verdict, text: Said| Finding::new(&epoch.name, &MASKS, verdict, text);
     let (mut found, mut missing, mut broken) = (Vec::new(), Vec::new(), Vec::new());
     let mut there = 0;
     for masks in masks {
@@ -70,7 +71,10 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         found.push(finding(Verdict::Doubt, text));
     }
     if found.is_empty() {
-        found.push(finding(Verdict::Fine, format!("there for every photo ({there})")));
+        found.push(finding(
+            Verdict::Fine,
+            format!("there for every photo ({there})").into(),
+        ));
     }
     Ok(found)
 }

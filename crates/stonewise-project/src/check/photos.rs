@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{BROKEN_PHOTOS, MISSING_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraFile, Photos, find_photos};
@@ -47,8 +48,7 @@ pub(super) fn look<'a>(
         }
     }
     let mut out = Vec::new();
-    let mut add =
-        |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, PHOTOS.english, verdict, text));
+    let mut add = |verdict: Verdict, text: Said| out.push(Finding::new(&epoch.name, &PHOTOS, verdict, text));
     let (verdict, text) = presence(project, epoch, cameras, &photos);
     add(verdict, text);
     if !photos.without_camera.is_empty() {
@@ -58,7 +58,7 @@ pub(super) fn look<'a>(
             .collect();
         add(
             Verdict::Note,
-            format!("without a camera, left out: {}", some(&names)),
+            format!("without a camera, left out: {}", some(&names)).into(),
         );
     }
     if !broken.is_empty() {
@@ -72,7 +72,7 @@ pub(super) fn look<'a>(
 
 /// Which of the photos that the camera file names are there. Cameras that were oriented together may be in the
 /// files of several epochs, whose photos lie in a folder each.
-fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Photos) -> (Verdict, String) {
+fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Photos) -> (Verdict, Said) {
     let mut found: Vec<bool> = photos.paths.iter().map(Option::is_some).collect();
     let here = found.iter().filter(|found| **found).count();
     let total = found.len().to_string();
@@ -83,7 +83,10 @@ fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Pho
         return (Verdict::Wrong, NO_PHOTOS.say(&values));
     }
     if here == found.len() {
-        return (Verdict::Fine, format!("all {total} posed photos are there"));
+        return (
+            Verdict::Fine,
+            format!("all {total} posed photos are there").into(),
+        );
     }
     for other in project.epochs.iter().filter(|e| e.name != epoch.name) {
         // One that cannot be read is named where its own epoch is looked at.
@@ -96,7 +99,7 @@ fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Pho
     let missing: Vec<String> = missing.map(|(view, _)| view.name.clone()).collect();
     if missing.is_empty() {
         let text = format!("{here} of the {total} posed photos are there, the others in another epoch");
-        return (Verdict::Fine, text);
+        return (Verdict::Fine, text.into());
     }
     let (number, names) = (missing.len().to_string(), some(&missing));
     let values = [

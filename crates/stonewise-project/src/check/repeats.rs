@@ -8,6 +8,7 @@ use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
 use nalgebra::Point3;
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{CLOUDS, ROUNDED, SAME_POINTS, TWICE};
 use stonewise_core::geometry::cell_of;
 use stonewise_core::statistics::{split_mix, upper_median};
@@ -33,8 +34,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
     let mut found = Vec::new();
     let mut earlier: Vec<(&str, Cells)> = Vec::new();
     for (epoch, survey) in read(project, surveys) {
-        let mut doubt =
-            |text: String| found.push(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
+        let mut doubt = |text: Said| found.push(Finding::new(&epoch.name, &CLOUDS, Verdict::Doubt, text));
         let (step_m, spacing_m) = (step(&survey.points), survey.spacing_m.unwrap_or(0.0));
         if step_m > spacing_m * CHANCE_STEP {
             if survey.spacing_m.is_some() && step_m > spacing_m * COARSE_STEP {

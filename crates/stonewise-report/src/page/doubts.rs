@@ -17,7 +17,7 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
-        let message = said(&warning.message, texts);
+        let message = said(&warning.message, warning.german.as_deref(), texts);
         let _ = write!(out, "<li>{}: {message}</li>", escape(&warning.subject));
     }
     out.push_str("</ul></div>");
@@ -45,9 +45,7 @@ mod tests {
         warnings.doubt(
             "register",
             "2027",
-            stonewise_base::messages::NOT_CONVERGED
-                .english
-                .replace("{iterations}", "30"),
+            stonewise_base::messages::NOT_CONVERGED.say(&[("iterations", "30")]),
         );
         let html = doubts(&warnings.sorted(), german);
         assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));

@@ -41,6 +41,7 @@ use crate::results::records::{Datum, DatumState, ObserversRecord, RegistrationRe
 use crate::results::{
     Facade, StoneOutline, StoneRow, facade_of, read_outlines, write_neighbours, write_stones,
 };
+use crate::texts::notices::REGISTRATION_UNKNOWN;
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
@@ -340,7 +341,7 @@ fn measure(
     )?;
     if datum.state == DatumState::Unknown {
         let epoch = &context.project.epochs[number - 1].name;
-        context.warnings.notice("register", epoch, &datum.note);
+        context.warnings.notice("register", epoch, &REGISTRATION_UNKNOWN);
     }
     note_doubts(
         context,

@@ -2,7 +2,7 @@
 
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
-use crate::texts::{BESIDE, BESIDE_COMPARED, Message, TORN};
+use crate::texts::{BESIDE, BESIDE_COMPARED, Message, Said, TORN};
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::Stone;
 
@@ -24,14 +24,14 @@ const AGREED: f64 = 0.8;
 const LEAST_STONES: usize = 8;
 
 /// Labels beside the stones: cameras and clouds do not fit each other.
-pub(super) fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(String, String)> {
+pub(super) fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(String, Said)> {
     let [first, second] = [0, number - 1].map(|e| &context.project.epochs[e].name);
     // The first epoch takes part in every pair.
     let of_first = offsets.first.filter(|_| number == 2);
     let within = [(first, &of_first), (second, &offsets.second)]
         .into_iter()
         .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
-    let within: Vec<(String, String)> = within.collect();
+    let within: Vec<(String, Said)> = within.collect();
     let between = || {
         let offset = offsets.between.as_ref()?;
         Some((second.clone(), off_place(&BESIDE_COMPARED, offset, first)?))
@@ -43,7 +43,7 @@ pub(super) fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -
 }
 
 /// An offset in words, if it is clear and large.
-fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<String> {
+fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Said> {
     let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
     let is_off = is_clear && offset.length_m() > OFFSET_M;
     let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
@@ -59,7 +59,7 @@ fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Strin
 }
 
 /// The photos of an epoch disagree on where its stones are.
-pub(super) fn torn(stones: &[Stone]) -> Option<String> {
+pub(super) fn torn(stones: &[Stone]) -> Option<Said> {
     // A single photo agrees with itself.
     let seen_twice = stones.iter().filter(|s| s.photos >= 2);
     let mut shares: Vec<f64> = seen_twice.map(|s| s.confidence).collect();
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn photos_that_do_not_agree_about_most_stones_are_a_doubt() {
         let message = torn(&stones(21, 3, |i| 0.5 + 0.01 * f64::from(i))).unwrap();
-        assert!(message.contains("only 60 %"), "{message}");
+        assert!(message.english.contains("only 60 %"), "{message}");
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
         assert_eq!(torn(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })), None);
         assert_eq!(torn(&stones(21, 1, |_| 0.5)), None);

@@ -12,6 +12,7 @@ use crate::pipeline::steps::offsets::LabelOffsets;
 use crate::pipeline::steps::register::Registered;
 use crate::results::StoneRow;
 use crate::results::records::Datum;
+use crate::texts::Said;
 use labels::{beside, torn};
 use motions::{blind, few_measured, unsettled};
 use scale::stretched;
@@ -62,7 +63,7 @@ fn is_prescribed(context: &Context, number: usize) -> bool {
 }
 
 /// See [`registration::misregistered`].
-fn misregistered(context: &Context, registered: &Registered) -> Option<String> {
+fn misregistered(context: &Context, registered: &Registered) -> Option<Said> {
     let check = registered.epoch_errors.as_ref()?.cross_check.as_ref()?;
     registration::misregistered(context.project.settings.registration.epoch_error_m, check)
 }

@@ -3,7 +3,7 @@
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED};
+use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, Said};
 use std::collections::BTreeMap;
 use stonewise_core::stone::StoneMotion;
 
@@ -14,7 +14,7 @@ const LIMIT_EXCESS: f64 = 100.0;
 const SIGMAS_95: f64 = 1.96;
 
 /// The adjustment stopped before its motions had settled.
-pub(super) fn unsettled(registered: &Registered) -> Option<String> {
+pub(super) fn unsettled(registered: &Registered) -> Option<Said> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
@@ -23,7 +23,7 @@ pub(super) fn unsettled(registered: &Registered) -> Option<String> {
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
-pub(super) fn few_measured(rows: &[StoneRow]) -> Option<String> {
+pub(super) fn few_measured(rows: &[StoneRow]) -> Option<Said> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     (2 * measured < matched).then(|| {
@@ -44,7 +44,7 @@ pub(super) fn few_measured(rows: &[StoneRow]) -> Option<String> {
 }
 
 /// Motions are far less certain than the points allow.
-pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
+pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<Said> {
     let points: BTreeMap<u32, [f64; 2]> = rows
         .iter()
         .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
@@ -115,7 +115,10 @@ mod tests {
     fn an_adjustment_that_did_not_converge_is_a_doubt() {
         let mut registered = registered(&rows(), 0.001, 0.001);
         let message = unsettled(&registered).unwrap();
-        assert!(message.contains("did not converge in 32 iterations"), "{message}");
+        assert!(
+            message.english.contains("did not converge in 32 iterations"),
+            "{message}"
+        );
         if let EstimatorRecord::Adjustment(adjustment) = &mut registered.estimator {
             adjustment.converged = true;
         }
@@ -143,9 +146,9 @@ mod tests {
             "1 failed_disagreement",
             "1 unobservable",
         ] {
-            assert!(message.contains(part), "{part}: {message}");
+            assert!(message.english.contains(part), "{part}: {message}");
         }
-        assert!(!message.contains("unmatched"), "{message}");
+        assert!(!message.english.contains("unmatched"), "{message}");
     }
 
     #[test]
@@ -155,7 +158,7 @@ mod tests {
         assert_eq!(blind(&registered(&rows, 0.0031, 0.001), &rows), None);
         let message = blind(&registered(&rows, 0.0033, 0.001), &rows).unwrap();
         assert!(
-            message.contains("below about 6 mm") && message.contains("103 times"),
+            message.english.contains("below about 6 mm") && message.english.contains("103 times"),
             "{message}"
         );
         // A wall without measured stones, and stones whose residuals are zero, show no limit.

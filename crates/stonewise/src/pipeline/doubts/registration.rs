@@ -1,6 +1,6 @@
 //! Doubts about the registration of an epoch.
 
-use crate::texts::MISREGISTERED_EPOCH;
+use crate::texts::{MISREGISTERED_EPOCH, Said};
 use nalgebra::Vector3;
 use stonewise_core::registration::observers::CrossCheck;
 
@@ -10,7 +10,7 @@ const MISREGISTERED: f64 = 1e-3;
 
 /// Surfaces off the wall show a registration error that differs significantly from the one found without
 /// them. An error that the project states is not questioned.
-pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<String> {
+pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<Said> {
     if stated_m.is_some() || check.p >= MISREGISTERED {
         return None;
     }
@@ -42,7 +42,7 @@ mod tests {
         assert_eq!(misregistered(Some(0.02), &with(1e-9)), None);
         let message = misregistered(None, &with(1e-9)).unwrap();
         for part in ["30 pieces", "(+20.0, +0.0, -1.0) mm", "of 0.5 mm"] {
-            assert!(message.contains(part), "{message}");
+            assert!(message.english.contains(part), "{message}");
         }
     }
 }

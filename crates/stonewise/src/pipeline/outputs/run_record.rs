@@ -51,7 +51,7 @@ pub fn write_run_record(
             .transpose()?,
         parameters: project.settings.clone(),
         steps: context.times(),
-        warnings: context.warnings.sorted(),
+        warnings: context.warnings.recorded(project.settings.report.language),
     };
     write_readable_json(&context.out.join(RUN), &record)
 }

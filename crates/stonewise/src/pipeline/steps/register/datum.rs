@@ -30,7 +30,7 @@ pub fn datum(project: &Project, number: usize, registered: &Registered, stones: 
             })
             .collect();
     }
-    datum
+    datum.recorded(project.settings.report.language)
 }
 
 fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {

@@ -7,6 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
+use crate::texts::Said;
 use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
@@ -43,7 +44,7 @@ struct Outcome {
     /// Its stones; absent where it is left out.
     instances: Option<Vec<Instance>>,
     /// Why it is left out.
-    reason: Option<String>,
+    reason: Option<Said>,
 }
 
 impl<'a> Detection<'a> {
@@ -212,10 +213,10 @@ impl<'a> Detection<'a> {
 }
 
 impl Outcome {
-    fn left_out(reason: String) -> Self {
+    fn left_out(reason: impl Into<Said>) -> Self {
         Self {
             instances: None,
-            reason: Some(reason),
+            reason: Some(reason.into()),
         }
     }
 }
