@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
-//!    < {transfer | matching | registration | change} < evaluate
+//!    < surface < {transfer | matching | registration | change} < evaluate
 //! ```
 
 pub mod change;
@@ -26,4 +26,5 @@ pub mod raster;
 pub mod registration;
 pub mod statistics;
 pub mod stone;
+pub mod surface;
 pub mod transfer;

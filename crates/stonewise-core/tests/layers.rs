@@ -2,12 +2,13 @@
 //! each other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 7] = [
+const LAYERS: [&[&str]; 8] = [
     &["id", "epoch", "statistics", "linalg", "progress", "parallel"],
     &["geometry"],
     &["raster"],
     &["cloud"],
     &["stone"],
+    &["surface"],
     &["transfer", "matching", "registration", "change"],
     &["evaluate"],
 ];

@@ -12,9 +12,6 @@ use stonewise_core::change::{M3c2Params, params_from_cloudcompare};
 /// M3C2 of a project or of two clouds.
 pub fn m3c2(args: &CompareArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let params = args.params.as_deref().map(cloudcompare_params).transpose()?;
-    if args.inputs.len() == 2 && params.is_none() {
-        printer.log("normals point upwards (no cameras tell the outside); parameters are the defaults");
-    }
     let mut project = project(args, params.clone().unwrap_or_default())?;
     if let Some(params) = params {
         project.settings.m3c2 = params;
@@ -55,10 +52,16 @@ fn compare(
         require_memory_of_clouds(project)?;
     }
     let folder = claim(project, args, force)?;
-    compare_clouds(project, what, &folder, printer)?;
+    let warnings = compare_clouds(project, what, &folder, printer)?;
     printer.finish();
+    for doubt in warnings.iter().filter(|w| w.doubt) {
+        printer.log(&format!("DOUBT: {}: {}", doubt.subject, doubt.message));
+    }
     printer.log(&format!("results: {}", folder.path().display()));
-    Ok(Outcome::Done)
+    Ok(match warnings.iter().any(|w| w.doubt) {
+        true => Outcome::InDoubt,
+        false => Outcome::Done,
+    })
 }
 
 /// Results of a project go where its other results are; those of two clouds into a folder of these clouds.

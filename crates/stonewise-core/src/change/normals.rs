@@ -2,17 +2,20 @@
 
 use crate::cloud::{CellMoments, GridIndex};
 use crate::geometry::Plane;
+use crate::surface::Outside;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// Which side of the surface is outside.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum OutwardReference<'a> {
     /// Positions that see the surface from outside, such as camera or scanner centres; the nearest one
     /// counts.
     Towards(&'a [Point3<f64>]),
     /// A direction, of any length, that points out of the surface everywhere.
     Direction(Vector3<f64>),
+    /// A surface whose outside was found.
+    Surface(&'a Outside),
 }
 
 impl OutwardReference<'_> {
@@ -20,6 +23,7 @@ impl OutwardReference<'_> {
     /// nothing.
     pub fn orient(&self, at: &Point3<f64>, normal: Vector3<f64>) -> Vector3<f64> {
         let outside = match self {
+            Self::Surface(outside) => return outside.orient(at, normal),
             Self::Direction(direction) => *direction,
             Self::Towards(positions) => positions
                 .iter()

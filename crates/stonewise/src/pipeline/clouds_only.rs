@@ -6,21 +6,26 @@ use crate::pipeline::agenda::Agenda;
 use crate::pipeline::context::Context;
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
-use crate::pipeline::steps::ingest::ingest;
+use crate::pipeline::steps::ingest::{Ingested, ingest};
 use crate::pipeline::steps::m3c2::m3c2;
 use crate::project::Project;
-use nalgebra::{Point3, Vector3};
+use crate::warnings::Warning;
+use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_io::cloud::{Dimension, ExtraColumn, read_mesh, write_points_laz};
+use stonewise_core::surface::{Outside, orient, surface_cells};
+use stonewise_io::cloud::{Dimension, ExtraColumn, cloud_info, read_mesh, write_points_laz};
 
 /// Names of the steps that leave nothing for later runs.
 const C2C: &str = "c2c";
 const C2M: &str = "c2m";
 const C2C_DISTANCE: Dimension = Dimension::new("c2c_distance", "m", "distance to nearest point");
 const C2M_DISTANCE: Dimension = Dimension::new("c2m_distance", "m", "distance to the mesh");
+
+/// Edge of the cells in which the outside of a surface is found, metres: about a stone with its joints.
+const CELL_M: f64 = 0.25;
 
 /// What to compare with what.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +49,8 @@ pub enum Comparison<'a> {
 
 /// Compares the first two epochs of a project in an output folder; neither photos nor masks are needed.
 ///
-/// M3C2's normals point at the cameras of the first epoch where it has any, else upwards.
+/// M3C2's normals point at the cameras of the first epoch where it has any. Else they point outside as scanner
+/// positions or the surface itself say; the returned warnings hold a doubt where these do not say it clearly.
 ///
 /// # Errors
 /// A cloud, the mesh or a camera file cannot be read; a result cannot be written; interruption.
@@ -53,7 +59,7 @@ pub fn compare_clouds(
     what: Comparison,
     folder: &OutputFolder,
     progress: &dyn Progress,
-) -> Result<()> {
+) -> Result<Vec<Warning>> {
     let mut context = Context::new(project, folder, progress)?;
     context.agenda = match what {
         Comparison::M3c2 => Agenda::of_clouds(project, 1..=2, "m3c2-2", "M3C2"),
@@ -67,19 +73,23 @@ pub fn compare_clouds(
             let epochs = [ingest(&context, 1)?, ingest(&context, 2)?];
             let views = views_of(project)?;
             let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
-            let outward = match centres.as_slice() {
-                [] => OutwardReference::Direction(Vector3::z()),
-                centres => OutwardReference::Towards(centres),
+            let outside = match centres.is_empty() {
+                true => Some(outside_of(&context, &epochs[0])?),
+                false => None,
+            };
+            let outward = match &outside {
+                Some(outside) => OutwardReference::Surface(outside),
+                None => OutwardReference::Towards(&centres),
             };
             let change = m3c2(&context, epochs.each_ref(), 2, &outward)?;
-            write_m3c2(out, 1, coordinate_system(project)?.as_ref(), &change)
+            write_m3c2(out, 1, coordinate_system(project)?.as_ref(), &change)?;
         }
         Comparison::C2c { max_m } => {
             let [first, second] = [ingest(&context, 1)?, ingest(&context, 2)?];
             context.timed(C2C, || {
                 let measure = |sink: Sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink);
                 Distances::collect(measure)?.write(project, &out.join("c2c.laz"), C2C_DISTANCE)
-            })
+            })?;
         }
         Comparison::C2m { mesh, max_m } => {
             let second = ingest(&context, 2)?;
@@ -87,9 +97,46 @@ pub fn compare_clouds(
                 let index = MeshIndex::new(read_mesh(mesh)?);
                 let measure = |sink: Sink| c2m_survey(&index, &second.tiles, max_m, progress, sink);
                 Distances::collect(measure)?.write(project, &out.join("c2m.laz"), C2M_DISTANCE)
-            })
+            })?;
         }
     }
+    Ok(context.warnings.sorted())
+}
+
+/// The outside of the first epoch's surface; tells what it follows from, and notes a doubt where that is weak.
+fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
+    let epoch = &context.project.epochs[0];
+    let mut scanners = Vec::new();
+    for cloud in &epoch.clouds {
+        scanners.extend(
+            cloud_info(cloud)?
+                .scans
+                .into_iter()
+                .filter_map(|scan| scan.origin),
+        );
+    }
+    let cells = surface_cells::<_, Error>(&first.tiles.surveyed, CELL_M, context.progress)?;
+    let found = orient(cells, &scanners);
+    let evidence = found.evidence;
+    let reason = match scanners.len() {
+        0 => format!(
+            "no camera or scanner position says which side is outside; level surfaces, joints and batter do by {:.1}, {:.1} and \
+             {:.1} standard deviations",
+            evidence.level, evidence.joints, evidence.batter
+        ),
+        1 => "normals point to the side of the scanner".to_owned(),
+        n => format!("normals point to the side of the {n} scanner positions"),
+    };
+    if found.is_sure() {
+        context.progress.note(&reason);
+    } else {
+        let message = format!(
+            "{reason}: all distances may have the wrong sign. Compare the normals in m3c2.laz with the wall, or give a project \
+             with cameras"
+        );
+        context.warnings.doubt("m3c2", &epoch.name, message);
+    }
+    Ok(Outside::of(&found.cells))
 }
 
 /// Cuts the clouds of all epochs of a project into tiles, as the first step of a run; the number of their
