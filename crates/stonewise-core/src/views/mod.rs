@@ -1,0 +1,14 @@
+//! Views of a cloud: pictures as a camera would take them, for surveys without photos.
+//!
+//! [`plan_views`] places cameras that cover the walls of a cloud from several directions; [`Picture`] collects
+//! the points that such a camera sees and becomes an image of their colour, their intensity or their relief.
+
+mod fill;
+mod params;
+mod picture;
+mod plan;
+mod shade;
+
+pub use params::ViewParams;
+pub use picture::{Picture, Shade};
+pub use plan::plan_views;
