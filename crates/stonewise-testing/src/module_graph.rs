@@ -11,6 +11,12 @@ use std::path::Path;
 /// Names of the modules from the crate's root to a file.
 type Module = Vec<String>;
 
+/// A path to an item, and the name that the item has in the file.
+struct Import {
+    path: Module,
+    name: String,
+}
+
 /// Fails unless every top-level module of a crate is listed and uses only modules of lines above its own, and no files
 /// use each other in a circle.
 ///
@@ -37,14 +43,15 @@ impl ModuleGraph {
     fn read(src: &Path) -> Self {
         let mut texts = BTreeMap::new();
         collect(src, &[], &mut texts);
-        let paths: BTreeMap<Module, Vec<Module>> = texts
+        let paths: BTreeMap<Module, Vec<Import>> = texts
             .iter()
             .map(|(module, text)| (module.clone(), paths(text, &children(module, &texts))))
             .collect();
         let uses = paths.iter().map(|(module, list)| {
-            let used = list.iter().filter_map(|path| owner(module, path, &paths));
-            // What the root itself holds are re-exports of other crates.
-            let mut used: Vec<Module> = used.filter(|used| used != module && !used.is_empty()).collect();
+            let used = list
+                .iter()
+                .filter_map(|import| owner(module, &import.path, &paths));
+            let mut used: Vec<Module> = used.filter(|used| used != module).collect();
             used.sort();
             used.dedup();
             (module.clone(), used)
@@ -144,7 +151,7 @@ fn code(text: &str) -> String {
 
 /// All paths in a file that begin with `crate`, `super`, `self` or a child module, and all imports; trees are
 /// expanded.
-fn paths(code: &str, children: &[String]) -> Vec<Module> {
+fn paths(code: &str, children: &[String]) -> Vec<Import> {
     let mut found = Vec::new();
     let is_name = |c: char| c.is_alphanumeric() || c == '_';
     let starts = ["crate", "super", "self"].into_iter();
@@ -170,7 +177,7 @@ fn paths(code: &str, children: &[String]) -> Vec<Module> {
 }
 
 /// Expands `a::{b, c::D}` into its paths; returns the length of the tree.
-fn tree(text: &str, before: &[String], found: &mut Vec<Module>) -> usize {
+fn tree(text: &str, before: &[String], found: &mut Vec<Import>) -> usize {
     let mut path = before.to_vec();
     let mut at = 0;
     loop {
@@ -203,16 +210,19 @@ fn tree(text: &str, before: &[String], found: &mut Vec<Module>) -> usize {
             at += 2;
             continue;
         }
-        if text[at..].trim_start().starts_with("as ") {
-            at = text[at..].find([',', ';', '}']).map_or(text.len(), |k| at + k);
+        let mut name = rest[..end].to_owned();
+        if let Some(alias) = text[at..].trim_start().strip_prefix("as ") {
+            let length = alias.find([',', ';', '}']).unwrap_or(alias.len());
+            name = alias[..length].trim().to_owned();
+            at = text.len() - alias.len() + length;
         }
-        found.push(path);
+        found.push(Import { path, name });
         return at;
     }
 }
 
 /// The module that owns what a path in `module` leads to; `None` for other crates. `paths`: of all modules.
-fn owner(module: &Module, path: &[String], paths: &BTreeMap<Module, Vec<Module>>) -> Option<Module> {
+fn owner(module: &Module, path: &[String], paths: &BTreeMap<Module, Vec<Import>>) -> Option<Module> {
     let mut at = match path.first()?.as_str() {
         "crate" => Vec::new(),
         "super" | "self" => module.clone(),
@@ -228,12 +238,14 @@ fn owner(module: &Module, path: &[String], paths: &BTreeMap<Module, Vec<Module>>
             name => {
                 let inner = [at.as_slice(), &[name.to_owned()]].concat();
                 if !paths.contains_key(&inner) {
-                    let exported = paths[&at]
-                        .iter()
-                        .find(|p| p.last().is_some_and(|last| last == name));
-                    let follows = at != *module && exported.is_some_and(|p| p != path);
-                    let from = exported.filter(|_| follows);
-                    return from.and_then(|p| owner(&at, p, paths)).or(Some(at));
+                    let exported = paths[&at].iter().find(|import| import.name == name);
+                    let follows = at != *module && exported.is_some_and(|import| import.path != path);
+                    let Some(import) = exported.filter(|_| follows) else {
+                        return Some(at);
+                    };
+                    let owned = owner(&at, &import.path, paths);
+                    // What the root passes on from another crate belongs to no file of this one.
+                    return if at.is_empty() { owned } else { owned.or(Some(at)) };
                 }
                 at = inner;
             }
