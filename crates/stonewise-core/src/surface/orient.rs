@@ -2,8 +2,8 @@
 
 use super::SurfaceCell;
 use super::spanning::consistent_groups;
+use crate::cloud::GridIndex;
 use nalgebra::Point3;
-use serde::{Deserialize, Serialize};
 
 /// Cosine of the angle to the vertical below which a cell is a wall, and above which it is level.
 const STEEP: f64 = 0.5;
@@ -21,7 +21,7 @@ const EYE_M: f64 = 1.5;
 const INDEPENDENT: f64 = 0.1;
 
 /// What speaks for the outside that was chosen, in standard deviations; negative speaks against it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Evidence {
     /// Scanners stand outside.
     pub scanners: f64,
@@ -88,11 +88,13 @@ pub fn orient(mut cells: Vec<SurfaceCell>, scanners: &[Point3<f64>]) -> Orientat
     };
     let found = evidence_of(&cells, largest, scanners);
     decided = turn(&mut cells, largest, found, found.total() < 0.0);
+    let centroids: Vec<Point3<f64>> = largest.iter().map(|&i| cells[i].centroid).collect();
+    let index = GridIndex::for_nearest(&centroids);
     for group in others {
         let found = evidence_of(&cells, group, scanners);
         let is_inward = match found.total().abs() >= SURE {
             true => found.total() < 0.0,
-            false => opposes(&cells, group, largest),
+            false => opposes(&cells, group, largest, &index),
         };
         turn(&mut cells, group, found, is_inward);
     }
@@ -113,18 +115,15 @@ fn turn(cells: &mut [SurfaceCell], group: &[usize], found: Evidence, is_inward: 
     found.reversed()
 }
 
-/// Whether most normals of a group oppose those of the nearest cells of the largest group.
-fn opposes(cells: &[SurfaceCell], group: &[usize], largest: &[usize]) -> bool {
-    let nearest = |i: usize| {
-        let apart = |&&j: &&usize| (cells[j].centroid - cells[i].centroid).norm_squared();
-        largest.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))
-    };
-    // A few cells of the group say what all would, at a cost that does not grow with its square.
+/// Whether most normals of a group oppose those of the nearest cells of the largest group; `index`: of its
+/// centroids.
+fn opposes(cells: &[SurfaceCell], group: &[usize], largest: &[usize], index: &GridIndex) -> bool {
+    // A few cells of the group say what all would.
     let step = group.len().div_ceil(50);
-    let cosines = group
-        .iter()
-        .step_by(step)
-        .filter_map(|&i| Some(cells[i].normal.dot(&cells[*nearest(i)?].normal)));
+    let cosines = group.iter().step_by(step).filter_map(|&i| {
+        let (nearest, _) = index.nearest(&cells[i].centroid, f64::INFINITY)?;
+        Some(cells[i].normal.dot(&cells[largest[nearest]].normal))
+    });
     cosines.sum::<f64>() < 0.0
 }
 

@@ -4,8 +4,8 @@ use super::SurfaceCell;
 use crate::cloud::GridIndex;
 use nalgebra::{Point3, Vector3};
 
-/// Cells that are asked for a normal: those around a place, of which one is parallel to it.
-const ASKED: usize = 8;
+/// Nearest cells whose normals are compared with one at a place: at an edge, one of them is parallel to it.
+const COMPARED: usize = 8;
 
 /// The side of a surface that is outside, for normals anywhere on it.
 pub struct Outside {
@@ -25,7 +25,7 @@ impl Outside {
 
     /// The normal or its opposite, as the most parallel of the nearest cells points; unchanged without cells.
     pub fn orient(&self, at: &Point3<f64>, normal: Vector3<f64>) -> Vector3<f64> {
-        let nearest = self.index.nearest_k(at, ASKED, f64::INFINITY);
+        let nearest = self.index.nearest_k(at, COMPARED, f64::INFINITY);
         let cosines = nearest.iter().map(|(cell, _)| self.normals[*cell].dot(&normal));
         let most_parallel = cosines.max_by(|a, b| a.abs().total_cmp(&b.abs()));
         match most_parallel {

@@ -1,7 +1,7 @@
 //! Consistent signs of normals over a surface.
 
 use super::SurfaceCell;
-use crate::geometry::CellMap;
+use crate::geometry::{CellMap, cells_between};
 
 /// Above this cosine, two neighbouring cells belong to one smooth surface and have like normals; below, they
 /// meet at an edge.
@@ -46,9 +46,8 @@ fn ties_of(cells: &[SurfaceCell]) -> Vec<Tie> {
     }
     let mut ties = Vec::new();
     for (i, cell) in cells.iter().enumerate() {
-        let around = |d: i64| [d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1];
-        for offset in (0..27).map(around) {
-            let key = [0, 1, 2].map(|axis| cell.cell[axis] + offset[axis]);
+        let [low, high] = [-1, 1].map(|step| cell.cell.map(|c| c + step));
+        for key in cells_between(low, high) {
             let others = at.get(&key).into_iter().flatten();
             ties.extend(others.filter(|&&j| j > i).map(|&j| Tie::new(cells, [i, j])));
         }
@@ -74,7 +73,7 @@ impl Tie {
     }
 }
 
-/// Disjoint sets whose members know whether they oppose their root.
+/// Disjoint sets, each member with its sign relative to the root of its set.
 struct Forest {
     parents: Vec<usize>,
     is_opposite: Vec<bool>,
