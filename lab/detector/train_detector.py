@@ -39,15 +39,6 @@ def arguments():
     return parser.parse_args()
 
 
-def save(out, state):
-    """Writes the state to continue from and the mean weights to use, each complete or not at all."""
-    half = {name: value.half() for name, value in state["mean"].items()}
-    files = {"checkpoint.pt": state, "model.pt": {"step": state["step"], "weights": half}}
-    for name, content in files.items():
-        torch.save(content, out / f"{name}.part")
-        (out / f"{name}.part").rename(out / name)
-
-
 class Training:
     """The model, its optimizer, the running mean of its weights, and how far it has come."""
 
