@@ -1,4 +1,4 @@
-//! What the tests of several crates share. It knows none of them, so that unit tests of all can use it.
+//! What the tests of several crates share. It depends on none of them, so that unit tests of all can use it.
 
 mod csv_metadata;
 mod module_graph;
