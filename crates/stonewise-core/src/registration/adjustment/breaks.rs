@@ -23,10 +23,11 @@ pub(crate) fn find_breaks(
     is_loose: impl Fn(usize) -> bool,
 ) -> Vec<Break> {
     adjustment
+        .prior
         .graph
         .edges
         .iter()
-        .zip(&adjustment.ties)
+        .zip(&adjustment.prior.ties)
         .filter(|(edge, _)| !is_loose(edge.low) && !is_loose(edge.high))
         .filter_map(|(edge, tie)| {
             let (low, high) = (&state[edge.low], &state[edge.high]);
@@ -45,13 +46,14 @@ pub(crate) fn find_breaks(
 
 fn is_broken(adjustment: &Adjustment, edge: &Edge, tie: &Tie, jump: &Vector3<f64>) -> bool {
     if tie.is_parted {
-        return adjustment.cracks.iter().any(|crack| {
+        return adjustment.prior.cracks.iter().any(|crack| {
             let sign = f64::from(u8::from(crack.side[edge.high])) - f64::from(u8::from(crack.side[edge.low]));
             sign * jump.dot(&crack.jump) > CRACK_SHARE * crack.jump.norm_squared()
         });
     }
     let local = edge.face_from_world * jump;
     let [inside, outside] = adjustment
+        .prior
         .components
         .drift
         .map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
@@ -62,21 +64,16 @@ fn is_broken(adjustment: &Adjustment, edge: &Edge, tie: &Tie, jump: &Vector3<f64
 #[cfg(test)]
 mod tests {
     use super::super::field::Crack;
-    use super::super::params::AdjustmentParams;
     use super::super::stone_vector::Vector9;
-    use super::super::survey::survey;
-    use super::super::testing::{COLUMNS, wall};
+    use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
-    use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
 
     /// Motion of the stones right of the middle against the others.
     const JUMP: [f64; 3] = [0.002, -0.004, 0.006];
 
     fn adjustment() -> Adjustment {
-        let params = AdjustmentParams::default();
-        let pairs = MemoryPairs::new(wall(4, [0.001; 2], |_| Vector3::zeros()));
-        Adjustment::new(survey(&pairs, &params, &Silent).unwrap(), &params).unwrap()
+        begun(&MemoryPairs::new(wall(4, [0.001; 2], |_| Vector3::zeros()))).0
     }
 
     fn is_right(stone: usize) -> bool {
@@ -91,7 +88,7 @@ mod tests {
         );
         let stone = |i: usize| {
             // The wall lies in the plane x = 0; its frame says which way along and up point.
-            let node = &adjustment.graph.nodes[i];
+            let node = &adjustment.prior.graph.nodes[i];
             let place = node.face_from_world * adjustment.stones[i].info.place.centroid.coords;
             let mut d = along * place.x + up * place.y;
             if is_right(i) {
@@ -110,7 +107,7 @@ mod tests {
     #[test]
     fn a_field_with_constant_gradients_breaks_no_tie_however_weak() {
         let mut adjustment = adjustment();
-        adjustment.ties.iter_mut().for_each(|t| t.weight = 1e-6);
+        adjustment.prior.ties.iter_mut().for_each(|t| t.weight = 1e-6);
         let smooth = field(&adjustment, Vector3::zeros());
         assert!(find_breaks(&adjustment, &smooth, |_| false).is_empty());
     }
@@ -123,9 +120,9 @@ mod tests {
             find_breaks(&adjustment, &state, |_| false).is_empty(),
             "ties are whole"
         );
-        adjustment.ties.iter_mut().for_each(|t| t.weight = 0.01);
+        adjustment.prior.ties.iter_mut().for_each(|t| t.weight = 0.01);
         let breaks = find_breaks(&adjustment, &state, |_| false);
-        let expected = adjustment.graph.edges.iter().filter(|e| crosses(e)).count();
+        let expected = adjustment.prior.graph.edges.iter().filter(|e| crosses(e)).count();
         assert!(expected >= 4);
         assert_eq!(breaks.len(), expected);
         for found in &breaks {
@@ -145,10 +142,16 @@ mod tests {
     #[test]
     fn a_jump_counts_from_the_stated_excess_over_the_variance_of_a_whole_tie() {
         let mut adjustment = adjustment();
-        adjustment.ties.iter_mut().for_each(|t| t.weight = 0.01);
-        let crossing: Vec<&Edge> = adjustment.graph.edges.iter().filter(|e| crosses(e)).collect();
+        adjustment.prior.ties.iter_mut().for_each(|t| t.weight = 0.01);
+        let crossing: Vec<&Edge> = adjustment
+            .prior
+            .graph
+            .edges
+            .iter()
+            .filter(|e| crosses(e))
+            .collect();
         // An integrated random walk of rate q has the variance q^2 L^3 / 12 about its mean gradient.
-        let sd_m = |e: &Edge| adjustment.components.drift[1] * (e.length_m.powi(3) / 12.0).sqrt();
+        let sd_m = |e: &Edge| adjustment.prior.components.drift[1] * (e.length_m.powi(3) / 12.0).sqrt();
         for out_m in [0.5, 0.9, 1.1, 2.0].map(|f| f * (EXCESS.sqrt() * sd_m(crossing[0]))) {
             let state = field(&adjustment, Vector3::new(out_m, 0.0, 0.0));
             let expected = crossing.iter().filter(|e| (out_m / sd_m(e)).powi(2) > EXCESS);
@@ -166,15 +169,12 @@ mod tests {
             side: (0..adjustment.stones.len()).map(is_right).collect(),
             jump: Vector3::from(JUMP),
         };
-        for (tie, edge) in adjustment.ties.iter_mut().zip(&adjustment.graph.edges) {
-            tie.is_parted = crosses(edge);
-        }
-        adjustment.cracks.push(crack);
+        adjustment.prior.part_along(crack);
         let count = |share: f64| {
             let state = field(&adjustment, share * Vector3::from(JUMP));
             find_breaks(&adjustment, &state, |_| false).len()
         };
-        let all = adjustment.graph.edges.iter().filter(|e| crosses(e)).count();
+        let all = adjustment.prior.graph.edges.iter().filter(|e| crosses(e)).count();
         assert_eq!([-1.0, 0.0, 0.45, 0.55, 1.0].map(count), [0, 0, 0, all, all]);
     }
 }

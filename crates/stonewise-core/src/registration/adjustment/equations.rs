@@ -18,7 +18,7 @@ pub(crate) struct StoneEquations {
 impl Adjustment {
     /// Equations of all stones, with correlation between points accounted for.
     pub fn equations(&self) -> Vec<StoneEquations> {
-        let error_m = self.components.error_m;
+        let error_m = self.prior.components.error_m;
         let of_stone = |(i, with_field): (usize, NormalEquations)| StoneEquations {
             with_field,
             on_own: self.on_own(i, error_m),
@@ -67,7 +67,11 @@ impl Adjustment {
     /// What photos say of a stone, where they show it.
     pub fn observed_by_photos(&self, i: usize, moving: Moving) -> Option<NormalEquations> {
         let photos = self.photos.as_ref()?.stone(i)?;
-        Some(photos.normal_equations(&self.common_in(i), self.components.appearance_m(), moving))
+        Some(photos.normal_equations(
+            &self.prior.common_in(i),
+            self.prior.components.appearance_m(),
+            moving,
+        ))
     }
 
     /// What a stone's own points say at one of its motions.
@@ -76,7 +80,7 @@ impl Adjustment {
         let mut sum = NormalEquations::nothing();
         if stone.info.usable {
             let inflation = self.surface.inflation(stone.surface());
-            let origin = self.common_in(i);
+            let origin = self.prior.common_in(i);
             sum += self
                 .surface
                 .normal_equations(&candidate.surface, &origin, inflation, error_m);
@@ -109,9 +113,9 @@ impl Adjustment {
 
     /// Octaves of length between a stone and the wall, at least one.
     pub fn octaves(&self) -> f64 {
-        let places = self.graph.nodes.iter().map(|n| n.centroid);
+        let places = self.prior.graph.nodes.iter().map(|n| n.centroid);
         let extent_m = Bounds::of(places).map_or(0.0, |b| (b.max - b.min).norm());
-        let mut lengths: Vec<f64> = self.graph.edges.iter().map(|e| e.length_m).collect();
+        let mut lengths: Vec<f64> = self.prior.graph.edges.iter().map(|e| e.length_m).collect();
         let step_m = upper_median(&mut lengths).unwrap_or(extent_m);
         (extent_m / step_m.max(SHORTEST_STEP_M)).log2().max(0.0) + 1.0
     }

@@ -36,7 +36,7 @@ impl Adjustment {
     pub fn estimate(&self, i: usize, solution: &Solution, shared: &[f64; 9]) -> Estimate {
         let (stone, equations) = (&self.stones[i], &solution.equations[i]);
         let prediction = &solution.field.from_others[i];
-        let own = self.components.own_variances();
+        let own = self.prior.own_variances();
         let tied = posterior(&equations.with_field, prediction, &own);
         let mut covariance = tied.covariance;
         let mut relative_covariance = covariance_against(&tied, prediction, &own, shared);
@@ -59,7 +59,7 @@ impl Adjustment {
                 by_field: tied_by_field,
             };
         };
-        let wide = self.loose.own_variances(&self.components);
+        let wide = self.prior.loose_variances();
         let loose = posterior(at_own, prediction, &wide);
         let p = 1.0 - p_loose;
         let apart = (tied.mean - loose.mean).unknowns().to_owned();
@@ -80,7 +80,7 @@ impl Adjustment {
     /// tell.
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
         match stone.is_undecided {
-            true => self.loose.share,
+            true => self.prior.loose.share,
             false => 1.0 - stone.p_with_field,
         }
     }

@@ -6,7 +6,8 @@ use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{Correlation, Equations, LocalPair, estimate_noise};
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
-use crate::progress::{Interrupted, Progress};
+use super::survey::Points;
+use crate::progress::Interrupted;
 use crate::registration::points::{PairPoints, PairSource};
 use rayon::prelude::*;
 
@@ -20,12 +21,11 @@ struct Evaluation {
 impl Adjustment {
     /// Estimates the noise of the points at the stones' present motions; all equations are then evaluated
     /// anew.
-    pub fn estimate_noise(&mut self) {
-        let sample: Vec<(LocalPair, StoneVector)> = self
-            .sample
+    pub fn estimate_noise(&mut self, sample: &[(usize, PairPoints)]) {
+        let sample: Vec<(LocalPair, StoneVector)> = sample
             .par_iter()
             .map(|(i, pair)| {
-                let pair = LocalPair::new(pair, &self.graph.nodes[*i].face_from_world);
+                let pair = LocalPair::new(pair, &self.prior.graph.nodes[*i].face_from_world);
                 (pair, self.stones[*i].with_field.motion)
             })
             .collect();
@@ -40,28 +40,23 @@ impl Adjustment {
     }
 
     /// Normal equations of all stones that moved since they were last evaluated.
-    pub fn evaluate<S: PairSource>(
-        &mut self,
-        source: &S,
-        progress: &dyn Progress,
-    ) -> Result<(), AdjustError<S::Error>> {
-        for (batch, range) in self.batches.clone().into_iter().enumerate() {
-            progress.check()?;
-            let count = range.len();
+    pub fn evaluate<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
+        for (batch, range) in points.batches.iter().enumerate() {
+            points.progress.check()?;
             if self.stones[range.clone()].iter().any(|s| self.is_due(s)) {
-                let pairs = source.load(batch).map_err(AdjustError::Source)?;
+                let pairs = points.load(batch)?;
                 let new: Vec<Option<Evaluation>> = pairs
                     .par_iter()
                     .zip(range.clone())
                     .map(|(pair, i)| self.evaluate_one(i, pair))
                     .collect();
-                for (new, stone) in new.into_iter().zip(&mut self.stones[range]) {
+                for (new, stone) in new.into_iter().zip(&mut self.stones[range.clone()]) {
                     if let Some(new) = new {
                         new.store(stone);
                     }
                 }
             }
-            progress.advance(count as u64);
+            points.progress.advance(range.len() as u64);
         }
         let known: Vec<(&Equations, f64)> = self
             .stones
@@ -88,7 +83,7 @@ impl Adjustment {
         if !self.is_due(stone) {
             return None;
         }
-        let local = LocalPair::new(pair, &self.graph.nodes[i].face_from_world);
+        let local = LocalPair::new(pair, &self.prior.graph.nodes[i].face_from_world);
         let anew = |candidate: &CandidateMotion| {
             let window = candidate.surface.window(&candidate.motion);
             self.surface.equations(&local, &candidate.motion, &window)
@@ -117,20 +112,16 @@ impl Adjustment {
     /// found.
     ///
     /// Cost: eight evaluations of these stones.
-    pub fn probe<S: PairSource>(
-        &mut self,
-        source: &S,
-        progress: &dyn Progress,
-    ) -> Result<(), AdjustError<S::Error>> {
-        for (batch, range) in self.batches.clone().into_iter().enumerate() {
+    pub fn probe<S: PairSource>(&mut self, points: &Points<S>) -> Result<(), AdjustError<S::Error>> {
+        for (batch, range) in points.batches.iter().enumerate() {
             if self.stones[range.clone()].iter().any(|s| self.is_open(s)) {
-                let pairs = source.load(batch).map_err(AdjustError::Source)?;
+                let pairs = points.load(batch)?;
                 let found: Vec<(usize, Option<StoneVector>)> = pairs
                     .par_iter()
-                    .zip(range)
+                    .zip(range.clone())
                     .filter(|(_, i)| self.is_open(&self.stones[*i]))
                     .map(|(pair, i)| {
-                        progress.check()?;
+                        points.progress.check()?;
                         Ok((i, self.probe_one(i, pair)))
                     })
                     .collect::<Result<_, Interrupted>>()?;
@@ -155,7 +146,7 @@ impl Adjustment {
     fn probe_one(&self, i: usize, pair: &PairPoints) -> Option<StoneVector> {
         let stone = &self.stones[i];
         let probe = Probe {
-            pair: &LocalPair::new(pair, &self.graph.nodes[i].face_from_world),
+            pair: &LocalPair::new(pair, &self.prior.graph.nodes[i].face_from_world),
             here: placed(&stone.with_field),
             surface: &self.surface,
             inflation: self.surface.inflation_of_all(stone.surface()),
@@ -187,11 +178,8 @@ fn placed(candidate: &CandidateMotion) -> Placed {
 
 #[cfg(test)]
 mod tests {
-    use super::super::params::AdjustmentParams;
-    use super::super::survey::survey;
-    use super::super::testing::wall;
+    use super::super::testing::{begun, wall};
     use super::*;
-    use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
     use nalgebra::Vector3;
     use std::convert::Infallible;
@@ -222,14 +210,9 @@ mod tests {
         }
     }
 
-    fn adjustment(pairs: &MemoryPairs) -> Adjustment {
-        let params = AdjustmentParams::default();
-        Adjustment::new(survey(pairs, &params, &Silent).unwrap(), &params).unwrap()
-    }
-
     /// The true motion of a stone in its frame.
     fn true_motion(adjustment: &Adjustment, i: usize, world: Vector3<f64>) -> StoneVector {
-        StoneVector::from_translation(adjustment.graph.nodes[i].face_from_world * world)
+        StoneVector::from_translation(adjustment.prior.graph.nodes[i].face_from_world * world)
     }
 
     #[test]
@@ -237,14 +220,14 @@ mod tests {
         let truth = Vector3::new(0.001, 0.004, -0.003);
         let noise = [0.001, 0.0015];
         let pairs = MemoryPairs::new(wall(8, noise, |_| truth));
-        let mut adjustment = adjustment(&pairs);
+        let (mut adjustment, points) = begun(&pairs);
         adjustment.surface.noise.sigma_m = noise;
         // Half a millimetre beside the truth, far less than the waves of the faces.
         for i in 0..adjustment.stones.len() {
             let beside = truth + Vector3::new(0.0002, -0.0004, 0.0003);
             adjustment.stones[i].with_field.motion = true_motion(&adjustment, i, beside);
         }
-        adjustment.evaluate(&pairs, &Silent).unwrap();
+        adjustment.evaluate(&points).unwrap();
         let squares: Vec<f64> = (0..adjustment.stones.len())
             .map(|i| {
                 let stone = &adjustment.stones[i].with_field;
@@ -265,22 +248,23 @@ mod tests {
             pairs: MemoryPairs::new(wall(10, [0.001; 2], |_| Vector3::zeros())),
             loads: Default::default(),
         };
-        let mut adjustment = adjustment(&source.pairs);
-        adjustment.evaluate(&source, &Silent).unwrap();
+        let (mut adjustment, points) = begun(&source);
         assert_eq!(source.loads(), [1, 1]);
-        adjustment.evaluate(&source, &Silent).unwrap();
-        assert_eq!(source.loads(), [1, 1]);
+        adjustment.evaluate(&points).unwrap();
+        assert_eq!(source.loads(), [2, 2]);
+        adjustment.evaluate(&points).unwrap();
+        assert_eq!(source.loads(), [2, 2]);
 
         let gradient =
             |a: &Adjustment, i: usize| a.stones[i].with_field.surface.equations().unwrap().gradient;
         let before = [0, 70, 71].map(|i| gradient(&adjustment, i));
         let moved = true_motion(&adjustment, 70, Vector3::new(0.0, 0.001, 0.0));
         adjustment.stones[70].with_field.motion = moved;
-        adjustment.evaluate(&source, &Silent).unwrap();
-        assert_eq!(source.loads(), [1, 2]);
+        adjustment.evaluate(&points).unwrap();
+        assert_eq!(source.loads(), [2, 3]);
         assert_eq!([0, 71].map(|i| gradient(&adjustment, i)), [before[0], before[2]]);
         // Brute force: the stone's points alone at its new motion.
-        let frame = &adjustment.graph.nodes[70].face_from_world;
+        let frame = &adjustment.prior.graph.nodes[70].face_from_world;
         let local = LocalPair::new(&source.pairs.pairs()[70], frame);
         let alone = adjustment.surface.equations(&local, &moved, &moved);
         assert_eq!(gradient(&adjustment, 70), alone.gradient);
@@ -291,11 +275,11 @@ mod tests {
     fn the_noise_of_both_epochs_is_found_and_equations_are_due_again() {
         let noise = [0.001, 0.002];
         let pairs = MemoryPairs::new(wall(8, noise, |_| Vector3::zeros()));
-        let mut adjustment = adjustment(&pairs);
+        let (mut adjustment, points) = begun(&pairs);
         for _ in 0..4 {
-            adjustment.evaluate(&pairs, &Silent).unwrap();
+            adjustment.evaluate(&points).unwrap();
             assert!(!adjustment.stones.iter().any(|s| adjustment.is_due(s)));
-            adjustment.estimate_noise();
+            adjustment.estimate_noise(&points.sample);
             assert!(adjustment.stones.iter().all(|s| adjustment.is_due(s)));
         }
         for (found, truth) in adjustment.surface.noise.sigma_m.iter().zip(noise) {
@@ -309,13 +293,13 @@ mod tests {
         let moved = |k| if k == 20 { far } else { Vector3::zeros() };
         let noise = [0.005; 2];
         let pairs = MemoryPairs::new(wall(5, noise, moved));
-        let mut adjustment = adjustment(&pairs);
+        let (mut adjustment, points) = begun(&pairs);
         for _ in 0..3 {
-            adjustment.evaluate(&pairs, &Silent).unwrap();
-            adjustment.estimate_noise();
+            adjustment.evaluate(&points).unwrap();
+            adjustment.estimate_noise(&points.sample);
         }
-        adjustment.evaluate(&pairs, &Silent).unwrap();
-        adjustment.probe(&pairs, &Silent).unwrap();
+        adjustment.evaluate(&points).unwrap();
+        adjustment.probe(&points).unwrap();
         let followed: Vec<usize> = (0..adjustment.stones.len())
             .filter(|&i| adjustment.stones[i].on_own.is_some())
             .collect();
@@ -323,13 +307,13 @@ mod tests {
         assert!(followed.contains(&20) && followed.len() <= 3, "{followed:?}");
         // Newton's steps from there lead to the truth.
         for _ in 0..4 {
-            adjustment.evaluate(&pairs, &Silent).unwrap();
+            adjustment.evaluate(&points).unwrap();
             let own = adjustment.stones[20].on_own.as_mut().unwrap();
             let e = own.surface.equations().unwrap();
             let step = e.information.cholesky().unwrap().solve(&e.gradient);
             own.motion = own.motion - StoneVector::from(step);
         }
-        adjustment.evaluate(&pairs, &Silent).unwrap();
+        adjustment.evaluate(&points).unwrap();
         let own = adjustment.stones[20].on_own.as_ref().unwrap().motion;
         let error = own - true_motion(&adjustment, 20, far);
         assert!(error.translation().norm() < 0.004, "{error:?}");

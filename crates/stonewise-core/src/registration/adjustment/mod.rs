@@ -1,8 +1,9 @@
 //! The joint adjustment of all stones.
 //!
-//! [`adjust`] reads as the method. What the stones' points say comes from `observation`, the motion that
-//! neighbours share from `field`, and whether a stone moved with it or on its own from `hypothesis`; `state`
-//! is what changes between iterations.
+//! [`adjust`] reads as the method. Its phases are in `phases`, and the order of an iteration (evaluate, solve,
+//! step) in `iteration`: each hands a type to the next, so that none can be called out of order. What the
+//! stones' points say comes from `observation`, the motion that neighbours share from `field`, and whether a
+//! stone moved with it or on its own from `hypothesis`; `state` is what changes between iterations.
 
 mod adjust;
 mod breaks;
@@ -13,10 +14,12 @@ mod estimate;
 mod evaluate;
 mod field;
 mod hypothesis;
+mod iteration;
 mod neighbour_covariances;
 pub(crate) mod observation;
 mod outcome;
 mod params;
+mod phases;
 mod significance;
 mod solution;
 mod state;

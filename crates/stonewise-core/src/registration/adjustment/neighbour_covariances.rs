@@ -64,7 +64,7 @@ pub(crate) fn neighbour_covariances(
                 + of_poses([a, b]),
         })
     };
-    let edges = adjustment.graph.edges.par_iter().enumerate();
+    let edges = adjustment.prior.graph.edges.par_iter().enumerate();
     edges.filter_map(of_edge).collect()
 }
 
@@ -84,7 +84,7 @@ struct Measured<'a> {
 
 impl<'a> Measured<'a> {
     fn new(adjustment: &'a Adjustment, i: usize, estimate: &'a Estimate, octave: &Matrix3<f64>) -> Self {
-        let face_from_world = &adjustment.graph.nodes[i].face_from_world;
+        let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
         let in_world = |covariance: &Matrix3<f64>| face_from_world.transpose() * covariance * face_from_world;
         let photos = adjustment.photo_part(i);
         let translation = estimate.covariance.fixed_view::<3, 3>(0, 0) / widening(estimate.missed);

@@ -6,13 +6,13 @@ use super::estimate::Estimate;
 use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
-use super::params::AdjustmentReport;
+use super::params::{AdjustmentReport, Break};
 use super::significance::{Tested, test_stones};
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use crate::geometry::Rigid3;
-use crate::stone::{MotionFailure, PairResult, StoneMotion};
+use crate::stone::{MotionFailure, NeighbourCovariance, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Matrix6, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -32,6 +32,15 @@ const OCTAVES_IN_MEAN: f64 = 4.0 / 3.0;
 /// counts.
 const RIDGE: f64 = 1e-9;
 
+/// What the last iteration says of the stones; nothing where there was none.
+#[derive(Default)]
+struct Found {
+    results: Vec<PairResult>,
+    breaks: Vec<Break>,
+    neighbours: Vec<NeighbourCovariance>,
+    common_covariance: Matrix3<f64>,
+}
+
 /// Results of the last iteration; `None`: there was none.
 pub(crate) fn report(
     adjustment: &Adjustment,
@@ -39,39 +48,39 @@ pub(crate) fn report(
     iterations: usize,
     converged: bool,
 ) -> AdjustmentReport {
-    let tested = last.map_or_else(Vec::new, |solution| test_stones(adjustment, solution));
-    let shared = adjustment.shared_variances(1.0);
-    let estimates = last.map_or_else(Vec::new, |solution| estimates(adjustment, solution, &shared));
-    let results = last.map_or_else(Vec::new, |solution| {
-        results(adjustment, solution, &tested, &estimates)
-    });
-    let breaks = last.map_or_else(Vec::new, |solution| {
-        find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose)
-    });
-    let moved: Vec<Vector3<f64>> = results
-        .iter()
-        .filter_map(|r| r.motion.as_ref().ok().filter(|m| !m.loose))
-        .map(|m| m.displacement)
-        .collect();
-    let neighbours = last.map_or_else(Vec::new, |solution| {
-        neighbour_covariances(adjustment, solution, &results, &estimates, &shared)
-    });
-    let is_loose = |r: &&PairResult| r.motion.as_ref().is_ok_and(|m| m.loose);
+    let found = last.map_or_else(Found::default, |solution| Found::of(adjustment, solution));
+    let motions = || found.results.iter().filter_map(|r| r.motion.as_ref().ok());
+    let moved: Vec<Vector3<f64>> = motions().filter(|m| !m.loose).map(|m| m.displacement).collect();
     AdjustmentReport {
-        loose: results.iter().filter(is_loose).count(),
-        photos: adjustment.photo_report(&results),
-        results,
+        loose: motions().filter(|m| m.loose).count(),
+        photos: adjustment.photo_report(&found.results),
+        results: found.results,
         sigma_m: adjustment.surface.noise.sigma_m,
         roughness_m: adjustment.surface.noise.tau_m,
         cell_m: adjustment.surface.layout.cell_m,
         correlation_factor: adjustment.surface.correlation.factor(),
-        components: adjustment.components,
+        components: adjustment.prior.components,
         common_motion: moved.iter().sum::<Vector3<f64>>() / moved.len().max(1) as f64,
-        common_covariance: last.map_or_else(Matrix3::zeros, |s| common_covariance(adjustment, s, &shared)),
+        common_covariance: found.common_covariance,
         iterations,
         converged,
-        breaks,
-        neighbours,
+        breaks: found.breaks,
+        neighbours: found.neighbours,
+    }
+}
+
+impl Found {
+    fn of(adjustment: &Adjustment, solution: &Solution) -> Self {
+        let tested = test_stones(adjustment, solution);
+        let shared = adjustment.shared_variances(1.0);
+        let estimates = estimates(adjustment, solution, &shared);
+        let results = results(adjustment, solution, &tested, &estimates);
+        Self {
+            breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
+            neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &shared),
+            common_covariance: common_covariance(adjustment, solution, &shared),
+            results,
+        }
     }
 }
 
@@ -82,7 +91,7 @@ pub(crate) fn report(
 ///
 /// `shared`: variances of errors that all points of a stone share, over one octave.
 fn common_covariance(adjustment: &Adjustment, solution: &Solution, shared: &[f64; 9]) -> Matrix3<f64> {
-    let own = adjustment.components.own_variances();
+    let own = adjustment.prior.own_variances();
     let octave = shared[0];
     let of_stone = (0..3).map(|k| own[k] + shared[k] - octave).fold(0.0, f64::max);
     let stones = adjustment.stones.len().max(1) as f64;
@@ -187,9 +196,9 @@ fn motion(
     estimate: &Estimate,
     shared: &[f64; 9],
 ) -> StoneMotion {
-    let node = &adjustment.graph.nodes[i];
+    let node = &adjustment.prior.graph.nodes[i];
     let world = node.face_from_world.transpose();
-    let x = estimate.mean + adjustment.common_in(i);
+    let x = estimate.mean + adjustment.prior.common_in(i);
     let displacement = world * x.translation();
     let rotation = world * x.rotation();
     let turned = UnitQuaternion::from_scaled_axis(rotation);
@@ -204,7 +213,7 @@ fn motion(
     }
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];
-    let common = adjustment.common_in(i).translation();
+    let common = adjustment.prior.common_in(i).translation();
     let expected = world * (prediction.mean.fixed_rows::<3>(0) + common);
     let equations = adjustment.stones[i].more_probable().surface.equations();
     StoneMotion {

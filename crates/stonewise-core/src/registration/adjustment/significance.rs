@@ -46,7 +46,7 @@ pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<T
 /// Probability of so large a departure from what the neighbours predict. `None` where a stone's points say
 /// nothing.
 fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
-    let mut own = adjustment.components.own_variances();
+    let mut own = adjustment.prior.own_variances();
     for (v, shared) in own.iter_mut().zip(adjustment.shared_variances(1.0)) {
         *v += shared;
     }

@@ -2,8 +2,8 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, estimate_components,
-    estimated_share, find_crack, posterior, probabilities_with_field, reweight_ties, solve,
+    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, VarianceComponents, estimated_share,
+    find_crack, most_likely_components, posterior, probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::state::Adjustment;
@@ -12,7 +12,7 @@ use nalgebra::Matrix3;
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
 /// is expensive.
-const REWEIGHTINGS: usize = 4;
+const ROUNDS: usize = 4;
 /// A stone whose motion, as a loose stone, stays this uncertain in some direction (as a share of what loose
 /// stones are expected to move) has observations too weak to tell it from its neighbours: they took off a
 /// quarter of the variance at most.
@@ -26,11 +26,11 @@ pub(crate) struct Solution {
 }
 
 impl Adjustment {
-    /// Estimates the variance components from the stones' equations; from parts of large walls.
+    /// The variance components that the stones' equations show; of large walls, those that parts of it show.
     ///
     /// # Errors
     /// The caller stopped the work.
-    pub fn estimate_components(&mut self, progress: &dyn Progress) -> Result<(), Interrupted> {
+    pub fn components_of_wall(&self, progress: &dyn Progress) -> Result<VarianceComponents, Interrupted> {
         let equations = match &self.photos {
             None => self.equations_with_field(0.0),
             Some(_) => self.cloud_equations(0.0),
@@ -40,26 +40,25 @@ impl Adjustment {
             stones: (0..self.stones.len())
                 .map(|i| {
                     let is_usable = self.stones[i].info.usable;
-                    (photos.stone(i).filter(|_| is_usable), self.common_in(i))
+                    (photos.stone(i).filter(|_| is_usable), self.prior.common_in(i))
                 })
                 .collect(),
         });
-        self.components = match Subgraph::new(&self.graph, &self.displacements()) {
-            None => estimate_components(&problem, progress)?,
-            Some(part) => estimate_components(&part.restrict(&problem), progress)?,
-        };
-        Ok(())
+        match Subgraph::new(&self.prior.graph, &self.displacements()) {
+            None => most_likely_components(&problem, progress),
+            Some(part) => most_likely_components(&part.restrict(&problem), progress),
+        }
     }
 
     /// Where the stones are so far. Stones that seem loose count where they went: many of them together are a
     /// bulge.
     fn displacements(&self) -> Vec<Displacement> {
-        let stones = self.stones.iter().zip(&self.graph.nodes).enumerate();
+        let stones = self.stones.iter().zip(&self.prior.graph.nodes).enumerate();
         stones
             .map(|(i, (stone, node))| {
                 let world = node.face_from_world.transpose();
                 let covariance = self.cloud_motion(i, [0.0; 2]).map_or_else(
-                    || Matrix3::identity() * self.loose.move_m.powi(2),
+                    || Matrix3::identity() * self.prior.loose.move_m.powi(2),
                     |clouds| clouds.covariance,
                 );
                 Displacement {
@@ -79,19 +78,19 @@ impl Adjustment {
     /// again.
     pub fn solve_and_reweight(&mut self, equations: &[StoneEquations]) -> Option<Field> {
         let mut field = self.solve(equations)?;
-        let rounds = if Subgraph::is_needed(&self.graph) {
+        let rounds = if Subgraph::is_needed(&self.prior.graph) {
             1
         } else {
-            REWEIGHTINGS
+            ROUNDS
         };
         for _ in 0..rounds {
             self.reweight_stones(equations, &field);
             reweight_ties(
-                &self.graph,
+                &self.prior.graph,
                 &field,
                 self.params.tie_freedom,
-                &mut self.components,
-                &mut self.ties,
+                &mut self.prior.components,
+                &mut self.prior.ties,
             );
             field = self.solve(equations)?;
         }
@@ -104,7 +103,7 @@ impl Adjustment {
     /// of them proves a jump.
     pub fn add_crack(&mut self, solution: &Solution) -> bool {
         let photos = self.photos.as_ref();
-        let of_clouds = photos.map(|_| self.cloud_equations(self.components.error_m));
+        let of_clouds = photos.map(|_| self.cloud_equations(self.prior.components.error_m));
         let problem = match &of_clouds {
             Some(equations) => self.problem(equations.iter()),
             None => self.problem(solution.equations.iter().map(|e| &e.with_field)),
@@ -112,26 +111,23 @@ impl Adjustment {
         let Some(crack) = find_crack(&problem, &solution.field) else {
             return false;
         };
-        for (tie, edge) in self.ties.iter_mut().zip(&self.graph.edges) {
-            tie.is_parted |= crack.side[edge.low] != crack.side[edge.high];
-        }
-        self.cracks.push(crack);
+        self.prior.part_along(crack);
         true
     }
 
     fn problem<'a>(&'a self, equations: impl Iterator<Item = &'a NormalEquations>) -> FieldProblem<'a> {
         let stones = equations.zip(&self.stones);
         FieldProblem {
-            graph: &self.graph,
+            graph: &self.prior.graph,
             stones: stones
                 .map(|(equations, stone)| FieldStone {
                     equations,
                     p_with_field: stone.p_with_field,
                 })
                 .collect(),
-            ties: self.ties.clone(),
-            components: self.components,
-            loose: self.loose,
+            ties: self.prior.ties.clone(),
+            components: self.prior.components,
+            loose: self.prior.loose,
             photos: None,
         }
     }
@@ -145,20 +141,21 @@ impl Adjustment {
         }
         self.return_to_field(equations, field);
         let decided = self.stones.iter().filter(|s| !s.is_undecided);
-        self.loose.share = estimated_share(self.params.loose_share, decided.map(|s| 1.0 - s.p_with_field));
+        self.prior.loose.share =
+            estimated_share(self.params.loose_share, decided.map(|s| 1.0 - s.p_with_field));
     }
 
     /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
     /// (few noisy points have optima far away), and those of which one half contradicts it, unless photos
     /// show it.
     fn return_to_field(&mut self, equations: &[StoneEquations], field: &Field) {
-        let own = self.loose.own_variances(&self.components);
+        let own = self.prior.loose_variances();
         for (i, (equations, prediction)) in equations.iter().zip(&field.from_others).enumerate() {
             let at_optimum = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let loose = posterior(at_optimum, prediction, &own);
             let covariance = loose.covariance.fixed_view::<3, 3>(0, 0).into_owned();
             let largest_m = covariance.symmetric_eigenvalues().max().sqrt();
-            let is_open = largest_m > UNCERTAIN_SHARE * self.loose.move_m;
+            let is_open = largest_m > UNCERTAIN_SHARE * self.prior.loose.move_m;
             let is_contradicted =
                 self.stones[i].ratio.is_contradicted && !self.photos_show_own_motion(i, prediction);
             let stone = &mut self.stones[i];
@@ -173,11 +170,8 @@ impl Adjustment {
 #[cfg(test)]
 mod tests {
     use super::super::observation::photo::{BiasWeights, PhotoModel, PoseInfluence, StonePhotos};
-    use super::super::params::AdjustmentParams;
-    use super::super::survey::survey;
-    use super::super::testing::{COLUMNS, wall};
+    use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
-    use crate::progress::Silent;
     use crate::registration::points::MemoryPairs;
     use nalgebra::Vector3;
 
@@ -187,13 +181,12 @@ mod tests {
 
     /// Whether a wall is parted whose right half moved by these by its points and by its photos.
     fn is_parted(by_points: Vector3<f64>, by_photos: Vector3<f64>) -> bool {
-        let params = AdjustmentParams::default();
         let moved = |k: u32| by_points * f64::from(u8::from(is_right(k as usize)));
         let source = MemoryPairs::new(wall(10, [0.001; 2], moved));
-        let mut adjustment = Adjustment::new(survey(&source, &params, &Silent).unwrap(), &params).unwrap();
-        adjustment.estimate_noise();
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
         for _ in 0..3 {
-            adjustment.evaluate(&source, &Silent).unwrap();
+            adjustment.evaluate(&points).unwrap();
             let equations = adjustment.equations();
             let field = adjustment.solve_and_reweight(&equations).unwrap();
             adjustment.step(&Solution { equations, field });
@@ -203,7 +196,9 @@ mod tests {
         let shown = |i: usize| StonePhotos {
             information,
             vector: information
-                * (adjustment.graph.nodes[i].face_from_world * by_photos * f64::from(u8::from(is_right(i)))),
+                * (adjustment.prior.graph.nodes[i].face_from_world
+                    * by_photos
+                    * f64::from(u8::from(is_right(i)))),
             place: [0.0; 2],
             bias_factor: 1.0,
             turn: None,
@@ -212,7 +207,7 @@ mod tests {
         };
         let photos = (0..adjustment.stones.len()).map(shown).collect();
         adjustment.photos = Some(PhotoModel::showing(photos));
-        adjustment.components.appearance_m = Some(1e-4);
+        adjustment.prior.components.appearance_m = Some(1e-4);
         let equations = adjustment.equations();
         let field = adjustment.solve(&equations).unwrap();
         adjustment.add_crack(&Solution { equations, field })
@@ -227,15 +222,14 @@ mod tests {
 
     #[test]
     fn a_wall_without_loose_stones_lowers_their_share() {
-        let params = AdjustmentParams::default();
         let source = MemoryPairs::new(wall(10, [0.001; 2], |_| Vector3::zeros()));
-        let mut adjustment = Adjustment::new(survey(&source, &params, &Silent).unwrap(), &params).unwrap();
-        adjustment.estimate_noise();
-        adjustment.evaluate(&source, &Silent).unwrap();
+        let (mut adjustment, points) = begun(&source);
+        adjustment.estimate_noise(&points.sample);
+        adjustment.evaluate(&points).unwrap();
         let equations = adjustment.equations();
         adjustment.solve_and_reweight(&equations).unwrap();
         // None of 80 stones is loose, and 300 count for what is expected.
-        let share = adjustment.loose.share;
+        let share = adjustment.prior.loose.share;
         assert!((share / 0.03 - 300.0 / 380.0).abs() < 0.02, "{share}");
     }
 }

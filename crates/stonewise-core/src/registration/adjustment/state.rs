@@ -1,37 +1,24 @@
 //! The state of the adjustment between iterations.
 
 use super::candidate::{CandidateMotion, Moving};
-use super::field::{Crack, Graph, LoosePrior, Place, Tie, VarianceComponents};
+use super::field::{LoosePrior, MotionPrior, Place};
 use super::hypothesis::LikelihoodRatio;
 use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
 use super::params::AdjustmentParams;
 use super::stone_vector::StoneVector;
-use super::survey::{StoneInfo, Survey};
-use crate::registration::points::PairPoints;
+use super::survey::{StoneInfo, smoothed_shifts};
 use crate::statistics::component_median;
 use nalgebra::Vector3;
-use std::ops::Range;
 
-/// All stones, the field that ties them, and the models under which they are observed.
+/// All stones, what is assumed of their motions, and the models under which they are observed.
 pub(crate) struct Adjustment {
-    /// In the order of the source; one per node of the graph.
+    /// In the order of the source; one per node of the prior's graph.
     pub stones: Vec<StoneState>,
-    pub graph: Graph,
-    /// One per edge of the graph.
-    pub ties: Vec<Tie>,
-    pub components: VarianceComponents,
-    pub loose: LoosePrior,
-    pub cracks: Vec<Crack>,
-    /// Common translation about which the field is solved, world.
-    pub common: Vector3<f64>,
+    pub prior: MotionPrior,
     pub surface: SurfaceModel,
     /// What photos show of the stones, where they are used.
     pub photos: Option<PhotoModel>,
-    /// Pairs kept in memory for the noise estimate, with their index.
-    pub sample: Vec<(usize, PairPoints)>,
-    /// The stones of each batch.
-    pub batches: Vec<Range<usize>>,
     pub params: AdjustmentParams,
 }
 
@@ -56,43 +43,33 @@ pub(crate) struct StoneState {
 }
 
 impl Adjustment {
-    /// Every stone moves as its neighbours' centroids did, with the field; ties are whole. `None` where
-    /// memory does not suffice.
-    pub fn new(survey: Survey, params: &AdjustmentParams) -> Option<Self> {
-        let places: Vec<Place> = survey.stones.iter().map(|s| s.place.clone()).collect();
-        let graph = Graph::new(&places, params.neighbours_per_side)?;
-        let start = survey.smoothed_shifts(&graph);
+    /// Every stone moves as its neighbours' centroids did, with the field; ties are whole. `spacing_m`: of the
+    /// points. `None` where memory does not suffice.
+    pub fn new(stones: Vec<StoneInfo>, spacing_m: f64, params: &AdjustmentParams) -> Option<Self> {
+        let places: Vec<Place> = stones.iter().map(|s| s.place.clone()).collect();
+        let loose = LoosePrior {
+            share: params.loose_share,
+            move_m: params.loose_move_m,
+            turn_rad: params.loose_turn_rad,
+        };
+        let mut prior = MotionPrior::new(&places, params.neighbours_per_side, loose)?;
+        let start = smoothed_shifts(&stones, &prior.graph);
+        prior.common = component_median(&start);
         let layout = Layout {
-            cell_m: (params.cell_spacings * survey.spacing_m).max(params.min_cell_m),
+            cell_m: (params.cell_spacings * spacing_m).max(params.min_cell_m),
             patch_cells: params.patch_cells,
             outlier_sigmas: params.outlier_sigmas,
         };
-        let stones = survey.stones.into_iter().zip(&graph.nodes).zip(&start);
+        let stones = stones.into_iter().zip(&prior.graph.nodes).zip(&start);
         Some(Self {
             stones: stones
                 .map(|((info, node), shift)| StoneState::new(info, node.face_from_world * shift))
                 .collect(),
-            ties: vec![Tie::WHOLE; graph.edges.len()],
-            components: VarianceComponents::start(),
-            loose: LoosePrior {
-                share: params.loose_share,
-                move_m: params.loose_move_m,
-                turn_rad: params.loose_turn_rad,
-            },
-            cracks: Vec::new(),
-            common: component_median(&start),
+            prior,
             surface: SurfaceModel::start(layout),
             photos: None,
-            sample: survey.sample,
-            batches: survey.batches,
             params: params.clone(),
-            graph,
         })
-    }
-
-    /// The common translation in a stone's frame.
-    pub fn common_in(&self, i: usize) -> StoneVector {
-        StoneVector::from_translation(self.graph.nodes[i].face_from_world * self.common)
     }
 }
 

@@ -24,13 +24,13 @@ impl Adjustment {
         // What counts as an error might be the start of a motion: the equations follow it, so that a loose
         // stone shows itself.
         let followed = self.equations_with_field(0.0);
-        let own = self.components.with_error(self.components.own_variances());
+        let own = self.prior.components.with_error(self.prior.own_variances());
         let mut restless = 0;
         for (i, equations) in followed.iter().enumerate() {
             let tied = posterior(equations, &solution.field.from_others[i], &own);
             let p = self.stones[i].p_with_field;
             self.stones[i].effective_freedom = tied.effective_freedom;
-            let origin = self.common_in(i);
+            let origin = self.prior.common_in(i);
             let limits = StepLimits::of(self);
             let with_field = limits.follow(&mut self.stones[i].with_field, &tied, &origin, p);
             let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
@@ -53,16 +53,16 @@ impl Adjustment {
 
     /// Moves a stone on its own, or begins to where that has become likely.
     fn step_on_own(&mut self, i: usize, equations: &StoneEquations, field: &Field) -> Step {
-        let wide = self.loose.own_variances(&self.components);
+        let wide = self.prior.loose_variances();
         let prediction = &field.from_others[i];
-        let origin = self.common_in(i);
+        let origin = self.prior.common_in(i);
         let limits = StepLimits::of(self);
         let stone = &mut self.stones[i];
         let p_loose = 1.0 - stone.p_with_field;
         if let (Some(own), Some(equations)) = (&mut stone.on_own, &equations.on_own) {
             return limits.follow(own, &posterior(equations, prediction, &wide), &origin, p_loose);
         }
-        let is_suspect = p_loose > SUSPECT * self.loose.share;
+        let is_suspect = p_loose > SUSPECT * self.prior.loose.share;
         if is_suspect {
             let observed = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let start = posterior(observed, prediction, &wide).mean + origin;

@@ -23,15 +23,29 @@ pub(crate) struct StoneInfo {
     pub usable: bool,
 }
 
-/// All pairs without their points.
-pub(crate) struct Survey {
+/// All pairs, with and without their points.
+pub(crate) struct Survey<'a, S> {
     pub stones: Vec<StoneInfo>,
-    /// The stones of each batch.
-    pub batches: Vec<Range<usize>>,
     /// Median point spacing of the sparser epoch, metres.
     pub spacing_m: f64,
-    /// Pairs kept in memory for the noise estimate, with their index.
+    pub points: Points<'a, S>,
+}
+
+/// The points of all pairs: where they are read again, and those that stay in memory.
+pub(crate) struct Points<'a, S> {
+    source: &'a S,
+    /// The stones of each batch.
+    pub batches: Vec<Range<usize>>,
+    /// Pairs kept for the noise estimate, with their index.
     pub sample: Vec<(usize, PairPoints)>,
+    pub progress: &'a dyn Progress,
+}
+
+impl<S: PairSource> Points<'_, S> {
+    /// The pairs of a batch.
+    pub fn load(&self, batch: usize) -> Result<Vec<PairPoints>, AdjustError<S::Error>> {
+        self.source.load(batch).map_err(AdjustError::Source)
+    }
 }
 
 /// Pairs kept for the noise estimate: each has a patch or more, and 64 patches determine the noise to a
@@ -46,11 +60,11 @@ const SPACING_POINTS: usize = 10;
 const USUAL_SPACING_M: f64 = 0.005;
 
 /// Reads every batch once.
-pub(crate) fn survey<S: PairSource>(
-    source: &S,
+pub(crate) fn survey<'a, S: PairSource>(
+    source: &'a S,
     params: &AdjustmentParams,
-    progress: &dyn Progress,
-) -> Result<Survey, AdjustError<S::Error>> {
+    progress: &'a dyn Progress,
+) -> Result<Survey<'a, S>, AdjustError<S::Error>> {
     let mut stones = Vec::new();
     let mut batches = Vec::new();
     let mut spacings = Vec::new();
@@ -75,13 +89,15 @@ pub(crate) fn survey<S: PairSource>(
         }
     }
     let keep = sample.len().div_ceil(SAMPLE).max(1);
-    let sample = sample.into_iter().step_by(keep).collect();
-    let spacing_m = upper_median(&mut spacings).unwrap_or(USUAL_SPACING_M);
     Ok(Survey {
         stones,
-        batches,
-        spacing_m,
-        sample,
+        spacing_m: upper_median(&mut spacings).unwrap_or(USUAL_SPACING_M),
+        points: Points {
+            source,
+            batches,
+            sample: sample.into_iter().step_by(keep).collect(),
+            progress,
+        },
     })
 }
 
@@ -99,28 +115,26 @@ impl StoneInfo {
     }
 }
 
-impl Survey {
-    /// Centroid shifts, each the median of the stone's and its nearest neighbours' along the graph.
-    pub fn smoothed_shifts(&self, graph: &Graph) -> Vec<Vector3<f64>> {
-        let next = graph.neighbours();
-        (0..self.stones.len())
-            .into_par_iter()
-            .map(|i| {
-                let mut reached = BTreeSet::from([i]);
-                for _ in 0..2 {
-                    reached.extend(reached.clone().iter().flat_map(|&j| next[j].iter().copied()));
-                }
-                let centre = self.stones[i].place.centroid;
-                let mut nearest: Vec<usize> = reached.into_iter().collect();
-                nearest.sort_by(|&a, &b| {
-                    let d = |k: usize| (self.stones[k].place.centroid - centre).norm_squared();
-                    d(a).total_cmp(&d(b)).then(a.cmp(&b))
-                });
-                nearest.truncate(SMOOTHED);
-                component_median(&nearest.iter().map(|&j| self.stones[j].shift).collect::<Vec<_>>())
-            })
-            .collect()
-    }
+/// Centroid shifts, each the median of the stone's and its nearest neighbours' along the graph.
+pub(crate) fn smoothed_shifts(stones: &[StoneInfo], graph: &Graph) -> Vec<Vector3<f64>> {
+    let next = graph.neighbours();
+    (0..stones.len())
+        .into_par_iter()
+        .map(|i| {
+            let mut reached = BTreeSet::from([i]);
+            for _ in 0..2 {
+                reached.extend(reached.clone().iter().flat_map(|&j| next[j].iter().copied()));
+            }
+            let centre = stones[i].place.centroid;
+            let mut nearest: Vec<usize> = reached.into_iter().collect();
+            nearest.sort_by(|&a, &b| {
+                let d = |k: usize| (stones[k].place.centroid - centre).norm_squared();
+                d(a).total_cmp(&d(b)).then(a.cmp(&b))
+            });
+            nearest.truncate(SMOOTHED);
+            component_median(&nearest.iter().map(|&j| stones[j].shift).collect::<Vec<_>>())
+        })
+        .collect()
 }
 
 /// Mean point spacing of the sparser epoch.
@@ -163,16 +177,21 @@ mod tests {
         }
     }
 
+    fn surveyed(pairs: &MemoryPairs) -> Survey<'_, MemoryPairs> {
+        survey(pairs, &AdjustmentParams::default(), &Silent).unwrap()
+    }
+
     #[test]
     fn one_pass_finds_spacing_batches_and_a_sample_from_everywhere() {
         let pairs: Vec<PairPoints> = (0..400).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
-        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default(), &Silent).unwrap();
+        let pairs = MemoryPairs::new(pairs);
+        let found = surveyed(&pairs);
         assert_eq!(found.stones.len(), 400);
         assert!(found.stones.iter().all(|s| s.usable && s.counts == [400, 400]));
         assert!((found.spacing_m / 0.01 - 1.0).abs() < 0.15, "{}", found.spacing_m);
-        let covered: Vec<usize> = found.batches.iter().cloned().flatten().collect();
+        let covered: Vec<usize> = found.points.batches.iter().cloned().flatten().collect();
         assert_eq!(covered, (0..400).collect::<Vec<_>>());
-        let kept: Vec<usize> = found.sample.iter().map(|s| s.0).collect();
+        let kept: Vec<usize> = found.points.sample.iter().map(|s| s.0).collect();
         assert!((SAMPLE / 2..=SAMPLE).contains(&kept.len()), "{}", kept.len());
         assert!(kept.windows(2).all(|k| k[1] - k[0] == kept[1] - kept[0]) && kept[kept.len() - 1] > 380);
     }
@@ -181,10 +200,11 @@ mod tests {
     fn stones_with_few_points_are_kept_but_not_used() {
         let mut pairs: Vec<PairPoints> = (0..12).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
         pairs[4] = pair(4, 0.05, Vector3::zeros());
-        let found = survey(&MemoryPairs::new(pairs), &AdjustmentParams::default(), &Silent).unwrap();
+        let pairs = MemoryPairs::new(pairs);
+        let found = surveyed(&pairs);
         let usable: Vec<bool> = found.stones.iter().map(|s| s.usable).collect();
         assert_eq!(usable.iter().filter(|u| !**u).count(), 1);
-        assert!(!usable[4] && !found.sample.iter().any(|s| s.0 == 4));
+        assert!(!usable[4] && !found.points.sample.iter().any(|s| s.0 == 4));
     }
 
     #[test]
@@ -192,14 +212,10 @@ mod tests {
         let shift = Vector3::new(0.001, 0.02, -0.01);
         let wrong = Vector3::new(0.0, 0.3, 0.1);
         let pairs = (0..60).map(|k| pair(k, 0.02, if k == 27 { wrong } else { shift }));
-        let found = survey(
-            &MemoryPairs::new(pairs.collect()),
-            &AdjustmentParams::default(),
-            &Silent,
-        )
-        .unwrap();
+        let pairs = MemoryPairs::new(pairs.collect());
+        let found = surveyed(&pairs);
         let places: Vec<Place> = found.stones.iter().map(|s| s.place.clone()).collect();
-        let smoothed = found.smoothed_shifts(&Graph::new(&places, 2).unwrap());
+        let smoothed = smoothed_shifts(&found.stones, &Graph::new(&places, 2).unwrap());
         assert!(
             smoothed.iter().all(|s| (s - shift).norm() < 1e-12),
             "{smoothed:?}"

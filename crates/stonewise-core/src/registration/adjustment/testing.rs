@@ -1,8 +1,12 @@
 //! A simulated wall of stones with their points, for tests.
 
+use super::params::AdjustmentParams;
+use super::state::Adjustment;
+use super::survey::{Points, survey};
 use crate::cloud::Cloud;
 use crate::id::StoneId;
-use crate::registration::points::PairPoints;
+use crate::progress::Silent;
+use crate::registration::points::{PairPoints, PairSource};
 use nalgebra::{Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -47,4 +51,12 @@ pub(super) fn wall(rows: u32, noise_m: [f64; 2], motion: impl Fn(u32) -> Vector3
         }
     };
     (0..COLUMNS * rows).map(pair).collect()
+}
+
+/// The start of an adjustment with default parameters.
+pub(super) fn begun<S: PairSource>(source: &S) -> (Adjustment, Points<'_, S>) {
+    let params = AdjustmentParams::default();
+    let survey = survey(source, &params, &Silent).unwrap();
+    let adjustment = Adjustment::new(survey.stones, survey.spacing_m, &params).unwrap();
+    (adjustment, survey.points)
 }

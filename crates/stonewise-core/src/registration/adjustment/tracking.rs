@@ -10,7 +10,8 @@ use super::observation::photo::{
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
-use crate::progress::{Interrupted, Progress};
+use super::survey::Points;
+use crate::progress::Interrupted;
 use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
 use crate::registration::points::PairSource;
 use crate::stone::PairResult;
@@ -51,14 +52,14 @@ impl Adjustment {
     /// Tracks every stone, batch by batch.
     pub fn track<S: PairSource>(
         &mut self,
-        source: &S,
+        points: &Points<S>,
         photos: &dyn PhotoSource<S::Error>,
-        progress: &dyn Progress,
     ) -> Result<(), AdjustError<S::Error>> {
         let mut tracks: Vec<Track> = Vec::with_capacity(self.stones.len());
+        let progress = points.progress;
         progress.begin("track stones in photos", self.stones.len() as u64);
-        for (batch, range) in self.batches.clone().into_iter().enumerate() {
-            let pairs = source.load(batch).map_err(AdjustError::Source)?;
+        for (batch, range) in points.batches.iter().enumerate() {
+            let pairs = points.load(batch)?;
             let chips = photos.load(batch).map_err(AdjustError::Source)?;
             let found: Vec<Track> = pairs
                 .par_iter()
@@ -68,7 +69,7 @@ impl Adjustment {
                     progress.check()?;
                     let tracker = Tracker {
                         pair,
-                        face_from_world: &self.graph.nodes[i].face_from_world,
+                        face_from_world: &self.prior.graph.nodes[i].face_from_world,
                         start: self.face_motion(i),
                         search_m: self.search_m(i, photos),
                         photos: photos.photos(),
@@ -89,7 +90,7 @@ impl Adjustment {
             &stones,
             tracks,
         ));
-        self.components.appearance_m = Some(START_APPEARANCE_M);
+        self.prior.components.appearance_m = Some(START_APPEARANCE_M);
         Ok(())
     }
 
@@ -100,12 +101,17 @@ impl Adjustment {
             return;
         };
         let stones = self.stones_in_photos(|i| photos.place(i));
-        photos.update(&stones, self.components.appearance_m());
+        photos.update(&stones, self.prior.components.appearance_m());
         if let Some(solution) = last {
             let shared = self.shared_variances(1.0);
             photos.weigh(|i, stone, moving| {
                 let (expected, covariance) = self.motion_without_photos(i, moving, solution, &shared);
-                stone.bias_square(self.components.appearance_m(), moving, &expected, &covariance)
+                stone.bias_square(
+                    self.prior.components.appearance_m(),
+                    moving,
+                    &expected,
+                    &covariance,
+                )
             });
         }
         self.photos = Some(photos);
@@ -121,16 +127,16 @@ impl Adjustment {
     ) -> (StoneVector, Matrix9) {
         let stone = &self.stones[i];
         let (candidate, own) = match moving {
-            Moving::WithField => (&stone.with_field, self.components.own_variances()),
+            Moving::WithField => (&stone.with_field, self.prior.own_variances()),
             Moving::OnOwn => (
                 stone.on_own.as_ref().unwrap_or(&stone.with_field),
-                self.loose.own_variances(&self.components),
+                self.prior.loose_variances(),
             ),
         };
         let own = std::array::from_fn(|k| own[k] + shared[k]);
-        let equations = self.observed_by_clouds(i, candidate, self.components.error_m);
+        let equations = self.observed_by_clouds(i, candidate, self.prior.components.error_m);
         let known = posterior(&equations, &solution.field.from_others[i], &own);
-        (known.mean + self.common_in(i), known.covariance)
+        (known.mean + self.prior.common_in(i), known.covariance)
     }
 
     /// What the stones' own points say, moving with the field.
@@ -145,9 +151,11 @@ impl Adjustment {
     /// what passes for an error of the clouds may be a slide, and so may what passes for an appearance bias;
     /// it is both where both are there.
     pub fn undetected_slide_m(&self, i: usize) -> f64 {
-        let error_m = self.components.error_m;
+        let error_m = self.prior.components.error_m;
         match self.photos.as_ref().and_then(|p| p.stone(i)) {
-            Some(photos) => error_m.min(photos.bias_sd_m(self.components.appearance_m(), Moving::WithField)),
+            Some(photos) => {
+                error_m.min(photos.bias_sd_m(self.prior.components.appearance_m(), Moving::WithField))
+            }
             None => error_m,
         }
     }
@@ -157,7 +165,8 @@ impl Adjustment {
     pub fn photo_part(&self, i: usize) -> Option<PhotoPart<'_>> {
         let model = self.photos.as_ref()?;
         let stone = model.stone(i)?;
-        let (information, _, _) = stone.with_bias(self.components.appearance_m(), self.stones[i].moving());
+        let (information, _, _) =
+            stone.with_bias(self.prior.components.appearance_m(), self.stones[i].moving());
         let by_clouds = self
             .cloud_motion(i, [0.0; 2])
             .and_then(|c| c.covariance.try_inverse())
@@ -169,14 +178,11 @@ impl Adjustment {
     /// Whether a stone's photos alone make it more probable that it is loose than that it moves as
     /// `prediction` says.
     pub fn photos_show_own_motion(&self, i: usize, prediction: &Prediction) -> bool {
-        let own = [
-            self.components.own_variances(),
-            self.loose.own_variances(&self.components),
-        ];
+        let own = [self.prior.own_variances(), self.prior.loose_variances()];
         let [with_field, on_own] =
             [Moving::WithField, Moving::OnOwn].map(|moving| self.observed_by_photos(i, moving));
         with_field.zip(on_own).is_some_and(|(with_field, on_own)| {
-            log_odds_of_loose([&with_field, &on_own], prediction, &own, self.loose.share) > 0.0
+            log_odds_of_loose([&with_field, &on_own], prediction, &own, self.prior.loose.share) > 0.0
         })
     }
 
@@ -184,12 +190,12 @@ impl Adjustment {
     pub fn photo_report(&self, results: &[PairResult]) -> Option<PhotoReport> {
         let photos = self.photos.as_ref()?;
         let moving: Vec<Moving> = self.stones.iter().map(StoneState::moving).collect();
-        let mut report = photos.report(self.components.appearance_m(), &moving);
+        let mut report = photos.report(self.prior.components.appearance_m(), &moving);
         for (i, evidence) in report.evidence.iter_mut().enumerate() {
             if let Some(evidence) = evidence {
                 evidence.clouds = self.shift_by_clouds(i, evidence.place);
                 let motion = results.get(i).and_then(|r| r.motion.as_ref().ok());
-                let face_from_world = &self.graph.nodes[i].face_from_world;
+                let face_from_world = &self.prior.graph.nodes[i].face_from_world;
                 evidence.both = motion.and_then(|m| FaceShift::of_motion(m, face_from_world, evidence.place));
             }
         }
@@ -202,7 +208,7 @@ impl Adjustment {
             face_from_world: node.face_from_world,
             clouds: self.cloud_motion(i, place(i)),
         };
-        self.graph.nodes.iter().enumerate().map(of_stone).collect()
+        self.prior.graph.nodes.iter().enumerate().map(of_stone).collect()
     }
 
     /// The displacement in the face by the stone's own points alone, about the motion that it more probably
@@ -225,11 +231,11 @@ impl Adjustment {
         candidate: &CandidateMotion,
         place: [f64; 2],
     ) -> Option<CloudMotion> {
-        let equations = self.observed_by_clouds(i, candidate, self.components.error_m);
+        let equations = self.observed_by_clouds(i, candidate, self.prior.components.error_m);
         if equations.information.trace() <= 0.0 {
             return None;
         }
-        let shift = self.loose.move_m.max(self.params.max_sd_m).powi(-2);
+        let shift = self.prior.loose.move_m.max(self.params.max_sd_m).powi(-2);
         let turn = OPEN[0].powi(-2);
         let bend = OPEN[1].powi(-2);
         let open = Vector9::from([shift, shift, shift, turn, turn, turn, bend, bend, bend]);
@@ -237,7 +243,7 @@ impl Adjustment {
             .cholesky()?
             .inverse();
         let lever = StonePhotos::lever(place);
-        let mean: Vector3<f64> = lever * (inverse * equations.vector + self.common_in(i).unknowns());
+        let mean: Vector3<f64> = lever * (inverse * equations.vector + self.prior.common_in(i).unknowns());
         let covariance = lever * inverse * lever.transpose();
         Some(CloudMotion {
             mean,

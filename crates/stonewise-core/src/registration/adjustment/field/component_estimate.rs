@@ -35,7 +35,7 @@ const UNSOLVABLE: f64 = f64::MAX / 1e6;
 ///
 /// # Errors
 /// The caller stopped the work.
-pub(crate) fn estimate_components(
+pub(crate) fn most_likely_components(
     problem: &FieldProblem,
     progress: &dyn Progress,
 ) -> Result<VarianceComponents, Interrupted> {
@@ -331,7 +331,7 @@ mod tests {
         let mut problem = wall.problem(1.0);
         // As in the adjustment: some calls, each from where the last ended.
         for _ in 0..3 {
-            problem.components = estimate_components(&problem, &Silent).unwrap();
+            problem.components = most_likely_components(&problem, &Silent).unwrap();
         }
         let found = problem.components;
         let ratios = [
@@ -356,7 +356,7 @@ mod tests {
     #[test]
     fn the_estimate_ends_once_the_caller_stops_it() {
         let wall = SmallWall::new(4, 3, 1);
-        let stopped = estimate_components(&wall.problem(1.0), &Stopped);
+        let stopped = most_likely_components(&wall.problem(1.0), &Stopped);
         assert_eq!(stopped.err(), Some(Interrupted));
     }
 }

@@ -8,6 +8,7 @@ mod graph;
 mod jump;
 mod loose_prior;
 mod mixture;
+mod motion_prior;
 mod posterior;
 mod prior;
 mod problem;
@@ -18,12 +19,15 @@ mod testing;
 mod ties;
 mod variance_components;
 
-pub(crate) use component_estimate::estimate_components;
-pub(crate) use cracks::{Crack, find_crack};
+pub(crate) use component_estimate::most_likely_components;
+#[cfg(test)]
+pub(crate) use cracks::Crack;
+pub(crate) use cracks::find_crack;
 pub(crate) use field_vector::{FieldVector, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::{LoosePrior, estimated_share};
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
+pub(crate) use motion_prior::MotionPrior;
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
 pub(crate) use prior::Tie;
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};

@@ -1,0 +1,61 @@
+//! What is assumed of the stones' motions between one solution and the next.
+
+use super::cracks::Crack;
+use super::graph::{Graph, Place};
+use super::loose_prior::LoosePrior;
+use super::prior::Tie;
+use super::variance_components::VarianceComponents;
+use crate::registration::adjustment::stone_vector::StoneVector;
+use nalgebra::Vector3;
+
+/// Which stones are neighbours, how stiff the ties between them are, and what stones do on their own.
+pub(crate) struct MotionPrior {
+    pub graph: Graph,
+    /// One per edge of the graph.
+    pub ties: Vec<Tie>,
+    pub components: VarianceComponents,
+    pub loose: LoosePrior,
+    pub cracks: Vec<Crack>,
+    /// Common translation about which the field is solved, world.
+    pub common: Vector3<f64>,
+}
+
+impl MotionPrior {
+    /// All ties are whole, and nothing is known of the common translation. `None` where memory does not
+    /// suffice.
+    pub fn new(places: &[Place], neighbours_per_side: usize, loose: LoosePrior) -> Option<Self> {
+        let graph = Graph::new(places, neighbours_per_side)?;
+        Some(Self {
+            ties: vec![Tie::WHOLE; graph.edges.len()],
+            graph,
+            components: VarianceComponents::start(),
+            loose,
+            cracks: Vec::new(),
+            common: Vector3::zeros(),
+        })
+    }
+
+    /// The common translation in a stone's frame.
+    pub fn common_in(&self, i: usize) -> StoneVector {
+        StoneVector::from_translation(self.graph.nodes[i].face_from_world * self.common)
+    }
+
+    /// Variances of the (translation, rotation, bending) that a stone of the field makes on its own, in its
+    /// frame.
+    pub fn own_variances(&self) -> [f64; 9] {
+        self.components.own_variances()
+    }
+
+    /// Those that a loose stone makes.
+    pub fn loose_variances(&self) -> [f64; 9] {
+        self.loose.own_variances(&self.components)
+    }
+
+    /// Parts all ties between the two sides of a crack.
+    pub fn part_along(&mut self, crack: Crack) {
+        for (tie, edge) in self.ties.iter_mut().zip(&self.graph.edges) {
+            tie.is_parted |= crack.side[edge.low] != crack.side[edge.high];
+        }
+        self.cracks.push(crack);
+    }
+}
