@@ -58,7 +58,7 @@ def test_given_normals_and_places_without_points():
     assert down.distances[0] == pytest.approx(-0.01, abs=1e-3)
     from_below = stonewise.m3c2(first, second, core[:1], viewpoints=[[1.0, 1.0, -5.0]])
     assert from_below.distances[0] == pytest.approx(-change.distances[0], abs=1e-12)
-    with pytest.raises(stonewise.Error, match="one row for each core point"):
+    with pytest.raises(stonewise.Error, match="one normal for each core point"):
         stonewise.m3c2(first, second, core, corepoint_normals=[[0.0, 0.0, 1.0]])
 
 

@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
-use stonewise_core::change::SurveyError;
+use stonewise_core::change::CompareError;
 use stonewise_core::progress::Interrupted;
 use stonewise_core::registration::AdjustError;
 use stonewise_core::transfer::TransferError;
@@ -147,7 +147,7 @@ pub enum Error {
     Registration(String),
     /// Clouds could not be compared.
     #[error(transparent)]
-    Compare(SurveyError),
+    Compare(CompareError),
     /// Layers could not be written.
     #[error(transparent)]
     Layers(#[from] stonewise_io::layers::LayerError),
@@ -194,10 +194,10 @@ impl From<TransferError> for Error {
     }
 }
 
-impl From<SurveyError> for Error {
-    fn from(error: SurveyError) -> Self {
+impl From<CompareError> for Error {
+    fn from(error: CompareError) -> Self {
         match error {
-            SurveyError::Interrupted(_) => Self::Interrupted,
+            CompareError::Interrupted(_) => Self::Interrupted,
             error => Self::Compare(error),
         }
     }

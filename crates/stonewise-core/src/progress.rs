@@ -39,6 +39,33 @@ pub trait Progress: Sync {
     }
 }
 
+impl dyn Progress + '_ {
+    /// Does a piece of work item by item, in order: begins it under this name, looks before each item whether
+    /// to stop, and advances after it.
+    ///
+    /// # Errors
+    /// The work on an item failed, or the caller stopped it.
+    pub fn each<I, E>(
+        &self,
+        what: &str,
+        items: I,
+        mut work: impl FnMut(I::Item) -> Result<(), E>,
+    ) -> Result<(), E>
+    where
+        I: IntoIterator<IntoIter: ExactSizeIterator>,
+        E: From<Interrupted>,
+    {
+        let items = items.into_iter();
+        self.begin(what, items.len() as u64);
+        for item in items {
+            self.check()?;
+            work(item)?;
+            self.advance(1);
+        }
+        Ok(())
+    }
+}
+
 /// Reports nothing and never cancels.
 pub struct Silent;
 

@@ -4,7 +4,7 @@
 
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
-use stonewise_core::change::{M3c2Params, OutwardReference, estimate_normals, m3c2};
+use stonewise_core::change::{CorePoint, M3c2Params, OutwardReference, estimate_normals, m3c2};
 use stonewise_core::cloud::GridIndex;
 
 const TOLERANCE_M: f64 = 1e-6;
@@ -42,10 +42,13 @@ fn params(robust: bool) -> M3c2Params {
 #[test]
 fn distances_limits_spreads_and_counts_are_those_of_py4dgeo() {
     let (first, second, expected) = (cloud("first.csv"), cloud("second.csv"), table("py4dgeo.csv"));
-    let core: Vec<_> = expected.iter().map(|r| Point3::new(r[0], r[1], r[2])).collect();
-    let normals: Vec<_> = expected.iter().map(|r| Vector3::new(r[3], r[4], r[5])).collect();
+    let core_point = |r: &Vec<f64>| CorePoint {
+        position: Point3::new(r[0], r[1], r[2]),
+        normal: Some(Vector3::new(r[3], r[4], r[5])),
+    };
+    let core: Vec<_> = expected.iter().map(core_point).collect();
     for (robust, column) in [(false, 6), (true, 12)] {
-        let field = m3c2(&first, &second, &core, &normals, &params(robust));
+        let field = m3c2(&first, &second, &core, &params(robust));
         let mut empty = 0;
         for (point, row) in field.points.iter().zip(&expected) {
             let [distance, limit, spread_1, n_1, spread_2, n_2] = std::array::from_fn(|i| row[column + i]);

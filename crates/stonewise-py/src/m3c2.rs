@@ -3,17 +3,12 @@
 use crate::arrays::{from_vectors, points, vectors};
 use crate::attended::{Listeners, attended};
 use crate::error::{error, explained};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use stonewise_core::change::{
-    ChangePoint, M3c2Params, OutwardReference, estimate_normals, m3c2 as compare, thin_to_voxels,
+    ChangePoint, CoreNormals, M3c2Params, OutwardReference, m3c2_clouds, thin_to_voxels,
 };
-use stonewise_core::cloud::GridIndex;
-use stonewise_core::progress::{Interrupted, Progress};
-
-/// Core points between two looks whether to stop.
-const BATCH: usize = 8192;
 
 /// Distances, detection limits, spread and count in either epoch, normals.
 type Columns<'py> = (
@@ -55,22 +50,19 @@ pub fn m3c2<'py>(
         ddof,
         ..M3c2Params::default()
     };
-    params.check().map_err(explained)?;
     let clouds = [points(&points_1)?, points(&points_2)?];
     let core = points(&core_points)?;
     let given = normals.as_ref().map(vectors).transpose()?;
-    if given.as_ref().is_some_and(|n| n.len() != core.len()) {
-        return Err(error("corepoint_normals must have one row for each core point"));
-    }
     let viewpoints = viewpoints.as_ref().map(points).transpose()?;
     let found = attended(py, &Listeners::progress(progress), |progress| {
-        let outward = match &viewpoints {
-            Some(positions) => OutwardReference::Towards(positions),
-            None => OutwardReference::Direction(Vector3::from(direction)),
+        let normals = match (&given, &viewpoints) {
+            (Some(normals), _) => CoreNormals::Given(normals),
+            (None, Some(places)) => CoreNormals::Fitted(OutwardReference::Towards(places)),
+            (None, None) => CoreNormals::Fitted(OutwardReference::Direction(direction.into())),
         };
-        measure(clouds, &core, given.as_deref(), &outward, &params, progress)
+        m3c2_clouds(clouds, &core, &normals, &params, progress)
     })?;
-    let found = found.map_err(explained)?;
+    let found = found.map_err(explained)?.points;
     let column = |value: fn(&ChangePoint) -> Option<f64>| {
         let values: Vec<f64> = found.iter().map(|p| value(p).unwrap_or(f64::NAN)).collect();
         values.into_pyarray(py)
@@ -87,58 +79,6 @@ pub fn m3c2<'py>(
         [count(0), count(1)],
         from_vectors(py, &normals)?,
     ))
-}
-
-/// One entry for each core point.
-fn measure(
-    clouds: [Vec<Point3<f64>>; 2],
-    core: &[Point3<f64>],
-    given: Option<&[Vector3<f64>]>,
-    outward: &OutwardReference<'_>,
-    params: &M3c2Params,
-    progress: &dyn Progress,
-) -> Result<Vec<ChangePoint>, Interrupted> {
-    progress.begin("M3C2", core.len() as u64);
-    let [first, second] = clouds.map(|mut points| {
-        points.retain(|p| p.iter().all(|c| c.is_finite()));
-        GridIndex::new(&points, params.cylinder_radius_m)
-    });
-    let mut found = Vec::with_capacity(core.len());
-    for (number, batch) in core.chunks(BATCH).enumerate() {
-        progress.check()?;
-        let normals: Vec<Option<Vector3<f64>>> = match given {
-            Some(normals) => {
-                let start = number * BATCH;
-                let unit =
-                    |n: &Vector3<f64>| n.try_normalize(0.0).filter(|n| n.iter().all(|c| c.is_finite()));
-                normals[start..start + batch.len()].iter().map(unit).collect()
-            }
-            None => estimate_normals(&first, batch, params.normal_radius_m, outward),
-        };
-        let usable = batch.iter().zip(&normals).filter_map(|(p, n)| Some((*p, (*n)?)));
-        let (places, directions): (Vec<Point3<f64>>, Vec<Vector3<f64>>) = usable.unzip();
-        let mut measured = compare(&first, &second, &places, &directions, params)
-            .points
-            .into_iter();
-        found.extend(batch.iter().zip(&normals).map(|(position, normal)| {
-            let of_normal = normal.and_then(|_| measured.next());
-            of_normal.unwrap_or_else(|| without_normal(*position))
-        }));
-        progress.advance(batch.len() as u64);
-    }
-    Ok(found)
-}
-
-/// A core point whose surroundings have no plane.
-fn without_normal(position: Point3<f64>) -> ChangePoint {
-    ChangePoint {
-        position,
-        normal: Vector3::repeat(f64::NAN),
-        distance_m: None,
-        detection_limit_m: None,
-        spread_m: [None; 2],
-        counts: [0; 2],
-    }
 }
 
 /// Indices of the points that stay when every voxel keeps the one nearest to its middle.

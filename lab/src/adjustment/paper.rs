@@ -3,7 +3,7 @@
 use super::trial::Trial;
 use crate::figures::rms;
 use nalgebra::{Point3, Vector3};
-use stonewise_core::change::{M3c2Params, m3c2};
+use stonewise_core::change::{CorePoint, M3c2Params, m3c2};
 use stonewise_core::cloud::{Cloud, GridIndex};
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::registration::{
@@ -40,10 +40,10 @@ pub fn gicp(trial: &Trial, pairs: &MemoryPairs) -> Vec<PairResult> {
             }
         })
         .collect();
-    let mut results = align(&first, &second, &stones, &params);
-    let centroids: Vec<Point3<f64>> = stones.iter().map(|s| s.centroid).collect();
-    relate_to_neighbours(&mut results, &centroids, &params);
-    results
+    let results = align(&first, &second, &stones, &params);
+    let mut placed: Vec<_> = stones.iter().map(|s| s.centroid).zip(results).collect();
+    relate_to_neighbours(&mut placed, &params);
+    placed.into_iter().map(|(_, result)| result).collect()
 }
 
 /// RMSE of M3C2 at the stones' centroids along the true normal of the face: in the face (2D), out of it,
@@ -59,9 +59,11 @@ pub fn m3c2_errors(trial: &Trial, pairs: &MemoryPairs) -> [f64; 2] {
         .iter()
         .filter_map(|p| Some((p.centroid, trial.truth.get(&p.first.0).filter(|t| t.countable)?)))
         .collect();
-    let places: Vec<Point3<f64>> = counted.iter().map(|c| c.0).collect();
-    let normals: Vec<Vector3<f64>> = counted.iter().map(|c| c.1.normal).collect();
-    let found = m3c2(&first, &second, &places, &normals, &params);
+    let core = counted.iter().map(|(position, truth)| CorePoint {
+        position: *position,
+        normal: Some(truth.normal),
+    });
+    let found = m3c2(&first, &second, &core.collect::<Vec<_>>(), &params);
     let errors: Vec<Vector3<f64>> = found
         .points
         .iter()

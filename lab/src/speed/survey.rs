@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use std::path::Path;
-use stonewise_core::change::{M3c2Params, OutwardReference, c2c, estimate_normals, m3c2};
+use stonewise_core::change::{CorePoint, M3c2Params, OutwardReference, c2c, m3c2};
 use stonewise_core::cloud::{Cloud, GridIndex};
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::{GicpBlock, GicpParams, GicpStone, align};
@@ -55,12 +55,8 @@ impl Survey {
         let params = M3c2Params::default();
         let [first, second] = [0, 1].map(|e| GridIndex::new(&self.clouds[e], params.cylinder_radius_m));
         let outward = OutwardReference::Direction(-Vector3::y());
-        let normals: Vec<Vector3<f64>> =
-            estimate_normals(&first, &self.core, params.normal_radius_m, &outward)
-                .into_iter()
-                .map(Option::unwrap)
-                .collect();
-        let field = m3c2(&first, &second, &self.core, &normals, &params);
+        let core = CorePoint::fitted(&first, &self.core, params.normal_radius_m, &outward);
+        let field = m3c2(&first, &second, &core, &params);
         let values = field.points.iter().flat_map(|p| {
             [
                 p.distance_m.unwrap_or(f64::NAN),

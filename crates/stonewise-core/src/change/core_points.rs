@@ -1,7 +1,33 @@
-//! Thinning a cloud to core points.
+//! Core points: where two clouds are compared.
 
+use super::normals::{OutwardReference, estimate_normals};
+use crate::cloud::GridIndex;
 use crate::geometry::{CellMap, floor};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+
+/// A place at which two clouds are compared along a normal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CorePoint {
+    /// World frame, metres.
+    pub position: Point3<f64>,
+    /// Unit vector out of the wall; `None` where no plane shows it.
+    pub normal: Option<Vector3<f64>>,
+}
+
+impl CorePoint {
+    /// Core points at these positions with normals fitted to a cloud; see [`estimate_normals`].
+    pub fn fitted(
+        cloud: &GridIndex,
+        positions: &[Point3<f64>],
+        radius_m: f64,
+        outward: &OutwardReference<'_>,
+    ) -> Vec<Self> {
+        let normals = estimate_normals(cloud, positions, radius_m, outward);
+        let both = positions.iter().zip(normals);
+        both.map(|(&position, normal)| Self { position, normal })
+            .collect()
+    }
+}
 
 /// Indices of the points that stay when every voxel keeps only the point nearest to its middle.
 ///

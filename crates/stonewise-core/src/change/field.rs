@@ -15,7 +15,7 @@ pub struct ChangeField {
 pub struct ChangePoint {
     /// Core point, world frame, metres.
     pub position: Point3<f64>,
-    /// Unit vector along which the distance is measured, out of the wall.
+    /// Unit vector along which the distance is measured, out of the wall; NaN where no plane shows it.
     pub normal: Vector3<f64>,
     /// Second epoch minus first along the normal, metres; `None` where a cylinder is empty.
     pub distance_m: Option<f64>,
@@ -28,6 +28,17 @@ pub struct ChangePoint {
 }
 
 impl ChangePoint {
+    pub(super) fn without_normal(position: Point3<f64>) -> Self {
+        Self {
+            position,
+            normal: Vector3::repeat(f64::NAN),
+            distance_m: None,
+            detection_limit_m: None,
+            spread_m: [None; 2],
+            counts: [0; 2],
+        }
+    }
+
     /// Whether the distance exceeds its detection limit.
     pub fn is_significant(&self) -> bool {
         matches!((self.distance_m, self.detection_limit_m), (Some(d), Some(limit)) if d.abs() > limit)

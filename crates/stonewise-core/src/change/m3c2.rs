@@ -1,9 +1,8 @@
 //! Multiscale model to model cloud comparison.
 
 use crate::change::spread::{Summary, mean_and_deviation, median_and_range};
-use crate::change::{ChangeField, ChangePoint, M3c2Params};
+use crate::change::{ChangeField, ChangePoint, CorePoint, M3c2Params};
 use crate::cloud::{Cylinder, GridIndex};
-use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// Half-width of a 95 % interval of the normal distribution, in standard deviations.
@@ -14,14 +13,14 @@ const Z95: f64 = 1.96;
 /// At each core point a cylinder along the normal collects the points of either cloud; the distance is the
 /// difference of their mean (or median) positions along the normal, and
 /// LoD95 = 1.96 (sqrt(s1^2 / n1 + s2^2 / n2) + reg). A cylinder ends `max_depth_m` before and behind the core
-/// point, border included. `core_points` and `normals` (unit, out of the wall) run in parallel.
+/// point, border included. One entry for each core point; without a normal there is no distance.
 ///
 /// Source: Lague, Brodu & Leroux (2013), equation 1. Cost: core points x points per cylinder. The cells of
 /// the indices are best as large as the cylinder's radius.
 ///
 /// ```
 /// use nalgebra::{Point3, Vector3};
-/// use stonewise_core::change::{M3c2Params, m3c2};
+/// use stonewise_core::change::{CorePoint, M3c2Params, m3c2};
 /// use stonewise_core::cloud::GridIndex;
 ///
 /// let plane = |x: f64| -> Vec<Point3<f64>> {
@@ -30,20 +29,22 @@ const Z95: f64 = 1.96;
 /// let params = M3c2Params::default();
 /// let index = |points: &[Point3<f64>]| GridIndex::new(points, params.cylinder_radius_m);
 /// let (first, second) = (index(&plane(0.0)), index(&plane(0.005)));
-/// let field = m3c2(&first, &second, &[Point3::new(0.0, 0.2, 0.2)], &[Vector3::x()], &params);
+/// let core = CorePoint { position: Point3::new(0.0, 0.2, 0.2), normal: Some(Vector3::x()) };
+/// let field = m3c2(&first, &second, &[core], &params);
 /// assert!((field.points[0].distance_m.unwrap() - 0.005).abs() < 1e-12);
 /// ```
 pub fn m3c2(
     first: &GridIndex,
     second: &GridIndex,
-    core_points: &[Point3<f64>],
-    normals: &[Vector3<f64>],
+    core_points: &[CorePoint],
     params: &M3c2Params,
 ) -> ChangeField {
     let points = core_points
         .par_iter()
-        .zip(normals)
-        .map_init(Vec::new, |scratch, (&position, &normal)| {
+        .map_init(Vec::new, |scratch, &CorePoint { position, normal }| {
+            let Some(normal) = normal else {
+                return ChangePoint::without_normal(position);
+            };
             let cylinder = Cylinder {
                 centre: position,
                 axis: normal,
@@ -101,6 +102,7 @@ pub(super) fn variances_of_means(spread_m: [Option<f64>; 2], counts: [u32; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::{Point3, Vector3};
 
     /// A level grid of 11 x 11 points, 2 cm apart, at these heights in turn.
     fn sheet(heights: &[f64]) -> Vec<Point3<f64>> {
@@ -114,14 +116,11 @@ mod tests {
 
     fn compare(first: &[f64], second: &[f64], params: &M3c2Params) -> ChangePoint {
         let clouds = [first, second].map(|h| GridIndex::new(&sheet(h), 0.05));
-        m3c2(
-            &clouds[0],
-            &clouds[1],
-            &[Point3::origin()],
-            &[Vector3::z()],
-            params,
-        )
-        .points[0]
+        let core = CorePoint {
+            position: Point3::origin(),
+            normal: Some(Vector3::z()),
+        };
+        m3c2(&clouds[0], &clouds[1], &[core], params).points[0]
     }
 
     #[test]

@@ -1,152 +1,93 @@
 //! Comparing whole surveys, one tile of the first (or compared) cloud at a time.
 
+use super::error::CompareError;
 use crate::change::{
-    ChangeField, M3c2Params, M3c2ParamsError, MeshIndex, OutwardReference, c2c, c2m, estimate_normals, m3c2,
-    thin_to_voxels,
+    ChangeField, CorePoint, M3c2Params, MeshIndex, OutwardReference, c2c, c2m, m3c2, thin_to_voxels,
 };
 use crate::cloud::{GridIndex, TileSource};
 use crate::geometry::Bounds;
-use crate::progress::{Interrupted, Progress};
-use nalgebra::{Point3, Vector3};
+use crate::progress::Progress;
+use nalgebra::Point3;
 use std::ops::Range;
 
-/// What the receiver of results may fail with.
-pub type SinkError = Box<dyn std::error::Error + Send + Sync>;
-
-/// Why a survey could not be compared.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SurveyError {
-    /// A tile could not be read.
-    #[error("a tile of the cloud could not be read")]
-    Read(#[source] SinkError),
-    /// The receiver of the results failed.
-    #[error("results could not be kept")]
-    Sink(#[source] SinkError),
-    /// Stopped by the caller.
-    #[error(transparent)]
-    Interrupted(#[from] Interrupted),
-    /// Parameters that cannot work.
-    #[error(transparent)]
-    Params(#[from] M3c2ParamsError),
-}
-
-/// M3C2 of two surveys at core points thinned from the first one; hands each tile's results to `sink`, in
-/// order.
+/// M3C2 of two surveys at core points thinned from some tiles of the first one, in the order of the tiles.
 ///
 /// Normals are fitted to the first survey. A core point belongs to the tile that holds it, and every tile is
 /// read with as much surroundings as normals and cylinders need, so results do not depend on the tiles.
-/// Memory: one tile of either survey with its surroundings. Core points without a normal are left out.
+/// Memory: one tile of either survey with its surroundings, and the results. Core points without a normal are
+/// left out.
 ///
 /// # Errors
-/// A tile cannot be read, the parameters are not usable, `sink` fails, or the caller stopped the work.
+/// A tile cannot be read, the parameters are not usable, or the caller stopped the work.
 pub fn m3c2_survey<A: TileSource, B: TileSource>(
     first: &A,
     second: &B,
-    outward: &OutwardReference<'_>,
-    params: &M3c2Params,
-    progress: &dyn Progress,
-    sink: impl FnMut(usize, ChangeField) -> Result<(), SinkError>,
-) -> Result<(), SurveyError>
-where
-    A::Error: Sync,
-    B::Error: Sync,
-{
-    m3c2_tiles(
-        first,
-        second,
-        outward,
-        params,
-        0..first.tile_count(),
-        progress,
-        sink,
-    )
-}
-
-/// The same at the core points of some tiles of the first survey.
-///
-/// # Errors
-/// As [`m3c2_survey`].
-pub fn m3c2_tiles<A: TileSource, B: TileSource>(
-    first: &A,
-    second: &B,
-    outward: &OutwardReference<'_>,
-    params: &M3c2Params,
     tiles: Range<usize>,
+    outward: &OutwardReference<'_>,
+    params: &M3c2Params,
     progress: &dyn Progress,
-    mut sink: impl FnMut(usize, ChangeField) -> Result<(), SinkError>,
-) -> Result<(), SurveyError>
-where
-    A::Error: Sync,
-    B::Error: Sync,
-{
+) -> Result<ChangeField, CompareError> {
     params.check()?;
     let cylinder_reach = params.cylinder_radius_m.hypot(params.max_depth_m);
-    progress.begin("M3C2", tiles.len() as u64);
-    for tile in tiles {
-        progress.check()?;
-        // The far corner of a voxel that straddles the border is at most its diagonal away.
-        let halo = params
-            .normal_radius_m
-            .max(cylinder_reach)
-            .max(params.core_spacing_m * 3f64.sqrt());
+    // The far corner of a voxel that straddles the border is at most its diagonal away.
+    let halo = params
+        .normal_radius_m
+        .max(cylinder_reach)
+        .max(params.core_spacing_m * 3f64.sqrt());
+    let mut field = ChangeField::default();
+    progress.each("M3C2", tiles, |tile| -> Result<(), CompareError> {
         let mut points = tile_points(first, tile)?;
         let own = points.len();
         points.extend(points_around(first, &first.bounds(tile).grown(halo), Some(tile))?);
-        let core: Vec<Point3<f64>> = thin_to_voxels(&points, params.core_spacing_m)
+        let positions: Vec<Point3<f64>> = thin_to_voxels(&points, params.core_spacing_m)
             .into_iter()
             .filter(|&i| i < own)
             .map(|i| points[i])
             .collect();
         let first_index = GridIndex::new(&points, params.cylinder_radius_m);
         drop(points);
-        let normals = estimate_normals(&first_index, &core, params.normal_radius_m, outward);
-        let (core, normals): (Vec<Point3<f64>>, Vec<Vector3<f64>>) = core
-            .into_iter()
-            .zip(normals)
-            .filter_map(|(p, n)| Some((p, n?)))
-            .unzip();
-        let field = match Bounds::of(core.iter().copied()) {
-            None => ChangeField::default(),
-            Some(bounds) => {
-                let near = points_around(second, &bounds.grown(cylinder_reach), None)?;
-                let second_index = GridIndex::new(&near, params.cylinder_radius_m);
-                m3c2(&first_index, &second_index, &core, &normals, params)
-            }
-        };
-        sink(tile, field).map_err(SurveyError::Sink)?;
-        progress.advance(1);
-    }
-    Ok(())
+        let mut core = CorePoint::fitted(&first_index, &positions, params.normal_radius_m, outward);
+        core.retain(|point| point.normal.is_some());
+        if let Some(bounds) = Bounds::of(core.iter().map(|point| point.position)) {
+            let near = points_around(second, &bounds.grown(cylinder_reach), None)?;
+            let second_index = GridIndex::new(&near, params.cylinder_radius_m);
+            field
+                .points
+                .extend(m3c2(&first_index, &second_index, &core, params).points);
+        }
+        Ok(())
+    })?;
+    Ok(field)
 }
 
-/// Cloud to cloud distances of every point of `compared` to `reference`; `sink(tile, points, distances)` gets
-/// them in the order of the tile's points.
+/// Points of a survey, tile by tile, with their distances from something.
+#[derive(Clone, Debug, Default)]
+pub struct PointDistances {
+    /// World frame, metres.
+    pub points: Vec<Point3<f64>>,
+    /// Of each point, metres; `None`: farther than was looked for.
+    pub distances_m: Vec<Option<f64>>,
+}
+
+/// Cloud to cloud distances of every point of `compared` to `reference`.
 ///
-/// Memory: one tile of `compared`, and of `reference` what lies within `max_m` of it.
+/// Memory: one tile of `compared`, of `reference` what lies within `max_m` of it, and the results.
 ///
 /// # Errors
-/// A tile cannot be read, `sink` fails, or the caller stopped the work.
+/// A tile cannot be read, or the caller stopped the work.
 pub fn c2c_survey<A: TileSource, B: TileSource>(
     reference: &A,
     compared: &B,
     max_m: f64,
     progress: &dyn Progress,
-    mut sink: impl FnMut(usize, &[Point3<f64>], Vec<Option<f64>>) -> Result<(), SinkError>,
-) -> Result<(), SurveyError>
-where
-    A::Error: Sync,
-    B::Error: Sync,
-{
-    each_tile("C2C", compared, progress, |tile, points, bounds| {
+) -> Result<PointDistances, CompareError> {
+    distances("C2C", compared, progress, |points, bounds| {
         let near = points_around(reference, &bounds.grown(max_m), None)?;
-        let index = GridIndex::for_nearest(&near);
-        sink(tile, points, c2c(&index, points, max_m)).map_err(SurveyError::Sink)
+        Ok(c2c(&GridIndex::for_nearest(&near), points, max_m))
     })
 }
 
-/// Signed distances of every point of `compared` to a mesh; `sink(tile, points, distances)` gets them in the
-/// order of the tile's points.
+/// Signed distances of every point of `compared` to a mesh.
 ///
 /// # Errors
 /// As [`c2c_survey`].
@@ -155,39 +96,36 @@ pub fn c2m_survey<B: TileSource>(
     compared: &B,
     max_m: f64,
     progress: &dyn Progress,
-    mut sink: impl FnMut(usize, &[Point3<f64>], Vec<Option<f64>>) -> Result<(), SinkError>,
-) -> Result<(), SurveyError>
-where
-    B::Error: Sync,
-{
-    each_tile("C2M", compared, progress, |tile, points, _| {
-        sink(tile, points, c2m(mesh, points, max_m)).map_err(SurveyError::Sink)
+) -> Result<PointDistances, CompareError> {
+    distances("C2M", compared, progress, |points, _| {
+        Ok(c2m(mesh, points, max_m))
     })
 }
 
-fn each_tile<S: TileSource>(
+fn distances<S: TileSource>(
     what: &str,
-    source: &S,
+    compared: &S,
     progress: &dyn Progress,
-    mut work: impl FnMut(usize, &[Point3<f64>], Bounds) -> Result<(), SurveyError>,
-) -> Result<(), SurveyError>
-where
-    S::Error: Sync,
-{
-    progress.begin(what, source.tile_count() as u64);
-    for tile in 0..source.tile_count() {
-        progress.check()?;
-        work(tile, &tile_points(source, tile)?, source.bounds(tile))?;
-        progress.advance(1);
-    }
-    Ok(())
+    measure: impl Fn(&[Point3<f64>], &Bounds) -> Result<Vec<Option<f64>>, CompareError>,
+) -> Result<PointDistances, CompareError> {
+    let mut found = PointDistances::default();
+    progress.each(
+        what,
+        0..compared.tile_count(),
+        |tile| -> Result<(), CompareError> {
+            let points = tile_points(compared, tile)?;
+            found
+                .distances_m
+                .extend(measure(&points, &compared.bounds(tile))?);
+            found.points.extend(points);
+            Ok(())
+        },
+    )?;
+    Ok(found)
 }
 
-fn tile_points<S: TileSource>(source: &S, tile: usize) -> Result<Vec<Point3<f64>>, SurveyError>
-where
-    S::Error: Sync,
-{
-    let cloud = source.load(tile).map_err(|e| SurveyError::Read(Box::new(e)))?;
+fn tile_points<S: TileSource>(source: &S, tile: usize) -> Result<Vec<Point3<f64>>, CompareError> {
+    let cloud = source.load(tile).map_err(|e| CompareError::Read(Box::new(e)))?;
     Ok((0..cloud.len()).map(|i| cloud.world(i)).collect())
 }
 
@@ -197,18 +135,12 @@ fn points_around<S: TileSource>(
     source: &S,
     region: &Bounds,
     except: Option<usize>,
-) -> Result<Vec<Point3<f64>>, SurveyError>
-where
-    S::Error: Sync,
-{
+) -> Result<Vec<Point3<f64>>, CompareError> {
     let mut found = Vec::new();
     for tile in (0..source.tile_count()).filter(|&t| Some(t) != except && source.bounds(t).intersects(region))
     {
-        found.extend(
-            tile_points(source, tile)?
-                .into_iter()
-                .filter(|p| region.contains(p)),
-        );
+        let points = tile_points(source, tile)?.into_iter();
+        found.extend(points.filter(|p| region.contains(p)));
     }
     Ok(found)
 }
@@ -247,13 +179,10 @@ mod tests {
             normal_radius_m: 0.1,
             ..M3c2Params::default()
         };
-        let mut all = Vec::new();
         let outward = OutwardReference::Towards(&[Point3::new(8.0, 1.0, 1.0)]);
-        m3c2_survey(first, second, &outward, &params, &Silent, |_, field| {
-            all.extend(field.points);
-            Ok(())
-        })
-        .unwrap();
+        let tiles = 0..first.tile_count();
+        let field = m3c2_survey(first, second, tiles, &outward, &params, &Silent).unwrap();
+        let mut all = field.points;
         all.sort_by(|a, b| {
             let key = |c: &ChangePoint| [c.position.z, c.position.y, c.position.x];
             key(a).partial_cmp(&key(b)).unwrap()
@@ -280,20 +209,14 @@ mod tests {
     #[test]
     fn cloud_to_cloud_goes_tile_by_tile_in_point_order() {
         let (first, second) = (tiled(&wall(0.0), 0.7), tiled(&wall(0.03), 0.5));
-        let mut seen = 0;
-        c2c_survey(&first, &second, 0.1, &Silent, |tile, points, distances| {
-            let cloud = second.load(tile).unwrap();
-            assert_eq!((points.len(), distances.len()), (cloud.len(), cloud.len()));
-            assert_eq!(points[0], cloud.world(0));
-            assert!(
-                distances
-                    .iter()
-                    .all(|d| d.is_some_and(|d| d > 0.015 && d < 0.0301))
-            );
-            seen += points.len();
-            Ok(())
-        })
-        .unwrap();
-        assert_eq!(seen, 10_000);
+        let found = c2c_survey(&first, &second, 0.1, &Silent).unwrap();
+        let clouds = (0..second.tile_count()).map(|tile| second.load(tile).unwrap());
+        let points: Vec<Point3<f64>> = clouds
+            .flat_map(|cloud| (0..cloud.len()).map(|i| cloud.world(i)).collect::<Vec<_>>())
+            .collect();
+        assert_eq!((points.len(), &points), (10_000, &found.points));
+        assert_eq!(found.distances_m.len(), points.len());
+        let is_near = |d: &Option<f64>| d.is_some_and(|d| d > 0.015 && d < 0.0301);
+        assert!(found.distances_m.iter().all(is_near));
     }
 }

@@ -12,7 +12,7 @@ use crate::project::Project;
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use std::path::Path;
-use stonewise_core::change::{MeshIndex, OutwardReference, SinkError, SurveyError, c2c_survey, c2m_survey};
+use stonewise_core::change::{MeshIndex, OutwardReference, PointDistances, c2c_survey, c2m_survey};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 use stonewise_core::surface::{Outside, orient, surface_cells};
@@ -87,16 +87,16 @@ pub fn compare_clouds(
         Comparison::C2c { max_m } => {
             let [first, second] = [ingest(&context, 1)?, ingest(&context, 2)?];
             context.timed(C2C, || {
-                let measure = |sink: Sink| c2c_survey(&first.tiles, &second.tiles, max_m, progress, sink);
-                Distances::collect(measure)?.write(project, &out.join("c2c.laz"), C2C_DISTANCE)
+                let found = c2c_survey(&first.tiles, &second.tiles, max_m, progress)?;
+                write_distances(&found, project, &out.join("c2c.laz"), C2C_DISTANCE)
             })?;
         }
         Comparison::C2m { mesh, max_m } => {
             let second = ingest(&context, 2)?;
             context.timed(C2M, || {
                 let index = MeshIndex::new(read_mesh(mesh)?);
-                let measure = |sink: Sink| c2m_survey(&index, &second.tiles, max_m, progress, sink);
-                Distances::collect(measure)?.write(project, &out.join("c2m.laz"), C2M_DISTANCE)
+                let found = c2m_survey(&index, &second.tiles, max_m, progress)?;
+                write_distances(&found, project, &out.join("c2m.laz"), C2M_DISTANCE)
             })?;
         }
     }
@@ -160,40 +160,24 @@ fn views_of(project: &Project) -> Result<Vec<View>> {
     }
 }
 
-/// Points with their distances.
-#[derive(Default)]
-struct Distances {
-    points: Vec<Point3<f64>>,
-    distances: Vec<f64>,
-}
-
-type Sink<'a> =
-    &'a mut dyn FnMut(usize, &[Point3<f64>], Vec<Option<f64>>) -> std::result::Result<(), SinkError>;
-
-impl Distances {
-    fn collect(measure: impl FnOnce(Sink) -> std::result::Result<(), SurveyError>) -> Result<Self> {
-        let mut all = Self::default();
-        measure(&mut |_, points, distances| {
-            all.points.extend_from_slice(points);
-            all.distances
-                .extend(distances.into_iter().map(|d| d.unwrap_or(f64::NAN)));
-            Ok(())
-        })?;
-        if all.distances.iter().all(|d| d.is_nan()) {
-            return Err(Error::Survey(
-                "no point lies near enough to the reference: are both in one frame?".into(),
-            ));
-        }
-        Ok(all)
+/// Writes points with their distances; NaN where there is none.
+fn write_distances(
+    found: &PointDistances,
+    project: &Project,
+    path: &Path,
+    dimension: Dimension,
+) -> Result<()> {
+    if found.distances_m.iter().all(Option::is_none) {
+        return Err(Error::Survey(
+            "no point lies near enough to the reference: are both in one frame?".into(),
+        ));
     }
-
-    fn write(&self, project: &Project, path: &Path, dimension: Dimension) -> Result<()> {
-        let crs = coordinate_system(project)?.map(|c| c.text());
-        Ok(write_points_laz(
-            path,
-            crs.as_deref(),
-            &self.points,
-            &[(dimension, ExtraColumn::F64(&self.distances))],
-        )?)
-    }
+    let crs = coordinate_system(project)?.map(|c| c.text());
+    let distances: Vec<f64> = found.distances_m.iter().map(|d| d.unwrap_or(f64::NAN)).collect();
+    Ok(write_points_laz(
+        path,
+        crs.as_deref(),
+        &found.points,
+        &[(dimension, ExtraColumn::F64(&distances))],
+    )?)
 }

@@ -9,7 +9,7 @@ use crate::storage::step::{Key, StepDir};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::ops::Range;
 use std::path::Path;
-use stonewise_core::change::{ChangeField, ChangePoint, M3c2Params, OutwardReference, m3c2_tiles};
+use stonewise_core::change::{ChangeField, ChangePoint, M3c2Params, OutwardReference, m3c2_survey};
 use stonewise_core::cloud::TileSource;
 use stonewise_core::registration::observers::EpochErrors;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
@@ -89,20 +89,14 @@ impl<'a> Comparison<'a> {
     }
 
     fn field(&self, tiles: Range<usize>) -> Result<ChangeField> {
-        let mut field = ChangeField::default();
-        m3c2_tiles(
+        Ok(m3c2_survey(
             &self.epochs[0].tiles,
             &self.epochs[1].tiles,
+            tiles,
             self.outward,
             &self.context.project.settings.m3c2,
-            tiles,
             self.context.progress,
-            |_, tile| {
-                field.points.extend(tile.points);
-                Ok(())
-            },
-        )?;
-        Ok(field)
+        )?)
     }
 
     /// The core points of one of `count` batches of tiles of the first epoch.
