@@ -45,10 +45,8 @@ pub fn run(words: &Words) -> Outcome {
     println!("sigma {:?}", report.sigma_m);
 
     let started = std::time::Instant::now();
-    let same: Vec<usize> = (0..sources.list.len()).collect();
     let pair = EpochPair {
         sources: &sources.list,
-        same_as: &same,
         stones: &stones,
         neighbours: &[],
         stable: &stable,
@@ -137,6 +135,7 @@ impl Sources {
             name: format!("{epoch}/{number}"),
             epoch: *epoch,
             has_times: true,
+            same_as: None,
         };
         Self {
             list: seen.iter().map(source).collect(),

@@ -10,10 +10,10 @@ use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use stonewise::Settings;
 use stonewise::results::{Reference, StoneRow, stone_table};
-use stonewise::{MatchedPair, PairPlaces, Settings};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{Bounds, Camera, Plane, View, cell_of};
+use stonewise_core::geometry::{Camera, Plane, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
 use stonewise_core::progress::Progress;
@@ -21,7 +21,7 @@ use stonewise_core::registration::observers::{
     EpochErrorParams, EpochPair, SeenStone, Source, SourcePoints, epoch_errors,
 };
 use stonewise_core::registration::{
-    AdjustmentReport, MemoryPairs, NearPoint, PairPoints, adjust as adjust_pairs,
+    AdjustmentReport, MatchedPair, MemoryPairs, adjust as adjust_pairs, choose_points,
 };
 use stonewise_core::stone::{MatchOutcome, PairResult, Stone, common_motion};
 use stonewise_core::transfer::{LabelStore, MemoryLabels, TileLabels, build_stones};
@@ -92,11 +92,7 @@ fn measure(
     let matched = first.matched(&second, settings);
     let pairs = gather(&first, &second, &matched, settings.registration.border_noises);
     progress.check()?;
-    let adjusted = adjust_pairs(
-        &MemoryPairs::new(pairs),
-        &settings.registration.adjustment,
-        progress,
-    );
+    let adjusted = adjust_pairs(&pairs, &settings.registration.adjustment, progress);
     let mut report = adjusted.map_err(|e| match e {
         stonewise_core::registration::AdjustError::Interrupted(_) => stonewise::Error::Interrupted,
         e => stonewise::Error::Registration(e.to_string()),
@@ -138,7 +134,7 @@ impl Epoch {
     }
 
     /// Every point with its stone, in the order of the tiles.
-    fn points(&self) -> impl Iterator<Item = (Point3<f64>, u32)> + '_ {
+    fn points(&self) -> impl Iterator<Item = (Point3<f64>, u32)> + Clone + '_ {
         let tiles = &self.tiled.tiles;
         (0..tiles.tile_count()).flat_map(move |tile| {
             let Ok(cloud) = tiles.load(tile);
@@ -175,19 +171,6 @@ impl Epoch {
         }
         (covered, footprints)
     }
-
-    fn extents(&self) -> BTreeMap<u32, Bounds> {
-        let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
-        for (place, stone) in self.points().filter(|p| p.1 != 0) {
-            let point = Bounds {
-                min: place,
-                max: place,
-            };
-            let extent = extents.entry(stone).or_insert(point);
-            *extent = extent.union(&point);
-        }
-        extents
-    }
 }
 
 /// The stones as the steps of a run hand them over, in a file: reading its numbers changes some in the last
@@ -198,33 +181,14 @@ fn handed_over(stones: &[Stone]) -> Result<Vec<Stone>, stonewise::Error> {
 }
 
 /// The points of all matched stones, in the order of a run.
-fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f64) -> Vec<PairPoints> {
+fn gather(first: &Epoch, second: &Epoch, matched: &MatchReport, border_noises: f64) -> MemoryPairs {
     let partner = |(id, outcome): &(StoneId, MatchOutcome)| match outcome {
         MatchOutcome::Matched { second } => Some((*id, *second)),
         MatchOutcome::Unmatched(_) => None,
     };
     let matches: Vec<(StoneId, StoneId)> = matched.outcomes.iter().filter_map(partner).collect();
     let pairs = MatchedPair::of_matches(&first.stones, &second.stones, &matches);
-    let extents = match border_noises > 0.0 {
-        true => first.extents(),
-        false => BTreeMap::new(),
-    };
-    let near = |epoch: &Epoch, is_later| {
-        let places = PairPlaces::new(&pairs, is_later, &extents);
-        let mut near: Vec<Vec<NearPoint>> = vec![Vec::new(); pairs.len()];
-        for (point, stone) in epoch.points() {
-            places
-                .near(point, stone)
-                .for_each(|(k, point)| near[k].push(point));
-        }
-        near
-    };
-    let (ones, twos) = (near(first, false), near(second, true));
-    let near = ones.iter().zip(&twos);
-    let points = pairs.iter().zip(near);
-    points
-        .map(|(pair, (one, two))| pair.points([one, two], border_noises))
-        .collect()
+    choose_points(&pairs, [first.points(), second.points()], border_noises)
 }
 
 /// Covariance of the non-rigid part of the registration error at each matched stone, m^2, as assumed for clouds
@@ -240,6 +204,7 @@ fn relative_errors(
         name: String::new(),
         epoch,
         has_times: false,
+        same_as: None,
     });
     let sight = |source, stone: &Stone| SourcePoints {
         source,
@@ -257,7 +222,6 @@ fn relative_errors(
         .collect();
     let pair = EpochPair {
         sources: &sources,
-        same_as: &[0, 1],
         stones: &seen,
         neighbours: &[],
         stable: &[],

@@ -5,11 +5,11 @@ use crate::files::write_readable_json;
 use crate::results::names::EVALUATION_TRUTH;
 use crate::results::records::Datum;
 use crate::results::{ResultSet, StoneRow};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use std::fs;
 use std::path::Path;
 use stonewise_core::evaluate::{
-    Evaluation, EvaluationParams, RotationEstimate, StoneOutcome, TrueStone, owners_by_centroid,
+    Evaluation, EvaluationParams, RotationEstimate, StoneOutcome, TrueStone, owned_by_nearest,
     score_against_truth, score_neighbours, score_rotations,
 };
 use stonewise_core::id::StoneId;
@@ -38,12 +38,11 @@ pub fn evaluate_truth(results: &Path, truth: &Path, params: &EvaluationParams) -
         .iter()
         .map(|row| outcome(row, normal(row), set.datum()))
         .collect();
-    let centroids: Vec<Point3<f64>> = outcomes.iter().map(|o| o.centroid).collect();
-    let owners = owners_by_centroid(&centroids, &stones, params);
+    let outcomes = owned_by_nearest(outcomes, &stones, params);
     let mut evaluation = Evaluation::new(truth.display().to_string(), params);
-    evaluation.external = Some(score_against_truth(&outcomes, &owners, &stones, params));
-    evaluation.rotations = score_rotations(&outcomes, &owners, &stones, params);
-    evaluation.neighbours = score_neighbours(&outcomes, &owners, &stones, &set.neighbours, params);
+    evaluation.external = Some(score_against_truth(&outcomes, &stones, params));
+    evaluation.rotations = score_rotations(&outcomes, &stones, params);
+    evaluation.neighbours = score_neighbours(&outcomes, &stones, &set.neighbours, params);
     write_readable_json(&results.join(EVALUATION_TRUTH), &evaluation)?;
     Ok(evaluation)
 }

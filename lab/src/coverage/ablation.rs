@@ -40,6 +40,7 @@ fn merged(mut survey: Survey) -> Survey {
             name: format!("{epoch}"),
             epoch,
             has_times: false,
+            same_as: None,
         })
         .into();
     survey

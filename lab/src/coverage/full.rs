@@ -95,6 +95,7 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
                 name: format!("{}/{}", s / count, s % count),
                 epoch: s / count,
                 has_times: true,
+                same_as: None,
             })
             .collect(),
         stones: Vec::new(),

@@ -82,10 +82,8 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
         false => simulate(case, seed),
     };
     let survey = kept.apply(survey);
-    let same: Vec<usize> = (0..survey.sources.len()).collect();
     let pair = EpochPair {
         sources: &survey.sources,
-        same_as: &same,
         stones: &survey.stones,
         neighbours: &[],
         stable: &survey.stable,

@@ -61,12 +61,12 @@ pub fn pairs(
         .filter(|id| *id > 0 && second.contains_key(id))
         .collect();
     let centroids: Vec<Point3<f64>> = ids.iter().map(|id| mean(&first[id])).collect();
-    let moved: Vec<Vector3<f64>> = ids
+    let moved: Vec<(Point3<f64>, Vector3<f64>)> = ids
         .iter()
         .zip(&centroids)
-        .map(|(id, c)| mean(&second[id]) - c)
+        .map(|(id, c)| (*c, mean(&second[id]) - c))
         .collect();
-    let shifts = local_shifts(&centroids, &moved);
+    let shifts = local_shifts(&moved);
     let surroundings = Surroundings::new(epochs);
     ids.par_iter()
         .zip(&centroids)

@@ -1,6 +1,5 @@
 //! Results against the truth of a simulated survey.
 
-use crate::change::ChangeField;
 use crate::cloud::GridIndex;
 use crate::evaluate::detection::share;
 use crate::evaluate::{EvaluationParams, MotionSample, MotionScore, StoneOutcome, score_motions};
@@ -30,8 +29,8 @@ pub struct TrueStone {
     pub visible_share: f64,
 }
 
-/// True stone that a result belongs to; `None` where there is none.
-pub type Owner = Option<StoneId>;
+/// A row of results, and the true stone that it belongs to; `None` where there is none.
+pub type Owned = (StoneOutcome, Option<StoneId>);
 
 /// Results against truth, missing stones included.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -67,43 +66,27 @@ impl TrueStone {
     }
 }
 
-/// Owners of result centroids by the nearest truly labelled point (0 is no stone) within `owner_reach_m`.
-///
-/// `labelled` indexes the points that `labels` runs parallel to.
-pub fn owners_by_labels(
-    centroids: &[Point3<f64>],
-    labelled: &GridIndex,
-    labels: &[u32],
-    params: &EvaluationParams,
-) -> Vec<Owner> {
-    centroids
-        .iter()
-        .map(|c| labelled.nearest(c, params.owner_reach_m))
-        .map(|hit| hit.map(|(i, _)| labels[i]).filter(|&id| id != 0).map(StoneId))
-        .collect()
-}
-
-/// Owners of result centroids by the nearest true centroid within `owner_reach_m`: for truth without labels.
-pub fn owners_by_centroid(
-    centroids: &[Point3<f64>],
+/// The rows with their owners: the true stone whose centroid is nearest, within `owner_reach_m`.
+pub fn owned_by_nearest(
+    outcomes: Vec<StoneOutcome>,
     stones: &[TrueStone],
     params: &EvaluationParams,
-) -> Vec<Owner> {
+) -> Vec<Owned> {
     let index = GridIndex::new(&stones.iter().map(|s| s.centroid).collect::<Vec<_>>(), 0.2);
-    centroids
-        .iter()
-        .map(|c| index.nearest(c, params.owner_reach_m))
-        .map(|hit| hit.map(|(i, _)| stones[i].stone_id))
-        .collect()
+    let owner = |outcome: &StoneOutcome| index.nearest(&outcome.centroid, params.owner_reach_m);
+    let owned = outcomes.into_iter().map(|outcome| {
+        let owner = owner(&outcome).map(|(i, _)| stones[i].stone_id);
+        (outcome, owner)
+    });
+    owned.collect()
 }
 
-/// Scores result rows against a simulated survey; `owners` runs parallel to `outcomes`.
+/// Scores result rows against a simulated survey.
 ///
 /// The truth of a row is the rigid motion of its owner, evaluated at the row's centroid; directions are those
 /// of the true face. Loose stones are compared where both sides say.
 pub fn score_against_truth(
-    outcomes: &[StoneOutcome],
-    owners: &[Owner],
+    outcomes: &[Owned],
     stones: &[TrueStone],
     params: &EvaluationParams,
 ) -> TruthScore {
@@ -111,7 +94,7 @@ pub fn score_against_truth(
         of_stone: rows,
         duplicates: duplicate_rows,
         foreign: foreign_rows,
-    } = Rows::new(outcomes, owners, stones);
+    } = Rows::new(outcomes, stones);
     let by_id: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let countable: Vec<&TrueStone> = by_id.into_values().filter(|s| s.is_countable(params)).collect();
     let (mut without_row, mut without_motion, mut samples) = (Vec::new(), Vec::new(), Vec::new());
@@ -149,15 +132,14 @@ pub(super) struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    /// `owners` runs parallel to `outcomes`.
-    pub(super) fn new(outcomes: &'a [StoneOutcome], owners: &[Owner], stones: &[TrueStone]) -> Self {
+    pub(super) fn new(outcomes: &'a [Owned], stones: &[TrueStone]) -> Self {
         let by_id: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
         let mut rows = Self {
             of_stone: BTreeMap::new(),
             duplicates: 0,
             foreign: 0,
         };
-        for (outcome, owner) in outcomes.iter().zip(owners) {
+        for (outcome, owner) in outcomes {
             let Some(stone) = owner.and_then(|id| by_id.get(&id)) else {
                 rows.foreign += 1;
                 continue;
@@ -179,40 +161,9 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Scores M3C2 against a simulated survey; `owners` runs parallel to the core points.
-///
-/// The truth of a core point is the rigid motion of the countable stone that owns it; core points on anything
-/// else are left out.
-pub fn score_change_against_truth(
-    field: &ChangeField,
-    owners: &[Owner],
-    stones: &[TrueStone],
-    params: &EvaluationParams,
-) -> MotionScore {
-    let countable: BTreeMap<StoneId, &TrueStone> = stones
-        .iter()
-        .filter(|s| s.is_countable(params))
-        .map(|s| (s.stone_id, s))
-        .collect();
-    let owned: Vec<_> = field
-        .points
-        .iter()
-        .zip(owners)
-        .filter_map(|(p, owner)| Some((p, *countable.get(&(*owner)?)?)))
-        .collect();
-    let samples: Vec<_> = owned
-        .iter()
-        .filter_map(|(p, stone)| {
-            MotionSample::of_change(p, &stone.normal, stone.displacement_at(&p.position))
-        })
-        .collect();
-    score_motions(&samples, owned.len(), params)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::change::ChangePoint;
 
     fn stone(stone_id: u32, y: f64) -> TrueStone {
         TrueStone {
@@ -225,11 +176,6 @@ mod tests {
             edge: stone_id == 4,
             visible_share: if stone_id == 5 { 0.2 } else { 0.9 },
         }
-    }
-
-    /// 0: none.
-    fn owner(id: u32) -> Owner {
-        (id != 0).then_some(StoneId(id))
     }
 
     fn row(y: f64, displacement: Option<Vector3<f64>>) -> StoneOutcome {
@@ -261,7 +207,7 @@ mod tests {
         let params = EvaluationParams::default();
         let stones: Vec<_> = (1..=6).map(|id| stone(id, f64::from(id))).collect();
         let d = Some(Vector3::new(0.01, 0.0, 0.0));
-        let rows = [
+        let rows = vec![
             row(1.04, Some(Vector3::zeros())),
             row(1.01, d),
             row(2.0, d),
@@ -269,10 +215,10 @@ mod tests {
             row(4.0, d),
             row(9.0, d),
         ];
-        let centroids: Vec<_> = rows.iter().map(|r| r.centroid).collect();
-        let owners = owners_by_centroid(&centroids, &stones, &params);
-        assert_eq!(owners, [1, 1, 2, 3, 4, 0].map(owner));
-        let score = score_against_truth(&rows, &owners, &stones, &params);
+        let rows = owned_by_nearest(rows, &stones, &params);
+        let owners: Vec<u32> = rows.iter().map(|r| r.1.map_or(0, |id| id.0)).collect();
+        assert_eq!(owners, [1, 1, 2, 3, 4, 0]);
+        let score = score_against_truth(&rows, &stones, &params);
         assert_eq!((score.countable, score.found), (4, 2));
         assert_eq!(
             (score.without_row, score.without_motion),
@@ -283,46 +229,5 @@ mod tests {
         assert_eq!((loose.reported, loose.truly_loose, loose.right), (2, 1, 1));
         // The row at 1.01 counts: off by the turn over 1 cm.
         assert!(score.motions.errors.norm_3d.unwrap().rmse_m < 2e-4);
-    }
-
-    #[test]
-    fn core_points_take_the_motion_of_the_stone_they_lie_on() {
-        let params = EvaluationParams::default();
-        let stones: Vec<_> = (1..=5).map(|id| stone(id, f64::from(id))).collect();
-        let point = |y: f64, distance_m| ChangePoint {
-            position: Point3::new(0.0, y, 0.0),
-            normal: Vector3::x(),
-            distance_m,
-            detection_limit_m: Some(0.002),
-            spread_m: [Some(0.001); 2],
-            counts: [30; 2],
-        };
-        let truth = stones[0].displacement_at(&Point3::new(0.0, 1.2, 0.0));
-        let field = ChangeField {
-            points: vec![
-                point(1.2, Some(truth.x)),
-                point(2.0, None),
-                point(4.0, Some(1.0)),
-                point(5.0, Some(1.0)),
-                point(7.0, Some(1.0)),
-            ],
-        };
-        let owners = [1, 2, 4, 5, 0].map(owner);
-        let score = score_change_against_truth(&field, &owners, &stones, &params);
-        assert_eq!((score.expected, score.estimated), (2, 1));
-        assert!(score.errors.out_of_plane.unwrap().rmse_m < 1e-15);
-        assert!((score.errors.along.unwrap().mean_m + truth.y).abs() < 1e-15);
-    }
-
-    #[test]
-    fn labels_under_the_centroid_name_the_owner() {
-        let points: Vec<_> = (0..10)
-            .map(|i| Point3::new(0.02, 0.1 * f64::from(i), 0.0))
-            .collect();
-        let labels = [1, 1, 1, 0, 2, 2, 2, 2, 2, 2];
-        let index = GridIndex::new(&points, 0.1);
-        let centroids = [0.11, 0.29, 0.52, 3.0].map(|y| Point3::new(0.0, y, 0.0));
-        let owners = owners_by_labels(&centroids, &index, &labels, &EvaluationParams::default());
-        assert_eq!(owners, [1, 0, 2, 0].map(owner));
     }
 }

@@ -40,13 +40,6 @@ impl LabelConfusion {
         *self.counts.entry((predicted, truth)).or_default() += 1;
     }
 
-    /// Counts points whose labels run in parallel.
-    pub fn extend(&mut self, predicted: &[u32], truth: &[u32]) {
-        for (&p, &t) in predicted.iter().zip(truth) {
-            self.add(p, t);
-        }
-    }
-
     /// Number of points with this pair of labels.
     pub fn count(&self, predicted: u32, truth: u32) -> u64 {
         self.counts.get(&(predicted, truth)).copied().unwrap_or(0)

@@ -23,10 +23,7 @@ pub use calibration::{Calibration, Coverage};
 pub use definitions::definitions;
 pub use detection::{Detection, LooseDetection};
 pub use evaluation::Evaluation;
-pub use external_truth::{
-    Owner, TrueStone, TruthScore, owners_by_centroid, owners_by_labels, score_against_truth,
-    score_change_against_truth,
-};
+pub use external_truth::{Owned, TrueStone, TruthScore, owned_by_nearest, score_against_truth};
 pub use instances::InstanceScore;
 pub use labels::{LabelConfusion, LabelScore};
 pub use matches::{MatchScore, score_matches};

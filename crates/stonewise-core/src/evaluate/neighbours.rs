@@ -1,7 +1,7 @@
 //! Motions of neighbours relative to each other.
 
 use super::calibration::Calibration;
-use super::external_truth::{Owner, TrueStone};
+use super::external_truth::{Owned, TrueStone};
 use super::sample::{EvaluationParams, MotionSample, StoneOutcome};
 use super::score::{Directions, directions};
 use crate::id::StoneId;
@@ -21,11 +21,10 @@ pub struct NeighbourScore {
     pub calibration: Calibration,
 }
 
-/// Scores the differences between neighbours whose true stones are countable; `owners` runs parallel to
-/// `outcomes`. `None` without such neighbours.
+/// Scores the differences between neighbours whose true stones are countable. `None` without such
+/// neighbours.
 pub fn score_neighbours(
-    outcomes: &[StoneOutcome],
-    owners: &[Owner],
+    outcomes: &[Owned],
     stones: &[TrueStone],
     neighbours: &[NeighbourCovariance],
     params: &EvaluationParams,
@@ -33,7 +32,6 @@ pub fn score_neighbours(
     let true_stones: BTreeMap<StoneId, &TrueStone> = stones.iter().map(|s| (s.stone_id, s)).collect();
     let known: BTreeMap<StoneId, (&StoneOutcome, &TrueStone)> = outcomes
         .iter()
-        .zip(owners)
         .filter_map(|(outcome, owner)| Some((outcome.stone, (outcome, *true_stones.get(&(*owner)?)?))))
         .filter(|(_, (_, stone))| stone.is_countable(params))
         .collect();
@@ -97,22 +95,21 @@ mod tests {
             edge: false,
             visible_share: 1.0,
         };
-        let outcomes: Vec<StoneOutcome> = (0..3).map(outcome).collect();
+        let outcomes: Vec<Owned> = (0..3).map(|k| (outcome(k), Some(StoneId(k + 10)))).collect();
         let stones: Vec<TrueStone> = (0..3).map(stone).collect();
-        let owners: Vec<Owner> = (0..3).map(|k| Some(StoneId(k + 10))).collect();
         let pair = |a: u32, b: u32| NeighbourCovariance {
             stones: [StoneId(a), StoneId(b)],
             covariance: Matrix3::identity() * 1e-6,
         };
         let pairs = [pair(0, 1), pair(1, 2), pair(2, 7)];
         let params = EvaluationParams::default();
-        let score = score_neighbours(&outcomes, &owners, &stones, &pairs, &params).unwrap();
+        let score = score_neighbours(&outcomes, &stones, &pairs, &params).unwrap();
         // Errors of 1 and 3 mm with a stated standard deviation of 1 mm.
         assert_eq!(score.pairs, 2);
         let along = score.errors.along.unwrap();
         assert!((along.rmse_m - 5e-6f64.sqrt()).abs() < 1e-12);
         assert!((score.calibration.chi_square_mean.unwrap() - 5.0).abs() < 1e-9);
         assert_eq!(score.calibration.coverage_95.along, Some(0.5));
-        assert!(score_neighbours(&outcomes, &owners, &stones, &pairs[2..], &params).is_none());
+        assert!(score_neighbours(&outcomes, &stones, &pairs[2..], &params).is_none());
     }
 }

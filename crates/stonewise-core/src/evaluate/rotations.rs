@@ -1,7 +1,7 @@
 //! Rotations of stones against the truth.
 
 use super::calibration::{Calibration, Claim};
-use super::external_truth::{Owner, Rows, TrueStone};
+use super::external_truth::{Owned, Rows, TrueStone};
 use super::sample::{
     EvaluationParams, MotionSample, RotationEstimate, StoneOutcome, half_widths, normalised,
 };
@@ -108,17 +108,16 @@ impl RotationSample {
     }
 }
 
-/// Scores the rotations of countable stones; `owners` runs parallel to `outcomes`. `None` without rotations.
+/// Scores the rotations of countable stones. `None` without rotations.
 ///
 /// The error is the rotation vector from the true to the estimated orientation; the rotation of a rigid stone
 /// does not depend on its centroid. The common rigid motions are those fitted to the displacements.
 pub fn score_rotations(
-    outcomes: &[StoneOutcome],
-    owners: &[Owner],
+    outcomes: &[Owned],
     stones: &[TrueStone],
     params: &EvaluationParams,
 ) -> Option<RotationScore> {
-    let rows = Rows::new(outcomes, owners, stones).of_stone;
+    let rows = Rows::new(outcomes, stones).of_stone;
     let found: Vec<(&StoneOutcome, &TrueStone)> = stones
         .iter()
         .filter(|s| s.is_countable(params))
@@ -226,9 +225,9 @@ mod tests {
     }
 
     fn score(rows: Vec<(StoneOutcome, TrueStone)>) -> RotationScore {
-        let owners: Vec<Owner> = rows.iter().map(|r| Some(r.1.stone_id)).collect();
-        let (outcomes, stones): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
-        score_rotations(&outcomes, &owners, &stones, &EvaluationParams::default()).unwrap()
+        let owned = |(outcome, stone): (StoneOutcome, TrueStone)| ((outcome, Some(stone.stone_id)), stone);
+        let (outcomes, stones): (Vec<Owned>, Vec<_>) = rows.into_iter().map(owned).unzip();
+        score_rotations(&outcomes, &stones, &EvaluationParams::default()).unwrap()
     }
 
     #[test]

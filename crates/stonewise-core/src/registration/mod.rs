@@ -17,5 +17,6 @@ pub use adjustment::{
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;
 pub use points::{
-    MemoryPairs, NearPoint, PairPoints, PairSource, StonePoints, Window, local_shifts, stone_points,
+    MatchedPair, MemoryPairs, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, StonePoints,
+    Window, choose_points, local_shifts, stone_points,
 };

@@ -30,18 +30,20 @@ pub(super) fn gather_atoms<T: TileSource>(
     progress: &dyn Progress,
 ) -> Result<Vec<Atom>, TransferError> {
     let mut sums: CellMap<Signature, (u32, Vec<f64>)> = CellMap::default();
-    progress.begin("sightings", tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
-        let candidates = observer.candidates(&tiles.bounds(tile));
-        if !candidates.is_empty() {
-            let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-            for sightings in sample(observer, tile, &cloud, &candidates, sample_m) {
-                add(&mut sums, &sightings);
+    progress.each(
+        "sightings",
+        0..tiles.tile_count(),
+        |tile| -> Result<(), TransferError> {
+            let candidates = observer.candidates(&tiles.bounds(tile));
+            if !candidates.is_empty() {
+                let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+                for sightings in sample(observer, tile, &cloud, &candidates, sample_m) {
+                    add(&mut sums, &sightings);
+                }
             }
-        }
-        progress.advance(1);
-    }
+            Ok(())
+        },
+    )?;
     let mut atoms: Vec<Atom> = sums.into_iter().map(finish).collect();
     atoms.sort_unstable_by(|a, b| keys(a).cmp(keys(b)));
     Ok(atoms)

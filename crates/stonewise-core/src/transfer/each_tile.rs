@@ -15,9 +15,7 @@ pub(super) fn each_tile<T: TileSource, S: LabelStore>(
     progress: &dyn Progress,
     mut visit: impl FnMut(usize, &Cloud, &TileLabels),
 ) -> Result<(), TransferError> {
-    progress.begin(what, tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
+    progress.each(what, 0..tiles.tile_count(), |tile| {
         let labels = store.read(tile).map_err(|e| TransferError::labels(tile, e))?;
         let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
         let count = labels.stone.len().min(labels.confidence.len());
@@ -29,7 +27,6 @@ pub(super) fn each_tile<T: TileSource, S: LabelStore>(
             });
         }
         visit(tile, &cloud, &labels);
-        progress.advance(1);
-    }
-    Ok(())
+        Ok(())
+    })
 }

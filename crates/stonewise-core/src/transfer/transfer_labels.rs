@@ -250,9 +250,7 @@ impl<'a> PreparedTransfer<'a> {
         let names = Names::of(&electorate, &self.election.overlaps, self.observer.views());
         let link_m = self.params.island_link_m.max(3.0 * self.election.spacing_m);
         let mut occupancy = Occupancy::new(link_m);
-        progress.begin("labels", range.len() as u64);
-        for tile in range {
-            progress.check()?;
+        progress.each("labels", range, |tile| {
             let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
             let candidates = self.observer.candidates(&tiles.bounds(tile));
             let labels = label_tile(tile, &cloud, &self.observer, &candidates, &electorate, &names);
@@ -260,9 +258,8 @@ impl<'a> PreparedTransfer<'a> {
             occupancy.add_all(labelled.map(|(i, &stone)| (stone, cloud.world(i))));
             store
                 .write(tile, &labels)
-                .map_err(|e| TransferError::labels(tile, e))?;
-            progress.advance(1);
-        }
+                .map_err(|e| TransferError::labels(tile, e))
+        })?;
         Ok(occupancy)
     }
 }
@@ -301,29 +298,24 @@ fn load_masks<'a, E: std::error::Error + Send + Sync + 'static>(
     progress: &dyn Progress,
 ) -> Result<Vec<(&'a View, RunLabels)>, TransferError> {
     let mut masked = Vec::new();
-    progress.begin("masks", views.len() as u64);
-    for view in views {
-        progress.check()?;
+    progress.each("masks", views, |view| {
         let image = mask(view.image).map_err(|e| TransferError::Mask {
             photo: view.name.clone(),
             source: Box::new(e),
         })?;
-        if let Some(image) = image {
-            let (found, expected) = (
-                [image.width(), image.height()],
-                [view.camera.width, view.camera.height],
-            );
-            if found != expected {
-                return Err(TransferError::MaskSize {
-                    photo: view.name.clone(),
-                    mask: found,
-                    camera: expected,
-                });
-            }
-            masked.push((view, RunLabels::new(&image)));
+        let Some(image) = image else { return Ok(()) };
+        let found = [image.width(), image.height()];
+        let expected = [view.camera.width, view.camera.height];
+        if found != expected {
+            return Err(TransferError::MaskSize {
+                photo: view.name.clone(),
+                mask: found,
+                camera: expected,
+            });
         }
-        progress.advance(1);
-    }
+        masked.push((view, RunLabels::new(&image)));
+        Ok(())
+    })?;
     if masked.is_empty() {
         return Err(TransferError::NoMasks { photos: views.len() });
     }
@@ -372,25 +364,22 @@ fn remove<T: TileSource, S: LabelStore>(
             }
         })
         .collect();
-    progress.begin("islands", tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        progress.check()?;
+    progress.each("islands", 0..tiles.tile_count(), |tile| {
         let bounds = tiles.bounds(tile);
-        if boxes.iter().any(|b| b.intersects(&bounds)) {
-            let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-            let mut labels = store.read(tile).map_err(|e| TransferError::labels(tile, e))?;
-            for (i, stone) in labels.stone.iter_mut().enumerate() {
-                if *stone != 0 && removal.takes(*stone, &cloud.world(i)) {
-                    *stone = 0;
-                }
-            }
-            store
-                .write(tile, &labels)
-                .map_err(|e| TransferError::labels(tile, e))?;
+        if !boxes.iter().any(|b| b.intersects(&bounds)) {
+            return Ok(());
         }
-        progress.advance(1);
-    }
-    Ok(())
+        let cloud = tiles.load(tile).map_err(|e| TransferError::tile(tile, e))?;
+        let mut labels = store.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+        for (i, stone) in labels.stone.iter_mut().enumerate() {
+            if *stone != 0 && removal.takes(*stone, &cloud.world(i)) {
+                *stone = 0;
+            }
+        }
+        store
+            .write(tile, &labels)
+            .map_err(|e| TransferError::labels(tile, e))
+    })
 }
 
 /// Outward names of stones, photos and instances.

@@ -43,7 +43,8 @@ pub fn spoil_masks(labels: &LabelImage, error: MaskError, seed: u64) -> LabelIma
 /// `None` without true instances.
 pub fn mean_iou(labels: &LabelImage, truth: &LabelImage) -> Option<f64> {
     let mut confusion = LabelConfusion::default();
-    confusion.extend(labels.data(), truth.data());
+    let pixels = labels.data().iter().zip(truth.data());
+    pixels.for_each(|(predicted, truth)| confusion.add(*predicted, *truth));
     confusion.score_instances().mean_iou_all
 }
 

@@ -8,7 +8,6 @@ mod clouds_only;
 mod context;
 mod doubts;
 mod look;
-mod matched_pairs;
 mod outputs;
 mod run;
 mod steps;
@@ -17,7 +16,6 @@ mod until;
 
 pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
-pub use matched_pairs::{MatchedPair, PairPlaces};
 pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
 pub(crate) use steps::segment::segment;

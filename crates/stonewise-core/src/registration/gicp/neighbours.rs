@@ -15,19 +15,19 @@ const FAR_M: f64 = 5.0;
 
 /// Fills in `relative`, `relative_covariance`, `own_motion_p` and `loose` of every measured stone.
 ///
-/// `centroids`: first epoch, world, one per result. The motion that a stone should have is the median, axis
+/// `stones`: each with its centroid in the first epoch, world. The motion that a stone should have is the median, axis
 /// by axis, of its nearest measured neighbours; its variance is that of a median of as many values (pi / 2k
 /// times theirs), with the spread the neighbours really have. Loose are the stones whose difference is
 /// significant with the false discovery rate controlled (Benjamini & Hochberg 1995).
-pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>], params: &GicpParams) {
-    let measured: Vec<usize> = (0..results.len())
-        .filter(|&i| results[i].motion.is_ok())
+pub fn relate_to_neighbours(stones: &mut [(Point3<f64>, PairResult)], params: &GicpParams) {
+    let measured: Vec<usize> = (0..stones.len())
+        .filter(|&i| stones[i].1.motion.is_ok())
         .collect();
-    let places: Vec<Point3<f64>> = measured.iter().map(|&i| centroids[i]).collect();
+    let places: Vec<Point3<f64>> = measured.iter().map(|&i| stones[i].0).collect();
     let index = GridIndex::new(&places, 0.5);
     let relatives: Vec<Option<(Vector3<f64>, Matrix3<f64>)>> = (0..measured.len())
         .map(|m| {
-            let motion = |m: usize| results[measured[m]].motion.as_ref().ok();
+            let motion = |m: usize| stones[measured[m]].1.motion.as_ref().ok();
             let others: Vec<&StoneMotion> = index
                 .nearest_k(&places[m], params.neighbours + 1, FAR_M)
                 .iter()
@@ -37,9 +37,9 @@ pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>
             Some(relative(motion(m)?, &others))
         })
         .collect();
-    let mut tests = vec![None; results.len()];
+    let mut tests = vec![None; stones.len()];
     for (&i, found) in measured.iter().zip(relatives) {
-        if let (Ok(motion), Some((difference, covariance))) = (&mut results[i].motion, found) {
+        if let (Ok(motion), Some((difference, covariance))) = (&mut stones[i].1.motion, found) {
             motion.relative = difference;
             motion.relative_covariance = covariance;
             motion.own_motion_p = p_value(&difference, &covariance);
@@ -47,7 +47,7 @@ pub fn relate_to_neighbours(results: &mut [PairResult], centroids: &[Point3<f64>
         }
     }
     for i in discoveries(&tests, params.false_discovery_rate) {
-        if let Ok(motion) = &mut results[i].motion {
+        if let Ok(motion) = &mut stones[i].1.motion {
             motion.loose = true;
         }
     }

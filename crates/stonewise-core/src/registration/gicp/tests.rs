@@ -238,14 +238,9 @@ fn too_few_points_and_missing_surroundings_are_said() {
 fn one_stone_among_still_ones_is_loose() {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let sigma = 5e-4;
-    let mut centroids = Vec::new();
-    let mut results = Vec::new();
+    let mut stones = Vec::new();
     for id in 0..100u32 {
-        centroids.push(Point3::new(
-            f64::from(id % 10) * 0.3,
-            f64::from(id / 10) * 0.2,
-            0.0,
-        ));
+        let centroid = Point3::new(f64::from(id % 10) * 0.3, f64::from(id / 10) * 0.2, 0.0);
         let error =
             Vector3::from_fn(|_, _| sigma * (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>());
         let own = if id == 44 {
@@ -253,7 +248,7 @@ fn one_stone_among_still_ones_is_loose() {
         } else {
             Vector3::zeros()
         };
-        results.push(PairResult {
+        let result = PairResult {
             first: StoneId(id),
             second: StoneId(id),
             motion: Ok(StoneMotion {
@@ -269,14 +264,15 @@ fn one_stone_among_still_ones_is_loose() {
                 observability: 1.0,
                 rmse_m: 0.0,
             }),
-        });
+        };
+        stones.push((centroid, result));
     }
-    relate_to_neighbours(&mut results, &centroids, &GicpParams::default());
+    relate_to_neighbours(&mut stones, &GicpParams::default());
     let loose: Vec<usize> = (0..100)
-        .filter(|&i| results[i].motion.as_ref().unwrap().loose)
+        .filter(|&i| stones[i].1.motion.as_ref().unwrap().loose)
         .collect();
     assert_eq!(loose, [44]);
-    let relative = results[44].motion.as_ref().unwrap().relative;
+    let relative = stones[44].1.motion.as_ref().unwrap().relative;
     assert!((relative - Vector3::new(0.0, 0.004, 0.0)).norm() < 5.0 * sigma);
 }
 

@@ -48,13 +48,8 @@ pub(super) fn cross_check(
     if offered.len() < params.stable.min_cells {
         return None;
     }
-    let unknowns = Unknowns::new(
-        pair.sources,
-        pair.same_as,
-        &all_sights(pair, &offered),
-        model.class,
-    )
-    .with_planes(&offered);
+    let unknowns =
+        Unknowns::new(pair.sources, &all_sights(pair, &offered), model.class).with_planes(&offered);
     let all: Vec<&Observation> = within.iter().flatten().chain(&offered).collect();
     let judging = model.widened(&unknowns, &all);
     let (kept, _) = standing(&unknowns, within, offered, &judging);

@@ -120,7 +120,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     let mut within: [Vec<Observation>; 2] =
         [0, 1].map(|e| contrasts(pair.sources, pair.stones, e, &params.contrasts));
     let stable = stable_observations(pair.stable, pair.sigma_m, &params.stable);
-    let unknowns = Unknowns::new(pair.sources, pair.same_as, &all_sights(pair, &stable), class);
+    let unknowns = Unknowns::new(pair.sources, &all_sights(pair, &stable), class);
     let (components, significance) = estimated(&unknowns, &mut within, class);
     let overlaps = within.iter().all(|w| !w.is_empty());
     let is_significant = overlaps && significance > SIGNIFICANT;
@@ -201,7 +201,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
 
 /// Whether sources of the later epoch have the error of sources of the reference.
 fn is_one_survey(pair: &EpochPair) -> bool {
-    pair.same_as.iter().enumerate().any(|(s, &same)| s != same)
+    pair.sources.iter().any(|s| s.same_as.is_some())
 }
 
 /// Number of sources of each epoch.

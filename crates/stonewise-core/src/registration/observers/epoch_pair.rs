@@ -28,9 +28,6 @@ pub struct EpochErrorParams {
 pub struct EpochPair<'a> {
     /// Sources of both epochs.
     pub sources: &'a [Source],
-    /// For each source, the source whose error it shares: itself, or for halves of one survey that of the
-    /// other half.
-    pub same_as: &'a [usize],
     /// The stones.
     pub stones: &'a [SeenStone],
     /// Pairs of neighbours among them, as indices.

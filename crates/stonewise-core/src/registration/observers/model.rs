@@ -102,23 +102,24 @@ impl Prior {
 pub(super) type Row = Vec<(usize, Matrix3<f64>)>;
 
 impl Unknowns {
-    /// `same_as[s]`: the source whose error source s shares, itself where it has its own.
-    pub fn new(sources: &[Source], same_as: &[usize], sights: &[Sight], class: SensorClass) -> Self {
+    /// The unknowns of these sources, which see these sights.
+    pub fn new(sources: &[Source], sights: &[Sight], class: SensorClass) -> Self {
         let mut blocks = Vec::new();
         let mut of_source = vec![0; sources.len()];
         let mut first = 0;
         let blocks_of = |epoch| {
-            let own = (0..sources.len()).filter(|&s| same_as[s] == s);
-            own.filter(|&s| sources[s].epoch == epoch).count()
+            let own = sources.iter().filter(|s| s.same_as.is_none());
+            own.filter(|s| s.epoch == epoch).count()
         };
-        for s in 0..sources.len() {
-            if same_as[s] != s {
-                of_source[s] = of_source[same_as[s]];
+        for (s, source) in sources.iter().enumerate() {
+            if let Some(same) = source.same_as {
+                of_source[s] = of_source[same];
                 continue;
             }
-            let seen: Vec<&Sight> = sights.iter().filter(|x| same_as[x.source] == s).collect();
-            let is_alone = blocks_of(sources[s].epoch) == 1;
-            let block = Block::new(first, &seen, &sources[s], is_alone);
+            let is_seen = |x: &&Sight| sources[x.source].same_as.unwrap_or(x.source) == s;
+            let seen: Vec<&Sight> = sights.iter().filter(is_seen).collect();
+            let is_alone = blocks_of(source.epoch) == 1;
+            let block = Block::new(first, &seen, source, is_alone);
             first += 6 + 3 * block.knots.len();
             of_source[s] = blocks.len();
             blocks.push(block);

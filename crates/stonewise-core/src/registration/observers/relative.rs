@@ -42,7 +42,7 @@ pub(super) fn relative_errors(
             ..s.clone()
         })
         .collect();
-    let unknowns = Unknowns::new(&sources, pair.same_as, &all_sights(pair, &[]), class);
+    let unknowns = Unknowns::new(&sources, &all_sights(pair, &[]), class);
     let merged = class.merged();
     let sd_m = params.merged_error_m.unwrap_or(merged.sd_m);
     let prior = Prior {

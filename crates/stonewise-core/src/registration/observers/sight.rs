@@ -13,6 +13,8 @@ pub struct Source {
     /// Whether its points carry times that can order its errors; otherwise their place along the source
     /// stands in.
     pub has_times: bool,
+    /// The source whose error it shares, as halves of one survey do; `None`: it has its own.
+    pub same_as: Option<usize>,
 }
 
 /// A stone, or another small part of the wall, as the sources of both epochs show it.

@@ -23,6 +23,7 @@ fn sources(count: usize) -> Vec<Source> {
             name: format!("{s}"),
             epoch: s / count,
             has_times: true,
+            same_as: None,
         })
         .collect()
 }
@@ -82,8 +83,7 @@ fn the_size_of_the_sources_errors_is_found_within_its_sampling_range() {
         .collect();
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let same: Vec<usize> = (0..2 * count).collect();
-    let unknowns = Unknowns::new(&sources(count), &same, &sights, SensorClass::Airborne);
+    let unknowns = Unknowns::new(&sources(count), &sights, SensorClass::Airborne);
     let found = estimate(&Problem::new(&unknowns, &all), SensorClass::Airborne);
     assert!((0.0022..0.0042).contains(&found.translation_m), "{found:?}");
     assert!(found.drift_m < 0.001 && found.noise_scale < 1.5, "{found:?}");
@@ -125,9 +125,8 @@ fn a_stretch_that_all_stations_share_is_not_taken_for_errors_of_their_registrati
         .collect();
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let same: Vec<usize> = (0..2 * count).collect();
     let class = SensorClass::Terrestrial;
-    let unknowns = Unknowns::new(&sources(count), &same, &sights, class);
+    let unknowns = Unknowns::new(&sources(count), &sights, class);
     let problem = Problem::new(&unknowns, &all);
     let components = estimate(&problem, class);
     // The scatter of 72 shifts has a standard error of a tenth.
@@ -186,7 +185,7 @@ fn the_marginal_likelihood_is_that_of_the_dense_covariance() {
     let list: Vec<Observation> = list.into_iter().step_by(9).collect();
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns = Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights, SensorClass::Terrestrial);
+    let unknowns = Unknowns::new(&sources(2), &sights, SensorClass::Terrestrial);
     let problem = Problem::new(&unknowns, &all);
     let dense = |c: &ObserverComponents| {
         let (total, values) = dense(&unknowns, &all, &Prior::new(c, 1e-3), c);
@@ -304,7 +303,6 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     let found = |stable: &[StablePoints]| {
         let pair = EpochPair {
             sources: &sources,
-            same_as: &[0, 1, 2, 3],
             stones: &stones,
             neighbours: &[[0, 1], [0, 4], [3, 3]],
             stable,
@@ -356,8 +354,7 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     list.extend(cells.into_iter().step_by(12));
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
-    let unknowns =
-        Unknowns::new(&sources(2), &[0, 1, 2, 3], &sights, SensorClass::Airborne).with_planes(&list);
+    let unknowns = Unknowns::new(&sources(2), &sights, SensorClass::Airborne).with_planes(&list);
     let c = ObserverComponents::expected(SensorClass::Airborne);
     let prior = Prior::with_planes(&c, 0.01, 0.001);
     let problem = Problem::new(&unknowns, &all);
@@ -404,7 +401,6 @@ fn an_area_that_moved_is_named_and_left_out() {
         stable.extend(stable_area(2, &Vector3::new(5.0, 4.0, 0.0), &ERRORS, 0.002));
         let pair = EpochPair {
             sources: &sources,
-            same_as: &[0, 1, 2, 3],
             stones: &stones,
             neighbours: &[],
             stable: &stable,
@@ -437,7 +433,6 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
     let (stones, sources) = (wall(&errors, 0.002, 1), sources(2));
     let pair = EpochPair {
         sources: &sources,
-        same_as: &[0, 1, 2, 3],
         stones: &stones,
         neighbours: &[],
         stable: &stable_points(&errors, 0.002),
@@ -467,7 +462,6 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
         }
         let pair = EpochPair {
             sources: &sources,
-            same_as: &[0, 1, 2, 3],
             stones: &wall(&errors, 0.002, 1),
             neighbours: &[],
             stable: &[],
@@ -510,10 +504,10 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     {
         s.time_s -= 20.0;
     }
-    let sources = sources(2);
+    let mut sources = sources(2);
+    (0..2).for_each(|s| sources[2 + s].same_as = Some(s));
     let pair = EpochPair {
         sources: &sources,
-        same_as: &[0, 1, 0, 1],
         stones: &stones,
         neighbours: &[],
         stable: &[],
@@ -540,7 +534,6 @@ fn sources_without_errors_leave_the_datum_unknown() {
     let sources = sources(2);
     let pair = EpochPair {
         sources: &sources,
-        same_as: &[0, 1, 2, 3],
         stones: &stones,
         neighbours: &[],
         stable: &[],
@@ -585,7 +578,6 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
     let neighbours = [[4, 7], [0, 59]];
     let pair = EpochPair {
         sources: &sources(1),
-        same_as: &[0, 1],
         stones: &stones,
         neighbours: &neighbours,
         stable: &[],

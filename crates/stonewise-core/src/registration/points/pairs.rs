@@ -6,7 +6,9 @@ use crate::id::StoneId;
 use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
 
-/// The points of a stone in both epochs.
+/// The points of a stone in both epochs. [`choose_points`](crate::registration::choose_points) chooses them from
+/// labelled clouds in memory, [`MatchedPair::choose`](crate::registration::MatchedPair::choose) from what lies near a
+/// stone.
 #[derive(Clone, Debug)]
 pub struct PairPoints {
     /// Stone of the first epoch.
@@ -47,6 +49,7 @@ pub trait PairSource: Sync {
 }
 
 /// Pairs that are all in memory: for tests and for small surveys.
+#[derive(Debug)]
 pub struct MemoryPairs {
     pairs: Vec<PairPoints>,
 }

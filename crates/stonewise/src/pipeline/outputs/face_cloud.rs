@@ -36,32 +36,32 @@ pub fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) 
     };
     let crs = coordinate_system(context.project)?;
     let crs = crs.map(|c| c.text());
-    context.progress.begin("face cloud", tiles.tile_count() as u64);
     write_coloured_laz(
         &context.out.join(FACE_CLOUD),
         &bounds,
         &DIMENSIONS,
         crs.as_deref(),
         |out| {
-            for tile in 0..tiles.tile_count() {
-                context.progress.check()?;
-                let labels = first.labels(tile)?;
-                if labels.stone.iter().any(|s| *s != 0) {
-                    let cloud = tiles.load(tile)?;
-                    for (i, stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
-                        let row = by_id.get(stone).copied();
-                        let motion = row.and_then(|r| r.motion.as_ref());
-                        let mm = motion.map_or([f32::NAN; 5], |m| {
-                            let [a, u, o] = [m.face.x, m.face.y, m.face.z];
-                            [a, u, o, m.displacement.norm(), m.detection_limit_m].map(|v| (v * 1e3) as f32)
-                        });
-                        let numbers = [*stone as f32, mm[0], mm[1], mm[2], mm[3], mm[4]];
-                        out.push(cloud.world(i), colours.of(row), &numbers)?;
+            context
+                .progress
+                .each("face cloud", 0..tiles.tile_count(), |tile| {
+                    let labels = first.labels(tile)?;
+                    if labels.stone.iter().any(|s| *s != 0) {
+                        let cloud = tiles.load(tile)?;
+                        for (i, stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
+                            let row = by_id.get(stone).copied();
+                            let motion = row.and_then(|r| r.motion.as_ref());
+                            let mm = motion.map_or([f32::NAN; 5], |m| {
+                                let [a, u, o] = [m.face.x, m.face.y, m.face.z];
+                                [a, u, o, m.displacement.norm(), m.detection_limit_m]
+                                    .map(|v| (v * 1e3) as f32)
+                            });
+                            let numbers = [*stone as f32, mm[0], mm[1], mm[2], mm[3], mm[4]];
+                            out.push(cloud.world(i), colours.of(row), &numbers)?;
+                        }
                     }
-                }
-                context.progress.advance(1);
-            }
-            Ok(())
+                    Ok(())
+                })
         },
     )
 }

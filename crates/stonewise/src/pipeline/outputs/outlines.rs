@@ -39,17 +39,15 @@ pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<
 
 fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
-    context
-        .progress
-        .begin("outlines", first.ingested.tiles.tile_count() as u64);
-    for tile in 0..first.ingested.tiles.tile_count() {
-        context.progress.check()?;
-        let (cloud, labels) = (first.ingested.tiles.load(tile)?, first.labels(tile)?);
+    let tiles = &first.ingested.tiles;
+    let all = 0..tiles.tile_count();
+    context.progress.each("outlines", all, |tile| -> Result<()> {
+        let (cloud, labels) = (tiles.load(tile)?, first.labels(tile)?);
         for (i, &stone) in labels.stone.iter().enumerate().filter(|(_, s)| **s != 0) {
             points.entry(stone).or_default().push(cloud.world(i));
         }
-        context.progress.advance(1);
-    }
+        Ok(())
+    })?;
     let params = OutlineParams::default();
     let outline = |stone: &Stone| {
         let ring = face_outline(points.get(&stone.id.0)?, &stone.normal, &params)?;

@@ -74,9 +74,7 @@ fn gather(
     points: &mut Vec<SectionPoint>,
 ) -> Result<()> {
     let tiles = &epoch.ingested.tiles;
-    context.progress.begin("sections", tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        context.progress.check()?;
+    context.progress.each("sections", 0..tiles.tile_count(), |tile| {
         let labels = epoch.labels(tile)?;
         if labels.stone.iter().any(|s| searches.contains_key(s)) {
             let cloud = tiles.load(tile)?;
@@ -103,7 +101,6 @@ fn gather(
                 }
             }
         }
-        context.progress.advance(1);
-    }
-    Ok(())
+        Ok(())
+    })
 }

@@ -27,9 +27,8 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
     let tiles = &epoch.ingested.tiles;
     let every = tiles.surveyed.point_count().div_ceil(WANTED).max(1);
     let mut kept = Vec::new();
-    context.progress.begin("thin cloud", tiles.tile_count() as u64);
-    for tile in 0..tiles.tile_count() {
-        context.progress.check()?;
+    let all = 0..tiles.tile_count();
+    context.progress.each("thin cloud", all, |tile| -> Result<()> {
         let (moved, surveyed, labels) = (tiles.load(tile)?, tiles.surveyed.load(tile)?, epoch.labels(tile)?);
         let chosen =
             (0..moved.len()).filter(|&i| split_mix((tile as u64) << 40 | i as u64).is_multiple_of(every));
@@ -42,7 +41,7 @@ pub fn thin_cloud(context: &Context, epoch: &Labelled) -> Result<Vec<Candidate>>
             surveyed: surveyed.world(i),
             photo: None,
         }));
-        context.progress.advance(1);
-    }
+        Ok(())
+    })?;
     Ok(kept)
 }

@@ -15,9 +15,9 @@ pub use disk_labels::DiskLabels;
 use std::collections::BTreeMap;
 use step_key::{label_key, label_name};
 use stonewise_core::cloud::TileSource;
-use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
+use stonewise_core::registration::StoneExtents;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
 
@@ -47,25 +47,17 @@ impl Labelled {
         self.store.read(tile)
     }
 
-    /// Box around the points of every stone. Cost: one pass over all tiles.
-    pub fn extents(&self, progress: &dyn Progress) -> Result<BTreeMap<u32, Bounds>> {
+    /// Boxes around the points of all stones. Cost: one pass over all tiles.
+    pub fn extents(&self, progress: &dyn Progress) -> Result<StoneExtents> {
         let tiles = &self.ingested.tiles;
-        let mut extents: BTreeMap<u32, Bounds> = BTreeMap::new();
-        progress.begin("find stones", tiles.tile_count() as u64);
-        for tile in 0..tiles.tile_count() {
-            progress.check()?;
+        let mut extents = StoneExtents::default();
+        progress.each("find stones", 0..tiles.tile_count(), |tile| -> Result<()> {
             let (cloud, labels) = (tiles.load(tile)?, self.labels(tile)?);
             for i in (0..cloud.len()).filter(|&i| labels.stone[i] != 0) {
-                let place = cloud.world(i);
-                let point = Bounds {
-                    min: place,
-                    max: place,
-                };
-                let extent = extents.entry(labels.stone[i]).or_insert(point);
-                *extent = extent.union(&point);
+                extents.add(labels.stone[i], cloud.world(i));
             }
-            progress.advance(1);
-        }
+            Ok(())
+        })?;
         Ok(extents)
     }
 }

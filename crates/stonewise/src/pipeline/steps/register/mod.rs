@@ -118,7 +118,6 @@ pub fn register(
         let neighbours = registered.neighbours_among(&sights.stones);
         let pair = EpochPair {
             sources: &sights.sources,
-            same_as: &sights.same_as,
             stones: &sights.seen,
             neighbours: &neighbours,
             stable: &sights.stable,

@@ -42,17 +42,15 @@ impl OffWall {
         let mut contents: HashMap<[i64; 3], CellPoints> = HashMap::new();
         for (number, epoch) in epochs.iter().enumerate() {
             let tiles = &epoch.ingested.tiles;
-            progress.begin("look off the wall", tiles.tile_count() as u64);
-            for tile in 0..tiles.tile_count() {
-                progress.check()?;
+            progress.each("look off the wall", 0..tiles.tile_count(), |tile| -> Result<()> {
                 let cloud = tiles.load(tile)?;
                 for i in 0..cloud.len() {
                     let cell = cell_of(&cloud.world(i), CELL_M);
                     let place = cloud.world(i) - middle(&cell);
                     contents.entry(cell).or_default().add(number, &place);
                 }
-                progress.advance(1);
-            }
+                Ok(())
+            })?;
         }
         let surfaces = contents.iter().filter_map(|(cell, points)| {
             let surface = Surface {

@@ -1,21 +1,20 @@
 //! Points of matched stones, gathered from the tiles of two epochs into batches of neighbours on disk.
 
 use crate::error::{Error, Result};
-use crate::pipeline::matched_pairs::{MatchedPair, PairPlaces};
 use crate::pipeline::steps::label::Labelled;
 use crate::storage::spill::{Spill, SpillBins};
 use crate::storage::step::StepDir;
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
-use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::Bounds;
+use stonewise_core::cloud::TileSource;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{NearPoint, PairPoints, PairSource, Window, stone_points};
+use stonewise_core::registration::{
+    MatchedPair, NearPoint, PairPlaces, PairPoints, PairSource, StoneExtents, Window, stone_points,
+};
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
 /// Stones in a batch: at 20,000 points an epoch, 30 MB.
@@ -53,7 +52,7 @@ impl DiskPairs {
         let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
         let extents = match border_noises > 0.0 {
             true => first.extents(progress)?,
-            false => BTreeMap::new(),
+            false => StoneExtents::default(),
         };
         pairs.spill(first, 0, &extents, &mut spill, progress)?;
         pairs.spill(second, 1, &extents, &mut spill, progress)?;
@@ -144,18 +143,16 @@ impl DiskPairs {
         &self,
         epoch: &Labelled,
         which: u16,
-        extents: &BTreeMap<u32, Bounds>,
+        extents: &StoneExtents,
         spill: &mut Spill<u32>,
         progress: &dyn Progress,
     ) -> Result<()> {
         let places = PairPlaces::new(&self.batches.concat(), which > 0, extents);
-        progress.begin("gather stones", epoch.ingested.tiles.tile_count() as u64);
-        for tile in 0..epoch.ingested.tiles.tile_count() {
-            progress.check()?;
-            let bounds = epoch.ingested.tiles.bounds(tile);
+        let tiles = &epoch.ingested.tiles;
+        progress.each("gather stones", 0..tiles.tile_count(), |tile| {
             let labels = epoch.labels(tile)?;
-            if places.reach_into(&bounds) || labels.stone.iter().any(|s| places.has(*s)) {
-                let cloud = epoch.ingested.tiles.load(tile)?;
+            if places.reach_into(&tiles.bounds(tile)) || labels.stone.iter().any(|s| places.has(*s)) {
+                let cloud = tiles.load(tile)?;
                 for (i, stone) in labels.stone.iter().enumerate() {
                     for (k, near) in places.near(cloud.world(i), *stone) {
                         let (batch, slot) = ((k / BATCH) as u32, (k % BATCH) as u16);
@@ -163,9 +160,8 @@ impl DiskPairs {
                     }
                 }
             }
-            progress.advance(1);
-        }
-        Ok(())
+            Ok(())
+        })
     }
 }
 
@@ -190,21 +186,7 @@ impl PairSource for DiskPairs {
             offsets[slot[i] as usize][part[i] as usize].push([x[i], y[i], z[i]]);
         }
         let loaded = pairs.iter().zip(offsets).zip(&self.windows[batch]);
-        let loaded = loaded.map(|((pair, offsets), window)| {
-            let [points_first, points_second, nearby_second] =
-                offsets.map(|o| Cloud::new(pair.first.centroid, o));
-            PairPoints {
-                first: pair.first.id,
-                second: pair.second.id,
-                centroid: pair.first.centroid,
-                centroid_second: pair.second.centroid,
-                normal: pair.first.normal,
-                points_first,
-                points_second,
-                nearby_second,
-                window: window.clone(),
-            }
-        });
+        let loaded = loaded.map(|((pair, offsets), window)| pair.with_points(offsets, window.clone()));
         Ok(loaded.collect())
     }
 }

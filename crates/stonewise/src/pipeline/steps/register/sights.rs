@@ -25,9 +25,6 @@ const STABLE_POINTS: u32 = 40;
 pub struct Sights {
     /// Those of the reference epoch, then those of the later one.
     pub sources: Vec<Source>,
-    /// For each source, the one whose error it shares: itself, or for halves of one survey that of the first
-    /// half.
-    pub same_as: Vec<usize>,
     /// Stones of the reference epoch, in the order of `seen`.
     pub stones: Vec<StoneId>,
     /// What the sources show of them.
@@ -60,7 +57,7 @@ impl Sights {
             let raw = epoch.ingested.tiles.surveyed.raw_sources()?;
             of_epoch.push(EpochSources::new(&raw, &project.epochs[n - 1].clouds));
         }
-        let sources: Vec<Source> = of_epoch
+        let mut sources: Vec<Source> = of_epoch
             .iter()
             .enumerate()
             .flat_map(|(epoch, list)| {
@@ -68,13 +65,15 @@ impl Sights {
                     name: s.name.clone(),
                     epoch,
                     has_times: s.has_times,
+                    same_as: None,
                 })
             })
             .collect();
-        let is_one_survey = project.epochs[number - 1].same_survey_as == Some(0);
+        if project.epochs[number - 1].same_survey_as == Some(0) {
+            share_errors(&mut sources);
+        }
         let places = matched_stones(&epochs[0].stones, matches);
         let mut sights = Self {
-            same_as: shared_errors(&sources, is_one_survey),
             stones: places.iter().map(|(first, _, _)| *first).collect(),
             seen: Vec::new(),
             stable: Vec::new(),
@@ -136,16 +135,13 @@ fn matched_stones<'a>(
     found.collect()
 }
 
-/// Sources of the same name have one error where both epochs are parts of one survey.
-fn shared_errors(sources: &[Source], is_one_survey: bool) -> Vec<usize> {
-    let same = |k: usize| {
-        let twin = sources[..k]
-            .iter()
-            .position(|s| s.epoch == 0 && s.name == sources[k].name);
-        twin.filter(|_| is_one_survey && sources[k].epoch == 1)
-            .unwrap_or(k)
-    };
-    (0..sources.len()).map(same).collect()
+/// Gives sources of the later epoch the error of those of the same name in the reference: both epochs are parts
+/// of one survey.
+fn share_errors(sources: &mut [Source]) {
+    let (first, second) = sources.split_at_mut(sources.partition_point(|s| s.epoch == 0));
+    for source in second {
+        source.same_as = first.iter().position(|s| s.name == source.name);
+    }
 }
 
 /// Points of one source on one stone, as far as they are gathered.
@@ -227,9 +223,7 @@ impl Pass<'_> {
         progress: &dyn Progress,
     ) -> Result<()> {
         let tiles = &self.epoch.ingested.tiles;
-        progress.begin("compare sources", tiles.tile_count() as u64);
-        for tile in 0..tiles.tile_count() {
-            progress.check()?;
+        progress.each("compare sources", 0..tiles.tile_count(), |tile| {
             let labels = self.epoch.labels(tile)?;
             if labels.stone.iter().any(|s| self.stones.contains_key(s)) {
                 let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
@@ -247,9 +241,8 @@ impl Pass<'_> {
                     }
                 }
             }
-            progress.advance(1);
-        }
-        Ok(())
+            Ok(())
+        })
     }
 
     /// Points in the project's stable areas.

@@ -8,7 +8,9 @@ use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::{GicpBlock, GicpParams, GicpStone, align, relate_to_neighbours};
+use stonewise_core::registration::{
+    GicpBlock, GicpParams, GicpStone, StoneExtents, align, relate_to_neighbours,
+};
 use stonewise_core::stone::{PairResult, Stone};
 
 /// Points beyond the windows that the planes at their edges need, metres.
@@ -40,14 +42,13 @@ pub fn align_windows(
         measured.extend(results.into_iter().map(|r| (r.first, r)));
         progress.advance(group.len() as u64);
     }
-    let mut results: Vec<PairResult> = measured.into_values().collect();
     let centroids: BTreeMap<StoneId, Point3<f64>> = pairs.iter().map(|p| (p.0.id, p.0.centroid)).collect();
-    let places: Vec<Point3<f64>> = results
-        .iter()
-        .filter_map(|r| centroids.get(&r.first).copied())
+    let placed = measured.into_values();
+    let mut placed: Vec<(Point3<f64>, PairResult)> = placed
+        .filter_map(|result| Some((*centroids.get(&result.first)?, result)))
         .collect();
-    relate_to_neighbours(&mut results, &places, params);
-    Ok(results)
+    relate_to_neighbours(&mut placed, params);
+    Ok(placed.into_iter().map(|(_, result)| result).collect())
 }
 
 fn pairs(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<(Stone, Stone)> {
@@ -63,10 +64,10 @@ fn align_group(
     first: &Labelled,
     second: &Labelled,
     group: &[&(Stone, Stone)],
-    extents: &BTreeMap<u32, Bounds>,
+    extents: &StoneExtents,
     params: &GicpParams,
 ) -> Result<Vec<PairResult>> {
-    let stones = group.iter().filter_map(|p| extents.get(&p.0.id.0).copied());
+    let stones = group.iter().filter_map(|p| extents.of(p.0.id).copied());
     let Some(stones) = stones.reduce(|a, b| a.union(&b)) else {
         return Ok(Vec::new());
     };

@@ -1,13 +1,16 @@
 //! Matched stones in the order in which they are measured, and the points that each of them may consist of.
 
+use super::local_shifts::local_shifts;
+use super::pairs::PairPoints;
+use super::stone_points::{NearPoint, stone_points};
+use super::window::Window;
+use crate::cloud::Cloud;
+use crate::geometry::{Bounds, cell_of, cells_between};
+use crate::id::StoneId;
+use crate::stone::Stone;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use stonewise_core::cloud::Cloud;
-use stonewise_core::geometry::{Bounds, cell_of, cells_between};
-use stonewise_core::id::StoneId;
-use stonewise_core::registration::{NearPoint, PairPoints, local_shifts, stone_points};
-use stonewise_core::stone::Stone;
 
 /// Edge of the cells by which stones are sorted into neighbourhoods, metres.
 const NEIGHBOURHOOD_M: f64 = 4.0;
@@ -41,33 +44,63 @@ impl MatchedPair {
             .iter()
             .filter_map(|(a, b)| Some(((*ones.get(a)?).clone(), (*twos.get(b)?).clone())))
             .collect();
-        let centroids: Vec<Point3<f64>> = found.iter().map(|(a, _)| a.centroid).collect();
-        let moved: Vec<Vector3<f64>> = found.iter().map(|(a, b)| b.centroid - a.centroid).collect();
+        let moved: Vec<(Point3<f64>, Vector3<f64>)> = found
+            .iter()
+            .map(|(a, b)| (a.centroid, b.centroid - a.centroid))
+            .collect();
         let mut pairs: Vec<Self> = found
             .into_iter()
-            .zip(local_shifts(&centroids, &moved))
+            .zip(local_shifts(&moved))
             .map(|((first, second), shift)| Self { first, second, shift })
             .collect();
         pairs.sort_by_key(|p| (cell_of(&p.first.centroid, NEIGHBOURHOOD_M), p.first.id));
         pairs
     }
 
-    /// Its points out of those near it in both epochs, relative to its centroid in the first; see
-    /// [`stone_points`].
-    pub fn points(&self, near: [&[NearPoint]; 2], border_noises: f64) -> PairPoints {
+    /// Its points out of those near it in both epochs; see [`stone_points`].
+    pub fn choose(&self, near: [&[NearPoint]; 2], border_noises: f64) -> PairPoints {
         let chosen = stone_points(near, &self.first.normal, &self.shift, border_noises);
-        let cloud = |offsets| Cloud::new(self.first.centroid, offsets);
+        let offsets = [chosen.first, chosen.second, chosen.nearby_second];
+        self.with_points(offsets, chosen.window.map(Arc::new))
+    }
+
+    /// The pair with points that are known: of the first epoch, of the second, and of the second near the
+    /// stone, relative to its centroid in the first.
+    pub fn with_points(&self, offsets: [Vec<[f32; 3]>; 3], window: Option<Arc<Window>>) -> PairPoints {
+        let clouds = offsets.map(|offsets| Cloud::new(self.first.centroid, offsets));
+        let [points_first, points_second, nearby_second] = clouds;
         PairPoints {
             first: self.first.id,
             second: self.second.id,
             centroid: self.first.centroid,
             centroid_second: self.second.centroid,
             normal: self.first.normal,
-            points_first: cloud(chosen.first),
-            points_second: cloud(chosen.second),
-            nearby_second: cloud(chosen.nearby_second),
-            window: chosen.window.map(Arc::new),
+            points_first,
+            points_second,
+            nearby_second,
+            window,
         }
+    }
+}
+
+/// Boxes around the points of the stones of an epoch.
+#[derive(Clone, Debug, Default)]
+pub struct StoneExtents(BTreeMap<u32, Bounds>);
+
+impl StoneExtents {
+    /// Counts a point of a stone in.
+    pub fn add(&mut self, stone: u32, place: Point3<f64>) {
+        let point = Bounds {
+            min: place,
+            max: place,
+        };
+        let extent = self.0.entry(stone).or_insert(point);
+        *extent = extent.union(&point);
+    }
+
+    /// The box of a stone, world frame, metres.
+    pub fn of(&self, stone: StoneId) -> Option<&Bounds> {
+        self.0.get(&stone.0)
     }
 }
 
@@ -91,9 +124,9 @@ struct Place {
 }
 
 impl PairPlaces {
-    /// The places in the first epoch, or in the later one. `extents`: boxes of the first epoch's stones by
-    /// stone, metres; without a box only points with the stone's own label count.
-    pub fn new(pairs: &[MatchedPair], is_later: bool, extents: &BTreeMap<u32, Bounds>) -> Self {
+    /// The places in the first epoch, or in the later one. `extents`: of the first epoch's stones;
+    /// without a box only points with the stone's own label count.
+    pub fn new(pairs: &[MatchedPair], is_later: bool, extents: &StoneExtents) -> Self {
         let mut found = Self {
             places: Vec::with_capacity(pairs.len()),
             of_stone: BTreeMap::new(),
@@ -105,7 +138,7 @@ impl PairPlaces {
                 true => (pair.second.id, pair.shift),
             };
             found.of_stone.insert(stone.0, k);
-            let extent = extents.get(&pair.first.id.0);
+            let extent = extents.of(pair.first.id);
             let extent = extent.map(|e| e.grown(BOX_MARGIN_M).moved(&shift));
             let cells =
                 extent.map(|e| cells_between(cell_of(&e.min, BOX_CELL_M), cell_of(&e.max, BOX_CELL_M)));
@@ -170,15 +203,12 @@ mod tests {
         let second = [stone(11, 0.01), stone(12, 0.41), stone(13, 9.01)];
         let matches = [(1, 11), (2, 12), (3, 13)].map(|(a, b)| (StoneId(a), StoneId(b)));
         let pairs = MatchedPair::of_matches(&first, &second, &matches);
-        let extents = pairs.iter().map(|p| {
-            let half = Vector3::new(0.25, 0.05, 0.1);
-            let bounds = Bounds {
-                min: p.first.centroid - half,
-                max: p.first.centroid + half,
-            };
-            (p.first.id.0, bounds)
-        });
-        let extents: BTreeMap<u32, Bounds> = extents.collect();
+        let half = Vector3::new(0.25, 0.05, 0.1);
+        let mut extents = StoneExtents::default();
+        for stone in &first {
+            extents.add(stone.id.0, stone.centroid - half);
+            extents.add(stone.id.0, stone.centroid + half);
+        }
         for is_later in [false, true] {
             let places = PairPlaces::new(&pairs, is_later, &extents);
             let label = if is_later { 12 } else { 2 };
@@ -199,7 +229,7 @@ mod tests {
             assert!(places.has(label) && !places.has(99));
         }
         // Without boxes only labels count.
-        let places = PairPlaces::new(&pairs, false, &BTreeMap::new());
+        let places = PairPlaces::new(&pairs, false, &StoneExtents::default());
         assert_eq!(places.near(Point3::origin(), 0).count(), 0);
         assert_eq!(places.near(Point3::origin(), 3).count(), 1);
     }
