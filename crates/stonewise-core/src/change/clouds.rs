@@ -10,7 +10,7 @@ use nalgebra::{Point3, Vector3};
 const BATCH: usize = 8192;
 
 /// Where the normals of core points come from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum CoreNormals<'a> {
     /// One for each core point, of any length.
     Given(&'a [Vector3<f64>]),
