@@ -54,7 +54,7 @@ def test_transfer_is_the_step_label(survey, results, epochs, clouds):
 
 def label_image(results, number: int) -> np.ndarray:
     """The label image that the run made of the masks of a photo, by its number."""
-    return np.asarray(Image.open(results.path / "work" / "segment-1" / f"{number:05}.png")).astype(np.int64)
+    return np.asarray(Image.open(next((results.path / "work" / "segment-1").glob(f"*/{number:05}.png")))).astype(np.int64)
 
 
 def test_adjust_is_a_run_without_photos_whose_motions_are_not_corrected(survey, results, epochs, clouds, tmp_path):

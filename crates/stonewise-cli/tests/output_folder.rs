@@ -201,8 +201,15 @@ fn damaged_work_is_done_again_and_said() {
     assert_eq!(run(survey(), out.path(), &[]).0, 0);
     let sound = results(out.path());
     let work = out.path().join("work");
+    // The one version of a step.
+    let folder = |step: &str| {
+        let mut versions = fs::read_dir(work.join(step)).unwrap().map(|e| e.unwrap().path());
+        let only = versions.next().unwrap();
+        assert!(versions.next().is_none(), "{step}");
+        only
+    };
     let first_in = |step: &str, end: &str| {
-        let mut files: Vec<_> = fs::read_dir(work.join(step))
+        let mut files: Vec<_> = fs::read_dir(folder(step))
             .unwrap()
             .map(|e| e.unwrap().path())
             .collect();
@@ -212,17 +219,15 @@ fn damaged_work_is_done_again_and_said() {
     };
     flip(&first_in("ingest-1", ".parquet"));
     flip(&first_in("label-2", ".parquet"));
-    flip(&work.join("stones-1/stones.json"));
+    flip(&folder("stones-1").join("stones.json"));
     fs::remove_file(first_in("segment-2", ".png")).unwrap();
-    let motions = fs::read(work.join("register-2/motions.json")).unwrap();
-    fs::write(
-        work.join("register-2/motions.json"),
-        &motions[..motions.len() / 2],
-    )
-    .unwrap();
-    fs::write(work.join("m3c2-2/done"), "").unwrap();
+    let motions_file = folder("register-2").join("motions.json");
+    let motions = fs::read(&motions_file).unwrap();
+    fs::write(motions_file, &motions[..motions.len() / 2]).unwrap();
+    fs::write(folder("m3c2-2").join("done"), "").unwrap();
     flip(&out.path().join("epoch1/cloud_tls.laz"));
-    fs::write(work.join("label-1/.7_0_0.parquet.123.partial"), "half").unwrap();
+    let partial = folder("label-1").join(".7_0_0.parquet.123.partial");
+    fs::write(&partial, "half").unwrap();
 
     let (code, log) = run(survey(), out.path(), &[]);
     assert_eq!(code, 0, "{log}");
@@ -247,7 +252,7 @@ fn damaged_work_is_done_again_and_said() {
     );
     assert!(!log.contains("step match-2 was done again"), "{log}");
     assert!(results(out.path()) == sound, "results differ");
-    assert!(!work.join("label-1/.7_0_0.parquet.123.partial").exists());
+    assert!(!partial.exists());
     let (_, log) = run(survey(), out.path(), &[]);
     assert!(!log.contains("done again"), "{log}");
 }

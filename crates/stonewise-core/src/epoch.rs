@@ -79,7 +79,7 @@ impl<T> Epochs<T> {
     }
 
     /// What a function makes of each value.
-    pub fn map<U>(&self, of: impl FnMut(&T) -> U) -> Epochs<U> {
+    pub fn map<'a, U>(&'a self, of: impl FnMut(&'a T) -> U) -> Epochs<U> {
         self.0.iter().map(of).collect()
     }
 }

@@ -15,6 +15,7 @@ use stonewise_base::report_params::{ReportParams, logo_type};
 use stonewise_base::settings::{IngestParams, RENAMED, RegistrationParams, SegmentParams, Settings};
 use stonewise_base::thresholds::Thresholds;
 use stonewise_core::change::M3c2Params;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
 use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
@@ -115,7 +116,7 @@ impl Project {
     ///     cameras = "cameras.xml"
     /// "#)?;
     /// let project = Project::read(&path)?;
-    /// assert_eq!(project.epochs[1].name, "2025");
+    /// assert_eq!(project.epochs.reference().name, "2024");
     /// assert_eq!(project.settings.ingest.size_m, 4.0);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -175,7 +176,7 @@ impl Project {
         Ok(Self {
             path: path.to_path_buf(),
             name: raw.project.name.into_inner(),
-            epochs,
+            epochs: epochs.into(),
             settings,
             notes,
             edits,
@@ -306,18 +307,18 @@ impl Source<'_> {
             return Err(self.error(name.span(), message));
         };
         for epoch in epochs.iter_mut() {
-            epoch.same_survey_as = epoch.same_survey_as.map(|same| match same.cmp(&at) {
-                Ordering::Less => same + 1,
-                Ordering::Equal => 0,
+            epoch.same_survey_as = epoch.same_survey_as.map(|same| match same.index().cmp(&at) {
+                Ordering::Less => EpochId::at(same.index() + 1),
+                Ordering::Equal => EpochId::REFERENCE,
                 Ordering::Greater => same,
             });
         }
         epochs[..=at].rotate_right(1);
         // An epoch names an earlier one; the reference now comes before that one.
         if let Some(same) = epochs[0].same_survey_as.take()
-            && let Some(twin) = epochs.get_mut(same)
+            && let Some(twin) = epochs.get_mut(same.index())
         {
-            twin.same_survey_as = Some(0);
+            twin.same_survey_as = Some(EpochId::REFERENCE);
         }
         let note = || {
             let numbered = epochs.iter().zip(1..).map(|(e, n)| format!("{n} {}", e.name));
@@ -331,9 +332,12 @@ impl Source<'_> {
         Ok((at > 0).then(note))
     }
 
-    /// The index of the epoch of that name.
-    fn earlier(&self, name: &Spanned<String>, earlier: &[Epoch]) -> Result<usize> {
-        let found = earlier.iter().position(|e| e.name == *name.get_ref());
+    /// The epoch of that name.
+    fn earlier(&self, name: &Spanned<String>, earlier: &[Epoch]) -> Result<EpochId> {
+        let found = earlier
+            .iter()
+            .position(|e| e.name == *name.get_ref())
+            .map(EpochId::at);
         found.ok_or_else(|| {
             let names: Vec<&str> = earlier.iter().map(|e| e.name.as_str()).collect();
             let message = format!("same_survey_as must name an earlier epoch: {}", names.join(", "));

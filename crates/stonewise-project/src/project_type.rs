@@ -8,6 +8,7 @@ use stonewise_base::error::Result;
 use stonewise_base::part::Part;
 use stonewise_base::settings::Settings;
 use stonewise_core::change::M3c2Params;
+use stonewise_core::epoch::{EpochId, Epochs};
 use stonewise_core::evaluate::MotionField;
 use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
 use stonewise_io::cloud::cloud_crs;
@@ -22,7 +23,7 @@ pub struct Project {
     pub name: String,
     /// The surveys; two at least. The reference, from which motions count, comes first; the others follow in
     /// time order.
-    pub epochs: Vec<Epoch>,
+    pub epochs: Epochs<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
     /// Notes for the user on how the file was read, one sentence each: keys with a new name, another
@@ -55,14 +56,19 @@ pub struct Epoch {
     pub motion: Option<MotionField>,
     /// What counts as one station or strip.
     pub sources: SourceRule,
-    /// Index of the earlier epoch of whose survey this one is another part: the same source then has the same
+    /// The earlier epoch of whose survey this one is another part: the same source then has the same
     /// error in both.
-    pub same_survey_as: Option<usize>,
+    pub same_survey_as: Option<EpochId>,
     /// What the project file says about where the clouds lie on the map.
     pub map: MapFrame,
 }
 
 impl Epoch {
+    /// Whether it is another part of the survey of the reference.
+    pub fn is_of_reference_survey(&self) -> bool {
+        self.same_survey_as == Some(EpochId::REFERENCE)
+    }
+
     /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
     ///
     /// # Errors
@@ -113,7 +119,7 @@ impl Project {
         Self {
             path: before.to_path_buf(),
             name: "clouds".to_owned(),
-            epochs: vec![epoch("before", before), epoch("after", after)],
+            epochs: vec![epoch("before", before), epoch("after", after)].into(),
             settings: Settings {
                 m3c2,
                 ..Settings::default()

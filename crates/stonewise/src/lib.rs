@@ -24,8 +24,8 @@ pub use error::{Error, Result};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};
 pub use part::Part;
 pub use pipeline::{
-    Comparison, Coordinator, PairSummary, Plan, PlanOptions, Stage, Summary, Unit, UnitDone, Until,
-    compare_clouds, do_unit, plan, run, tile_clouds,
+    Comparison, Coordinator, PairSummary, Plan, PlanOptions, Summary, Unit, UnitDone, Until, compare_clouds,
+    do_unit, plan, run, tile_clouds,
 };
 pub use report_params::{Language, ReportParams};
 pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};

@@ -13,6 +13,7 @@ use stonewise::experiment::{
     Influence, PaperOptions, PaperSurvey, SensitivityOptions, TuneOptions, paper, sensitivity, tune,
 };
 use stonewise::{OutputFolder, Part, Project, Until, run};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::MotionField;
 use stonewise_core::progress::Silent;
 use stonewise_simulate::{
@@ -75,7 +76,8 @@ fn column(path: &Path, name: &str) -> Vec<String> {
 #[test]
 fn a_grid_finds_what_single_runs_find_and_resumes() {
     let (dir, mut project) = survey();
-    project.epochs[1].motion = Some(MotionField::translation(Vector3::new(0.0, 0.01, 0.02)).unwrap());
+    project.epochs[EpochId::at(1)].motion =
+        Some(MotionField::translation(Vector3::new(0.0, 0.01, 0.02)).unwrap());
     project.settings.r#match.min_overlap = 1.0;
     let options = TuneOptions {
         grid: [
@@ -152,7 +154,7 @@ fn a_grid_says_what_cannot_be() {
 fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
     let (dir, project) = survey();
     let out = dir.path().join("paper");
-    let part = Part::in_the_middle(&project.epochs[0].clouds, [1.2, 0.8]).unwrap();
+    let part = Part::in_the_middle(&project.epochs.reference().clouds, [1.2, 0.8]).unwrap();
     let surveys = [PaperSurvey {
         name: "TLS".to_owned(),
         project,
@@ -214,7 +216,7 @@ fn the_papers_experiment_splits_one_epoch_and_scores_every_method() {
 #[test]
 fn a_detector_learns_some_stones_is_measured_on_the_others_and_finds_all() {
     let (dir, project) = survey_with_photos(true);
-    let masks = fs::read_to_string(project.epochs[0].masks.as_ref().unwrap()).unwrap();
+    let masks = fs::read_to_string(project.epochs.reference().masks.as_ref().unwrap()).unwrap();
     let masks: serde_json::Value = serde_json::from_str(&masks).unwrap();
     let labelled = masks["annotations"].as_array().unwrap().len();
     let out = dir.path().join("paper");
@@ -253,7 +255,7 @@ fn a_detector_learns_some_stones_is_measured_on_the_others_and_finds_all() {
     let repeated = paper(&surveys, &options, &out, &Silent).unwrap();
     assert_eq!(repeated, tables);
     let mut unlabelled = project;
-    unlabelled.epochs[0].masks = None;
+    unlabelled.epochs[EpochId::REFERENCE].masks = None;
     let surveys = [PaperSurvey {
         name: "TLS".to_owned(),
         project: unlabelled,

@@ -108,7 +108,10 @@ fn in_a_run(project: &Path, model: &Path, out: &Path) -> LabelImage {
     let project = Project::read(&with_model).unwrap();
     let folder = OutputFolder::of_project(out, &project, false).unwrap();
     run(&project, &folder, Until::Segmented, &Silent).unwrap();
-    read_label_png(&out.join("work/segment-1/00000.png")).unwrap()
+    // The one version of the step.
+    let mut versions = fs::read_dir(out.join("work/segment-1")).unwrap();
+    let version = versions.next().unwrap().unwrap().path();
+    read_label_png(&version.join("00000.png")).unwrap()
 }
 
 /// Stones of the same photo by itself.

@@ -118,7 +118,7 @@ pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
         }
         let verdicts = summary.verdict.iter().flat_map(|v| &v.epochs);
         let verdict = verdicts.into_iter().find(|v| v.epoch == epoch.name);
-        let against = format!("{} against {}", epoch.name, project.epochs[0].name);
+        let against = format!("{} against {}", epoch.name, project.epochs.reference().name);
         printer.log(&format!("{against}: {}", counts(&pair.rows, verdict)));
         // The sentence on a single later epoch is the last line.
         if let Some(verdict) = verdict.filter(|_| summary.pairs.len() > 1) {

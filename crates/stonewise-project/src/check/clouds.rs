@@ -47,7 +47,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
     };
     for (epoch, bounds) in project.epochs.iter().zip(&boxes).skip(1) {
         let Some(bounds) = bounds else { continue };
-        let names = [project.epochs[0].name.as_str(), epoch.name.as_str()];
+        let names = [project.epochs.reference().name.as_str(), epoch.name.as_str()];
         match unit_ratio(&first, bounds) {
             Some(why) => found.push(Finding::new(names[1], UNITS.english, Verdict::Wrong, why)),
             None => found.push(overlap(names, &first, bounds)),
@@ -239,7 +239,7 @@ fn same_file(project: &Project) -> Option<Finding> {
     }
     let canonical = |p: &std::path::PathBuf| p.canonicalize().unwrap_or_else(|_| p.clone());
     for (number, epoch) in epochs.iter().enumerate() {
-        for earlier in &epochs[..number] {
+        for earlier in epochs.iter().take(number) {
             let files: Vec<_> = earlier.clouds.iter().map(canonical).collect();
             if let Some(twice) = epoch.clouds.iter().find(|c| files.contains(&canonical(c))) {
                 let (file, name) = (twice.display().to_string(), format!("{:?}", earlier.name));

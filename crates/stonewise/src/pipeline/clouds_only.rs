@@ -4,20 +4,25 @@ use crate::error::{Error, Result};
 use crate::output::OutputFolder;
 use crate::pipeline::agenda::Agenda;
 use crate::pipeline::context::Context;
+use crate::pipeline::graph::{Run, Task};
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
-use crate::pipeline::steps::ingest::{Ingested, ingest};
-use crate::pipeline::steps::m3c2::m3c2;
+use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::pipeline::steps::m3c2::{change_field, m3c2};
+use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::warnings::Warning;
 use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{MeshIndex, OutwardReference, PointDistances, c2c_survey, c2m_survey};
+use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 use stonewise_core::surface::{Outside, orient, surface_cells};
 use stonewise_io::cloud::{Dimension, ExtraColumn, cloud_info, read_mesh, write_points_laz};
 
+/// Name of the comparison along normals, which a run of the project finds.
+const M3C2: &str = "m3c2-2";
 /// Names of the steps that leave nothing for later runs.
 const C2C: &str = "c2c";
 const C2M: &str = "c2m";
@@ -60,44 +65,48 @@ pub fn compare_clouds(
     folder: &OutputFolder,
     progress: &dyn Progress,
 ) -> Result<Vec<Warning>> {
+    let later = EpochId::at(1);
     let mut context = Context::new(project, folder, progress)?;
     context.agenda = match what {
-        Comparison::M3c2 => Agenda::of_clouds(project, 1..=2, "m3c2-2", "M3C2"),
-        Comparison::C2c { .. } => Agenda::of_clouds(project, 1..=2, C2C, "C2C"),
-        Comparison::C2m { .. } => Agenda::of_clouds(project, 2..=2, C2M, "C2M"),
+        Comparison::M3c2 => agenda(project, &[EpochId::REFERENCE, later], M3C2, "M3C2"),
+        Comparison::C2c { .. } => agenda(project, &[EpochId::REFERENCE, later], C2C, "C2C"),
+        Comparison::C2m { .. } => agenda(project, &[later], C2M, "C2M"),
     };
     context.agenda.announce(progress);
+    let run = Run::new(&context, Until::Compared);
     let out = folder.path();
     match what {
         Comparison::M3c2 => {
-            let epochs = [ingest(&context, 1)?, ingest(&context, 2)?];
+            let first = run.clouds(later)?.first;
             let views = views_of(project)?;
             let centres: Vec<Point3<f64>> = views.iter().map(View::centre).collect();
             let outside = match centres.is_empty() {
-                true => Some(outside_of(&context, &epochs[0])?),
+                true => Some(outside_of(&context, &first)?),
                 false => None,
             };
             let outward = match &outside {
                 Some(outside) => OutwardReference::Surface(outside),
                 None => OutwardReference::Towards(&centres),
             };
-            let change = m3c2(&context, epochs.each_ref(), 2, &outward)?;
-            write_m3c2(out, 1, coordinate_system(project)?.as_ref(), &change)?;
+            let change = change_field(&context.in_line(M3C2, || m3c2(&run, later, &outward))?)?;
+            write_m3c2(out, later, coordinate_system(project)?.as_ref(), &change)?;
         }
         Comparison::C2c { max_m } => {
-            let [first, second] = [ingest(&context, 1)?, ingest(&context, 2)?];
-            context.timed(C2C, || {
-                let found = c2c_survey(&first.tiles, &second.tiles, max_m, progress)?;
+            let Pair { first, later } = run.clouds(later)?;
+            let compare = || {
+                let found = c2c_survey(&first.tiles, &later.tiles, max_m, progress)?;
                 write_distances(&found, project, &out.join("c2c.laz"), C2C_DISTANCE)
-            })?;
+            };
+            context.in_line(C2C, || context.timed(C2C, compare))?;
         }
         Comparison::C2m { mesh, max_m } => {
-            let second = ingest(&context, 2)?;
-            context.timed(C2M, || {
+            let later = run.ingested(later)?;
+            let compare = || {
                 let index = MeshIndex::new(read_mesh(mesh)?);
-                let found = c2m_survey(&index, &second.tiles, max_m, progress)?;
+                let found = c2m_survey(&index, &later.tiles, max_m, progress)?;
                 write_distances(&found, project, &out.join("c2m.laz"), C2M_DISTANCE)
-            })?;
+            };
+            context.in_line(C2M, || context.timed(C2M, compare))?;
         }
     }
     Ok(context.warnings.sorted())
@@ -105,7 +114,7 @@ pub fn compare_clouds(
 
 /// The outside of the first epoch's surface; tells what it follows from, and notes a doubt where that is weak.
 fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
-    let epoch = &context.project.epochs[0];
+    let epoch = context.project.epochs.reference();
     let mut scanners = Vec::new();
     for cloud in &epoch.clouds {
         scanners.extend(
@@ -139,6 +148,14 @@ fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
     Ok(Outside::of(&found.cells))
 }
 
+/// The clouds of these epochs are cut into tiles, then comes a step of this name.
+fn agenda(project: &Project, epochs: &[EpochId], name: &str, words: &str) -> Agenda {
+    let step = &INGEST;
+    let ingest = epochs.iter().map(|&epoch| Task { step, epoch });
+    let lines = ingest.map(|task| (task.id(), task.words(project)));
+    Agenda::of(lines.chain([(name.to_owned(), words.to_owned())]))
+}
+
 /// Cuts the clouds of all epochs of a project into tiles, as the first step of a run; the number of their
 /// points.
 ///
@@ -146,11 +163,9 @@ fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
 /// A cloud cannot be read, tiles cannot be written, interruption.
 pub fn tile_clouds(project: &Project, folder: &OutputFolder, progress: &dyn Progress) -> Result<u64> {
     let context = Context::new(project, folder, progress)?;
-    let mut points = 0;
-    for number in 1..=project.epochs.len() {
-        points += ingest(&context, number)?.tiles.surveyed.point_count();
-    }
-    Ok(points)
+    let run = Run::new(&context, Until::Segmented);
+    let points = |epoch| Ok(run.ingested(epoch)?.tiles.surveyed.point_count());
+    project.epochs.ids().map(points).sum()
 }
 
 fn views_of(project: &Project) -> Result<Vec<View>> {

@@ -9,15 +9,24 @@ use crate::project::Project;
 use crate::results::names::WORK_DIR;
 use crate::results::records::StepTime;
 use crate::storage::step::{Key, StepDir};
-use crate::storage::store::{Keeps, Origin, Scope, StepStore};
+use crate::storage::store::{Keeps, Name, Origin, Scope, StepStore};
 use crate::warnings::{Warning, Warnings};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stonewise_core::progress::Progress;
 
 /// Where a step notes its warnings.
 const WARNINGS: &str = "warnings.json";
+
+/// The step on the agenda whose work is done.
+#[derive(Default)]
+struct Line {
+    /// Its place; `None` where it is not listed.
+    place: Option<usize>,
+    /// Whether the caller was told that it begins.
+    is_entered: bool,
+}
 
 /// One run of a project in a folder.
 pub struct Context<'a> {
@@ -34,8 +43,11 @@ pub struct Context<'a> {
     pub progress: &'a dyn Progress,
     /// What went wrong without stopping the run.
     pub warnings: Warnings,
+    /// Whether the work goes on in spite of findings against the survey; `None`: it is not looked at.
+    pub forced: Option<bool>,
     /// The steps that the caller was told of; empty where the run is part of something larger.
     pub agenda: Agenda,
+    line: Mutex<Line>,
     /// How long other processes took for the steps that they did, by the name of the step.
     pub unit_times: BTreeMap<String, StepTime>,
     times: Mutex<Vec<StepTime>>,
@@ -87,16 +99,18 @@ impl<'a> Context<'a> {
             output: None,
             progress,
             warnings,
+            forced: None,
             agenda: Agenda::default(),
+            line: Mutex::default(),
             unit_times: BTreeMap::new(),
             times: Mutex::default(),
         })
     }
 
     /// Does a step, or takes the files and warnings that the same step left earlier.
-    pub fn step(
+    pub fn step<'n>(
         &self,
-        name: &str,
+        name: impl Into<Name<'n>>,
         key: Key,
         make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
     ) -> Result<StepDir> {
@@ -104,30 +118,28 @@ impl<'a> Context<'a> {
     }
 
     /// The same for a step that makes files outside its folder too.
-    pub fn step_publishing(
+    pub fn step_publishing<'n>(
         &self,
-        name: &str,
+        name: impl Into<Name<'n>>,
         key: Key,
         published: &[PathBuf],
         make: impl FnOnce(&StepDir, &Warnings) -> Result<()>,
     ) -> Result<StepDir> {
         self.progress.check()?;
-        let started = Clock::start();
+        let (name, started) = (name.into(), Clock::start());
         let (dir, origin) = self.store.step(name, key, published, |dir| {
-            self.enter(name);
+            self.enter();
             let warnings = Warnings::default();
             make(dir, &warnings)?;
             write_json(&dir.file(WARNINGS), &warnings.sorted())
         })?;
         if let Origin::MadeAgain(why) = &origin {
-            self.progress.note(&format!("step {name} was done again: {why}"));
-        }
-        if let (Origin::Found, Some(place)) = (&origin, self.agenda.place(name)) {
-            self.progress.take_over(place);
+            self.progress
+                .note(&format!("step {} was done again: {why}", name.step));
         }
         let warnings: Vec<Warning> = read_json(&dir.file(WARNINGS))?;
         warnings.into_iter().for_each(|w| self.warnings.push(w));
-        self.record(name, started, origin == Origin::Found);
+        self.record(name.step, started, origin == Origin::Found);
         Ok(dir)
     }
 
@@ -146,7 +158,7 @@ impl<'a> Context<'a> {
     /// Does a piece of work that keeps nothing between runs, and notes its time.
     pub fn timed<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
         self.progress.check()?;
-        self.enter(name);
+        self.enter();
         let started = Clock::start();
         let result = work()?;
         self.record(name, started, false);
@@ -163,10 +175,35 @@ impl<'a> Context<'a> {
         self.times.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    fn enter(&self, step: &str) {
-        if let Some(place) = self.agenda.place(step) {
+    /// Does the work of a step on the agenda, by its name. If all of it was done earlier, the caller is told so.
+    pub fn in_line<T>(&self, name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let Some(place) = self.agenda.place(name) else {
+            return work();
+        };
+        let own = Line {
+            place: Some(place),
+            is_entered: false,
+        };
+        let outer = std::mem::replace(&mut *self.line(), own);
+        let result = work();
+        let own = std::mem::replace(&mut *self.line(), outer);
+        if result.is_ok() && !own.is_entered {
+            self.progress.take_over(place);
+        }
+        result
+    }
+
+    /// Tells the caller that the present step works.
+    fn enter(&self) {
+        let mut line = self.line();
+        if let Some(place) = line.place {
+            line.is_entered = true;
             self.progress.enter(place);
         }
+    }
+
+    fn line(&self) -> MutexGuard<'_, Line> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn record(&self, step: &str, started: Clock, resumed: bool) {

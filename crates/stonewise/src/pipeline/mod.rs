@@ -1,14 +1,18 @@
 //! The steps of the method, with their files, and the run that strings them together.
 //!
-//! `units` shares a run out among processes. `steps` are the steps, `outputs` writes what a user opens.
+//! `graph` says what a step declares, `list` names all of them: `steps` compute, `outputs` write what a user
+//! opens. `run` walks over them, `agenda` announces them, and `units` shares them out among processes.
 
 mod agenda;
 mod clock;
 mod clouds_only;
 mod context;
+mod cost;
 mod doubts;
-mod look;
+mod graph;
+mod list;
 mod outputs;
+mod part;
 mod run;
 mod steps;
 mod units;
@@ -16,8 +20,8 @@ mod until;
 
 pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
+pub(crate) use graph::Run;
 pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
-pub(crate) use steps::segment::segment;
-pub use units::{Coordinator, Plan, PlanOptions, Stage, Unit, UnitDone, do_unit, plan};
+pub use units::{Coordinator, Plan, PlanOptions, Unit, UnitDone, do_unit, plan};
 pub use until::Until;

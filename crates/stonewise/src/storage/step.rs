@@ -67,7 +67,7 @@ pub(super) enum Look {
 /// The key that a folder was made under.
 const STAMP: &str = "step.json";
 /// What the step stands for, once all of it is there.
-const DONE: &str = "done";
+pub(super) const DONE: &str = "done";
 
 impl StepDir {
     /// Opens the folder of a step, emptied first if it was made under another key.
@@ -231,6 +231,22 @@ impl StepDir {
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+/// Removes the folder of a step, or of its parts, that nobody needs; it is gone at once or not at all. What no
+/// step made stays.
+pub(super) fn discard(path: &Path) -> Result<()> {
+    let is_parts = path.extension().is_some_and(|e| e == "parts");
+    let is_ours = is_parts || path.join(STAMP).exists() || path.join(DONE).exists();
+    if !is_ours || !path.is_dir() {
+        return Ok(());
+    }
+    let aside = partial_name(path).map_err(Error::io("removing a stale step", path))?;
+    match fs::rename(path, &aside).and_then(|()| fs::remove_dir_all(&aside)) {
+        // Another process was faster.
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        outcome => outcome.map_err(Error::io("removing a stale step", path)),
     }
 }
 

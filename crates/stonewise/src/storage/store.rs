@@ -1,6 +1,6 @@
 //! Steps that keep their results and resume, in the folders of a store.
 
-use super::step::{Key, Look, State, StepDir, path_digest};
+use super::step::{DONE, Key, Look, State, StepDir, discard, path_digest};
 use crate::error::{Error, Result};
 use crate::files::create_results_folder;
 use std::collections::{BTreeMap, BTreeSet};
@@ -38,7 +38,31 @@ pub struct Scope {
     pub units: BTreeSet<String>,
 }
 
-/// The folder that holds the folders of all steps.
+/// What a step is called, and the folder in which its versions lie.
+#[derive(Clone, Copy, Debug)]
+pub struct Name<'a> {
+    /// Its name, in records and messages; a unit of a plan has the same.
+    pub step: &'a str,
+    /// Steps that share a folder find what any of them has made under the same key.
+    pub folder: &'a str,
+}
+
+impl<'a> From<&'a str> for Name<'a> {
+    fn from(name: &'a str) -> Self {
+        Self {
+            step: name,
+            folder: name,
+        }
+    }
+}
+
+impl<'a> From<&'a String> for Name<'a> {
+    fn from(name: &'a String) -> Self {
+        name.as_str().into()
+    }
+}
+
+/// The folder that holds the folders of all steps: that of each version is named after its key.
 pub struct StepStore {
     folder: PathBuf,
     keeps: Keeps,
@@ -49,6 +73,8 @@ pub struct StepStore {
     digests: Mutex<BTreeMap<PathBuf, String>>,
     /// Steps whose files this process has compared with their digests or made itself.
     sound: Mutex<BTreeSet<(PathBuf, String)>>,
+    /// Folders of the steps that are this unit's business, relative to that of the store.
+    own: Mutex<BTreeSet<PathBuf>>,
 }
 
 /// A step: which, where, and what it depends on.
@@ -56,6 +82,7 @@ struct Place<'a> {
     name: &'a str,
     path: PathBuf,
     key: Key,
+    is_part: bool,
 }
 
 impl StepStore {
@@ -69,6 +96,7 @@ impl StepStore {
             turns: Mutex::default(),
             digests: Mutex::default(),
             sound: Mutex::default(),
+            own: Mutex::default(),
         })
     }
 
@@ -88,15 +116,21 @@ impl StepStore {
     /// step one does it and the others wait: call it from threads that no thread pool lends out, or they may
     /// wait for themselves. Cost of a step that is taken over: its files are read once to compare their
     /// digests.
-    pub fn step(
+    pub fn step<'n>(
         &self,
-        name: &str,
+        name: impl Into<Name<'n>>,
         key: Key,
         published: &[PathBuf],
         make: impl FnOnce(&StepDir) -> Result<()>,
     ) -> Result<(StepDir, Origin)> {
-        let path = self.path(name, &key);
-        self.do_at(Place { name, path, key }, published, make)
+        let name = name.into();
+        let place = Place {
+            name: name.step,
+            path: self.path(name.folder, &key),
+            key,
+            is_part: false,
+        };
+        self.do_at(place, published, make)
     }
 
     /// The same for a part of a step: a step of its own, which lies beside the whole until that is done.
@@ -110,6 +144,7 @@ impl StepStore {
             name: &format!("{whole}.{part}"),
             path: self.parts(whole, key).join(part),
             key: Key::new("part", &part, &[key.as_str()]),
+            is_part: true,
         };
         Ok(self.do_at(place, &[], make)?.0)
     }
@@ -131,7 +166,13 @@ impl StepStore {
         published: &[PathBuf],
         make: impl FnOnce(&StepDir) -> Result<()>,
     ) -> Result<(StepDir, Origin)> {
-        let Place { name, path, key } = place;
+        let Place {
+            name,
+            path,
+            key,
+            is_part,
+        } = place;
+        self.note_own(name, &path);
         let turn = {
             let mut turns = self.turns.lock().unwrap_or_else(PoisonError::into_inner);
             Arc::clone(turns.entry(path.clone()).or_default())
@@ -153,6 +194,9 @@ impl StepStore {
         };
         if origin != Origin::Found {
             self.refuse_others_work(name)?;
+            if self.keeps == Keeps::Newest && self.scope.is_none() && !is_part {
+                self.remove_versions(dir.path().parent(), Some(dir.path()))?;
+            }
             dir.replace(published, make)?;
         }
         self.sound().insert(identity);
@@ -170,11 +214,53 @@ impl StepStore {
         }
     }
 
-    fn path(&self, name: &str, key: &Key) -> PathBuf {
-        match self.keeps {
-            Keeps::Newest => self.folder.join(name),
-            Keeps::Every => self.folder.join(name).join(&key.as_str()[..VERSION_DIGITS]),
+    /// Removes all versions of steps that this process has neither made nor found; only for the last process
+    /// that works on a run, once it has been through all steps.
+    pub fn remove_unused(&self) -> Result<()> {
+        for entry in fs::read_dir(&self.folder).map_err(Error::io("listing", &self.folder))? {
+            let path = entry.map_err(Error::io("listing", &self.folder))?.path();
+            if path.is_dir() {
+                self.remove_versions(Some(&path), None)?;
+            }
         }
+        Ok(())
+    }
+
+    /// Removes the versions of a step that this process does not use, and their parts; `kept`: one of them.
+    fn remove_versions(&self, folder: Option<&Path>, kept: Option<&Path>) -> Result<()> {
+        let Some(entries) = folder.and_then(|f| fs::read_dir(f).ok()) else {
+            return Ok(());
+        };
+        let used: BTreeSet<PathBuf> = self.sound().iter().map(|(path, _)| path.clone()).collect();
+        for entry in entries.flatten() {
+            let path = entry.path();
+            let whole = path.with_extension("");
+            let is_used = kept == Some(whole.as_path()) || used.contains(&whole);
+            if is_version(&whole) && !is_used {
+                discard(&path)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn note_own(&self, name: &str, path: &Path) {
+        let is_own = |scope: &Scope| scope.unit == name || !scope.units.contains(name);
+        if self.scope.as_ref().is_some_and(is_own) {
+            let path = path.strip_prefix(&self.folder).unwrap_or(path).to_path_buf();
+            self.own
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .insert(path);
+        }
+    }
+
+    /// Folders of the steps that this process did or found for its unit, relative to that of the store.
+    pub fn own_folders(&self) -> BTreeSet<PathBuf> {
+        self.own.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn path(&self, folder: &str, key: &Key) -> PathBuf {
+        self.folder.join(folder).join(&key.as_str()[..VERSION_DIGITS])
     }
 
     fn parts(&self, whole: &str, key: &Key) -> PathBuf {
@@ -205,11 +291,34 @@ impl StepStore {
 /// Digits of a key that name one version of a step's files.
 const VERSION_DIGITS: usize = 16;
 
+/// Whether a folder has the name of a version.
+fn is_version(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.len() == VERSION_DIGITS && name.bytes().all(|b| b.is_ascii_hexdigit())
+}
+
+/// Whether the files of a step or of a part of one are still there, or those of the step that gathered the
+/// part; `folder`: as [`StepStore::own_folders`] has it, in that of the store.
+pub fn is_kept(store: &Path, folder: &Path) -> bool {
+    let is_done = |path: &Path| path.join(DONE).exists();
+    let path = store.join(folder);
+    let whole = path.parent().map(|parts| parts.with_extension(""));
+    is_done(&path) || whole.is_some_and(|whole| is_version(&whole) && is_done(&whole))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::files::write_text;
     use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// The folder of the only version of a step, without parts.
+    fn only_version(folder: &Path) -> PathBuf {
+        let entries = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
+        let versions: Vec<PathBuf> = entries.collect();
+        assert_eq!(versions.len(), 1, "{versions:?}");
+        versions.into_iter().next().unwrap()
+    }
 
     /// What a step finds after `spoil` changed its folder and what it published; and what it leaves.
     fn after(spoil: impl FnOnce(&Path, &Path)) -> (Origin, String, String) {
@@ -226,11 +335,12 @@ mod tests {
         let store = || StepStore::new(&work.path().join("work"), Keeps::Newest).unwrap();
         assert_eq!(step(&store()), Origin::Made);
         assert_eq!(step(&store()), Origin::Found);
-        spoil(&work.path().join("work/a"), &published);
+        let dir = only_version(&work.path().join("work/a"));
+        spoil(&dir, &published);
         let origin = step(&store());
         let read = |path: &Path| fs::read_to_string(path).unwrap();
         assert_eq!(step(&store()), Origin::Found);
-        (origin, read(&work.path().join("work/a/tile")), read(&published))
+        (origin, read(&dir.join("tile")), read(&published))
     }
 
     #[test]
@@ -292,7 +402,7 @@ mod tests {
         let other = newest.step("b", Key::new("b", &0, &[]), &[], |_| Ok(())).unwrap();
         assert_eq!(
             (other.0.path(), other.1),
-            (work.path().join("b").as_path(), Origin::Made)
+            (only_version(&work.path().join("b")).as_path(), Origin::Made)
         );
     }
 
@@ -305,7 +415,7 @@ mod tests {
             write_text(&dir.file("half"), "x")?;
             Err(Error::Survey("no".to_owned()))
         });
-        assert!(failed.is_err() && fs::read_dir(work.path()).unwrap().count() == 0);
+        assert!(failed.is_err() && fs::read_dir(work.path().join("a")).unwrap().count() == 0);
         let gather = |dir: &StepDir| {
             for name in ["1", "2"] {
                 let part = store.part(("a", &key), name, |part| write_text(&part.file("text"), name))?;
@@ -314,16 +424,46 @@ mod tests {
             Ok(())
         };
         let (dir, _) = store.step("a", key.clone(), &[], gather).unwrap();
-        assert!(work.path().join("a.parts/2/done").exists());
+        assert!(dir.path().with_extension("parts").join("2/done").exists());
         store.remove_parts("a", &key).unwrap();
         assert_eq!(fs::read_to_string(dir.file("2")).unwrap(), "2");
-        let other = store.step("a", Key::new("a", &1, &[]), &[], |_| Ok(())).unwrap();
-        assert!(!other.0.file("2").exists());
-        let names: Vec<_> = fs::read_dir(work.path())
-            .unwrap()
-            .map(|e| e.unwrap().file_name())
-            .collect();
-        assert_eq!(names, ["a"]);
+        assert_eq!(only_version(&work.path().join("a")), dir.path());
+    }
+
+    #[test]
+    fn a_new_version_replaces_what_this_run_has_not_used_and_nothing_that_is_not_ours() {
+        let work = tempfile::tempdir().unwrap();
+        let make = |store: &StepStore, name: Name, version: u32| {
+            let key = Key::new("match", &version, &[]);
+            store
+                .step(name, key, &[], |dir| write_text(&dir.file("x"), "x"))
+                .unwrap()
+        };
+        let name = Name::from("match");
+        let of_join = Name {
+            step: "join-match",
+            folder: "match",
+        };
+        let count = || fs::read_dir(work.path().join("match")).unwrap().count();
+        let store = StepStore::new(work.path(), Keeps::Newest).unwrap();
+        make(&store, of_join, 0);
+        make(&store, name, 1);
+        // What another step has made under the same key is found.
+        assert_eq!(make(&store, name, 0).1, Origin::Found);
+        fs::write(work.path().join("match/thesis.tex"), "x").unwrap();
+        assert_eq!(count(), 3);
+
+        let later = StepStore::new(work.path(), Keeps::Newest).unwrap();
+        assert_eq!(make(&later, of_join, 0).1, Origin::Found);
+        make(&later, name, 2);
+        assert_eq!(count(), 3);
+        assert_eq!(make(&later, name, 2).1, Origin::Found);
+
+        let last = StepStore::new(work.path(), Keeps::Newest).unwrap();
+        make(&last, name, 2);
+        last.remove_unused().unwrap();
+        assert_eq!(count(), 2);
+        assert!(work.path().join("match/thesis.tex").exists());
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use super::outcome::Example;
 use crate::error::Result;
 use crate::files::read_bytes;
-use crate::pipeline::{Context, segment};
+use crate::pipeline::{Context, Run, Until};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::{LabelImage, RgbImage};
 use stonewise_io::image_io::{read_rgb, write_jpeg};
@@ -16,7 +17,7 @@ const COVER: f64 = 0.45;
 /// The photo of the first half with the most instances, each in a colour of its own; `None` where there is no
 /// photo. `origin`: where the instances come from.
 pub(super) fn example(context: &Context, origin: &str) -> Result<Option<Example>> {
-    let segmented = segment(context, 1)?;
+    let segmented = Run::new(context, Until::Segmented).segmented(EpochId::REFERENCE)?;
     let chosen = segmented
         .photos
         .iter()

@@ -30,6 +30,7 @@ use outcome::{MaskOrigin, Outcome};
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::{MotionScore, StoneOutcome, score_change, score_stones};
 use stonewise_core::progress::Progress;
 
@@ -145,7 +146,7 @@ fn measure(
     if method == Method::Paper && survey.paper_part.is_some() {
         project.part.clone_from(&survey.paper_part);
     }
-    project.epochs[1].motion = Some(motion.field.clone());
+    project.epochs[EpochId::at(1)].motion = Some(motion.field.clone());
     let quiet = Quiet(progress);
     let context = Context::with_store(&project, folder, Arc::clone(store), &quiet)?;
     match run_in(&context, Until::Compared) {

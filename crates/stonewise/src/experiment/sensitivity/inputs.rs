@@ -68,7 +68,7 @@ pub(super) fn inputs(
                 })
             })?;
             for (_, project) in &mut projects {
-                for (number, epoch) in (1..).zip(&mut project.epochs) {
+                for (number, epoch) in (1..).zip(project.epochs.iter_mut()) {
                     epoch.cameras = dir.file(cameras_name(number));
                 }
             }

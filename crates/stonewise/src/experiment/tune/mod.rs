@@ -20,6 +20,7 @@ use crate::storage::store::{Keeps, StepStore};
 use front::{Worth, front, recommended};
 use std::path::Path;
 use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::MotionScore;
 use stonewise_core::parallel::in_parallel;
 use stonewise_core::progress::Progress;
@@ -99,12 +100,12 @@ fn cases(
         project.epochs.truncate(2);
         return Ok(vec![("the motion in the project file".to_owned(), project)]);
     }
-    let halves = halves_of(project, &project.epochs[0], seed, store, progress)?;
+    let halves = halves_of(project, project.epochs.reference(), seed, store, progress)?;
     let context = Context::with_store(&halves, &out.join("points"), Arc::clone(store), progress)?;
     let motions = paper_motions(&first_stones(&context)?)?;
     let moved = motions.into_iter().map(|motion| {
         let mut moved = halves.clone();
-        moved.epochs[1].motion = Some(motion.field);
+        moved.epochs[EpochId::at(1)].motion = Some(motion.field);
         (format!("halves of epoch 1, {}", motion.name), moved)
     });
     Ok(moved.collect())

@@ -3,6 +3,7 @@
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::texts::{BESIDE, BESIDE_COMPARED, Message, TORN};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::Stone;
 
@@ -24,10 +25,10 @@ const AGREED: f64 = 0.8;
 const LEAST_STONES: usize = 8;
 
 /// Labels beside the stones: cameras and clouds do not fit each other.
-pub(super) fn beside(context: &Context, number: usize, offsets: &LabelOffsets) -> Vec<(String, String)> {
-    let [first, second] = [0, number - 1].map(|e| &context.project.epochs[e].name);
+pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, String)> {
+    let [first, second] = context.project.epochs.pair(later).map(|e| &e.name).into_array();
     // The first epoch takes part in every pair.
-    let of_first = offsets.first.filter(|_| number == 2);
+    let of_first = offsets.first.filter(|_| later == EpochId::at(1));
     let within = [(first, &of_first), (second, &offsets.second)]
         .into_iter()
         .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));

@@ -6,59 +6,62 @@ mod registration;
 mod scale;
 mod turn;
 
+use crate::error::Result;
 use crate::pipeline::context::Context;
-use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::steps::offsets::LabelOffsets;
-use crate::pipeline::steps::register::Registered;
-use crate::results::StoneRow;
-use crate::results::records::Datum;
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::steps::known_motion::known_motion;
+use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::steps::offsets::OFFSETS;
+use crate::pipeline::steps::register::{Registered, note_registration};
+use crate::pipeline::until::Until;
 use labels::{beside, torn};
 use motions::{blind, few_measured, unsettled};
 use scale::stretched;
+use stonewise_core::epoch::EpochId;
 use turn::turned;
 
-/// Warns where the motions of a pair of epochs cannot be relied on.
-pub fn note_doubts(
-    context: &Context,
-    number: usize,
-    labelled: [&Labelled; 2],
-    offsets: &LabelOffsets,
-    (registered, datum): (&Registered, &Datum),
-    rows: &[StoneRow],
-) {
-    let epoch = &context.project.epochs[number - 1].name;
+/// Warns where the motions of a later epoch cannot be relied on.
+pub static DOUBTS: Step = Step {
+    name: "doubts",
+    about: About::Later,
+    needs: &[Need::same(&MEASURE), Need::same(&OFFSETS)],
+    wanted: |until| until >= Until::Registered,
+    make: note_doubts,
+    ..Step::PLAIN
+};
+
+fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
+    let (context, labelled) = (run.context, run.labelled_pair(later)?);
+    let (registered, measured) = (run.registered(later)?, run.measured(later)?);
+    let (datum, rows) = (&measured.datum, &measured.rows);
+    note_registration(context, later, &registered, datum);
+    let epochs = context.project.epochs.pair(later);
     // The first epoch takes part in every pair.
-    let first_time = usize::from(number > 2);
-    for (which, labels) in [0, number - 1].into_iter().zip(labelled).skip(first_time) {
+    let first_time = usize::from(later != EpochId::at(1));
+    for (epoch, labels) in epochs.zip(labelled).into_iter().skip(first_time) {
         if let Some(message) = torn(&labels.stones) {
-            let name = &context.project.epochs[which].name;
-            context.warnings.doubt("label", name, message);
+            context.warnings.doubt("label", &epoch.name, message);
         }
     }
-    for (name, message) in beside(context, number, offsets) {
+    for (name, message) in beside(context, later, &*run.offsets(later)?) {
         context.warnings.doubt("label", name, message);
     }
     let of_motions = [
-        unsettled(registered),
+        unsettled(&registered),
         few_measured(rows),
-        blind(registered, rows),
+        blind(&registered, rows),
         turned(rows),
     ];
-    let of_epochs = match is_prescribed(context, number) {
+    let of_epochs = match known_motion(context.project, later).is_some() {
+        // A prescribed motion moves all points, those off the wall too, which would otherwise show a wrong
+        // registration or scale.
         true => [None, None],
-        false => [misregistered(context, registered), stretched(rows, datum)],
+        false => [misregistered(context, &registered), stretched(rows, datum)],
     };
     for message in of_motions.into_iter().chain(of_epochs).flatten() {
-        context.warnings.doubt("register", epoch, message);
+        context.warnings.doubt("register", &epochs.later.name, message);
     }
-}
-
-/// Whether the project prescribes a motion of one of the two epochs. It moves all points, those off the wall
-/// too, which would otherwise show a wrong registration or scale.
-fn is_prescribed(context: &Context, number: usize) -> bool {
-    [0, number - 1]
-        .into_iter()
-        .any(|e| context.project.epochs[e].motion.is_some())
+    Ok(())
 }
 
 /// See [`registration::misregistered`].

@@ -6,6 +6,7 @@ use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::names::audit;
 use std::path::Path;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::id::ImageId;
 use stonewise_core::transfer::AuditEvent;
 use stonewise_io::table::{Table, write_csv};
@@ -20,10 +21,10 @@ const EVENTS: &str = "the decision: split_instance (a mask that covers several s
 
 /// Writes `audit_epochN.csv`, what the majority of the photos decided about merged, split and dropped
 /// instances, and the metadata of its columns.
-pub fn write_audit(context: &Context, number: usize, photos: &Segmented, labelled: &Labelled) -> Result<()> {
+pub fn write_audit(context: &Context, epoch: EpochId, photos: &Segmented, labelled: &Labelled) -> Result<()> {
     let events = labelled.transfer.audit.iter();
     let rows: Vec<AuditRow> = events.map(|e| AuditRow::new(e, photos)).collect();
-    write_rows(&context.out.join(audit(number)), &rows)
+    write_rows(&context.out.join(audit(epoch.number())), &rows)
 }
 
 fn write_rows(csv: &Path, rows: &[AuditRow]) -> Result<()> {

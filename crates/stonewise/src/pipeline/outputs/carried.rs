@@ -5,6 +5,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::carry::CarryAttempt;
 use crate::results::names::CARRY_AUDIT;
 use std::path::Path;
+use stonewise_core::epoch::{EpochId, Epochs};
 use stonewise_core::transfer::{CarriedStone, NotCarried};
 use stonewise_io::table::{Table, write_csv};
 
@@ -17,12 +18,12 @@ pub fn write_carry_audit(context: &Context, attempts: &[CarryAttempt]) -> Result
     if attempts.is_empty() {
         return Ok(());
     }
-    let names: Vec<&str> = context.project.epochs.iter().map(|e| e.name.as_str()).collect();
+    let names = context.project.epochs.map(|e| e.name.as_str());
     write_rows(&context.out.join(CARRY_AUDIT), &names, attempts)
 }
 
-fn write_rows(csv: &Path, epochs: &[&str], attempts: &[CarryAttempt]) -> Result<()> {
-    let name = |epoch: usize| epochs.get(epoch - 1).copied().unwrap_or_default().to_owned();
+fn write_rows(csv: &Path, epochs: &Epochs<&str>, attempts: &[CarryAttempt]) -> Result<()> {
+    let name = |epoch: EpochId| epochs[epoch].to_owned();
     let found = |of: &dyn Fn(&CarriedStone) -> f64| {
         let shares = attempts.iter().map(|a| a.outcome.as_ref().ok().map(of));
         shares.collect::<Vec<Option<f64>>>()
@@ -84,8 +85,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let csv = folder.path().join(CARRY_AUDIT);
         let attempt = |outcome| CarryAttempt {
-            epoch: 2,
-            from: 1,
+            epoch: EpochId::at(1),
+            from: EpochId::REFERENCE,
             stone: StoneId(7),
             photos: 3,
             missed: 5,
@@ -100,7 +101,7 @@ mod tests {
         let outvoted = NotCarried::Outvoted { photos: 1, missed: 9 };
         write_rows(
             &csv,
-            &["2024", "2025"],
+            &vec!["2024", "2025"].into(),
             &[attempt(Ok(carried)), attempt(Err(outvoted))],
         )
         .unwrap();

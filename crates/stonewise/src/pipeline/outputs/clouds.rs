@@ -3,7 +3,12 @@
 use crate::error::{Error, Result};
 use crate::output::cloud_names;
 use crate::pipeline::context::Context;
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::outputs::outlines::OUTLINES;
 use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::until::Until;
 use crate::results::StoneRow;
 use crate::results::names::epoch_dir;
 use crate::storage::step::Key;
@@ -11,27 +16,58 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
 use stonewise_io::cloud::{LabelColumns, PointLabel, PointMotion, write_labelled};
 
+/// Writes the clouds of an epoch with the stone of every point.
+pub static CLOUDS: Step = Step {
+    name: "clouds",
+    words: |_| "labelled clouds of",
+    about: About::Epoch,
+    needs: &[
+        Need::first_later(&MEASURE).when(|_, epoch| epoch.is_reference()),
+        Need::same(&OUTLINES),
+    ],
+    wanted: |until| matches!(until, Until::Labelled | Until::Reported),
+    cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
+    make: |run, epoch| run.write_clouds(epoch),
+    ..Step::PLAIN
+};
+
+impl Run<'_> {
+    /// The points of the reference get the motions of the first later epoch, too, in a run that goes so far.
+    fn write_clouds(&self, epoch: EpochId) -> Result<()> {
+        let first_later = self.context.project.epochs.later_ids().next();
+        let moved = first_later.filter(|_| epoch.is_reference() && self.until == Until::Reported);
+        let measured = moved.map(|later| self.measured(later)).transpose()?;
+        let rows = measured.as_ref().map(|m| m.rows.as_slice());
+        let labelled = self.labelled(epoch)?;
+        self.once(&CLOUDS, epoch, || {
+            write_clouds(self.context, epoch, &labelled, rows)
+        })
+        .map(drop)
+    }
+}
+
 /// Writes every cloud of an epoch, in input order, with `stone_id`; with motions too where rows are given.
-pub fn write_clouds(
+fn write_clouds(
     context: &Context,
-    number: usize,
+    id: EpochId,
     labelled: &Labelled,
     rows: Option<&[StoneRow]>,
 ) -> Result<()> {
-    let epoch = &context.project.epochs[number - 1];
-    let folder = context.out.join(epoch_dir(number));
+    let epoch = &context.project.epochs[id];
+    let folder = context.out.join(epoch_dir(id.number()));
     fs::create_dir_all(&folder).map_err(Error::io("making a folder", &folder))?;
-    let names = cloud_names(number, &epoch.clouds);
+    let names = cloud_names(id.number(), &epoch.clouds);
     if let Some(output) = context.output {
         names.iter().try_for_each(|name| output.bring_back(name))?;
     }
     let outputs: Vec<PathBuf> = names.iter().map(|name| context.out.join(name)).collect();
     let motions = rows.map_or_else(BTreeMap::new, motions);
     let key = Key::new("clouds", &format!("{motions:?}"), &[labelled.key.as_str()]);
-    context.step_publishing(&format!("clouds-{number}"), key, &outputs, |_, _| {
+    context.step_publishing(&format!("clouds-{id}"), key, &outputs, |_, _| {
         // Of two processes that do the same unit the slower one must not take away what the other has
         // finished.
         let removes = !context.store.is_of_unit();

@@ -3,14 +3,35 @@
 use crate::error::Result;
 use crate::export::FaceColours;
 use crate::pipeline::context::Context;
+use crate::pipeline::graph::{Need, Step};
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::until::Until;
 use crate::results::StoneRow;
-use crate::results::names::FACE_CLOUD;
+use crate::results::names::FACE_CLOUD as FILE;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::cloud::{Dimension, write_coloured_laz};
+
+/// Writes the points of stones in the colours of the first later epoch.
+pub static FACE_CLOUD: Step = Step {
+    name: "face-cloud",
+    needs: &[Need::first_later(&MEASURE)],
+    wanted: |until| until == Until::Reported,
+    make: |run, _| match run.context.project.epochs.later_ids().next() {
+        Some(later) => {
+            let (first, measured) = (run.labelled(EpochId::REFERENCE)?, run.measured(later)?);
+            run.context.timed("face cloud", || {
+                write_face_cloud(run.context, &first, &measured.rows)
+            })
+        }
+        None => Ok(()),
+    },
+    ..Step::PLAIN
+};
 
 /// Extra dimensions; NaN where the motion was not measured.
 const DIMENSIONS: [Dimension; 6] = [
@@ -24,7 +45,7 @@ const DIMENSIONS: [Dimension; 6] = [
 
 /// Writes `stones.laz`: every point of a stone of the first epoch, coloured by its motion out of the wall on
 /// the scale of the report, grey where that was not measured.
-pub fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
+fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) -> Result<()> {
     let colours = FaceColours::new(rows);
     let by_id: BTreeMap<u32, &StoneRow> = rows.iter().map(|r| (r.stone_id, r)).collect();
     let tiles = &first.ingested.tiles;
@@ -37,7 +58,7 @@ pub fn write_face_cloud(context: &Context, first: &Labelled, rows: &[StoneRow]) 
     let crs = coordinate_system(context.project)?;
     let crs = crs.map(|c| c.text());
     write_coloured_laz(
-        &context.out.join(FACE_CLOUD),
+        &context.out.join(FILE),
         &bounds,
         &DIMENSIONS,
         crs.as_deref(),

@@ -5,6 +5,7 @@ use crate::results::names::PairFile;
 use nalgebra::Point3;
 use std::path::Path;
 use stonewise_core::change::{ChangeField, ChangePoint};
+use stonewise_core::epoch::EpochId;
 use stonewise_io::cloud::{Dimension, ExtraColumn, write_points_laz};
 use stonewise_io::crs::Crs;
 use stonewise_io::table::{Table, write_csv};
@@ -32,10 +33,10 @@ const DIMENSIONS: [Dimension; 10] = [
 /// with PDAL's dimension names.
 ///
 /// In the LAZ an unknown number is NaN; in the CSV its cell is empty.
-pub fn write_m3c2(dir: &Path, pair: usize, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
-    let csv = dir.join(PairFile::M3c2Csv.name(pair));
+pub fn write_m3c2(dir: &Path, later: EpochId, crs: Option<&Crs>, field: &ChangeField) -> Result<()> {
+    let csv = dir.join(PairFile::M3c2Csv.name(later.index()));
     write_csv(&csv, &table(field)?, DESCRIPTION, None)?;
-    write_cloud(&dir.join(PairFile::M3c2Laz.name(pair)), crs, field)
+    write_cloud(&dir.join(PairFile::M3c2Laz.name(later.index())), crs, field)
 }
 
 fn table(field: &ChangeField) -> Result<Table> {
@@ -109,7 +110,7 @@ mod tests {
     fn the_metadata_describe_every_column() {
         let folder = tempfile::tempdir().unwrap();
         let field = ChangeField { points: Vec::new() };
-        write_m3c2(folder.path(), 2, None, &field).unwrap();
+        write_m3c2(folder.path(), EpochId::at(2), None, &field).unwrap();
         check_csv_metadata(&folder.path().join("m3c2_2.csv"));
     }
 

@@ -1,15 +1,18 @@
 //! The result files that steps do not write themselves.
 
-pub mod audit;
-pub mod carried;
+mod audit;
+pub mod audits;
+mod carried;
 pub mod clouds;
 pub mod crs;
-pub mod edits;
+mod edits;
 pub mod evidence;
 pub mod face_cloud;
 pub mod m3c2;
 pub mod outlines;
+pub mod report;
 pub mod run_record;
 pub mod series;
 pub mod stone_rows;
+pub mod tables;
 pub mod verdict;

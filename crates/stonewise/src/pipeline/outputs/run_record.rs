@@ -4,28 +4,32 @@ use super::crs::coordinate_system;
 use crate::error::{Error, Result};
 use crate::files::write_readable_json;
 use crate::pipeline::context::Context;
-use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::steps::segment::Segmented;
-use crate::project::Epoch;
+use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::outputs::verdict::VERDICT;
+use crate::pipeline::until::Until;
 use crate::results::names::RUN;
-use crate::results::records::{
-    CrsRecord, DatumState, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp, Verdict,
-};
+use crate::results::records::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp};
+use std::collections::BTreeMap;
 use std::path::Path;
+use stonewise_core::epoch::EpochId;
 
-/// Writes `run.json`; `datums`: what is known about the registration of each later epoch, `verdict`: the
-/// verdict on the run.
-pub fn write_run_record(
-    context: &Context,
-    photos: &[Segmented],
-    labelled: &[Labelled],
-    datums: &[DatumState],
-    verdict: &Verdict,
-) -> Result<()> {
+/// Writes `run.json`, once everything is known that it tells.
+pub static RECORD: Step = Step {
+    name: "record",
+    needs: &[Need::same(&VERDICT)],
+    wanted: |until| until >= Until::Registered,
+    make: |run, _| write_run_record(run),
+    ..Step::PLAIN
+};
+
+fn write_run_record(run: &Run) -> Result<()> {
+    let context = run.context;
+    let mut datum = BTreeMap::new();
+    for later in context.project.epochs.later_ids() {
+        let name = context.project.epochs[later].name.clone();
+        datum.insert(name, run.measured(later)?.datum.state);
+    }
     let project = context.project;
-    let found = photos.iter().zip(labelled);
-    let epochs = project.epochs.iter().zip(found);
-    let later = project.epochs.iter().skip(1).map(|e| e.name.clone());
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         finished_at: Timestamp::now(),
@@ -38,10 +42,10 @@ pub fn write_run_record(
             name: crs.name,
             wkt: crs.wkt,
         }),
-        datum: later.zip(datums.iter().copied()).collect(),
-        verdict: Some(verdict.headlines()),
-        epochs: epochs
-            .map(|(epoch, (photos, labelled))| epoch_record(context, epoch, photos, labelled))
+        datum,
+        verdict: Some(run.verdict()?.headlines()),
+        epochs: { project.epochs.ids() }
+            .map(|epoch| epoch_record(run, epoch))
             .collect::<Result<_>>()?,
         part: project.part.clone(),
         edits: project
@@ -56,12 +60,9 @@ pub fn write_run_record(
     write_readable_json(&context.out.join(RUN), &record)
 }
 
-fn epoch_record(
-    context: &Context,
-    epoch: &Epoch,
-    photos: &Segmented,
-    labelled: &Labelled,
-) -> Result<EpochRecord> {
+fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
+    let (context, epoch) = (run.context, &run.context.project.epochs[id]);
+    let (photos, labelled) = (run.segmented(id)?, run.labelled(id)?);
     let input = |path: &Path| input(context, path);
     Ok(EpochRecord {
         name: epoch.name.clone(),

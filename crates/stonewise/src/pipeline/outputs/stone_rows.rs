@@ -7,20 +7,21 @@ use crate::results::records::Datum;
 use crate::results::{Facade, Reference, StoneRow};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
+use stonewise_core::epoch::Pair;
 use stonewise_core::geometry::SmallMotion;
 use stonewise_core::stone::{MatchOutcome, Stone, common_motion};
 
 /// One row for each stone of the first epoch.
 pub fn stone_rows(
-    epochs: [&Labelled; 2],
+    epochs: Pair<&Labelled>,
     matched: &Matched,
     registered: &Registered,
     datum: &Datum,
     facade: &Facade,
 ) -> Vec<StoneRow> {
-    let [first, second] = epochs.map(|e| &e.stones);
+    let Pair { first, later } = epochs.map(|e| &e.stones);
     let (edited, carried) = (epochs.map(|e| &e.edited), epochs.map(|e| &e.carried));
-    let partners: BTreeMap<_, _> = second.iter().map(|s| (s.id, s)).collect();
+    let partners: BTreeMap<_, _> = later.iter().map(|s| (s.id, s)).collect();
     let outcomes: BTreeMap<_, _> = matched.report.outcomes.iter().copied().collect();
     let motions: BTreeMap<_, _> = registered.results.iter().map(|r| (r.first, r)).collect();
     let common = common_motion(first, &motions);
@@ -58,12 +59,12 @@ pub fn stone_rows(
         let pair = motions.get(&stone.id).copied();
         let place = facade.place(&stone.centroid);
         let row = StoneRow::new(stone, outcome, partner, pair, &reference, &place);
-        let of_partner = || edited[1].get(&partner?.id);
-        let from = carried[0].get(&stone.id);
-        let from = from.or_else(|| carried[1].get(&partner?.id));
+        let of_partner = || edited.later.get(&partner?.id);
+        let from = carried.first.get(&stone.id);
+        let from = from.or_else(|| carried.later.get(&partner?.id));
         Some(StoneRow {
-            edited: edited[0].get(&stone.id).or_else(of_partner).copied(),
-            carried_from: from.map(|&epoch| epoch as u32),
+            edited: edited.first.get(&stone.id).or_else(of_partner).copied(),
+            carried_from: from.map(|epoch| epoch.number() as u32),
             ..row
         })
     };

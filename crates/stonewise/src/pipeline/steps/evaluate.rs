@@ -1,55 +1,54 @@
 //! Results against the motion that the project file prescribes.
 
-use crate::pipeline::context::Context;
-use crate::results::StoneRow;
-use crate::results::records::Datum;
+use crate::error::Result;
+use crate::files::write_readable_json;
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::steps::change::CHANGE;
+use crate::pipeline::steps::known_motion::known_motion;
+use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::until::Until;
+use crate::results::names::PairFile;
 use crate::truth::outcome;
-use nalgebra::{Point3, Vector3};
-use stonewise_core::change::{ChangeField, ChangePoint};
-use stonewise_core::cloud::GridIndex;
-use stonewise_core::evaluate::{Evaluation, StoneOutcome, score_change, score_stones};
-use stonewise_core::stone::Stone;
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
+use stonewise_core::evaluate::{Evaluation, StoneOutcome, score_stones};
 
-/// Scores stones, and M3C2 where there is any, of epoch `number` against its prescribed motion; `None`
-/// where the project prescribes none.
-///
-/// The motion is that of the later epoch's points, as a function of where they were; a known motion of epoch
-/// 1 is taken away from it.
-pub fn evaluate(
-    context: &Context,
-    stones: &[Stone],
-    rows: &[StoneRow],
-    datum: &Datum,
-    change: Option<&ChangeField>,
-    number: usize,
-) -> Option<Evaluation> {
-    let epochs = &context.project.epochs;
-    let (before, after) = (&epochs[0].motion, &epochs[number - 1].motion);
-    if before.is_none() && after.is_none() {
-        return None;
+/// Scores the stones of a later epoch, and M3C2 where there is any, against the prescribed motion.
+pub static EVALUATE: Step = Step {
+    name: "evaluate",
+    about: About::Later,
+    needs: &[Need::same(&MEASURE), Need::same(&CHANGE)],
+    wanted: |until| until >= Until::Registered,
+    make: |run, epoch| match &*run.evaluated(epoch)? {
+        Some(evaluation) => {
+            let name = PairFile::Evaluation.name(epoch.index());
+            write_readable_json(&run.context.out.join(name), evaluation)
+        }
+        None => Ok(()),
+    },
+    ..Step::PLAIN
+};
+
+impl Run<'_> {
+    /// Scores of a later epoch; `None` where no motion is known.
+    pub fn evaluated(&self, later: EpochId) -> Result<Arc<Option<Evaluation>>> {
+        self.once(&EVALUATE, later, || {
+            let project = self.context.project;
+            let Some(truth) = known_motion(project, later) else {
+                return Ok(None);
+            };
+            let (first, measured) = (self.labelled(EpochId::REFERENCE)?, self.measured(later)?);
+            let params = &project.settings.evaluate;
+            let mut evaluation = Evaluation::new("the motion in the project file", params);
+            let stones = first.stones.iter().zip(&measured.rows);
+            let outcomes: Vec<StoneOutcome> = stones
+                .map(|(stone, row)| outcome(row, stone.normal, Some(&measured.datum)))
+                .collect();
+            evaluation.stones = Some(score_stones(&outcomes, truth, params));
+            if self.until > Until::Registered {
+                evaluation.m3c2 = Option::clone(&*self.change_score(later)?);
+            }
+            Ok(Some(evaluation))
+        })
     }
-    let at = |field: &Option<_>, p: &Point3<f64>| {
-        field
-            .as_ref()
-            .map_or_else(Vector3::zeros, |f: &stonewise_core::evaluate::MotionField| {
-                f.displacement_at(p)
-            })
-    };
-    let truth = |p: &Point3<f64>| at(after, p) - at(before, p);
-    let params = &context.project.settings.evaluate;
-    let mut evaluation = Evaluation::new("the motion in the project file", params);
-    let outcomes: Vec<StoneOutcome> = stones
-        .iter()
-        .zip(rows)
-        .map(|(stone, row)| outcome(row, stone.normal, Some(datum)))
-        .collect();
-    evaluation.stones = Some(score_stones(&outcomes, truth, params));
-    let index = GridIndex::new(&stones.iter().map(|s| s.centroid).collect::<Vec<_>>(), 0.5);
-    let face = |p: &ChangePoint| {
-        index
-            .nearest(&p.position, 2.0)
-            .map_or(p.normal, |(i, _)| stones[i].normal)
-    };
-    evaluation.m3c2 = change.map(|field| score_change(field, truth, face, params));
-    Some(evaluation)
 }

@@ -2,12 +2,42 @@
 
 use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{About, Run, Step};
 use crate::storage::epoch_tiles::EpochTiles;
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::{DiskTiles, cut_into_tiles};
 use crate::texts::notices::INVALID_POINTS;
 use nalgebra::Point3;
+use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::{EpochId, Pair};
+
+/// Cuts the clouds of an epoch into tiles.
+pub static INGEST: Step = Step {
+    name: "ingest",
+    words: |_| "clouds of",
+    about: About::Epoch,
+    // Tiles are sorted in a buffer of a quarter of a gibibyte.
+    cost: Some(|sizes, epoch| Cost::of(2, 256 << 20).reading(sizes.project.epochs[epoch].clouds.clone())),
+    make: |run, epoch| run.ingested(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+impl Run<'_> {
+    /// The tiles of an epoch.
+    pub fn ingested(&self, epoch: EpochId) -> Result<Arc<Ingested>> {
+        self.once(&INGEST, epoch, || ingest(self.context, epoch))
+    }
+
+    /// The tiles of the reference and of a later epoch.
+    pub fn clouds(&self, later: EpochId) -> Result<Pair<Arc<Ingested>>> {
+        Ok(Pair::new(
+            self.ingested(EpochId::REFERENCE)?,
+            self.ingested(later)?,
+        ))
+    }
+}
 
 /// The tiles of an epoch and the step that made them.
 pub struct Ingested {
@@ -17,9 +47,8 @@ pub struct Ingested {
     pub tiles: EpochTiles,
 }
 
-/// Cuts the clouds of an epoch into tiles.
-pub fn ingest(context: &Context, number: usize) -> Result<Ingested> {
-    let epoch = &context.project.epochs[number - 1];
+fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
+    let epoch = &context.project.epochs[id];
     let digests = epoch
         .clouds
         .iter()
@@ -33,7 +62,7 @@ pub fn ingest(context: &Context, number: usize) -> Result<Ingested> {
         &(&context.project.settings.ingest, part, epoch.sources),
         &inputs,
     );
-    let step = context.step(&format!("ingest-{number}"), key, |step, warnings| {
+    let step = context.step(&format!("ingest-{id}"), key, |step, warnings| {
         let takes_part = |p: &Point3<f64>| part.as_ref().is_none_or(|part| part.contains(p));
         let invalid = cut_into_tiles(
             &epoch.clouds,

@@ -4,17 +4,20 @@
 //! them. Photos of another epoch, in another light, then outvote them. This step comes after the vote of the
 //! photos of one epoch and before stones are carried. Epochs with masks stay as they are.
 
-use super::carry::{shapes, shift_back};
-use super::label::{DiskLabels, Labelled, Labels, tabulate};
-use super::r#match::match_in;
+use super::label::{DiskLabels, Labelled, Labels, STONES, tabulate};
 use super::segment::Segmented;
+use super::shapes::{Others, is_corrected, shapes, shift_back};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
-use crate::pipeline::context::Context;
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::until::Until;
 use crate::storage::step::Key;
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
 use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
@@ -23,60 +26,93 @@ use stonewise_core::transfer::{
     photos_facing,
 };
 
+/// Joins parts in the reference, by the stones of later epochs, then in each later epoch, by those of the
+/// reference.
+pub static JOIN: Step = Step {
+    name: "join",
+    words: |_| "parts of stones joined in",
+    about: About::Epoch,
+    needs: &[Need::all(&STONES), Need::reference(&JOIN)],
+    wanted: |until| until >= Until::Labelled,
+    applies: is_corrected,
+    cost: Some(|sizes, _| Cost::of(2, sizes.every_pair_bytes())),
+    make: |run, epoch| run.joined(epoch).map(drop),
+    ..Step::PLAIN
+};
+
 /// What the step says about the stones that it joined.
 const REPORT: &str = "report.json";
 
-/// Joins parts in the first epoch, by the stones of later epochs, then in each later epoch, by those of the
-/// first.
-pub fn join(context: &Context, photos: &[Segmented], mut labelled: Vec<Labelled>) -> Result<Vec<Labelled>> {
-    let epochs = &context.project.epochs;
-    if !context.project.settings.carry.enabled || epochs.iter().all(|e| e.masks.is_some()) {
-        return Ok(labelled);
+/// An epoch in which parts of stones are joined.
+pub struct JoinedEpoch {
+    /// Its labels.
+    pub labelled: Arc<Labelled>,
+    /// The new stones.
+    joined: Vec<Joined>,
+}
+
+impl Run<'_> {
+    /// An epoch in which parts of stones are joined.
+    pub fn joined(&self, epoch: EpochId) -> Result<Arc<JoinedEpoch>> {
+        if !is_corrected(self.context.project, epoch) {
+            return Ok(Arc::new(JoinedEpoch::unchanged(self.found(epoch)?)));
+        }
+        self.once(&JOIN, epoch, || match epoch.is_reference() {
+            true => join_reference(self),
+            false => join_later(self, epoch),
+        })
     }
-    let steepest = context.project.settings.label.max_incidence_rad;
-    let mut into_first = Vec::new();
-    for number in 2..=labelled.len() {
-        let report = match_in(
-            context,
-            &format!("join-match-{number}"),
-            &labelled[0],
-            &labelled[number - 1],
-        )?;
-        let matching = Matching::new(&labelled, number, &report);
-        into_first.extend(matching.whole_in_later(&photos[number - 1], steepest));
+}
+
+impl JoinedEpoch {
+    fn unchanged(labelled: Arc<Labelled>) -> Self {
+        let joined = Vec::new();
+        Self { labelled, joined }
     }
-    let in_first = join_into(context, 1, photos, &mut labelled, into_first)?;
-    // A stone that was divided alike in the first and a later epoch had partners before.
-    let name = match in_first.is_empty() {
+}
+
+fn join_reference(run: &Run) -> Result<JoinedEpoch> {
+    let steepest = run.context.project.settings.label.max_incidence_rad;
+    let first = run.found(EpochId::REFERENCE)?;
+    let (mut asked, mut others) = (Vec::new(), Others::new());
+    for later in run.context.project.epochs.later_ids() {
+        let labelled = run.found(later)?;
+        let pair = Pair::new(&*first, &*labelled);
+        let report = run.matches("join-match", pair, later)?;
+        let matching = Matching::new(pair, later, &report);
+        asked.extend(matching.whole_in_later(&*run.segmented(later)?, steepest));
+        others.insert(later, labelled);
+    }
+    join_into(run, EpochId::REFERENCE, first, &others, asked)
+}
+
+fn join_later(run: &Run, later: EpochId) -> Result<JoinedEpoch> {
+    let steepest = run.context.project.settings.label.max_incidence_rad;
+    let (first, own) = (run.joined(EpochId::REFERENCE)?, run.found(later)?);
+    // A stone that was divided alike in the reference and a later epoch had partners before.
+    let name = match first.joined.is_empty() {
         true => "join-match",
         false => "join-match-again",
     };
-    let shown: BTreeMap<StoneId, Shown> = in_first
-        .iter()
+    let pair = Pair::new(&*first.labelled, &*own);
+    let report = run.matches(name, pair, later)?;
+    let matching = Matching::new(pair, later, &report);
+    let mut asked = matching.whole_in_first(&*run.segmented(EpochId::REFERENCE)?, steepest);
+    let shown: BTreeMap<StoneId, Shown> = { first.joined.iter() }
         .filter_map(|joined| Some((*joined.parts.first()?, joined.shown)))
         .collect();
-    for number in 2..=labelled.len() {
-        let report = match_in(
-            context,
-            &format!("{name}-{number}"),
-            &labelled[0],
-            &labelled[number - 1],
-        )?;
-        let matching = Matching::new(&labelled, number, &report);
-        let mut asked = matching.whole_in_first(&photos[0], steepest);
-        for stone in &mut asked {
-            stone.shown = *shown.get(&stone.stone).unwrap_or(&stone.shown);
-        }
-        join_into(context, number, photos, &mut labelled, asked)?;
+    for stone in &mut asked {
+        stone.shown = *shown.get(&stone.stone).unwrap_or(&stone.shown);
     }
-    Ok(labelled)
+    let others = Others::from([(EpochId::REFERENCE, Arc::clone(&first.labelled))]);
+    join_into(run, later, own, &others, asked)
 }
 
 /// A stone that another epoch may show in parts.
 #[derive(Clone, Debug, Serialize)]
 struct Asked {
-    /// The epoch that shows it, from 1.
-    from: usize,
+    /// The epoch that shows it.
+    from: EpochId,
     stone: StoneId,
     outward: Vector3<f64>,
     /// How its surroundings moved from that epoch to the other.
@@ -86,7 +122,7 @@ struct Asked {
 }
 
 impl Asked {
-    fn new(photos: &Segmented, from: usize, stone: &Stone, shift: Vector3<f64>, steepest: f64) -> Self {
+    fn new(photos: &Segmented, from: EpochId, stone: &Stone, shift: Vector3<f64>, steepest: f64) -> Self {
         let facing = photos_facing(&photos.views, &stone.centroid, &stone.normal, steepest) as u32;
         Self {
             from,
@@ -103,36 +139,35 @@ impl Asked {
 
 /// The first epoch and a later one, with their matches.
 struct Matching<'a> {
-    labelled: [&'a Labelled; 2],
-    /// Of the epochs, from 1.
-    numbers: [usize; 2],
+    labelled: Pair<&'a Labelled>,
+    later: EpochId,
     report: &'a MatchReport,
 }
 
 impl<'a> Matching<'a> {
-    fn new(labelled: &'a [Labelled], number: usize, report: &'a MatchReport) -> Self {
+    fn new(labelled: Pair<&'a Labelled>, later: EpochId, report: &'a MatchReport) -> Self {
         Self {
-            labelled: [&labelled[0], &labelled[number - 1]],
-            numbers: [1, number],
+            labelled,
+            later,
             report,
         }
     }
 
     /// Stones of the first epoch that may be the whole of later stones without a partner.
     fn whole_in_first(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
-        let [first, later] = self.labelled;
+        let Pair { first, later } = self.labelled;
         let alone = |s: &&Stone| self.report.unmatched_second.binary_search(&s.id).is_ok();
         let alone: Vec<&Stone> = later.stones.iter().filter(alone).collect();
         let wholes = first.stones.iter().zip(&self.report.local_shifts);
         wholes
             .filter(|(whole, shift)| alone.iter().any(|part| may_be_part(part, whole, shift)))
-            .map(|(whole, shift)| Asked::new(photos, self.numbers[0], whole, *shift, steepest))
+            .map(|(whole, shift)| Asked::new(photos, EpochId::REFERENCE, whole, *shift, steepest))
             .collect()
     }
 
     /// Stones of the later epoch that may be the whole of first stones without a partner.
     fn whole_in_later(&self, photos: &Segmented, steepest: f64) -> Vec<Asked> {
-        let [first, later] = self.labelled;
+        let Pair { first, later } = self.labelled;
         let outcomes = first.stones.iter().zip(&self.report.outcomes);
         let alone: Vec<&Stone> = outcomes
             .filter(|(_, (_, outcome))| {
@@ -143,7 +178,7 @@ impl<'a> Matching<'a> {
         let asked = |whole: &Stone| {
             let shift = shift_back(&first.stones, self.report, whole)?;
             let has_part = alone.iter().any(|part| may_be_part(part, whole, &shift));
-            has_part.then(|| Asked::new(photos, self.numbers[1], whole, shift, steepest))
+            has_part.then(|| Asked::new(photos, self.later, whole, shift, steepest))
         };
         later.stones.iter().filter_map(asked).collect()
     }
@@ -156,30 +191,31 @@ fn may_be_part(part: &Stone, whole: &Stone, shift: &Vector3<f64>) -> bool {
     part.area_m2 < whole.area_m2 && apart_m * apart_m < 2.0 * whole.area_m2
 }
 
-/// Joins the parts that an epoch has of stones of other epochs; returns the new stones.
+/// Joins the parts that an epoch has of stones of other epochs.
 fn join_into(
-    context: &Context,
-    number: usize,
-    photos: &[Segmented],
-    labelled: &mut Vec<Labelled>,
+    run: &Run,
+    epoch: EpochId,
+    own: Arc<Labelled>,
+    others: &Others,
     asked: Vec<Asked>,
-) -> Result<Vec<Joined>> {
-    if asked.is_empty() || context.project.epochs[number - 1].masks.is_some() {
-        return Ok(Vec::new());
+) -> Result<JoinedEpoch> {
+    if asked.is_empty() {
+        return Ok(JoinedEpoch::unchanged(own));
     }
+    let context = run.context;
     let missed_weight = context.project.settings.label.missed_weight;
-    let sources: BTreeSet<usize> = asked.iter().map(|a| a.from).collect();
-    let mut keys = vec![labelled[number - 1].key.as_str()];
-    keys.extend(sources.iter().map(|&from| labelled[from - 1].key.as_str()));
+    let sources: BTreeSet<EpochId> = asked.iter().map(|a| a.from).collect();
+    let mut keys = vec![own.key.as_str()];
+    keys.extend(
+        sources
+            .iter()
+            .filter_map(|from| Some(others.get(from)?.key.as_str())),
+    );
     let key = Key::new("join", &(missed_weight, &asked), &keys);
-    let step = context.step(&format!("join-{number}"), key, |step, _| {
-        let own = &labelled[number - 1];
+    let step = context.step(&format!("join-{epoch}"), key, |step, _| {
         let mut target = DiskLabels::new(step.path(), &own.ingested.tiles.surveyed);
-        let shapes = shapes(
-            context,
-            labelled,
-            asked.iter().map(|a| (a.from, a.stone, a.outward)),
-        )?;
+        let wanted = asked.iter().map(|a| (a.from, a.stone, a.outward));
+        let shapes = shapes(others, wanted, context.progress)?;
         let wholes = asked.iter().filter_map(|a| {
             let placed = PlacedShape {
                 shape: shapes.get(&(a.from, a.stone))?,
@@ -203,23 +239,22 @@ fn join_into(
     })?;
     let report: JoinReport = read_json(&step.file(REPORT))?;
     if report.joined.is_empty() {
-        return Ok(Vec::new());
+        return Ok(JoinedEpoch::unchanged(own));
     }
-    let own = labelled.remove(number - 1);
-    let mut store = own.store;
+    let mut store = own.store.clone();
     store.replace(
         &report.tiles,
         &DiskLabels::new(step.path(), &own.ingested.tiles.surveyed),
     );
     let labels = Labels {
-        transfer: joined(own.transfer, &report),
+        transfer: joined(own.transfer.clone(), &report),
         store,
         step,
     };
-    let photos = &photos[number - 1];
-    let tabulated = tabulate(context, number, "stones-joined", photos, own.ingested, labels)?;
-    labelled.insert(number - 1, tabulated);
-    Ok(report.joined)
+    Ok(JoinedEpoch {
+        labelled: Arc::new(tabulate(run, epoch, "stones-joined", labels)?),
+        joined: report.joined,
+    })
 }
 
 /// The instances of each stone in photos; those of joined parts are those of the new stone.

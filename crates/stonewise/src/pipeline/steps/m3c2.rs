@@ -2,15 +2,22 @@
 
 use crate::error::Result;
 use crate::pipeline::context::Context;
-use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::label::batches::batch_name;
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
+use crate::pipeline::part::Part;
+use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::pipeline::steps::segment::SEGMENT;
+use crate::pipeline::until::Until;
 use crate::results::records::Datum;
 use crate::storage::step::{Key, StepDir};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use stonewise_core::change::{ChangeField, ChangePoint, M3c2Params, OutwardReference, m3c2_survey};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::{EpochId, Pair};
+use stonewise_core::geometry::View;
 use stonewise_core::registration::observers::EpochErrors;
 use stonewise_io::table::{Table, read_parquet, write_parquet};
 
@@ -18,18 +25,68 @@ use stonewise_io::table::{Table, read_parquet, write_parquet};
 /// of a dam.
 const FIELD: &str = "field.parquet";
 
-/// Compares two epochs along the normals of the first.
-pub fn m3c2(
-    context: &Context,
-    epochs: [&Ingested; 2],
-    number: usize,
-    outward: &OutwardReference,
-) -> Result<ChangeField> {
-    let comparison = Comparison::new(context, epochs, number, outward);
-    let all = 0..epochs[0].tiles.tile_count();
-    let step = context.step(&comparison.name, comparison.key.clone(), |step, _| {
-        write_field(&step.file(FIELD), &comparison.field(all)?)
-    })?;
+/// Compares the clouds of a later epoch with those of the reference, along normals.
+pub static M3C2: Step = Step {
+    name: "m3c2",
+    words: |_| "M3C2 of",
+    about: About::Later,
+    needs: &[
+        Need::reference(&INGEST),
+        Need::same(&INGEST),
+        Need::reference(&SEGMENT),
+    ],
+    wanted: |until| until >= Until::Compared,
+    cost: Some(|sizes, _| Cost::of(1, sizes.cloud_bytes(EpochId::REFERENCE))),
+    parts: Some(Parts {
+        kind: PartKind::ReferenceTiles,
+        cost: |_, _| Cost::of(4, 512 << 20),
+        make: compare,
+    }),
+    make: |run, epoch| run.compared(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+impl Run<'_> {
+    /// The comparison of the clouds of a later epoch, on disk.
+    pub fn compared(&self, later: EpochId) -> Result<Arc<StepDir>> {
+        self.once(&M3C2, later, || {
+            let centres = self.reference_cameras()?;
+            m3c2(self, later, &OutwardReference::Towards(&centres))
+        })
+    }
+
+    fn reference_cameras(&self) -> Result<Vec<Point3<f64>>> {
+        let photos = self.segmented(EpochId::REFERENCE)?;
+        Ok(photos.views.iter().map(View::centre).collect())
+    }
+}
+
+/// Does a part of the step, or gathers all of them.
+fn compare(run: &Run, later: EpochId, part: Part) -> Result<()> {
+    let centres = run.reference_cameras()?;
+    let outward = OutwardReference::Towards(&centres);
+    let clouds = run.clouds(later)?;
+    let comparison = Comparison::new(run.context, clouds.each_ref().map(|c| &**c), later, &outward);
+    match part {
+        Part::Whole(count) => comparison.gather(count),
+        Part::Tiles(number, count) => comparison.batch(number, count).map(drop),
+        Part::Prepare | Part::Photo(_) => Ok(()),
+    }
+}
+
+/// Compares two epochs along the normals of the reference, in whatever direction is outwards.
+pub fn m3c2(run: &Run, later: EpochId, outward: &OutwardReference) -> Result<StepDir> {
+    let clouds = run.clouds(later)?;
+    let comparison = Comparison::new(run.context, clouds.each_ref().map(|c| &**c), later, outward);
+    let all = 0..clouds.first.tiles.tile_count();
+    run.context
+        .step(&comparison.name, comparison.key.clone(), |step, _| {
+            write_field(&step.file(FIELD), &comparison.field(all)?)
+        })
+}
+
+/// The comparison that the step left.
+pub fn change_field(step: &StepDir) -> Result<ChangeField> {
     read_field(&step.file(FIELD))
 }
 
@@ -60,38 +117,38 @@ pub fn with_datum(
 }
 
 /// The comparison of two epochs, for processes that share it.
-pub struct Comparison<'a> {
+struct Comparison<'a> {
     context: &'a Context<'a>,
-    epochs: [&'a Ingested; 2],
+    epochs: Pair<&'a Ingested>,
     outward: &'a OutwardReference<'a>,
     name: String,
     key: Key,
 }
 
 impl<'a> Comparison<'a> {
-    /// That of epoch `number` with the first.
-    pub fn new(
+    /// That of a later epoch with the reference.
+    fn new(
         context: &'a Context<'a>,
-        epochs: [&'a Ingested; 2],
-        number: usize,
+        epochs: Pair<&'a Ingested>,
+        later: EpochId,
         outward: &'a OutwardReference<'a>,
     ) -> Self {
         let params = &context.project.settings.m3c2;
-        let motions = epochs.map(|e| &e.tiles.motion);
-        let keys = epochs.map(|e| e.step.key().as_str());
+        let motions = epochs.map(|e| &e.tiles.motion).into_array();
+        let keys = epochs.map(|e| e.step.key().as_str()).into_array();
         Self {
             context,
             epochs,
             outward,
-            name: format!("m3c2-{number}"),
+            name: format!("m3c2-{later}"),
             key: Key::new("m3c2", &(params, motions), &keys),
         }
     }
 
     fn field(&self, tiles: Range<usize>) -> Result<ChangeField> {
         Ok(m3c2_survey(
-            &self.epochs[0].tiles,
-            &self.epochs[1].tiles,
+            &self.epochs.first.tiles,
+            &self.epochs.later.tiles,
             tiles,
             self.outward,
             &self.context.project.settings.m3c2,
@@ -100,16 +157,17 @@ impl<'a> Comparison<'a> {
     }
 
     /// The core points of one of `count` batches of tiles of the first epoch.
-    pub fn batch(&self, number: usize, count: usize) -> Result<StepDir> {
+    fn batch(&self, number: usize, count: usize) -> Result<StepDir> {
         let whole = (self.name.as_str(), &self.key);
-        self.context.part(whole, &batch_name(number, count), |part| {
-            let tiles = self.epochs[0].tiles.surveyed.batch(number, count);
-            write_field(&part.file(FIELD), &self.field(tiles)?)
-        })
+        self.context
+            .part(whole, &Part::Tiles(number, count).name(), |part| {
+                let tiles = self.epochs.first.tiles.surveyed.batch(number, count);
+                write_field(&part.file(FIELD), &self.field(tiles)?)
+            })
     }
 
     /// Takes the core points of all batches together.
-    pub fn gather(&self, count: usize) -> Result<()> {
+    fn gather(&self, count: usize) -> Result<()> {
         self.context.step(&self.name, self.key.clone(), |step, _| {
             let mut field = ChangeField::default();
             for number in 0..count {

@@ -1,13 +1,21 @@
-//! The steps, in their order: ingest, segment, label, join, carry, edit, match, offsets, register, m3c2, evaluate.
+//! The steps that compute, in their order: `../list.rs`.
 
 pub mod carry;
+pub mod change;
+pub mod check;
 pub mod edit;
 pub mod evaluate;
 pub mod ingest;
 pub mod join;
+pub mod known_motion;
 pub mod label;
 pub mod m3c2;
 pub mod r#match;
+mod matching;
+pub mod measure;
 pub mod offsets;
+pub mod overlap;
 pub mod register;
 pub mod segment;
+mod shapes;
+pub mod stone_outlines;

@@ -2,20 +2,35 @@
 
 use crate::error::Result;
 use crate::files::{read_json, write_json};
-use crate::pipeline::context::Context;
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::steps::r#match::Matched;
+use crate::pipeline::steps::r#match::MATCH;
+use crate::pipeline::until::Until;
 use crate::storage::step::Key;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::Bounds;
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::{FaceGrid, FacePatch, Offset, OffsetVote};
 use stonewise_core::progress::Progress;
 use stonewise_core::statistics::component_median;
 use stonewise_core::stone::Stone;
+
+/// Compares the labels of a pair of epochs with the relief of their clouds.
+pub static OFFSETS: Step = Step {
+    name: STEP,
+    about: About::Later,
+    needs: &[Need::same(&MATCH)],
+    wanted: |until| until >= Until::Registered,
+    cost: Some(|_, _| Cost::of(2, 0)),
+    make: |run, epoch| run.offsets(epoch).map(drop),
+    ..Step::PLAIN
+};
 
 /// Name of the step.
 const STEP: &str = "offsets";
@@ -71,21 +86,23 @@ impl From<Offset> for LabelOffset {
     }
 }
 
-/// Compares the labels of a pair of epochs with the relief of their clouds.
-pub fn label_offsets(
-    context: &Context,
-    first: &Labelled,
-    second: &Labelled,
-    matched: &Matched,
-    number: usize,
-) -> Result<LabelOffsets> {
-    let matches = matched.pairs();
-    let key = Key::new(STEP, &matches, &[first.key.as_str(), second.key.as_str()]);
-    let step = context.step(&format!("{STEP}-{number}"), key, |step, _| {
-        let places = places(&first.stones, &second.stones, &matches);
+impl Run<'_> {
+    /// How far labels lie beside the stones of their clouds.
+    pub fn offsets(&self, later: EpochId) -> Result<Arc<LabelOffsets>> {
+        self.once(&OFFSETS, later, || label_offsets(self, later))
+    }
+}
+
+fn label_offsets(run: &Run, later: EpochId) -> Result<LabelOffsets> {
+    let (context, labelled) = (run.context, run.labelled_pair(later)?);
+    let matches = run.matched(later)?.pairs();
+    let keys = labelled.each_ref().map(|l| l.key.as_str());
+    let key = Key::new(STEP, &matches, &keys.into_array());
+    let step = context.step(&format!("{STEP}-{later}"), key, |step, _| {
+        let places = places(&labelled.first.stones, &labelled.later.stones, &matches);
         let views = [
-            look(first, &places, |p| p.first, context.progress)?,
-            look(second, &places, |p| p.second, context.progress)?,
+            look(&labelled.first, &places, |p| p.first, context.progress)?,
+            look(&labelled.later, &places, |p| p.second, context.progress)?,
         ];
         write_json(&step.file("offsets.json"), &compare(&views))
     })?;

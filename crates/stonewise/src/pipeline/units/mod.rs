@@ -5,12 +5,12 @@
 //! noted in the results folder and nowhere else.
 
 mod inputs;
+mod list;
 mod plan;
 mod receipt;
-mod stage;
 mod unit;
 
+pub use list::Unit;
 pub use plan::{Coordinator, Plan, PlanOptions, plan};
 pub(super) use receipt::forget;
-pub use stage::{Stage, Unit};
 pub use unit::{UnitDone, do_unit};

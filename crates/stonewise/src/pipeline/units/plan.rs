@@ -1,20 +1,24 @@
 //! The units of a run, and who coordinates them.
 
 use super::inputs::{PlannedInput, inputs_of};
+use super::list::{Unit, units_of};
 use super::receipt::{Receipt, plan_file, withdraw, withdraw_all};
-use super::stage::{Stage, Unit, units_of};
 use crate::error::{Error, Result};
 use crate::files::write_readable_json;
 use crate::output::{OutputFolder, UNFINISHED_FILE};
 use crate::pipeline::context::Context;
-use crate::pipeline::look::look;
+use crate::pipeline::graph::Run;
+use crate::pipeline::steps::check::CHECK;
+use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::results::names::{RUN, WORK_DIR};
 use crate::storage::step::{Key, code_version};
+use crate::storage::store::is_kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::fs;
 use std::path::{Path, PathBuf};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 
 /// Version of the document.
@@ -92,8 +96,9 @@ pub fn plan(
     let project = Project::read(&path)?.with_parameters(parameters)?;
     let folder = OutputFolder::of_project(out, &project, options.force)?;
     let mut plan = {
-        let context = Context::new(&project, &folder, progress)?;
-        look(&context, options.force)?;
+        let mut context = Context::new(&project, &folder, progress)?;
+        context.forced = Some(options.force);
+        (CHECK.make)(&Run::new(&context, Until::Reported), EpochId::REFERENCE)?;
         Plan::of(&context, parameters, options)?
     };
     plan.take_over(out)?;
@@ -140,29 +145,19 @@ impl Plan {
             return withdraw_all(out);
         }
         let work = out.join(WORK_DIR);
-        let is_finished = out.join(RUN).exists() && !out.join(UNFINISHED_FILE).exists();
         for unit in &mut self.units {
-            let step = unit.id.split('.').next().unwrap_or_default();
-            let whole = work.join(step).join("done").exists();
-            let part = || {
-                let part = unit.id.strip_prefix(step).and_then(|p| p.strip_prefix('.'));
-                part.is_some_and(|p| work.join(format!("{step}.parts")).join(p).join("done").exists())
-            };
-            let has_files = match unit.stage {
-                Stage::Report => is_finished,
-                _ => whole || part(),
-            };
-            unit.done = has_files && Receipt::read(out, &self.id, &unit.id).is_some();
+            let receipt = Receipt::read(out, &self.id, &unit.id);
+            unit.done = receipt.is_some_and(|r| r.folders.iter().all(|folder| is_kept(&work, folder)));
             if !unit.done {
                 withdraw(out, &unit.id)?;
             }
         }
-        // The tables are written together with the report.
-        if self.units.iter().any(|unit| !unit.done) {
-            withdraw(out, "report")?;
-            if let Some(report) = self.units.last_mut() {
-                report.done = false;
-            }
+        // The last unit writes the tables.
+        let is_finished = out.join(RUN).exists() && !out.join(UNFINISHED_FILE).exists();
+        let all_done = is_finished && self.units.iter().all(|unit| unit.done);
+        if let Some(last) = self.units.last_mut().filter(|_| !all_done) {
+            last.done = false;
+            withdraw(out, &last.id)?;
         }
         Ok(())
     }

@@ -1,34 +1,23 @@
 //! Doing one unit of a plan.
 
 use super::inputs::unchanged;
+use super::list::Unit;
 use super::plan::Plan;
 use super::receipt::{Receipt, plan_file, times};
-use super::stage::{Stage, Unit};
 use crate::error::{Error, Result};
 use crate::output::OutputFolder;
 use crate::pipeline::Summary;
 use crate::pipeline::clock::Clock;
 use crate::pipeline::context::Context;
-use crate::pipeline::look::look;
-use crate::pipeline::outputs::clouds::write_clouds;
-use crate::pipeline::outputs::outlines::write_stone_outlines;
-use crate::pipeline::run::{
-    Corrected, check_overlap, corrected, labelled, matched, measured, outlined, run_in,
-};
-use crate::pipeline::steps::ingest::ingest;
-use crate::pipeline::steps::label::batches::LabelBatches;
-use crate::pipeline::steps::label::gather_labels;
-use crate::pipeline::steps::m3c2::Comparison;
-use crate::pipeline::steps::offsets::label_offsets;
-use crate::pipeline::steps::register::register;
-use crate::pipeline::steps::segment::{segment, segment_photo};
+use crate::pipeline::graph::{PartKind, Run, Task};
+use crate::pipeline::list::tasks;
+use crate::pipeline::part::Part;
+use crate::pipeline::run::run_in;
 use crate::pipeline::until::Until;
 use crate::project::Project;
 use crate::storage::step::code_version;
 use crate::storage::store::Scope;
 use std::path::Path;
-use stonewise_core::change::OutwardReference;
-use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 
 /// A unit that is done.
@@ -82,18 +71,26 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
         unit: id.to_owned(),
         units: plan.units.iter().map(|u| u.id.clone()).collect(),
     };
-    let summary = {
+    let (summary, folders) = {
         let mut context = Context::of_unit(&project, &folder, scope, digests, progress)?;
+        context.forced = Some(plan.forced);
         context.unit_times = times(out, &plan.id, plan.units.iter().map(|u| u.id.as_str()));
-        do_stage(&context, unit, plan.forced)?
+        let is_last = plan.units.last().is_some_and(|last| last.id == id);
+        let summary = match is_last {
+            true => Some(run_in(&context, Until::Reported)?),
+            false => do_step(&context, unit).map(|()| None)?,
+        };
+        if is_last {
+            context.store.remove_unused()?;
+        }
+        (summary, context.store.own_folders())
     };
     if summary.is_some() {
-        // The last unit: all others are done, and what they left unfinished when they were killed is of no
-        // use.
+        // All other units are done, and what they left unfinished when they were killed is of no use.
         folder.sweep(&project);
         folder.finish_results(true)?;
     }
-    Receipt::write(out, &plan.id, id, &clock)?;
+    Receipt::write(out, &plan.id, id, &clock, folders)?;
     Ok(UnitDone {
         project,
         was_done: false,
@@ -113,91 +110,27 @@ fn refuse_too_early(out: &Path, plan: &Plan, unit: &Unit) -> Result<()> {
     }
 }
 
-fn do_stage(context: &Context, unit: &Unit, forced: bool) -> Result<Option<Summary>> {
-    let epoch = unit.epoch.unwrap_or(1);
-    match unit.stage {
-        Stage::Ingest => ingest(context, epoch).map(drop)?,
-        Stage::SegmentPhoto => segment_photo(context, epoch, unit.part.unwrap_or(0))?,
-        Stage::Segment => segment(context, epoch).map(drop)?,
-        Stage::LabelPrepare | Stage::LabelTiles | Stage::Label => labels(context, epoch, unit)?,
-        Stage::Stones => labelled(context, epoch).map(drop)?,
-        Stage::Outlines => write_stone_outlines(context, &corrected(context)?.labelled[0])?,
-        Stage::Match => pair(context, epoch)?,
-        Stage::Offsets | Stage::Register => {
-            let Corrected { photos, labelled, .. } = corrected(context)?;
-            let (first, second) = (&labelled[0], &labelled[epoch - 1]);
-            let matched = matched(context, first, second, epoch)?;
-            match unit.stage {
-                Stage::Offsets => label_offsets(context, first, second, &matched, epoch).map(drop)?,
-                _ => register(
-                    context,
-                    [&photos[0], &photos[epoch - 1]],
-                    [first, second],
-                    &matched,
-                    epoch,
-                )
-                .map(drop)?,
-            }
+/// Does what a unit stands for.
+fn do_step(context: &Context, unit: &Unit) -> Result<()> {
+    let run = Run::new(context, Until::Reported);
+    let name = unit.id.split('.').next().unwrap_or_default();
+    let mut tasks = tasks(context.project, Until::Reported).into_iter();
+    let Some(Task { step, epoch }) = tasks.find(|task| task.id() == name) else {
+        return Err(Error::Plan {
+            path: plan_file(&context.out),
+            message: format!("this build of stonewise has no step {name:?}: run `stonewise plan` again"),
+        });
+    };
+    match (&step.parts, unit.part, unit.parts) {
+        (Some(parts), Some(number), Some(count)) => {
+            let part = match parts.kind {
+                PartKind::Photos(_) => Part::Photo(number),
+                PartKind::PreparedTiles | PartKind::ReferenceTiles => Part::Tiles(number, count),
+            };
+            (parts.make)(&run, epoch, part)
         }
-        Stage::M3c2Tiles | Stage::M3c2 => compare(context, epoch, unit)?,
-        Stage::Clouds => clouds(context, epoch)?,
-        Stage::Report => {
-            look(context, forced)?;
-            return run_in(context, Until::Reported).map(Some);
-        }
+        (Some(parts), None, Some(count)) => (parts.make)(&run, epoch, Part::Whole(count)),
+        (Some(parts), None, None) if unit.id != name => (parts.make)(&run, epoch, Part::Prepare),
+        _ => (step.make)(&run, epoch),
     }
-    Ok(None)
-}
-
-fn labels(context: &Context, epoch: usize, unit: &Unit) -> Result<()> {
-    let (ingested, photos) = (ingest(context, epoch)?, segment(context, epoch)?);
-    let count = unit.parts.unwrap_or(1);
-    let batches = LabelBatches::new(context, epoch, &ingested, &photos, count);
-    match unit.stage {
-        Stage::LabelPrepare => batches.prepare().map(drop),
-        Stage::LabelTiles => batches.batch(unit.part.unwrap_or(0)).map(drop),
-        _ => gather_labels(context, epoch, &ingested, &photos, count),
-    }
-}
-
-fn pair(context: &Context, epoch: usize) -> Result<()> {
-    let Corrected { labelled, .. } = corrected(context)?;
-    let (first, second) = (&labelled[0], &labelled[epoch - 1]);
-    check_overlap(context, &[(&first.ingested, 1), (&second.ingested, epoch)])?;
-    matched(context, first, second, epoch).map(drop)
-}
-
-fn compare(context: &Context, epoch: usize, unit: &Unit) -> Result<()> {
-    let centres: Vec<_> = segment(context, 1)?.views.iter().map(View::centre).collect();
-    let clouds = [ingest(context, 1)?, ingest(context, epoch)?];
-    let outward = OutwardReference::Towards(&centres);
-    let comparison = Comparison::new(context, clouds.each_ref(), epoch, &outward);
-    let count = unit.parts.unwrap_or(1);
-    match unit.stage {
-        Stage::M3c2Tiles => comparison.batch(unit.part.unwrap_or(0), count).map(drop),
-        _ => comparison.gather(count),
-    }
-}
-
-fn clouds(context: &Context, epoch: usize) -> Result<()> {
-    let Corrected {
-        photos,
-        labelled,
-        edited,
-    } = corrected(context)?;
-    let own = &labelled[epoch - 1];
-    if epoch > 1 {
-        return write_clouds(context, epoch, own, None);
-    }
-    let (_, facade) = outlined(context, own, edited)?;
-    let matched = matched(context, own, &labelled[1], 2)?;
-    let measured = measured(
-        context,
-        [&photos[0], &photos[1]],
-        [own, &labelled[1]],
-        &matched,
-        &facade,
-        2,
-    )?;
-    write_clouds(context, epoch, own, Some(&measured.rows))
 }

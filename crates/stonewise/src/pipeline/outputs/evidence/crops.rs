@@ -12,6 +12,7 @@ use crate::texts::notices::PHOTO_NOT_SHOWN;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::MotionField;
 use stonewise_core::geometry::View;
 use stonewise_core::id::ImageId;
@@ -38,8 +39,8 @@ struct Job<'a> {
 /// An epoch as the report shows it.
 #[derive(Clone, Copy)]
 pub struct ShownEpoch<'a> {
-    /// Its number, from 1.
-    pub number: usize,
+    /// Which one.
+    pub epoch: EpochId,
     /// Its photos.
     pub photos: &'a Segmented,
     /// Its points and stones.
@@ -67,7 +68,7 @@ pub fn write_epoch_crops(
     points: &mut [Candidate],
 ) -> Result<()> {
     let ShownEpoch {
-        number,
+        epoch: id,
         photos,
         labelled,
     } = epoch;
@@ -124,7 +125,7 @@ pub fn write_epoch_crops(
     }
     crops.sort_by_key(|(crop, _)| crop.stone_id);
     let (crops, tiles): (Vec<Crop>, Vec<Vec<[u8; 3]>>) = crops.into_iter().unzip();
-    write_crops(&context.out, number, side_px, &crops, &tiles)
+    write_crops(&context.out, id.number(), side_px, &crops, &tiles)
 }
 
 /// Instances that make up each stone of the first epoch, by its id; of its partner in a later epoch.

@@ -8,51 +8,63 @@ mod tracks;
 mod window;
 
 use crate::error::{Error, Result};
-use crate::pipeline::context::Context;
-use crate::pipeline::steps::label::Labelled;
-use crate::pipeline::steps::segment::Segmented;
+use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::until::Until;
 use crate::report_params::logo_type;
-use crate::results::{
-    PosedPhoto, StoneOutline, StoneRow, write_cameras, write_logo, write_sections, write_thin_cloud,
-};
+use crate::results::{PosedPhoto, write_cameras, write_logo, write_sections, write_thin_cloud};
 use crops::{ShownEpoch, write_epoch_crops};
 use sections::sections;
-use std::collections::BTreeMap;
+use stonewise_core::epoch::EpochId;
 use thin::thin_cloud;
 pub use tracks::write_tracked_stones;
 use window::windows;
 
-/// Writes `evidence/`. `pairs`: rows of each later epoch against the first.
-pub fn write_evidence(
-    context: &Context,
-    photos: &[Segmented],
-    labelled: &[Labelled],
-    outlines: &BTreeMap<u32, StoneOutline>,
-    pairs: &[&[StoneRow]],
-) -> Result<()> {
+/// Writes `evidence/`.
+pub static EVIDENCE: Step = Step {
+    name: "evidence",
+    words: |_| "excerpts for the report",
+    needs: &[Need::all(&MEASURE)],
+    wanted: |until| until == Until::Reported,
+    make: |run, _| {
+        let write = || run.context.timed("evidence", || write_evidence(run));
+        run.once(&EVIDENCE, EpochId::REFERENCE, write).map(drop)
+    },
+    ..Step::PLAIN
+};
+
+fn write_evidence(run: &Run) -> Result<()> {
+    let (context, out) = (run.context, &run.context.out);
     if let Some(logo) = &context.project.settings.report.logo {
         let media_type = logo_type(logo).map_err(Error::Survey)?;
-        write_logo(&context.out, logo, media_type)?;
+        write_logo(out, logo, media_type)?;
     }
-    let windows = windows(&labelled[0].stones, outlines);
-    for (i, (photos, labelled)) in photos.iter().zip(labelled).enumerate() {
-        let epoch = i + 1;
-        let rows = i.checked_sub(1).and_then(|later| pairs.get(later).copied());
-        let posed: Vec<PosedPhoto> = photos.views.iter().map(PosedPhoto::of).collect();
-        write_cameras(&context.out, epoch, &posed)?;
-        let mut points = thin_cloud(context, labelled)?;
-        let shown = ShownEpoch {
-            number: epoch,
-            photos,
-            labelled,
+    let first = run.labelled(EpochId::REFERENCE)?;
+    let windows = windows(&first.stones, &run.outlined()?.outlines);
+    for epoch in context.project.epochs.ids() {
+        let (photos, labelled) = (run.segmented(epoch)?, run.labelled(epoch)?);
+        let measured = match epoch.is_reference() {
+            true => None,
+            false => Some(run.measured(epoch)?),
         };
+        let posed: Vec<PosedPhoto> = photos.views.iter().map(PosedPhoto::of).collect();
+        write_cameras(out, epoch.number(), &posed)?;
+        let mut points = thin_cloud(context, &labelled)?;
+        let shown = ShownEpoch {
+            epoch,
+            photos: &photos,
+            labelled: &labelled,
+        };
+        let rows = measured.as_ref().map(|m| m.rows.as_slice());
         write_epoch_crops(context, shown, &windows, rows, &mut points)?;
         let points: Vec<_> = points.into_iter().map(|p| p.point).collect();
-        write_thin_cloud(&context.out, epoch, &points)?;
+        write_thin_cloud(out, epoch.number(), &points)?;
     }
-    for (i, rows) in pairs.iter().enumerate() {
-        let points = sections(context, [&labelled[0], &labelled[i + 1]], &windows, rows)?;
-        write_sections(&context.out, i + 2, &points)?;
+    for later in context.project.epochs.later_ids() {
+        let labelled = run.labelled_pair(later)?;
+        let labelled = labelled.each_ref().map(|l| &**l);
+        let points = sections(context, labelled, &windows, &run.measured(later)?.rows)?;
+        write_sections(out, later.number(), &points)?;
     }
     Ok(())
 }

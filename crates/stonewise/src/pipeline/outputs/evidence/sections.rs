@@ -8,6 +8,7 @@ use crate::results::{Cut, SectionPoint, StoneRow};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::Pair;
 
 /// Points of all sections together, at most about: 6 MB in the report.
 const BUDGET: usize = 1_600_000;
@@ -28,7 +29,7 @@ struct Search<'a> {
 /// Sections of the measured stones, sorted by stone, epoch, cut and place.
 pub fn sections(
     context: &Context,
-    epochs: [&Labelled; 2],
+    epochs: Pair<&Labelled>,
     windows: &[Window],
     rows: &[StoneRow],
 ) -> Result<Vec<SectionPoint>> {

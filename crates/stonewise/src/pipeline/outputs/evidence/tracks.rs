@@ -3,12 +3,13 @@
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
+use crate::pipeline::steps::measure::Measured;
 use crate::pipeline::steps::register::Registered;
-use crate::results::records::Datum;
 use crate::results::{StoneRow, Tracks, most_pictured, write_tracks};
 use nalgebra::{Matrix2, Vector2};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::registration::{FaceShift, StoneEvidence};
 
@@ -17,20 +18,19 @@ use stonewise_core::registration::{FaceShift, StoneEvidence};
 /// Where the error of the later epoch is estimated it is taken off, as it is of the rows.
 pub fn write_tracked_stones(
     context: &Context,
-    number: usize,
+    later: EpochId,
     first: &Labelled,
     registered: &Registered,
-    datum: &Datum,
-    rows: &[StoneRow],
+    measured: &Measured,
 ) -> Result<()> {
     let Some(mut tracks) = registered.tracks()? else {
         return Ok(());
     };
-    if datum.is_estimated() {
+    if measured.datum.is_estimated() {
         take_errors_off(&mut tracks, first, registered);
     }
-    keep_pictures(&mut tracks, rows);
-    write_tracks(&context.out, number, &tracks)
+    keep_pictures(&mut tracks, &measured.rows);
+    write_tracks(&context.out, later.number(), &tracks)
 }
 
 fn take_errors_off(tracks: &mut Tracks, first: &Labelled, registered: &Registered) {

@@ -6,49 +6,90 @@
 
 mod photo_places;
 
+use super::carry::CARRY;
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
-use super::segment::Segmented;
+use super::stone_outlines::make_outlines;
 use crate::edits::EditsFile;
 use crate::error::Result;
 use crate::files::{read_json, write_json};
-use crate::pipeline::context::Context;
-use crate::pipeline::outputs::outlines::{OUTLINES_STEP, make_outlines};
+use crate::pipeline::cost::Cost;
+use crate::pipeline::graph::{Need, Run, Step};
+use crate::pipeline::until::Until;
 use crate::results::{Facade, facade_of, read_outlines};
 use crate::storage::step::Key;
 use nalgebra::Point3;
 use photo_places::{Places, photo_places};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use stonewise_core::epoch::{EpochId, Epochs, Pair};
 use stonewise_core::id::StoneId;
 use stonewise_core::transfer::{
     EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, StoneInstances, edit_labels,
 };
+
+/// Applies the project's edits to all epochs; an epoch that none changes stays as it is.
+pub static EDIT: Step = Step {
+    name: "edit",
+    words: |_| "edits by hand",
+    needs: &[Need::all(&CARRY)],
+    wanted: |until| until >= Until::Labelled,
+    applies: |project, _| project.edits.is_some(),
+    cost: Some(|sizes, _| Cost::of(1, 2 * sizes.every_pair_bytes())),
+    make: |run, _| run.corrected().map(drop),
+    ..Step::PLAIN
+};
+
+/// All epochs as a person corrected them.
+pub struct Corrected {
+    /// Their labels.
+    pub labelled: Epochs<Arc<Labelled>>,
+    /// What the edits did; `None` where there are none.
+    pub edited: Option<Edited>,
+}
 
 /// What the edits did.
 pub struct Edited {
     /// The unrolled wall of the stones as they were found: edits do not move the places of other stones.
     pub facade: Facade,
     /// By epoch.
-    pub effects: Vec<Effects>,
+    pub effects: Epochs<Effects>,
 }
 
 /// What each edit of the file did in an epoch; `None` where it does not concern the epoch.
 pub type Effects = Vec<Option<std::result::Result<EditEffect, NoEffect>>>;
 
-/// Applies the project's edits to all epochs; an epoch that none changes stays as it is. `None` where there
-/// are no edits.
-pub fn edit(
-    context: &Context,
-    photos: &[Segmented],
-    labelled: Vec<Labelled>,
-) -> Result<(Vec<Labelled>, Option<Edited>)> {
-    let Some(file) = &context.project.edits else {
-        return Ok((labelled, None));
+impl Run<'_> {
+    /// All epochs as a person corrected them.
+    pub fn corrected(&self) -> Result<Arc<Corrected>> {
+        self.once(&EDIT, EpochId::REFERENCE, || {
+            let epochs = self.context.project.epochs.ids();
+            let labelled = epochs.map(|epoch| Ok(Arc::clone(&self.carried(epoch)?.labelled)));
+            edit(self, labelled.collect::<Result<Vec<_>>>()?.into())
+        })
+    }
+
+    /// The labels of an epoch as every later step takes them.
+    pub fn labelled(&self, epoch: EpochId) -> Result<Arc<Labelled>> {
+        Ok(Arc::clone(&self.corrected()?.labelled[epoch]))
+    }
+
+    /// The labels of the reference and of a later epoch.
+    pub fn labelled_pair(&self, later: EpochId) -> Result<Pair<Arc<Labelled>>> {
+        Ok(self.corrected()?.labelled.pair(later).map(Arc::clone))
+    }
+}
+
+fn edit(run: &Run, labelled: Epochs<Arc<Labelled>>) -> Result<Corrected> {
+    let Some(file) = &run.context.project.edits else {
+        let edited = None;
+        return Ok(Corrected { labelled, edited });
     };
-    let outlines = read_outlines(make_outlines(context, &labelled[0], OUTLINES_STEP)?.path())?;
-    let found = labelled[0].stones.iter().map(|s| (s.id.0, s.centroid));
+    let first = labelled.reference();
+    let outlines = read_outlines(make_outlines(run.context, first, "edit-outlines")?.path())?;
+    let found = first.stones.iter().map(|s| (s.id.0, s.centroid));
     let facade = facade_of(found, &outlines);
     let drawn_on = file.facade.as_ref().unwrap_or(&facade);
-    let places = photo_places(context, file, drawn_on, photos, &labelled)?;
+    let places = photo_places(run, file, drawn_on, &labelled)?;
     let drawn = Drawn {
         file,
         places: &places,
@@ -56,12 +97,16 @@ pub fn edit(
     };
     let mut effects = Vec::new();
     let mut edited = Vec::new();
-    for ((number, photos), labelled) in (1..).zip(photos).zip(labelled) {
-        let (epoch, done) = edit_epoch(context, number, &drawn, photos, labelled)?;
+    for (id, labelled) in labelled.with_ids() {
+        let (epoch, done) = edit_epoch(run, id, &drawn, labelled)?;
         edited.push(epoch);
         effects.push(done);
     }
-    Ok((edited, Some(Edited { facade, effects })))
+    let effects = effects.into();
+    Ok(Corrected {
+        labelled: edited.into(),
+        edited: Some(Edited { facade, effects }),
+    })
 }
 
 /// The edits with their shapes on the wall.
@@ -75,14 +120,14 @@ struct Drawn<'a> {
 
 /// Applies the edits that concern one epoch.
 fn edit_epoch(
-    context: &Context,
-    number: usize,
+    run: &Run,
+    id: EpochId,
     drawn: &Drawn,
-    photos: &Segmented,
-    labelled: Labelled,
-) -> Result<(Labelled, Effects)> {
+    labelled: &Arc<Labelled>,
+) -> Result<(Arc<Labelled>, Effects)> {
+    let context = run.context;
     let Drawn { file, places, wall } = *drawn;
-    let epoch = &context.project.epochs[number - 1].name;
+    let epoch = &context.project.epochs[id].name;
     let mut effects = vec![None; file.edits.len()];
     let mut asked: Vec<(usize, LabelEdit)> = Vec::new();
     for (index, (edit, places)) in file.edits.iter().zip(places).enumerate() {
@@ -95,7 +140,7 @@ fn edit_epoch(
     let (indices, edits): (Vec<usize>, Vec<LabelEdit>) = asked.into_iter().unzip();
     let tiles = &labelled.ingested.tiles.surveyed;
     let key = Key::new("edit", &(&edits, wall), &[labelled.key.as_str()]);
-    let step = context.step(&format!("edit-{number}"), key, |step, _| {
+    let step = context.step(&format!("edit-{id}"), key, |step, _| {
         let mut target = DiskLabels::new(step.path(), tiles);
         let place = |p: &Point3<f64>| {
             let at = wall.place(p);
@@ -103,9 +148,9 @@ fn edit_epoch(
         };
         let on_wall = EditedWall {
             place: &place,
-            stones: &facing(&labelled, wall),
+            stones: &facing(labelled, wall),
             min_points: context.project.settings.label.min_points,
-            first_new: last_number(&labelled) + 1,
+            first_new: last_number(labelled) + 1,
         };
         let report = edit_labels(
             tiles,
@@ -122,12 +167,12 @@ fn edit_epoch(
         effects[index] = Some(effect.clone());
     }
     if report.tiles.is_empty() {
-        return Ok((labelled, effects));
+        return Ok((Arc::clone(labelled), effects));
     }
-    let mut store = labelled.store;
+    let mut store = labelled.store.clone();
     store.replace(&report.tiles, &DiskLabels::new(step.path(), tiles));
-    let mut transfer = labelled.transfer;
-    let mut carried = labelled.carried;
+    let mut transfer = labelled.transfer.clone();
+    let mut carried = labelled.carried.clone();
     carried.retain(|stone, _| !report.gone.contains(&stone.0));
     transfer.stones = instances(&transfer.stones, &report);
     let labels = Labels {
@@ -138,20 +183,12 @@ fn edit_epoch(
     let number_of = |index: &usize| indices[*index] as u32 + 1;
     let edited = report.edited_by.iter();
     let edited = edited.map(|(stone, index)| (StoneId(*stone), number_of(index)));
-    let tabulated = tabulate(
-        context,
-        number,
-        "stones-edited",
-        photos,
-        labelled.ingested,
-        labels,
-    )?;
     let tabulated = Labelled {
         edited: edited.collect(),
         carried,
-        ..tabulated
+        ..tabulate(run, id, "stones-edited", labels)?
     };
-    Ok((tabulated, effects))
+    Ok((Arc::new(tabulated), effects))
 }
 
 /// What the step says about its edits.

@@ -4,13 +4,16 @@ use crate::edits::{Edit, EditsFile, photo_named};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
+use crate::pipeline::graph::Run;
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::segment::Segmented;
 use crate::results::Facade;
 use crate::storage::step::Key;
 use nalgebra::{Point2, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::Epochs;
 use stonewise_core::geometry::{Bounds, Plane, View, cell_of};
 use stonewise_core::transfer::NoEffect;
 
@@ -31,20 +34,20 @@ pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 /// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their
 /// rays onto the stones that the photo's epoch shows there.
 pub(super) fn photo_places(
-    context: &Context,
+    run: &Run,
     file: &EditsFile,
     wall: &Facade,
-    photos: &[Segmented],
-    labelled: &[Labelled],
+    labelled: &Epochs<Arc<Labelled>>,
 ) -> Result<Vec<Places>> {
+    let context = run.context;
     let mut places: Vec<Places> = file
         .edits
         .iter()
         .map(|edit| Ok(edit.shape().iter().copied().map(Point2::from).collect()))
         .collect();
-    for (index, (photos, labelled)) in photos.iter().zip(labelled).enumerate() {
-        let name = &context.project.epochs[index].name;
-        let is_here = |edit: &&Edit| edit.epoch.as_ref().map_or(index == 0, |e| e == name);
+    for (id, labelled) in labelled.with_ids() {
+        let name = &context.project.epochs[id].name;
+        let is_here = |edit: &&Edit| edit.epoch.as_ref().map_or(id.is_reference(), |e| e == name);
         let drawn = file.edits.iter().enumerate().filter(|(_, e)| e.photo.is_some());
         let drawn: Vec<(usize, &Edit)> = drawn.filter(|(_, e)| is_here(e)).collect();
         if drawn.is_empty() {
@@ -52,10 +55,11 @@ pub(super) fn photo_places(
         }
         let shapes: Vec<_> = drawn.iter().map(|(_, e)| (&e.photo, e.shape())).collect();
         let key = Key::new("edit-places", &(&shapes, wall), &[labelled.key.as_str()]);
-        let step = context.step(&format!("edit-places-{}", index + 1), key, |step, _| {
+        let step = context.step(&format!("edit-places-{id}"), key, |step, _| {
             let mut found: Vec<Places> = Vec::new();
+            let photos = run.segmented(id)?;
             for (_, edit) in &drawn {
-                found.push(carry(context, edit, wall, photos, labelled)?);
+                found.push(carry(context, edit, wall, &photos, labelled)?);
             }
             write_json(&step.file(PLACES), &found)
         })?;

@@ -8,17 +8,17 @@ use super::step_key::{label_key, label_name};
 use crate::error::{Error, Result};
 use crate::files::read_bytes;
 use crate::pipeline::context::Context;
+use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::steps::segment::Segmented;
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::DiskTiles;
 use std::path::{Path, PathBuf};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::transfer::{Election, KeptParts, Occupancy, PreparedTransfer, Transfer, finish_transfer};
 use stonewise_io::atomic::write_atomically;
 
-/// Name of the part that comes first.
-pub const PREPARE: &str = "prepare";
 /// The decisions about instances, in its folder.
 const ELECTION: &str = "election";
 /// Where the stones of a batch are, in its folder.
@@ -35,10 +35,10 @@ pub struct LabelBatches<'a> {
 }
 
 impl<'a> LabelBatches<'a> {
-    /// The batches of epoch `number`.
+    /// The batches of an epoch.
     pub fn new(
         context: &'a Context<'a>,
-        number: usize,
+        epoch: EpochId,
         ingested: &'a Ingested,
         photos: &'a Segmented,
         count: usize,
@@ -48,14 +48,14 @@ impl<'a> LabelBatches<'a> {
             ingested,
             photos,
             count,
-            name: label_name(number),
-            key: label_key(context, number, ingested, photos),
+            name: label_name(epoch),
+            key: label_key(context, epoch, ingested, photos),
         }
     }
 
     /// Makes depth maps, and decides about the instances of all photos.
     pub fn prepare(&self) -> Result<StepDir> {
-        self.part(PREPARE, |part| {
+        self.part(Part::Prepare, |part| {
             let (tiles, params) = (self.tiles(), &self.context.project.settings.label);
             let mask = |image| self.photos.labels(image).map(Some);
             let views = &self.photos.views;
@@ -78,7 +78,7 @@ impl<'a> LabelBatches<'a> {
 
     /// Labels the tiles of one batch, counted from 0.
     pub fn batch(&self, number: usize) -> Result<StepDir> {
-        self.part(&batch_name(number, self.count), |part| {
+        self.part(Part::Tiles(number, self.count), |part| {
             let (tiles, params) = (self.tiles(), &self.context.project.settings.label);
             let kept = self.prepare()?;
             let range = tiles.batch(number, self.count);
@@ -124,18 +124,13 @@ impl<'a> LabelBatches<'a> {
         )?)
     }
 
-    fn part(&self, name: &str, make: impl FnOnce(&StepDir) -> Result<()>) -> Result<StepDir> {
-        self.context.part((&self.name, &self.key), name, make)
+    fn part(&self, part: Part, make: impl FnOnce(&StepDir) -> Result<()>) -> Result<StepDir> {
+        self.context.part((&self.name, &self.key), &part.name(), make)
     }
 
     fn tiles(&self) -> &DiskTiles {
         &self.ingested.tiles.surveyed
     }
-}
-
-/// Name of a batch of tiles among so many.
-pub fn batch_name(number: usize, count: usize) -> String {
-    format!("{:03}of{count:03}", number + 1)
 }
 
 fn election(kept: &StepDir) -> Result<Election> {

@@ -1,25 +1,101 @@
 //! An epoch's points with the stone of each.
 
-pub mod batches;
+mod batches;
 mod disk_labels;
 mod step_key;
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::steps::ingest::Ingested;
-use crate::pipeline::steps::segment::Segmented;
+use crate::pipeline::cost::{Cost, Sizes};
+use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
+use crate::pipeline::part::Part;
+use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::pipeline::steps::segment::{SEGMENT, Segmented};
+use crate::pipeline::until::Until;
 use crate::storage::step::{Key, StepDir};
 use batches::LabelBatches;
 pub use disk_labels::DiskLabels;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use step_key::{label_key, label_name};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::StoneExtents;
 use stonewise_core::stone::Stone;
 use stonewise_core::transfer::{LabelStore, TileLabels, Transfer, build_stones, transfer_labels};
+
+/// Carries the photos' labels into the points of an epoch.
+pub static LABEL: Step = Step {
+    name: "label",
+    words: |_| "stones in the clouds of",
+    about: About::Epoch,
+    needs: &[Need::same(&INGEST), Need::same(&SEGMENT)],
+    wanted: |until| until >= Until::Labelled,
+    cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
+    parts: Some(Parts {
+        kind: PartKind::PreparedTiles,
+        cost: |sizes, epoch| Cost::of(4, depth_map_bytes(sizes) + sizes.cloud_bytes(epoch) / 4),
+        make: do_part,
+    }),
+    make: |run, epoch| run.voted(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+/// Tabulates the stones of an epoch.
+pub static STONES: Step = Step {
+    name: "stones",
+    about: About::Epoch,
+    needs: &[Need::same(&LABEL)],
+    wanted: |until| until >= Until::Labelled,
+    cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
+    make: |run, epoch| run.found(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+fn depth_map_bytes(sizes: &Sizes) -> u64 {
+    u64::from(sizes.project.settings.label.depth_memory_mib) << 20
+}
+
+impl Run<'_> {
+    /// The step in which the photos of an epoch voted.
+    fn voted(&self, epoch: EpochId) -> Result<Arc<StepDir>> {
+        self.once(&LABEL, epoch, || {
+            transferred(
+                self.context,
+                epoch,
+                &*self.ingested(epoch)?,
+                &*self.segmented(epoch)?,
+            )
+        })
+    }
+
+    /// The stones of an epoch as its photos show them.
+    pub fn found(&self, epoch: EpochId) -> Result<Arc<Labelled>> {
+        self.once(&STONES, epoch, || {
+            let step = StepDir::clone(&*self.voted(epoch)?);
+            let labels = Labels {
+                transfer: read_json(&step.file(TRANSFER))?,
+                store: DiskLabels::new(step.path(), &self.ingested(epoch)?.tiles.surveyed),
+                step,
+            };
+            tabulate(self, epoch, "stones", labels)
+        })
+    }
+}
+
+/// Does a part of the step, or gathers all of them.
+fn do_part(run: &Run, epoch: EpochId, part: Part) -> Result<()> {
+    let (ingested, photos) = (run.ingested(epoch)?, run.segmented(epoch)?);
+    let batches = |count| LabelBatches::new(run.context, epoch, &ingested, &photos, count);
+    match part {
+        Part::Tiles(number, count) => batches(count).batch(number).map(drop),
+        Part::Whole(count) => gather_labels(run.context, epoch, &ingested, &photos, count),
+        Part::Prepare | Part::Photo(_) => batches(1).prepare().map(drop),
+    }
+}
 
 /// What was decided about the instances, in the step's folder.
 const TRANSFER: &str = "transfer.json";
@@ -27,15 +103,15 @@ const TRANSFER: &str = "transfer.json";
 /// A labelled epoch: its points (moved, where the project says so), their labels, its stones.
 pub struct Labelled {
     /// Points.
-    pub ingested: Ingested,
+    pub ingested: Arc<Ingested>,
     /// Stones, ascending by id.
     pub stones: Vec<Stone>,
     /// Which instances make up each stone, and what was decided about them.
     pub transfer: Transfer,
     /// Stones that a person made or changed, with the number of the last edit that did so.
     pub edited: BTreeMap<StoneId, u32>,
-    /// Stones that no photo of the epoch shows, with the number of the epoch from which they were carried.
-    pub carried: BTreeMap<StoneId, usize>,
+    /// Stones that no photo of the epoch shows, with the epoch from which they were carried.
+    pub carried: BTreeMap<StoneId, EpochId>,
     /// Key of everything above.
     pub key: Key,
     pub(super) store: DiskLabels,
@@ -62,25 +138,17 @@ impl Labelled {
     }
 }
 
-/// Carries the photos' labels into the points of an epoch; then moves the points, where the project says so.
-pub fn label(context: &Context, number: usize, ingested: Ingested, photos: &Segmented) -> Result<Labelled> {
-    let step = transferred(context, number, &ingested, photos)?;
-    let transfer = read_json(&step.file(TRANSFER))?;
-    let store = DiskLabels::new(step.path(), &ingested.tiles.surveyed);
-    let labels = Labels {
-        transfer,
-        store,
-        step,
-    };
-    tabulate(context, number, "stones", photos, ingested, labels)
-}
-
 /// Carries the photos' labels into the points of an epoch.
-fn transferred(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Result<StepDir> {
+fn transferred(
+    context: &Context,
+    epoch: EpochId,
+    ingested: &Ingested,
+    photos: &Segmented,
+) -> Result<StepDir> {
     let params = &context.project.settings.label;
     let tiles = &ingested.tiles.surveyed;
-    let key = label_key(context, number, ingested, photos);
-    context.step(&label_name(number), key, |step, _| {
+    let key = label_key(context, epoch, ingested, photos);
+    context.step(&label_name(epoch), key, |step, _| {
         let mut store = DiskLabels::new(step.path(), tiles);
         let mask = |image| photos.labels(image).map(Some);
         let transfer = transfer_labels(tiles, &photos.views, mask, &mut store, params, context.progress)?;
@@ -89,16 +157,16 @@ fn transferred(context: &Context, number: usize, ingested: &Ingested, photos: &S
 }
 
 /// The same from batches of tiles that other processes labelled.
-pub fn gather_labels(
+fn gather_labels(
     context: &Context,
-    number: usize,
+    epoch: EpochId,
     ingested: &Ingested,
     photos: &Segmented,
     batches: usize,
 ) -> Result<()> {
-    let (name, key) = (label_name(number), label_key(context, number, ingested, photos));
+    let (name, key) = (label_name(epoch), label_key(context, epoch, ingested, photos));
     context.step(&name, key.clone(), |step, _| {
-        let batches = LabelBatches::new(context, number, ingested, photos, batches);
+        let batches = LabelBatches::new(context, epoch, ingested, photos, batches);
         write_json(&step.file(TRANSFER), &batches.gather(step)?)
     })?;
     context.store.remove_parts(&name, &key)
@@ -112,15 +180,9 @@ pub(super) struct Labels {
     pub(super) step: StepDir,
 }
 
-/// Tabulates the stones of an epoch in a step of this name.
-pub(super) fn tabulate(
-    context: &Context,
-    number: usize,
-    name: &str,
-    photos: &Segmented,
-    ingested: Ingested,
-    labels: Labels,
-) -> Result<Labelled> {
+/// Tabulates the stones of an epoch in a step of this name; then moves the points, where the project says so.
+pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) -> Result<Labelled> {
+    let (context, ingested, photos) = (run.context, run.ingested(epoch)?, run.segmented(epoch)?);
     let Labels {
         transfer,
         store,
@@ -132,7 +194,7 @@ pub(super) fn tabulate(
         &(params, &ingested.tiles.motion),
         &[labelled.key().as_str()],
     );
-    let step = context.step(&format!("{name}-{number}"), key, |step, _| {
+    let step = context.step(&format!("{name}-{epoch}"), key, |step, _| {
         let stones = build_stones(
             &ingested.tiles,
             &store,
@@ -149,7 +211,7 @@ pub(super) fn tabulate(
             Some(_) => "are there stones in the part of the wall that the run is limited to?",
             None => "do its cameras and clouds share one frame?",
         };
-        let name = &context.project.epochs[number - 1].name;
+        let name = &context.project.epochs[epoch].name;
         return Err(Error::Survey(format!(
             "no stone of epoch {name:?} got any points: {why}"
         )));

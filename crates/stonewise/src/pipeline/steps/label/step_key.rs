@@ -4,16 +4,17 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::pipeline::steps::segment::Segmented;
 use crate::storage::step::Key;
+use stonewise_core::epoch::EpochId;
 
 /// Name of the step.
-pub fn label_name(number: usize) -> String {
-    format!("label-{number}")
+pub fn label_name(epoch: EpochId) -> String {
+    format!("label-{epoch}")
 }
 
 /// Its key.
-pub fn label_key(context: &Context, number: usize, ingested: &Ingested, photos: &Segmented) -> Key {
+pub fn label_key(context: &Context, epoch: EpochId, ingested: &Ingested, photos: &Segmented) -> Key {
     let params = &context.project.settings.label;
-    let map = &context.project.epochs[number - 1].map;
+    let map = &context.project.epochs[epoch].map;
     Key::new(
         "label",
         &(params, &map.crs, map.false_origin),

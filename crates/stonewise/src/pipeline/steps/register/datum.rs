@@ -7,18 +7,19 @@ use crate::texts::notices::{
     DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
 };
 use nalgebra::{Matrix6, Point3};
+use stonewise_core::epoch::EpochId;
 use stonewise_core::registration::observers::{self, EpochErrors};
 use stonewise_core::stone::Stone;
 
 /// The registration error of a later epoch, from the first of these that there is: stable areas, the error
 /// that the project states, differences between the sources of each epoch.
 ///
-/// `number`: of the later epoch, from 1. `stones`: of the first epoch; their middle is the centre of a stated
+/// `stones`: of the first epoch; their middle is the centre of a stated
 /// error.
-pub fn datum(project: &Project, number: usize, registered: &Registered, stones: &[Stone]) -> Datum {
-    let mut datum = of_errors(project, number, registered.epoch_errors.as_ref(), stones);
+pub fn datum(project: &Project, later: EpochId, registered: &Registered, stones: &[Stone]) -> Datum {
+    let mut datum = of_errors(project, later, registered.epoch_errors.as_ref(), stones);
     if let Some(errors) = &registered.epoch_errors {
-        let epochs = [0, number - 1].map(|e| project.epochs[e].name.clone());
+        let epochs = project.epochs.pair(later).map(|e| e.name.clone()).into_array();
         datum.sources = errors
             .sources
             .iter()
@@ -33,7 +34,7 @@ pub fn datum(project: &Project, number: usize, registered: &Registered, stones: 
     datum
 }
 
-fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {
+fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {
     let known = |state, errors: &EpochErrors, note| {
         Datum::known(state, &errors.rigid.centre, &errors.rigid.covariance, note)
     };
@@ -50,7 +51,7 @@ fn of_errors(project: &Project, number: usize, errors: Option<&EpochErrors>, sto
         let note = DATUM_STATED.say(&[("error_mm", &*format!("{:.1}", 1e3 * error_m))]);
         return Datum::known(DatumState::Stated, &centre, &covariance, note);
     }
-    if project.epochs[number - 1].same_survey_as == Some(0)
+    if project.epochs[later].is_of_reference_survey()
         && let Some(errors) = errors
     {
         return known(DatumState::Stated, errors, DATUM_ONE_SURVEY.say(&[]));

@@ -5,6 +5,7 @@ use crate::pipeline::steps::label::Labelled;
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::{BTreeMap, HashMap};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::Pair;
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::progress::Progress;
 use stonewise_core::stone::Stone;
@@ -37,10 +38,10 @@ pub struct OffWall {
 
 impl OffWall {
     /// Finds them in one pass over the tiles of both epochs.
-    pub fn find(epochs: [&Labelled; 2], progress: &dyn Progress) -> Result<Self> {
-        let face = Face::new(&epochs[0].stones);
+    pub fn find(epochs: Pair<&Labelled>, progress: &dyn Progress) -> Result<Self> {
+        let face = Face::new(&epochs.first.stones);
         let mut contents: HashMap<[i64; 3], CellPoints> = HashMap::new();
-        for (number, epoch) in epochs.iter().enumerate() {
+        for (number, epoch) in epochs.into_iter().enumerate() {
             let tiles = &epoch.ingested.tiles;
             progress.each("look off the wall", 0..tiles.tile_count(), |tile| -> Result<()> {
                 let cloud = tiles.load(tile)?;

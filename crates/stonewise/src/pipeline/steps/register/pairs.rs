@@ -10,6 +10,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
+use stonewise_core::epoch::Pair;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
 use stonewise_core::registration::{
@@ -34,8 +35,7 @@ impl DiskPairs {
     /// Nearer to the border of a stone than `border_noises` times the noise, points are chosen by their place
     /// instead of by their label, see [`stone_points`].
     pub fn gather(
-        first: &Labelled,
-        second: &Labelled,
+        labelled: Pair<&Labelled>,
         matches: &[(StoneId, StoneId)],
         border_noises: f64,
         step: &StepDir,
@@ -43,7 +43,7 @@ impl DiskPairs {
     ) -> Result<Self> {
         let mut pairs = Self {
             dir: step.path().to_path_buf(),
-            batches: MatchedPair::of_matches(&first.stones, &second.stones, matches)
+            batches: MatchedPair::of_matches(&labelled.first.stones, &labelled.later.stones, matches)
                 .chunks(BATCH)
                 .map(<[_]>::to_vec)
                 .collect(),
@@ -51,11 +51,11 @@ impl DiskPairs {
         };
         let mut spill = Spill::new(&step.file("spill"), |k: &u32| format!("b{k}"))?;
         let extents = match border_noises > 0.0 {
-            true => first.extents(progress)?,
+            true => labelled.first.extents(progress)?,
             false => StoneExtents::default(),
         };
-        pairs.spill(first, 0, &extents, &mut spill, progress)?;
-        pairs.spill(second, 1, &extents, &mut spill, progress)?;
+        pairs.spill(labelled.first, 0, &extents, &mut spill, progress)?;
+        pairs.spill(labelled.later, 1, &extents, &mut spill, progress)?;
         let bins = spill.finish()?;
         pairs.windows = (0..pairs.batches.len())
             .into_par_iter()

@@ -15,6 +15,7 @@ use crate::warnings::Warnings;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use stonewise_core::epoch::Pair;
 use stonewise_core::evaluate::SeenBeforeMotion;
 use stonewise_core::geometry::{Bounds, FaceFrame, View};
 use stonewise_core::raster::RgbImage;
@@ -55,14 +56,14 @@ impl DiskPhotos {
     /// an epoch has none.
     pub fn gather(
         context: &Context,
-        photos: [&Segmented; 2],
-        labelled: [&Labelled; 2],
+        photos: Pair<&Segmented>,
+        labelled: Pair<&Labelled>,
         pairs: &DiskPairs,
         step: &StepDir,
         warnings: &Warnings,
     ) -> Result<Option<Self>> {
         let mut params = context.project.settings.registration.photos.clone();
-        if photos.iter().any(|p| p.views.len() < params.min_photos) {
+        if photos.into_iter().any(|p| p.views.len() < params.min_photos) {
             return Ok(None);
         }
         if params.rolling_shutter.is_none() {
@@ -71,7 +72,7 @@ impl DiskPhotos {
         let (boxes, counts) = boxes(pairs)?;
         let mut list = Vec::new();
         let mut paths = Vec::new();
-        for (epoch, (segmented, labelled)) in photos.iter().zip(labelled).enumerate() {
+        for (epoch, (segmented, labelled)) in photos.zip(labelled).into_iter().enumerate() {
             for (view, photo) in segmented.views.iter().zip(&segmented.photos) {
                 list.push(Photo {
                     name: photo.camera.clone(),

@@ -10,6 +10,7 @@ use crate::stable::StableArea;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
@@ -40,22 +41,21 @@ pub struct Sights {
 const MOST_OFFERED: usize = 40;
 
 impl Sights {
-    /// `number`: of the later epoch, from 1. `off_wall`: areas off the wall, which count as stable if the
+    /// `off_wall`: areas off the wall, which count as stable if the
     /// project sets `auto_stable`. The project's parameters set how many stones keep their points; they are
     /// evenly chosen among the matches.
     pub fn gather(
         project: &Project,
-        epochs: [&Labelled; 2],
-        number: usize,
+        epochs: Pair<&Labelled>,
+        later: EpochId,
         matches: &[(StoneId, StoneId)],
         off_wall: &OffWall,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let numbers = [1, number];
         let mut of_epoch = Vec::new();
-        for (epoch, n) in epochs.iter().zip(numbers) {
-            let raw = epoch.ingested.tiles.surveyed.raw_sources()?;
-            of_epoch.push(EpochSources::new(&raw, &project.epochs[n - 1].clouds));
+        for (labelled, epoch) in epochs.zip(project.epochs.pair(later)) {
+            let raw = labelled.ingested.tiles.surveyed.raw_sources()?;
+            of_epoch.push(EpochSources::new(&raw, &epoch.clouds));
         }
         let mut sources: Vec<Source> = of_epoch
             .iter()
@@ -69,10 +69,10 @@ impl Sights {
                 })
             })
             .collect();
-        if project.epochs[number - 1].same_survey_as == Some(0) {
+        if project.epochs[later].is_of_reference_survey() {
             share_errors(&mut sources);
         }
-        let places = matched_stones(&epochs[0].stones, matches);
+        let places = matched_stones(&epochs.first.stones, matches);
         let mut sights = Self {
             stones: places.iter().map(|(first, _, _)| *first).collect(),
             seen: Vec::new(),
@@ -88,7 +88,7 @@ impl Sights {
         let most_stones = project.settings.registration.observers.contrasts.max_stones;
         let stride = places.len().div_ceil(most_stones.max(1)).max(1);
         let mut collected: Vec<BTreeMap<usize, Collected>> = vec![BTreeMap::new(); places.len()];
-        for (e, epoch) in epochs.iter().enumerate() {
+        for (e, epoch) in epochs.into_iter().enumerate() {
             let ids = places
                 .iter()
                 .enumerate()

@@ -5,6 +5,7 @@ use crate::pipeline::steps::label::Labelled;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use stonewise_core::cloud::{Cloud, TileSource};
+use stonewise_core::epoch::Pair;
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
@@ -20,25 +21,24 @@ const PLANE_MARGIN_M: f64 = 0.1;
 ///
 /// Memory holds the points of one neighbourhood and its surroundings in both epochs.
 pub fn align_windows(
-    first: &Labelled,
-    second: &Labelled,
+    labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     size_m: f64,
     params: &GicpParams,
     progress: &dyn Progress,
 ) -> Result<Vec<PairResult>> {
-    let pairs = pairs(first, second, matches);
+    let pairs = pairs(labelled, matches);
     let mut groups: BTreeMap<[i64; 3], Vec<&(Stone, Stone)>> = BTreeMap::new();
     for pair in &pairs {
         let cell = cell_of(&pair.0.centroid, size_m);
         groups.entry(cell).or_default().push(pair);
     }
-    let extents = first.extents(progress)?;
+    let extents = labelled.first.extents(progress)?;
     progress.begin("align stones", pairs.len() as u64);
     let mut measured: BTreeMap<StoneId, PairResult> = BTreeMap::new();
     for group in groups.values() {
         progress.check()?;
-        let results = align_group(first, second, group, &extents, params)?;
+        let results = align_group(labelled, group, &extents, params)?;
         measured.extend(results.into_iter().map(|r| (r.first, r)));
         progress.advance(group.len() as u64);
     }
@@ -51,18 +51,22 @@ pub fn align_windows(
     Ok(placed.into_iter().map(|(_, result)| result).collect())
 }
 
-fn pairs(first: &Labelled, second: &Labelled, matches: &[(StoneId, StoneId)]) -> Vec<(Stone, Stone)> {
+fn pairs(labelled: Pair<&Labelled>, matches: &[(StoneId, StoneId)]) -> Vec<(Stone, Stone)> {
     let find = |stones: &[Stone], id: StoneId| {
         let found = stones.binary_search_by_key(&id, |s| s.id).ok()?;
         Some(stones[found].clone())
     };
-    let both = |(a, b): &(StoneId, StoneId)| Some((find(&first.stones, *a)?, find(&second.stones, *b)?));
+    let both = |(a, b): &(StoneId, StoneId)| {
+        Some((
+            find(&labelled.first.stones, *a)?,
+            find(&labelled.later.stones, *b)?,
+        ))
+    };
     matches.iter().filter_map(both).collect()
 }
 
 fn align_group(
-    first: &Labelled,
-    second: &Labelled,
+    labelled: Pair<&Labelled>,
     group: &[&(Stone, Stone)],
     extents: &StoneExtents,
     params: &GicpParams,
@@ -76,9 +80,9 @@ fn align_group(
         .map(|(a, b)| (b.centroid - a.centroid).norm())
         .fold(0.0, f64::max);
     let region = stones.grown(params.buffer_m + params.plane_radius_m + PLANE_MARGIN_M);
-    let (cloud, mut points) = labelled_region(first, &region, group)?;
+    let (cloud, mut points) = labelled_region(labelled.first, &region, group)?;
     let reach = params.max_distance_m + largest_move;
-    let cloud_second = second.ingested.tiles.load_region(&region.grown(reach))?;
+    let cloud_second = labelled.later.ingested.tiles.load_region(&region.grown(reach))?;
     let blocks = [cloud, cloud_second].map(|cloud| GicpBlock::new(&cloud, params));
     let stones: Vec<GicpStone> = group
         .iter()

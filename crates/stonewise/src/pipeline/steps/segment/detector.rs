@@ -4,7 +4,9 @@ use super::voting_photo::{Instance, PHOTOS, STEP, VotingPhoto, check_any, label_
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
-use crate::pipeline::steps::ingest::{Ingested, ingest};
+use crate::pipeline::graph::Run;
+use crate::pipeline::part::Part;
+use crate::pipeline::steps::ingest::Ingested;
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
 use crate::texts::notices::PHOTO_SIZE;
@@ -12,6 +14,8 @@ use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::path::Path;
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
 use stonewise_core::transfer::photo_relief;
 use stonewise_io::image_io::read_rgb;
@@ -32,7 +36,7 @@ pub struct Detection<'a> {
     key: Key,
     weights: Weights,
     /// The clouds, where the detector takes relief beside colour.
-    ingested: Option<Ingested>,
+    ingested: Option<Arc<Ingested>>,
     /// Opened for the first photo that needs it.
     detector: OnceCell<StoneFinder>,
 }
@@ -47,9 +51,10 @@ struct Outcome {
 }
 
 impl<'a> Detection<'a> {
-    /// The step of an epoch, counted from 1.
-    pub fn new(context: &'a Context<'a>, number: usize) -> Result<Self> {
-        let epoch = &context.project.epochs[number - 1];
+    /// The step of an epoch.
+    pub fn new(run: &Run<'a>, id: EpochId) -> Result<Self> {
+        let context = run.context;
+        let epoch = &context.project.epochs[id];
         let params = &context.project.settings.segment;
         let weights = Weights::named(&params.model);
         let digest = match &weights {
@@ -63,7 +68,7 @@ impl<'a> Detection<'a> {
             Weights::File(path) => context.digest(path)?,
         };
         let ingested = match weights.takes_relief() {
-            Ok(true) => Some(ingest(context, number)?),
+            Ok(true) => Some(run.ingested(id)?),
             // An error is told where the detector is opened.
             Ok(false) | Err(_) => None,
         };
@@ -77,7 +82,7 @@ impl<'a> Detection<'a> {
         Ok(Self {
             context,
             epoch,
-            name: format!("{STEP}-{number}"),
+            name: format!("{STEP}-{id}"),
             key: Key::new(STEP, &params.tiling, &digests),
             weights,
             ingested,
@@ -150,7 +155,7 @@ impl<'a> Detection<'a> {
         let mut is_made = false;
         let part = self
             .context
-            .part((&self.name, &self.key), &part_name(number), |part| {
+            .part((&self.name, &self.key), &Part::Photo(number).name(), |part| {
                 is_made = true;
                 let outcome = self.find(part, view, path)?;
                 write_json(&part.file(PHOTO), &outcome)
@@ -218,11 +223,6 @@ impl Outcome {
             reason: Some(reason),
         }
     }
-}
-
-/// Name of a photo's part of the step.
-pub fn part_name(number: usize) -> String {
-    format!("{number:05}")
 }
 
 fn no_masks(context: &Context, epoch: &Epoch, error: &impl std::fmt::Display) -> Error {

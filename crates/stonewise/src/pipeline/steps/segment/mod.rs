@@ -6,20 +6,74 @@ mod voting_photo;
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
-use crate::pipeline::context::Context;
-use crate::project::Epoch;
+use crate::pipeline::cost::{Cost, Sizes};
+use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
+use crate::pipeline::part::Part;
+use crate::pipeline::steps::ingest::INGEST;
+use crate::project::{Epoch, Project};
 use crate::storage::step::{Key, StepDir};
 use crate::warnings::Warnings;
 use detector::Detection;
-pub use detector::part_name;
 use masks::write_labels;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
 use stonewise_core::id::ImageId;
 use stonewise_core::raster::LabelImage;
 use stonewise_io::masks::read_label_png;
+use stonewise_segment::Weights;
 use voting_photo::{PHOTOS, STEP, VotingPhoto, label_path, posed_photos};
+
+/// Brings the stones of every photo of an epoch into one label image each: from masks, where the epoch has
+/// them, else from the detector.
+pub static SEGMENT: Step = Step {
+    name: STEP,
+    words: |_| "stones in the photos of",
+    about: About::Epoch,
+    // A detector that takes relief looks at the clouds, too.
+    needs: &[Need::same(&INGEST).when(takes_relief)],
+    cost: Some(|sizes, epoch| {
+        let own = &sizes.project.epochs[epoch];
+        let inputs = [own.cameras.clone()].into_iter().chain(own.masks.clone());
+        Cost::of(2, photo_bytes(sizes, epoch)).reading(inputs)
+    }),
+    parts: Some(Parts {
+        kind: PartKind::Photos(photos_to_segment),
+        cost: |sizes, epoch| {
+            let own = &sizes.project.epochs[epoch];
+            Cost::of(4, photo_bytes(sizes, epoch)).reading([own.cameras.clone(), own.images.clone()])
+        },
+        make: |run, epoch, part| match part {
+            Part::Photo(number) => Detection::new(run, epoch)?.photo(number),
+            _ => run.segmented(epoch).map(drop),
+        },
+    }),
+    make: |run, epoch| run.segmented(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+/// Memory of the detector for each pixel of a photo, bytes: the photo as numbers at two sizes, and a tile a
+/// thread.
+const PIXEL_BYTES: u64 = 100;
+
+fn photo_bytes(sizes: &Sizes, epoch: EpochId) -> u64 {
+    PIXEL_BYTES * sizes.pixels[epoch]
+}
+
+fn takes_relief(project: &Project, epoch: EpochId) -> bool {
+    let weights = Weights::named(&project.settings.segment.model);
+    // An error is told where the detector is opened.
+    project.epochs[epoch].masks.is_none() && matches!(weights.takes_relief(), Ok(true))
+}
+
+impl Run<'_> {
+    /// The photos of an epoch with their stones.
+    pub fn segmented(&self, epoch: EpochId) -> Result<Arc<Segmented>> {
+        self.once(&SEGMENT, epoch, || segment(self, epoch))
+    }
+}
 
 /// The photos of an epoch after the segment step.
 pub struct Segmented {
@@ -38,13 +92,11 @@ impl Segmented {
     }
 }
 
-/// Brings the stones of every photo of an epoch into one label image each: from masks, where the epoch has
-/// them, else from the detector.
-pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
-    let epoch = &context.project.epochs[number - 1];
-    let name = format!("{STEP}-{number}");
+fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
+    let context = run.context;
+    let epoch = &context.project.epochs[id];
     let step = match &epoch.masks {
-        None => Detection::new(context, number)?.all()?,
+        None => Detection::new(run, id)?.all()?,
         Some(masks) => {
             let digests = [
                 context.digest(&epoch.cameras)?,
@@ -52,7 +104,7 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
                 listing(&epoch.images)?,
             ];
             let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
-            context.step(&name, key, |step, warnings| {
+            context.step(&format!("{STEP}-{id}"), key, |step, warnings| {
                 let photos = write_labels(context, epoch, masks, step, warnings)?;
                 write_json(&step.file(PHOTOS), &photos)
             })?
@@ -71,15 +123,10 @@ pub fn segment(context: &Context, number: usize) -> Result<Segmented> {
     Ok(Segmented { step, photos, views })
 }
 
-/// Finds the stones of one posed photo, counted from 0, of an epoch without masks: a part of [`segment`].
-pub fn segment_photo(context: &Context, number: usize, photo: usize) -> Result<()> {
-    Detection::new(context, number)?.photo(photo)
-}
-
 /// Photos of an epoch that the detector has to look at; none where it has masks.
-pub fn photos_to_segment(epoch: &Epoch) -> Result<usize> {
-    match &epoch.masks {
-        None => Ok(posed_photos(epoch, &Warnings::default())?.len()),
+fn photos_to_segment(project: &Project, epoch: EpochId) -> Result<usize> {
+    match &project.epochs[epoch].masks {
+        None => Ok(posed_photos(&project.epochs[epoch], &Warnings::default())?.len()),
         Some(_) => Ok(0),
     }
 }

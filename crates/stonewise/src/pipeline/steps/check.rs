@@ -4,11 +4,32 @@ use crate::check::{Depth, Report, Verdict, check, is_about_this_machine, require
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
+use crate::pipeline::graph::{Run, Step};
 use crate::pipeline::steps::segment::listing;
 use crate::storage::step::Key;
+use stonewise_core::epoch::EpochId;
+
+/// A look at the survey before the work.
+pub static CHECK: Step = Step {
+    name: STEP,
+    words: |_| "check of the survey",
+    make: |run, _| run.checked(),
+    ..Step::PLAIN
+};
 
 /// Name of the step.
 const STEP: &str = "check";
+
+impl Run<'_> {
+    fn checked(&self) -> Result<()> {
+        match self.context.forced {
+            Some(forced) => self
+                .once(&CHECK, EpochId::REFERENCE, || look(self.context, forced))
+                .map(drop),
+            None => Ok(()),
+        }
+    }
+}
 
 /// Looks at the survey before the work. What is doubtful becomes a warning; what cannot be right stops the
 /// run, unless it is forced.

@@ -1,0 +1,227 @@
+//! What a step declares about itself, and the run that makes its values.
+
+use super::context::Context;
+use super::cost::{Cost, Sizes};
+use super::part::Part;
+use super::until::Until;
+use crate::error::Result;
+use crate::project::Project;
+use crate::settings::Settings;
+use std::any::{Any, TypeId};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
+
+/// A kind of step. A run, its agenda, a plan, a unit of a plan and the documentation are walks over these.
+pub struct Step {
+    /// Its name; with the epoch's number behind it that of its files, its unit and its time.
+    pub name: &'static str,
+    /// What a reader is told while it works, followed by the epoch's name; empty: it counts as part of the
+    /// step before it.
+    pub words: fn(&Settings) -> &'static str,
+    /// What it is about.
+    pub about: About,
+    /// The steps that come first.
+    pub needs: &'static [Need],
+    /// Which runs do it, by how far they go.
+    pub wanted: fn(Until) -> bool,
+    /// Which projects and epochs have it.
+    pub applies: fn(&Project, EpochId) -> bool,
+    /// What it takes as a unit of a plan; `None`: the last unit does it.
+    pub cost: Option<fn(&Sizes, EpochId) -> Cost>,
+    /// The parts that other processes may do.
+    pub parts: Option<Parts>,
+    /// Does it.
+    pub make: fn(&Run, EpochId) -> Result<()>,
+}
+
+/// What a step is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum About {
+    /// The survey as a whole.
+    Survey,
+    /// An epoch.
+    Epoch,
+    /// A later epoch against the reference.
+    Later,
+}
+
+/// A step that comes before another.
+#[derive(Clone, Copy)]
+pub struct Need {
+    pub(super) step: &'static Step,
+    pub(super) of: Of,
+    when: fn(&Project, EpochId) -> bool,
+}
+
+/// Of which epochs a step is needed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Of {
+    Same,
+    Reference,
+    FirstLater,
+    All,
+}
+
+impl Need {
+    /// That of the same epoch, or of the survey.
+    pub const fn same(step: &'static Step) -> Self {
+        Self::of(step, Of::Same)
+    }
+
+    /// That of the reference.
+    pub const fn reference(step: &'static Step) -> Self {
+        Self::of(step, Of::Reference)
+    }
+
+    /// That of the epoch after the reference.
+    pub const fn first_later(step: &'static Step) -> Self {
+        Self::of(step, Of::FirstLater)
+    }
+
+    /// Those of all epochs.
+    pub const fn all(step: &'static Step) -> Self {
+        Self::of(step, Of::All)
+    }
+
+    /// The same, for some epochs only.
+    pub const fn when(self, when: fn(&Project, EpochId) -> bool) -> Self {
+        Self { when, ..self }
+    }
+
+    const fn of(step: &'static Step, of: Of) -> Self {
+        let when = |_: &Project, _: EpochId| true;
+        Self { step, of, when }
+    }
+}
+
+/// The parts of a step.
+pub struct Parts {
+    /// What they are.
+    pub kind: PartKind,
+    /// What each takes as a unit.
+    pub cost: fn(&Sizes, EpochId) -> Cost,
+    /// Does one, or gathers them.
+    pub make: fn(&Run, EpochId, Part) -> Result<()>,
+}
+
+/// What the parts of a step are.
+#[derive(Clone, Copy)]
+pub enum PartKind {
+    /// Photos, as many as the function counts.
+    Photos(fn(&Project, EpochId) -> Result<usize>),
+    /// Batches of the tiles of the step's epoch, after a part that all of them need.
+    PreparedTiles,
+    /// Batches of the tiles of the reference.
+    ReferenceTiles,
+}
+
+impl Step {
+    /// A step about the survey that every run does and that is no unit: what others change.
+    pub const PLAIN: Self = Self {
+        name: "",
+        words: |_| "",
+        about: About::Survey,
+        needs: &[],
+        wanted: |_| true,
+        applies: |_, _| true,
+        cost: None,
+        parts: None,
+        make: |_, _| Ok(()),
+    };
+}
+
+/// A step with the epoch that it is about.
+#[derive(Clone, Copy)]
+pub struct Task {
+    /// The step.
+    pub step: &'static Step,
+    /// The epoch; the reference where the step is about the survey.
+    pub epoch: EpochId,
+}
+
+impl Task {
+    /// Its name.
+    pub fn id(&self) -> String {
+        match self.step.about {
+            About::Survey => self.step.name.to_owned(),
+            About::Epoch | About::Later => format!("{}-{}", self.step.name, self.epoch),
+        }
+    }
+
+    /// What a reader is told; empty where it is no step of its own.
+    pub fn words(&self, project: &Project) -> String {
+        let words = (self.step.words)(&project.settings);
+        match self.step.about {
+            About::Epoch | About::Later if !words.is_empty() => {
+                format!("{words} {}", project.epochs[self.epoch].name)
+            }
+            _ => words.to_owned(),
+        }
+    }
+
+    /// The tasks that come first; in place of one that the project does not have those that it would need.
+    pub fn needs(&self, project: &Project) -> Vec<Self> {
+        let needs = self.step.needs.iter().filter(|n| (n.when)(project, self.epoch));
+        let tasks = needs.flat_map(|need| match (need.step.about, need.of) {
+            (About::Survey, _) | (_, Of::Reference) => vec![(need.step, EpochId::REFERENCE)],
+            (_, Of::Same) => vec![(need.step, self.epoch)],
+            (_, Of::FirstLater) => vec![(need.step, EpochId::at(1))],
+            (About::Epoch, Of::All) => project.epochs.ids().map(|e| (need.step, e)).collect(),
+            (About::Later, Of::All) => project.epochs.later_ids().map(|e| (need.step, e)).collect(),
+        });
+        let others = tasks.map(|(step, epoch)| Self { step, epoch });
+        others
+            .filter(|task| task.id() != self.id())
+            .flat_map(|task| match (task.step.applies)(project, task.epoch) {
+                true => vec![task],
+                false => task.needs(project),
+            })
+            .collect()
+    }
+}
+
+/// The values of one run of a project. Each is made when it is asked for first, from others or from what an
+/// earlier run left on disk; the steps add the methods that give them.
+pub struct Run<'a> {
+    /// Where to work, and whom to tell.
+    pub context: &'a Context<'a>,
+    /// How far it goes.
+    pub until: Until,
+    made: RefCell<BTreeMap<(String, TypeId), Arc<dyn Any + Send + Sync>>>,
+}
+
+impl<'a> Run<'a> {
+    /// A run that goes so far.
+    pub fn new(context: &'a Context<'a>, until: Until) -> Self {
+        Self {
+            context,
+            until,
+            made: RefCell::default(),
+        }
+    }
+
+    /// What a step makes of an epoch.
+    pub fn once<T: Any + Send + Sync>(
+        &self,
+        step: &'static Step,
+        epoch: EpochId,
+        make: impl FnOnce() -> Result<T>,
+    ) -> Result<Arc<T>> {
+        let id = Task { step, epoch }.id();
+        self.known(&id, || self.context.in_line(&id, make))
+    }
+
+    /// The value of this name.
+    pub fn known<T: Any + Send + Sync>(&self, id: &str, make: impl FnOnce() -> Result<T>) -> Result<Arc<T>> {
+        let key = (id.to_owned(), TypeId::of::<T>());
+        let known = self.made.borrow().get(&key).cloned();
+        if let Some(value) = known.and_then(|value| value.downcast().ok()) {
+            return Ok(value);
+        }
+        let value = Arc::new(make()?);
+        self.made.borrow_mut().insert(key, value.clone());
+        Ok(value)
+    }
+}

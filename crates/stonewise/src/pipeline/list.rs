@@ -1,0 +1,248 @@
+//! The list of all steps, and the walk over those that a run does. A new step is a file and a line here.
+
+use super::agenda::Agenda;
+use super::graph::{About, Step, Task};
+use super::until::Until;
+use super::{doubts, outputs, steps};
+use crate::project::Project;
+use stonewise_core::epoch::EpochId;
+
+/// All steps, each after those that it needs.
+pub static STEPS: &[&Step] = &[
+    &steps::check::CHECK,
+    &steps::ingest::INGEST,
+    &steps::overlap::OVERLAP,
+    &steps::segment::SEGMENT,
+    &steps::label::LABEL,
+    &steps::label::STONES,
+    &steps::join::JOIN,
+    &steps::carry::CARRY,
+    &steps::edit::EDIT,
+    &outputs::audits::AUDITS,
+    &outputs::outlines::OUTLINES,
+    &steps::r#match::MATCH,
+    &steps::offsets::OFFSETS,
+    &steps::register::REGISTER,
+    &steps::measure::MEASURE,
+    &doubts::DOUBTS,
+    &outputs::tables::TABLES,
+    &steps::m3c2::M3C2,
+    &steps::change::CHANGE,
+    &steps::evaluate::EVALUATE,
+    &outputs::verdict::VERDICT,
+    &outputs::evidence::EVIDENCE,
+    &outputs::clouds::CLOUDS,
+    &outputs::face_cloud::FACE_CLOUD,
+    &outputs::series::SERIES,
+    &outputs::run_record::RECORD,
+    &outputs::report::REPORT,
+    &outputs::report::LAYERS,
+];
+
+/// The tasks of a run that goes so far, each after those that it needs.
+///
+/// Neighbouring steps of later epochs are done epoch by epoch, those of all epochs step by step, together with
+/// steps behind them that have no words.
+pub fn tasks(project: &Project, until: Until) -> Vec<Task> {
+    let epochs = &project.epochs;
+    let of_block = |block: &[&'static Step]| -> Vec<Task> {
+        let of_epoch = |epoch: EpochId, steps: &[&'static Step]| -> Vec<Task> {
+            steps.iter().map(|&step| Task { step, epoch }).collect()
+        };
+        match block[0].about {
+            About::Survey => of_epoch(EpochId::REFERENCE, block),
+            About::Epoch => block
+                .chunk_by(|_, next| (next.words)(&project.settings).is_empty())
+                .flat_map(|steps| epochs.ids().flat_map(move |epoch| of_epoch(epoch, steps)))
+                .collect(),
+            About::Later => epochs
+                .later_ids()
+                .flat_map(|epoch| of_epoch(epoch, block))
+                .collect(),
+        }
+    };
+    let blocks = STEPS.chunk_by(|a, b| a.about == b.about);
+    let mut all: Vec<Task> = blocks.flat_map(of_block).collect();
+    all.retain(|task| (task.step.wanted)(until) && (task.step.applies)(project, task.epoch));
+    all
+}
+
+/// What a run that goes so far announces.
+pub fn agenda(project: &Project, until: Until) -> Agenda {
+    Agenda::of(
+        tasks(project, until)
+            .iter()
+            .map(|task| (task.id(), task.words(project))),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::graph::{Of, PartKind};
+    use crate::settings::Settings;
+
+    /// A project of three epochs, of which these have masks.
+    fn project(folder: &std::path::Path, masked: &[&str]) -> Project {
+        let path = folder.join("stonewise.toml");
+        std::fs::write(folder.join("cameras.json"), "[]").unwrap();
+        std::fs::write(folder.join("masks.json"), "{}").unwrap();
+        let epoch = |name: &str| {
+            std::fs::write(folder.join(format!("{name}.xyz")), "0 0 0\n").unwrap();
+            let masks = if masked.contains(&name) {
+                "masks = \"masks.json\"\n"
+            } else {
+                ""
+            };
+            format!(
+                "[[epochs]]\nname = \"{name}\"\nclouds = [\"{name}.xyz\"]\nimages = \".\"\n{masks}cameras = \"cameras.json\"\n"
+            )
+        };
+        let epochs = ["2024", "2025", "2026"].map(epoch).concat();
+        std::fs::write(&path, format!("[project]\nname = \"Wall\"\n{epochs}")).unwrap();
+        Project::read(&path).unwrap()
+    }
+
+    fn words(project: &Project, until: Until) -> Vec<String> {
+        let tasks = tasks(project, until).into_iter();
+        tasks
+            .map(|t| t.words(project))
+            .filter(|w| !w.is_empty())
+            .collect()
+    }
+
+    #[test]
+    fn every_step_of_a_run_is_named_with_its_epoch() {
+        let folder = tempfile::tempdir().unwrap();
+        let project = project(folder.path(), &["2024", "2025", "2026"]);
+        assert_eq!(
+            words(&project, Until::Segmented),
+            [
+                "check of the survey",
+                "clouds of 2024",
+                "clouds of 2025",
+                "clouds of 2026",
+                "stones in the photos of 2024",
+                "stones in the photos of 2025",
+                "stones in the photos of 2026"
+            ]
+        );
+        let all = words(&project, Until::Reported);
+        assert_eq!(all.len(), 1 + 3 * 3 + 1 + 2 * 3 + 1 + 3 + 1);
+        let place = |word: &str| all.iter().position(|w| w == word).unwrap();
+        assert!(place("adjustment of 2026") > place("M3C2 of 2025"));
+        assert!(words(&project, Until::Labelled).last().unwrap() == "labelled clouds of 2026");
+        let agenda = agenda(&project, Until::Reported);
+        assert_eq!(agenda.place("register-3"), Some(place("adjustment of 2026")));
+        assert_eq!((agenda.place("verdict"), agenda.place("check")), (None, Some(0)));
+    }
+
+    #[test]
+    fn epochs_without_masks_get_the_steps_that_correct_the_detector() {
+        let folder = tempfile::tempdir().unwrap();
+        let project = project(folder.path(), &["2025"]);
+        let all = words(&project, Until::Labelled);
+        let first = all
+            .iter()
+            .position(|w| w == "stones in the clouds of 2026")
+            .unwrap();
+        assert_eq!(
+            all[first + 1..first + 5],
+            [
+                "parts of stones joined in 2024",
+                "parts of stones joined in 2026",
+                "missed stones looked for in 2024",
+                "missed stones looked for in 2026",
+            ]
+        );
+    }
+
+    /// The list of steps as the documentation has it.
+    fn table() -> String {
+        let lines = STEPS.iter().map(|step| {
+            let words = (step.words)(&Settings::default());
+            let about = match step.about {
+                About::Survey => "survey",
+                About::Epoch => "epoch",
+                About::Later => "later epoch",
+            };
+            let parts = match step.parts.as_ref().map(|parts| &parts.kind) {
+                Some(PartKind::Photos(_)) => "photos",
+                Some(_) => "batches of tiles",
+                None => "–",
+            };
+            let cells = [
+                format!("`{}`", step.name),
+                match (words, step.about) {
+                    ("", _) | (_, About::Survey) => words.to_owned(),
+                    _ => format!("{words} …"),
+                },
+                about.to_owned(),
+                needs(step),
+                if step.cost.is_some() { "yes" } else { "no" }.to_owned(),
+                parts.to_owned(),
+                runs(step),
+            ];
+            format!("| {} |\n", cells.join(" | "))
+        });
+        lines.collect()
+    }
+
+    fn needs(step: &Step) -> String {
+        let needs = step.needs.iter().map(|need| {
+            let whose = match need.of {
+                Of::Same => "",
+                Of::Reference => " of the reference",
+                Of::FirstLater => " of the first later epoch",
+                Of::All => " of all",
+            };
+            format!("`{}`{whose}", need.step.name)
+        });
+        let needs: Vec<String> = needs.collect();
+        if needs.is_empty() {
+            "–".to_owned()
+        } else {
+            needs.join(", ")
+        }
+    }
+
+    fn runs(step: &Step) -> String {
+        let all = [
+            Until::Segmented,
+            Until::Labelled,
+            Until::Matched,
+            Until::Registered,
+            Until::Compared,
+            Until::Reported,
+        ];
+        let wanted: Vec<Until> = all.into_iter().filter(|until| (step.wanted)(*until)).collect();
+        let name = |until: &Until| format!("`{until:?}`").to_lowercase();
+        match all.ends_with(&wanted) {
+            true if wanted.len() == all.len() => "all".to_owned(),
+            true => format!("from {}", name(&wanted[0])),
+            false => wanted.iter().map(name).collect::<Vec<_>>().join(", "),
+        }
+    }
+
+    #[test]
+    fn the_documentation_lists_the_steps_as_they_are() {
+        let docs = include_str!("../../../../docs/src/units.md");
+        let table = table();
+        let missing: Vec<&str> = table.lines().filter(|line| !docs.contains(line)).collect();
+        assert!(
+            docs.contains(&table),
+            "docs/src/units.md lacks, or has in another order:\n{}",
+            missing.join("\n")
+        );
+    }
+
+    #[test]
+    fn every_step_comes_after_those_that_it_needs() {
+        for (place, step) in STEPS.iter().enumerate() {
+            for need in step.needs {
+                let before = STEPS[..=place].iter().any(|other| other.name == need.step.name);
+                assert!(before, "{} needs {}", step.name, need.step.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The rows of the stones of a later epoch.
+
+use crate::error::Result;
+use crate::pipeline::graph::{About, Need, Run, Step};
+use crate::pipeline::outputs::outlines::OUTLINES;
+use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
+use crate::pipeline::steps::register::{REGISTER, datum};
+use crate::pipeline::until::Until;
+use crate::results::StoneRow;
+use crate::results::records::Datum;
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
+
+/// Brings together what is known of every stone of a later epoch.
+pub static MEASURE: Step = Step {
+    name: "measure",
+    about: About::Later,
+    needs: &[Need::same(&REGISTER), Need::same(&OUTLINES)],
+    wanted: |until| until >= Until::Registered,
+    make: |run, epoch| run.measured(epoch).map(drop),
+    ..Step::PLAIN
+};
+
+/// What was measured of a later epoch against the reference.
+pub struct Measured {
+    /// What is known about the registration of the epoch.
+    pub datum: Datum,
+    /// One row for each stone of the reference.
+    pub rows: Vec<StoneRow>,
+}
+
+impl Run<'_> {
+    /// What was measured of a later epoch.
+    pub fn measured(&self, later: EpochId) -> Result<Arc<Measured>> {
+        self.once(&MEASURE, later, || {
+            let (labelled, registered) = (self.labelled_pair(later)?, self.registered(later)?);
+            let first = &labelled.first;
+            let datum = datum(self.context.project, later, &registered, &first.stones);
+            let datum = datum.against(motion_in_common(first, &registered).as_ref());
+            let labelled = labelled.each_ref().map(|l| &**l);
+            let facade = &self.outlined()?.facade;
+            let rows = stone_rows(labelled, &*self.matched(later)?, &registered, &datum, facade);
+            Ok(Measured { datum, rows })
+        })
+    }
+}

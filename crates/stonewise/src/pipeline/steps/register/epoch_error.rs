@@ -1,0 +1,50 @@
+//! The error that all motions of an epoch share, as its sources and areas off the wall show it.
+
+use super::off_wall::OffWall;
+use super::registered::Registered;
+use super::sights::Sights;
+use crate::error::Result;
+use crate::pipeline::context::Context;
+use crate::pipeline::steps::label::Labelled;
+use stonewise_core::epoch::{EpochId, Pair};
+use stonewise_core::id::StoneId;
+use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, epoch_errors};
+
+/// Estimates that error, and adds it to the covariances of neighbours.
+pub(super) fn add_epoch_error(
+    context: &Context,
+    later: EpochId,
+    labelled: Pair<&Labelled>,
+    matches: &[(StoneId, StoneId)],
+    registered: &mut Registered,
+) -> Result<()> {
+    let project = context.project;
+    let params = &project.settings.registration;
+    let is_known = params.epoch_error_m.is_some()
+        || !params.stable.is_empty()
+        || project.epochs[later].is_of_reference_survey();
+    let off_wall = match params.auto_stable || !is_known {
+        true => OffWall::find(labelled, context.progress)?,
+        false => OffWall::default(),
+    };
+    registered.off_wall = off_wall.areas().to_vec();
+    let sights = Sights::gather(project, labelled, later, matches, &off_wall, context.progress)?;
+    let neighbours = registered.neighbours_among(&sights.stones);
+    let pair = EpochPair {
+        sources: &sights.sources,
+        stones: &sights.seen,
+        neighbours: &neighbours,
+        stable: &sights.stable,
+        offered: &sights.offered,
+        sigma_m: registered.noise_m(),
+    };
+    let observers = EpochErrorParams {
+        shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),
+        ..params.observers.clone()
+    };
+    let errors = epoch_errors(&pair, &observers);
+    registered.add_registration(&errors.between);
+    registered.epoch_errors = Some(errors);
+    registered.error_stones = sights.stones;
+    Ok(())
+}
