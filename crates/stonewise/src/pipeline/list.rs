@@ -128,7 +128,7 @@ mod tests {
             ]
         );
         let all = words(&project, Until::Reported);
-        assert_eq!(all.len(), 1 + 3 * 3 + 1 + 2 * 3 + 1 + 3 + 1);
+        assert!((1..all.len()).all(|k| !all[..k].contains(&all[k])), "{all:?}");
         let place = |word: &str| all.iter().position(|w| w == word).unwrap();
         assert!(place("adjustment of 2026") > place("M3C2 of 2025"));
         assert!(words(&project, Until::Labelled).last().unwrap() == "labelled clouds of 2026");
