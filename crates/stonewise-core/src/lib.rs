@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
-//!    < surface < {transfer | matching | registration | change} < evaluate
+//!    < surface < {transfer | matching | registration | change | views} < evaluate
 //! ```
 
 pub mod change;
@@ -28,3 +28,4 @@ pub mod statistics;
 pub mod stone;
 pub mod surface;
 pub mod transfer;
+pub mod views;

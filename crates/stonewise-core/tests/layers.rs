@@ -9,7 +9,7 @@ const LAYERS: [&[&str]; 8] = [
     &["cloud"],
     &["stone"],
     &["surface"],
-    &["transfer", "matching", "registration", "change"],
+    &["transfer", "matching", "registration", "change", "views"],
     &["evaluate"],
 ];
 

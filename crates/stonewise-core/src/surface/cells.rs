@@ -22,6 +22,8 @@ pub struct SurfaceCell {
     pub centroid: Point3<f64>,
     /// Unit normal; its sign is arbitrary until the cells are oriented.
     pub normal: Vector3<f64>,
+    /// Mean distance between neighbouring points, metres: root of the area of a point.
+    pub spacing_m: f64,
     /// Skewness of the heights above the plane along `normal`, dimensionless. Joints lie behind the faces of
     /// stones, so that masonry has negative skewness along its outward normal.
     pub skewness: f64,
@@ -61,10 +63,13 @@ impl SurfaceCell {
                     .powi(3)
             })
             .sum();
+        // An evenly covered rectangle has variances of a twelfth of the squares of its sides.
+        let area_m2 = 12.0 * narrow * wide;
         Some(Self {
             cell,
             centroid: cloud.origin() + plane.centroid.coords,
             normal: plane.normal,
+            spacing_m: (area_m2 / count).sqrt(),
             skewness: if thin > 0.0 {
                 third / count / thin.powi(3)
             } else {

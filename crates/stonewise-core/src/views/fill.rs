@@ -1,0 +1,120 @@
+//! Small gaps between the spots of points.
+
+use crate::raster::RgbImage;
+
+/// Gaps up to twice as wide are filled, pixels: holes of stereo clouds on smooth stones, no windows.
+const HALF_GAP_PX: usize = 8;
+
+/// Fills gaps of up to 16 pixels with the mean of the known pixels around; larger gaps, and what lies
+/// outside the cloud, stay as they are.
+pub(super) fn fill_gaps(image: &mut RgbImage, known: &mut [bool]) {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let wanted = closed(known, width, height);
+    // From the rims inward, one pixel a round, so that a gap takes the colours of its own border.
+    for _ in 0..=HALF_GAP_PX {
+        let mut filled = Vec::new();
+        for at in (0..known.len()).filter(|&at| wanted[at] && !known[at]) {
+            let (x, y) = (at % width, at / width);
+            let (mut sum, mut count) = ([0u32; 3], 0);
+            for ny in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+                for nx in x.saturating_sub(1)..=(x + 1).min(width - 1) {
+                    let near = ny * width + nx;
+                    if known[near] {
+                        count += 1;
+                        for (s, v) in sum.iter_mut().zip(image.data()[near]) {
+                            *s += u32::from(v);
+                        }
+                    }
+                }
+            }
+            if count > 0 {
+                filled.push((at, sum.map(|s| ((s + count / 2) / count) as u8)));
+            }
+        }
+        if filled.is_empty() {
+            return;
+        }
+        for (at, value) in filled {
+            image.data_mut()[at] = value;
+            known[at] = true;
+        }
+    }
+}
+
+/// Morphological closing with a square: what a square that fits into the unknown never covers.
+fn closed(known: &[bool], width: usize, height: usize) -> Vec<bool> {
+    let dilated = spread(known, width, height, true);
+    spread(&dilated, width, height, false)
+}
+
+/// Lets one value win wherever it occurs within the square around a pixel; outside the image nothing counts.
+fn spread(pixels: &[bool], width: usize, height: usize, winner: bool) -> Vec<bool> {
+    let along = |from: &[bool], length: usize, at: &dyn Fn(usize) -> usize, into: &mut [bool]| {
+        let mut last: Option<usize> = None;
+        let mut next = 0;
+        for i in 0..length {
+            while next < length && next <= i + HALF_GAP_PX {
+                if from[at(next)] == winner {
+                    last = Some(next);
+                }
+                next += 1;
+            }
+            let is_near = last.is_some_and(|l| l + HALF_GAP_PX >= i);
+            into[at(i)] = if is_near { winner } else { !winner };
+        }
+    };
+    let mut rows = vec![!winner; pixels.len()];
+    for y in 0..height {
+        along(pixels, width, &|x| y * width + x, &mut rows);
+    }
+    let mut both = vec![!winner; pixels.len()];
+    for x in 0..width {
+        along(&rows, height, &|y| y * width + x, &mut both);
+    }
+    both
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn narrow_gaps_are_filled_and_wide_ones_stay() {
+        let (width, height) = (80, 60);
+        let is_gap = |x: usize, y: usize| {
+            (10..26).contains(&x) && y > 5 || (40..62).contains(&x) && (20..50).contains(&y)
+        };
+        let mut known: Vec<bool> = (0..width * height)
+            .map(|i| !is_gap(i % width, i / width))
+            .collect();
+        let mut image = RgbImage::filled(width as u32, height as u32, [90, 120, 200]);
+        for (pixel, known) in image.data_mut().iter_mut().zip(&known) {
+            if !known {
+                *pixel = [0; 3];
+            }
+        }
+        fill_gaps(&mut image, &mut known);
+        assert_eq!(image.get(17, 30), Some(&[90, 120, 200]));
+        assert_eq!(image.get(51, 30), Some(&[0; 3]));
+        assert_eq!(image.get(42, 30), Some(&[0; 3]), "a wide gap keeps its border");
+    }
+
+    #[test]
+    fn closing_is_that_of_brute_force() {
+        let (width, height) = (37, 29);
+        let known: Vec<bool> = (0..width * height)
+            .map(|i| (i * i * 31 + i * 7) % 97 < 3)
+            .collect();
+        let found = closed(&known, width, height);
+        let around = |x: usize, y: usize| {
+            let r = HALF_GAP_PX;
+            (y.saturating_sub(r)..=(y + r).min(height - 1))
+                .flat_map(move |v| (x.saturating_sub(r)..=(x + r).min(width - 1)).map(move |u| (u, v)))
+        };
+        let dilated = |x, y| around(x, y).any(|(u, v)| known[v * width + u]);
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let expected = around(x, y).all(|(u, v)| dilated(u, v));
+            assert_eq!(found[y * width + x], expected, "{x} {y}");
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! Views of a cloud: pictures as a camera would take them, for surveys without photos.
+//!
+//! [`plan_views`] places cameras that cover the walls of a cloud from several directions; [`Picture`] collects
+//! the points that such a camera sees and becomes an image of their colour, their intensity or their relief.
+
+mod fill;
+mod hidden;
+mod params;
+mod picture;
+mod plan;
+mod shade;
+mod tone;
+mod walls;
+
+pub use params::ViewParams;
+pub use picture::Picture;
+pub use plan::plan_views;
+pub use tone::{PointValues, Shade, Tones, Toning};
+pub use walls::Walls;

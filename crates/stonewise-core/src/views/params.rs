@@ -1,0 +1,44 @@
+//! Parameters of the views of a cloud.
+
+use super::Shade;
+use serde::{Deserialize, Serialize};
+
+/// How views of a cloud are made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ViewParams {
+    /// What the pixels show. Absent: the best that the points have.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub show: Option<Shade>,
+    /// Edge of the cells whose normals decide where cameras stand, metres: about one stone, so that its relief
+    /// does not count.
+    pub cell_m: f64,
+    /// Distance of the cameras from the wall, metres: far enough that stones a decimetre before or behind the
+    /// face have the same scale within 1 %.
+    pub distance_m: f64,
+    /// Angle by which views to the left, to the right, from above and from below are turned, radians.
+    pub turn_rad: f64,
+    /// Normals within this angle of the axis of a view are seen well, radians.
+    pub spread_rad: f64,
+    /// Least size of a pixel on the wall, metres; a pixel is never smaller than the spacing of the points.
+    pub pixel_m: f64,
+    /// Pixels of all views of an epoch together at most, millions; pixels grow until they fit.
+    pub megapixels: f64,
+    /// Longest side of a view, pixels.
+    pub side_px: u32,
+}
+
+impl Default for ViewParams {
+    fn default() -> Self {
+        Self {
+            show: None,
+            cell_m: 0.25,
+            distance_m: 12.0,
+            turn_rad: 0.25,
+            spread_rad: 0.6,
+            pixel_m: 0.003,
+            megapixels: 200.0,
+            side_px: 1600,
+        }
+    }
+}
