@@ -2,9 +2,11 @@
 
 mod epoch;
 mod listing;
+mod order;
 
-use epoch::{CLOUDS, Found, MASKS, look};
-use listing::{files, folders, is_made_by_stonewise, name};
+use epoch::{CLOUDS, Found, MASKS, look, scans_beside};
+use listing::{files, folders, has_extension, is_made_by_stonewise, name};
+use order::order;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
@@ -30,11 +32,16 @@ const NO_EPOCHS: [&str; 7] = [
     "unfinished",
 ];
 
+/// Extensions of clouds in formats that only the programs of scanners read.
+const UNREAD: [&str; 7] = ["ptx", "rcp", "rcs", "fls", "zfs", "rdbx", "lgs"];
+/// What is said of them.
+const NOT_READ: &str = "a format that is not read";
+
 /// Names of masks in a line at most.
 const NAMES: usize = 4;
 
-/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, in
-/// order of name.
+/// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, else for
+/// each scan that lies in `dir` itself, in order of time as far as names tell it.
 ///
 /// Of what is missing the file says so in a comment, and of what could be taken instead. Folders that
 /// stonewise made, and those of truth, are left out. An existing file is not overwritten.
@@ -80,23 +87,56 @@ pub fn init(dir: &Path) -> Result<Initialised> {
             }
         }
     }
+    let beside = scans_beside(dir)?;
     if epochs.is_empty() {
-        let message = format!(
-            "no folder with a point cloud ({}) in it; make one folder per epoch",
+        epochs = beside;
+    } else {
+        let scans = beside.iter().flat_map(|scan| &scan.clouds);
+        lines
+            .extend(scans.map(|scan| format!("left out: {} (beside the folders of epochs)", scan.display())));
+    }
+    lines.extend(unread(dir)?);
+    if epochs.is_empty() {
+        let mut message = format!(
+            "no point cloud ({}) in it or in its folders; put each epoch into a folder, or its scan here",
             CLOUDS.join(", ")
         );
+        lines.retain(|line| line.contains(NOT_READ));
+        if !lines.is_empty() {
+            message = format!("{message}\n{}", lines.join("\n"));
+        }
         return Err(Error::Input {
             path: dir.to_path_buf(),
             message,
         });
     }
     epoch::agree_on_sensor(&mut epochs);
+    let why = order(&mut epochs);
+    let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
+    lines.push(format!("order of time: {} ({why})", names.join(", ")));
     for epoch in &epochs {
         lines.extend(epoch.lines());
     }
     lines.extend(unused_masks(dir, &epochs)?);
     write_text(&path, &project_text(dir, &epochs))?;
     Ok(Initialised { path, lines })
+}
+
+/// Says which clouds in the folder and below are in formats that are not read.
+fn unread(dir: &Path) -> Result<Vec<String>> {
+    let mut lines = Vec::new();
+    let mut open = vec![dir.to_path_buf()];
+    while let Some(folder) = open.pop() {
+        for file in files(&folder)? {
+            if has_extension(&file, &UNREAD) {
+                let file = file.strip_prefix(dir).unwrap_or(&file).display().to_string();
+                lines.push(format!("left out: {file} ({NOT_READ}: export it as E57 or LAZ)"));
+            }
+        }
+        open.extend(folders(&folder)?.into_iter().filter(|f| !is_made_by_stonewise(f)));
+    }
+    lines.sort();
+    Ok(lines)
 }
 
 /// Says which masks beside the epochs were not taken; those of an epoch's name are named with the epoch.
@@ -134,6 +174,10 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
             let others = quoted_list(&epoch.other_clouds);
             let _ = writeln!(text, "# clouds = {others}   # of another sensor");
         }
+        let has_photos = epoch.images.is_some() && epoch.cameras.is_some();
+        if !has_photos {
+            text.push_str("# Without images and cameras, stones are looked for in views of the clouds.\n");
+        }
         for (key, found, what) in [
             ("images", &epoch.images, "folder of the photos"),
             (
@@ -144,7 +188,8 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
             ("masks", &epoch.masks, "COCO json or folder of 16-bit label PNGs"),
         ] {
             let _ = match found {
-                Some(path) => writeln!(text, "{key} = {}", quoted(&path.to_string_lossy())),
+                Some(path) if has_photos => writeln!(text, "{key} = {}", quoted(&path.to_string_lossy())),
+                Some(path) => writeln!(text, "# {key} = {}", quoted(&path.to_string_lossy())),
                 None => writeln!(text, "# {key} = \"...\"   # not found: {what}"),
             };
         }
@@ -251,6 +296,41 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("b/scans/day 1/x.laz"), "{text}");
+    }
+
+    #[test]
+    fn scans_in_one_folder_are_an_epoch_each() {
+        let (text, lines) = written(&["dam_2025.laz", "dam_2024.laz", "README.txt", "dam_2024.ptx"]);
+        let place = |what: &str| text.find(what).unwrap();
+        assert!(place("clouds = [\"dam_2024.laz\"]") < place("clouds = [\"dam_2025.laz\"]"));
+        assert!(
+            text.contains("\n# images = ") && text.contains("\n# cameras = "),
+            "{text}"
+        );
+        assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
+        assert!(
+            lines.contains("left out: dam_2024.ptx (a format that is not read"),
+            "{lines}"
+        );
+        let (text, _) = written(&["2024_tls.laz", "2024_uav.laz", "2025_tls.laz", "2025_uav.laz"]);
+        assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
+        assert!(text.contains("\nclouds = [\"2025_tls.laz\"]"), "{text}");
+    }
+
+    #[test]
+    fn a_model_of_colmap_beside_the_cloud_hides_only_its_own_points() {
+        let (text, _) = written(&["2024/images.txt", "2024/points3D.txt", "2024/x.ply", "2025/x.ply"]);
+        assert!(text.contains("clouds = [\"2024/x.ply\"]"), "{text}");
+    }
+
+    #[test]
+    fn folders_before_and_after_are_in_this_order() {
+        let (text, lines) = written(&["after/x.laz", "before/x.laz"]);
+        assert!(
+            text.find("\"before\"").unwrap() < text.find("\"after\"").unwrap(),
+            "{text}"
+        );
+        assert!(lines.contains("order of time: before, after ("), "{lines}");
     }
 
     #[test]

@@ -11,8 +11,11 @@ pub(super) const CLOUDS: [&str; 8] = ["laz", "las", "e57", "ply", "xyz", "txt", 
 pub(super) const MASKS: &str = "masks";
 /// Extensions of photos.
 const PHOTOS: [&str; 3] = ["jpg", "jpeg", "png"];
-/// Names of the files that make a folder a COLMAP model.
+/// Names of the files that make a folder a COLMAP model, and of all of its texts.
 const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
+const COLMAP_TEXTS: [&str; 3] = ["images.txt", "cameras.txt", "points3d.txt"];
+/// Extensions of scans that lie beside each other: no texts, which may be anything.
+const SCANS: [&str; 5] = ["laz", "las", "e57", "ply", "xyz"];
 /// Words in names of clouds, by sensor: the first of them wins where both are everywhere.
 const SENSORS: [(&str, &[&str]); 2] = [
     ("terrestrial", &["tls", "terrestrial", "scanner"]),
@@ -30,7 +33,7 @@ pub(super) struct Found {
     pub cameras: Option<PathBuf>,
     pub masks: Option<PathBuf>,
     /// What was not taken, with the reason.
-    left_out: Vec<(PathBuf, &'static str)>,
+    pub left_out: Vec<(PathBuf, &'static str)>,
 }
 
 impl Found {
@@ -122,6 +125,34 @@ pub(super) fn look(root: &Path, folder: &Path) -> Result<Found> {
     Ok(epoch)
 }
 
+/// Scans that lie in the folder of the project file: an epoch for each name, without the word for a sensor.
+pub(super) fn scans_beside(root: &Path) -> Result<Vec<Found>> {
+    let mut epochs: Vec<Found> = Vec::new();
+    for scan in files(root)?.into_iter().filter(|f| has_extension(f, &SCANS)) {
+        let mut own_name = scan
+            .file_stem()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        for word in SENSORS.iter().flat_map(|(_, words)| *words) {
+            if let Some(at) = own_name.to_ascii_lowercase().find(word) {
+                own_name.replace_range(at..at + word.len(), "");
+            }
+        }
+        let own_name = own_name.trim_matches(|c: char| !c.is_alphanumeric()).to_owned();
+        let cloud = scan.strip_prefix(root).unwrap_or(&scan).to_path_buf();
+        match epochs.iter_mut().find(|e| e.name == own_name) {
+            Some(epoch) => epoch.clouds.push(cloud),
+            None => epochs.push(Found {
+                name: own_name,
+                clouds: vec![cloud],
+                ..Found::default()
+            }),
+        }
+    }
+    Ok(epochs)
+}
+
 fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
     let files = files(dir)?;
     let is_colmap = files.iter().any(|f| COLMAP.contains(&name(f).as_str()));
@@ -141,7 +172,7 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
             found.cameras.push(file.clone());
         } else if has_extension(file, &["json"]) {
             found.masks.push(file.clone());
-        } else if has_extension(file, &CLOUDS) && !is_colmap {
+        } else if has_extension(file, &CLOUDS) && !COLMAP_TEXTS.contains(&name(file).as_str()) {
             found.clouds.push(file.clone());
         }
     }
