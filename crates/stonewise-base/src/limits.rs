@@ -4,7 +4,7 @@ use crate::settings::Settings;
 use toml::Value;
 
 /// Parameters that zero makes useless: sizes, radii, counts, steps.
-const POSITIVE: [&str; 18] = [
+const POSITIVE: [&str; 22] = [
     "size_m",
     "cell_m",
     "sample_m",
@@ -23,6 +23,10 @@ const POSITIVE: [&str; 18] = [
     "plane_epsilon",
     "correlation_cell_m",
     "outlier_sigmas",
+    "distance_m",
+    "megapixels",
+    "side_px",
+    "spread_rad",
 ];
 /// Parameters that are shares or rates without saying so in their names.
 const SHARES: [&str; 4] = ["min_iou", "min_area_ratio", "false_discovery_rate", "min_overlap"];

@@ -12,6 +12,7 @@ use stonewise_core::registration::observers::EpochErrorParams;
 use stonewise_core::registration::photos::PhotoParams;
 use stonewise_core::registration::{AdjustmentParams, GicpParams};
 use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
+use stonewise_core::views::ViewParams;
 use stonewise_segment::tiling::TilingOptions;
 
 /// How stones are found in photos without masks.
@@ -40,6 +41,8 @@ pub struct Settings {
     /// How clouds are cut.
     #[serde(alias = "tiles")]
     pub ingest: IngestParams,
+    /// Views of the clouds of epochs without photos.
+    pub views: ViewParams,
     /// Stones in photos without masks.
     pub segment: SegmentParams,
     /// Photo labels to points.

@@ -26,9 +26,10 @@ pub struct Args {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run the whole chain, from clouds and photos to results and a report. Resumes after an interruption.
+    /// Run the whole chain, from clouds and photos, or clouds alone, to results and a report. Resumes after an interruption.
     #[command(
-        after_help = "Example:\n  stonewise run survey/stonewise.toml --out results/\n  \
+        after_help = "Examples:\n  stonewise run survey/stonewise.toml --out results/\n  \
+        stonewise run dam_2024.laz dam_2025.laz --out results/\n  \
         stonewise run survey/stonewise.toml --out results/ --exit-on alarm\n\n\
         Exit codes: 0 done, 1 failed, 2 wrong arguments or project file, 3 inputs left out or results in doubt, 4 verdict at or above the --exit-on level."
     )]
@@ -135,9 +136,13 @@ pub struct ProjectArgs {
 /// Arguments of `run`.
 #[derive(Debug, ClapArgs)]
 pub struct RunArgs {
-    /// The project and the folder of its results.
-    #[command(flatten)]
-    pub project: ProjectArgs,
+    /// The project file; or scans without photos, one for each epoch in order of time, for which a project file
+    /// is written into the folder of the results.
+    #[arg(required = true, value_name = "PROJECT|SCANS")]
+    pub inputs: Vec<PathBuf>,
+    /// Folder of the results; created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
     /// Exit with code 4 if the verdict is this state or worse, and with 3 if the results allow no verdict.
     #[arg(long, value_enum, value_name = "STATE")]
     pub exit_on: Option<ExitOn>,
@@ -259,7 +264,7 @@ pub struct DemoArgs {
 /// Arguments of `init`.
 #[derive(Debug, ClapArgs)]
 pub struct InitArgs {
-    /// Folder with one subfolder per epoch; sorted by name, they must be in order of time.
+    /// Folder with one subfolder per epoch, or with one scan per epoch.
     pub dir: PathBuf,
 }
 

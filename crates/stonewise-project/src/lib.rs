@@ -6,9 +6,11 @@ mod init;
 mod project_file;
 mod project_parameters;
 mod project_type;
+mod scans;
 pub mod sources;
 mod split;
 
 pub use init::{Initialised, init};
-pub use project_type::{Epoch, Project};
+pub use project_type::{Epoch, PhotoFiles, Project};
+pub use scans::{ScansProject, is_scan};
 pub use split::{Halves, SPLIT_FILES, split};

@@ -1,6 +1,6 @@
 //! How a project file is read and checked.
 
-use super::{Epoch, Project};
+use super::{Epoch, PhotoFiles, Project};
 use crate::edits::EditsFile;
 use crate::sources::SourceRule;
 use serde::Deserialize;
@@ -19,6 +19,7 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
 use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
+use stonewise_core::views::ViewParams;
 use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::MapSystem;
 use stonewise_segment::Weights;
@@ -35,6 +36,8 @@ struct RawProject {
     epochs: Vec<RawEpoch>,
     #[serde(default, alias = "tiles")]
     ingest: IngestParams,
+    #[serde(default)]
+    views: ViewParams,
     #[serde(default)]
     segment: SegmentParams,
     #[serde(default, alias = "transfer")]
@@ -82,8 +85,8 @@ struct RawEpoch {
     #[serde(default)]
     conditions: BTreeMap<String, f64>,
     clouds: Spanned<Vec<Spanned<PathBuf>>>,
-    images: Spanned<PathBuf>,
-    cameras: Spanned<PathBuf>,
+    images: Option<Spanned<PathBuf>>,
+    cameras: Option<Spanned<PathBuf>>,
     masks: Option<Spanned<PathBuf>>,
     motion: Option<MotionField>,
     #[serde(default)]
@@ -137,9 +140,13 @@ impl Project {
 
     fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
         let path = &project_file(path);
-        let text = project_text(path)?;
-        let source = Source { path, text: &text };
-        let raw: RawProject = toml::from_str(&text).map_err(|e| source.not_toml(&e))?;
+        Self::parse(path, &project_text(path)?, least_epochs)
+    }
+
+    /// The project that a file at `path` with this text would be.
+    pub(crate) fn parse(path: &Path, text: &str, least_epochs: usize) -> Result<Self> {
+        let source = Source { path, text };
+        let raw: RawProject = toml::from_str(text).map_err(|e| source.not_toml(&e))?;
         if raw.epochs.len() < least_epochs {
             let at = text.find("[[epochs]]").unwrap_or(0);
             return Err(source.error(
@@ -149,6 +156,7 @@ impl Project {
         }
         let settings = Settings {
             ingest: raw.ingest,
+            views: raw.views,
             segment: source.segment(raw.segment)?,
             label: raw.label,
             stones: raw.stones,
@@ -168,7 +176,7 @@ impl Project {
         for epoch in raw.epochs {
             epochs.push(source.epoch(epoch, &map, &epochs)?);
         }
-        let mut notes = renamed_keys(&text);
+        let mut notes = renamed_keys(text);
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
@@ -277,6 +285,12 @@ impl Source<'_> {
         if raw.name.get_ref().trim().is_empty() {
             return Err(self.error(raw.name.span(), "an epoch needs a name"));
         }
+        let photos = self.photos(raw.images, raw.cameras)?;
+        if let (Some(masks), None) = (&raw.masks, &photos) {
+            let message = "masks need the photos in which they were drawn: add `images` and `cameras` to this epoch, or remove \
+                           `masks`";
+            return Err(self.error(masks.span(), message));
+        }
         let clouds = raw.clouds.into_inner();
         Ok(Epoch {
             name: raw.name.into_inner(),
@@ -286,8 +300,7 @@ impl Source<'_> {
                 .into_iter()
                 .map(|c| self.existing(c))
                 .collect::<Result<_>>()?,
-            images: self.existing(raw.images)?,
-            cameras: self.existing(raw.cameras)?,
+            photos,
             masks: raw.masks.map(|m| self.existing(m)).transpose()?,
             motion: raw.motion,
             map: map.clone(),
@@ -297,6 +310,31 @@ impl Source<'_> {
                 .map(|name| self.earlier(&name, earlier))
                 .transpose()?,
         })
+    }
+
+    /// The photos of an epoch, which need a camera file, and the other way round.
+    fn photos(
+        &self,
+        images: Option<Spanned<PathBuf>>,
+        cameras: Option<Spanned<PathBuf>>,
+    ) -> Result<Option<PhotoFiles>> {
+        match (images, cameras) {
+            (Some(images), Some(cameras)) => Ok(Some(PhotoFiles {
+                images: self.existing(images)?,
+                cameras: self.existing(cameras)?,
+            })),
+            (None, None) => Ok(None),
+            (Some(images), None) => Err(self.error(
+                images.span(),
+                "photos need their cameras: add `cameras = ...` to this epoch (Metashape XML, COLMAP folder or OpenSfM json), or \
+                 remove `images` to have the stones found in views of the clouds",
+            )),
+            (None, Some(cameras)) => Err(self.error(
+                cameras.span(),
+                "cameras need their photos: add `images = ...` to this epoch, or remove `cameras` to have the stones found in views \
+                 of the clouds",
+            )),
+        }
     }
 
     /// Moves the named epoch to the front; a note where that changes the numbers of epochs.
@@ -537,6 +575,39 @@ mod tests {
             "{message}"
         );
         assert!(message.contains("stonewise.toml:17: "), "{message}");
+    }
+
+    #[test]
+    fn photos_and_cameras_are_optional_together_and_masks_need_them() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["cloud.laz", "cameras.xml", "masks.json"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let file = dir.path().join("stonewise.toml");
+        let read = |first: &str| {
+            let text = format!(
+                "[project]\nname = \"wall\"\n[[epochs]]\nname = \"a\"\nclouds = [\"cloud.laz\"]\n{first}\n\
+                 [[epochs]]\nname = \"b\"\nclouds = [\"cloud.laz\"]\n"
+            );
+            fs::write(&file, text).unwrap();
+            Project::read(&file).map_err(|e| e.to_string())
+        };
+        let both = read("images = \".\"\ncameras = \"cameras.xml\"").unwrap();
+        let has_photos: Vec<bool> = both.epochs.iter().map(|e| e.photos.is_some()).collect();
+        assert_eq!(has_photos, [true, false]);
+        let without = &both.epochs.iter().last().unwrap();
+        assert!(without.read_cameras().unwrap().views.is_empty());
+        for (keys, fix) in [
+            ("images = \".\"", "add `cameras = ...`"),
+            ("cameras = \"cameras.xml\"", "add `images = ...`"),
+            ("masks = \"masks.json\"", "add `images` and `cameras`"),
+        ] {
+            let message = read(keys).unwrap_err();
+            assert!(
+                message.contains("stonewise.toml:6: ") && message.contains(fix),
+                "{message}"
+            );
+        }
     }
 
     #[test]

@@ -46,10 +46,8 @@ pub struct Epoch {
     pub conditions: BTreeMap<String, f64>,
     /// Point clouds, all in one frame.
     pub clouds: Vec<PathBuf>,
-    /// Folder of the photos.
-    pub images: PathBuf,
-    /// Camera file or COLMAP folder.
-    pub cameras: PathBuf,
+    /// Photos; where there are none, views of the clouds take their place.
+    pub photos: Option<PhotoFiles>,
     /// COCO json or folder of label PNGs.
     pub masks: Option<PathBuf>,
     /// Known motion of the points, applied after labelling.
@@ -63,22 +61,35 @@ pub struct Epoch {
     pub map: MapFrame,
 }
 
+/// Photos with their cameras.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PhotoFiles {
+    /// Folder of the photos.
+    pub images: PathBuf,
+    /// Camera file or COLMAP folder.
+    pub cameras: PathBuf,
+}
+
 impl Epoch {
     /// Whether it is another part of the survey of the reference.
     pub fn is_of_reference_survey(&self) -> bool {
         self.same_survey_as == Some(EpochId::REFERENCE)
     }
 
-    /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds.
+    /// Reads the camera file; cameras that lie on the earth are brought to the system of the clouds. An epoch
+    /// without photos has no cameras.
     ///
     /// # Errors
     /// A cloud's header or the camera file cannot be read; the system of the cameras is not supported.
     pub fn read_cameras(&self) -> Result<CameraFile> {
+        let Some(photos) = &self.photos else {
+            return Ok(CameraFile::default());
+        };
         let mut map = self.map.clone();
         for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {
             map.crs = map.crs.or(cloud_crs(cloud)?);
         }
-        Ok(read_cameras_on_map(&self.cameras, &map)?)
+        Ok(read_cameras_on_map(&photos.cameras, &map)?)
     }
 }
 
@@ -88,7 +99,8 @@ impl Project {
         let mut inputs = vec![self.path.clone()];
         for epoch in &self.epochs {
             inputs.extend(epoch.clouds.iter().cloned());
-            inputs.extend([epoch.images.clone(), epoch.cameras.clone()]);
+            let photos = epoch.photos.iter();
+            inputs.extend(photos.flat_map(|p| [p.images.clone(), p.cameras.clone()]));
             inputs.extend(epoch.masks.clone());
         }
         if let Weights::File(file) = Weights::named(&self.settings.segment.model) {
@@ -96,8 +108,6 @@ impl Project {
         }
         inputs.extend(self.settings.report.logo.clone());
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
-        // Comparisons of clouds alone have neither photos nor cameras.
-        inputs.retain(|path| !path.as_os_str().is_empty());
         inputs
     }
 
@@ -108,8 +118,7 @@ impl Project {
             date: None,
             conditions: BTreeMap::new(),
             clouds: vec![cloud.to_path_buf()],
-            images: PathBuf::new(),
-            cameras: PathBuf::new(),
+            photos: None,
             masks: None,
             motion: None,
             sources: SourceRule::default(),

@@ -2,10 +2,11 @@
 //! other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 3] = [
+const LAYERS: [&[&str]; 4] = [
     &["edits", "init", "sources"],
     &["project_type"],
     &["check", "project_file", "project_parameters", "split"],
+    &["scans"],
 ];
 
 #[test]

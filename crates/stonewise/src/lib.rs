@@ -31,7 +31,9 @@ pub use report_params::{Language, ReportParams};
 pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 pub use stable::StableArea;
 pub use stonewise_project as project;
-pub use stonewise_project::{Epoch, Halves, Initialised, Project, SPLIT_FILES, check, edits, init, split};
+pub use stonewise_project::{
+    Epoch, Halves, Initialised, Project, SPLIT_FILES, ScansProject, check, edits, init, is_scan, split,
+};
 pub use stonewise_report as report;
 pub use stonewise_results as results;
 pub use stonewise_results::export;

@@ -12,6 +12,14 @@ messages! {
             Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
             die Bilder ansehen";
 
+        SIDE_UNSURE:
+            "no camera or scanner position says which side of the wall is outside, and the cloud shows it too weakly: out-of-plane \
+            motions may have the wrong sign. Look at the views in the report: if the wall is seen from behind, give clouds that show \
+            the ground before the wall, or E57 files with the positions of the scanner",
+            "keine Kamera- oder Scannerposition sagt, welche Seite der Mauer außen ist, und die Punktwolke zeigt es zu schwach: \
+            Bewegungen aus der Ebene können das falsche Vorzeichen haben. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu \
+            sehen, Punktwolken angeben, die den Boden vor der Mauer zeigen, oder E57-Dateien mit den Positionen des Scanners";
+
         BESIDE_COMPARED:
             "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
             so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \

@@ -9,7 +9,8 @@ mod translation;
 
 pub use braces::fill;
 pub use doubts::{
-    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, STRETCHED, TORN, TURNED,
+    BESIDE, BESIDE_COMPARED, BLIND, FEW_MEASURED, MISREGISTERED_EPOCH, NOT_CONVERGED, SIDE_UNSURE, STRETCHED,
+    TORN, TURNED,
 };
 pub use message::Message;
 pub use translation::message_in;

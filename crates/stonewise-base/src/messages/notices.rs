@@ -8,6 +8,19 @@ messages! {
             "points without finite coordinates, left out: {n}",
             "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
+        VIEWS_OF_COLOURS:
+            "no photos: stones are looked for in {n} views of the cloud's colours",
+            "keine Fotos: Steine werden in {n} Ansichten der Farben der Punktwolke gesucht";
+
+        VIEWS_OF_INTENSITIES:
+            "no photos: stones are looked for in {n} views of the cloud's intensities",
+            "keine Fotos: Steine werden in {n} Ansichten der Intensitäten der Punktwolke gesucht";
+
+        VIEWS_OF_RELIEF:
+            "no photos: stones are looked for in {n} views of the cloud's relief, shaded, as neither colours nor intensities show any",
+            "keine Fotos: Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht, da weder Farben noch \
+            Intensitäten welche zeigen";
+
         AUTO_STABLE:
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
             "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";

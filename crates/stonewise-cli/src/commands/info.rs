@@ -72,7 +72,10 @@ fn project(path: &Path) -> Result<String> {
             "  epoch {}: {} cloud(s), {}\n",
             e.name,
             e.clouds.len(),
-            e.images.display()
+            match &e.photos {
+                Some(photos) => photos.images.display().to_string(),
+                None => "no photos".to_owned(),
+            }
         )
     });
     Ok(format!(

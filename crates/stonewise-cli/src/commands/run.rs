@@ -9,13 +9,24 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::results::records::{EpochVerdict, State};
 use stonewise::results::{Status, StoneRow};
-use stonewise::{OutputFolder, PREVIOUS_DIR, Project, Summary, Until};
+use stonewise::{OutputFolder, PREVIOUS_DIR, Project, ScansProject, Summary, Until, is_scan};
 use stonewise_core::progress::Progress;
 
 /// Runs a whole project; with `--exit-on` the verdict decides the exit code.
 pub fn run_all(args: &RunArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let project = Project::read(&args.project.project)?;
-    let folder = OutputFolder::of_project(&args.project.out, &project, force)?;
+    let (project, folder) = match args.inputs.as_slice() {
+        [project] if !is_scan(project) => {
+            let project = Project::read(project)?;
+            let folder = OutputFolder::of_project(&args.out, &project, force)?;
+            (project, folder)
+        }
+        scans => {
+            let scans = ScansProject::new(scans, &args.out)?;
+            let folder = OutputFolder::of_project(&args.out, &scans.project, force)?;
+            scans.write()?;
+            (scans.project, folder)
+        }
+    };
     let (outcome, summary) = run_to(&folder, &project, Until::Reported, printer)?;
     say_verdict(&summary, printer);
     let state = summary.verdict.as_ref().map(|v| v.state);

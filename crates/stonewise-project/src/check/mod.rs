@@ -20,7 +20,7 @@ pub use finding::{Finding, Report, Verdict};
 pub use resources::require_memory_of_clouds;
 pub use resources::{is_about_this_machine, require_memory_of_run};
 
-use crate::{Epoch, Project};
+use crate::{Epoch, PhotoFiles, Project};
 use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_base::messages::findings::{CAMERAS, MASKS, PHOTOS};
@@ -45,9 +45,16 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     for epoch in &project.epochs {
         progress.check()?;
         let survey = sample::sample(epoch, depth, &mut unreadable)?;
-        let cameras = unreadable.keep(epoch, &CAMERAS, cameras_of(epoch, survey.is_some()))?;
-        if let Some(cameras) = cameras.flatten() {
-            let photos = unreadable.keep(epoch, &PHOTOS, photos::look(project, epoch, &cameras))?;
+        let cameras = match &epoch.photos {
+            Some(files) => unreadable.keep(epoch, &CAMERAS, cameras_of(epoch, files, survey.is_some()))?,
+            None => {
+                let spacing_m = survey.as_ref().and_then(|s| s.spacing_m);
+                report.findings.push(photos::none(epoch, spacing_m));
+                None
+            }
+        };
+        if let (Some(cameras), Some(files)) = (cameras.flatten(), &epoch.photos) {
+            let photos = unreadable.keep(epoch, &PHOTOS, photos::look(project, epoch, files, &cameras))?;
             let are_listed = photos.is_some();
             let (findings, photos) = photos.unwrap_or_default();
             report.findings.extend(findings);
@@ -83,11 +90,11 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
 
 /// The cameras of an epoch, in the frame of its clouds. Where a cloud cannot be read, the cameras serve to find
 /// the photos alone, and it does not matter whether they can be brought to that frame: `None`, if they cannot.
-fn cameras_of(epoch: &Epoch, clouds_are_read: bool) -> Result<Option<CameraFile>> {
+fn cameras_of(epoch: &Epoch, files: &PhotoFiles, clouds_are_read: bool) -> Result<Option<CameraFile>> {
     if clouds_are_read {
         return epoch.read_cameras().map(Some);
     }
-    match read_cameras(&epoch.cameras) {
+    match read_cameras(&files.cameras) {
         Err(CameraError::UnsupportedCrs { .. }) => Ok(None),
         read => Ok(Some(read?)),
     }

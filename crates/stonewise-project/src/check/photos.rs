@@ -1,7 +1,7 @@
 //! Are the photos there, whole, and as large as their cameras say?
 
 use super::finding::{Finding, Verdict};
-use crate::{Epoch, Project};
+use crate::{Epoch, PhotoFiles, Project};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
@@ -13,19 +13,35 @@ use stonewise_io::image_io::image_size;
 
 /// Bytes at the end of a JPEG among which its end marker must be; some cameras append previews.
 const TAIL: u64 = 64 << 10;
+/// Stones with fewer spacings of the points across are found less often in views: on dam_small, 63 % of those
+/// with 10 to 15, 83 % with 15 to 20, 90 % with 20 to 25 and 94 % of larger ones.
+const SPACINGS_ACROSS: f64 = 20.0;
 /// Names in a message at most.
 const NAMES: usize = 4;
 
 /// A photo that is there, with its view.
 pub(super) type PosedPhoto<'a> = (&'a View, PathBuf);
 
+/// An epoch without photos; `spacing_m`: distance between its points.
+pub(super) fn none(epoch: &Epoch, spacing_m: Option<f64>) -> Finding {
+    let mut text = "none: stones are looked for in views of the clouds".to_owned();
+    if let Some(spacing_m) = spacing_m {
+        let cm = 1e2 * SPACINGS_ACROSS * spacing_m;
+        text = format!(
+            "{text}; those below {cm:.0} cm across (square root of the area) are found less often at this spacing"
+        );
+    }
+    Finding::new(&epoch.name, PHOTOS.english, Verdict::Fine, text)
+}
+
 /// Looks at the header and the end of every photo that a camera names; the photos that are there.
 pub(super) fn look<'a>(
     project: &Project,
     epoch: &Epoch,
+    files: &PhotoFiles,
     cameras: &'a CameraFile,
 ) -> Result<(Vec<Finding>, Vec<PosedPhoto<'a>>)> {
-    let photos = find_photos(&epoch.images, cameras)?;
+    let photos = find_photos(&files.images, cameras)?;
     let posed = posed(cameras, &photos);
     let (mut broken, mut sizes) = (Vec::new(), Vec::new());
     for (view, path) in &posed {
@@ -49,7 +65,7 @@ pub(super) fn look<'a>(
     let mut out = Vec::new();
     let mut add =
         |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, PHOTOS.english, verdict, text));
-    let (verdict, text) = presence(project, epoch, cameras, &photos);
+    let (verdict, text) = presence(project, epoch, files, cameras, &photos);
     add(verdict, text);
     if !photos.without_camera.is_empty() {
         let names = photos.without_camera.iter();
@@ -72,13 +88,19 @@ pub(super) fn look<'a>(
 
 /// Which of the photos that the camera file names are there. Cameras that were oriented together may be in the
 /// files of several epochs, whose photos lie in a folder each.
-fn presence(project: &Project, epoch: &Epoch, cameras: &CameraFile, photos: &Photos) -> (Verdict, String) {
+fn presence(
+    project: &Project,
+    epoch: &Epoch,
+    files: &PhotoFiles,
+    cameras: &CameraFile,
+    photos: &Photos,
+) -> (Verdict, String) {
     let mut found: Vec<bool> = photos.paths.iter().map(Option::is_some).collect();
     let here = found.iter().filter(|found| **found).count();
     let total = found.len().to_string();
-    let folder = epoch.images.to_string_lossy();
+    let folder = files.images.to_string_lossy();
     if here == 0 {
-        let file = epoch.cameras.to_string_lossy();
+        let file = files.cameras.to_string_lossy();
         let values = [("total", &*total), ("file", &*file), ("folder", &*folder)];
         return (Verdict::Wrong, NO_PHOTOS.say(&values));
     }
@@ -117,8 +139,11 @@ fn posed<'a>(cameras: &'a CameraFile, photos: &Photos) -> Vec<PosedPhoto<'a>> {
 
 /// Views whose photos are there.
 fn posed_views(epoch: &Epoch) -> Result<Vec<View>> {
+    let Some(files) = &epoch.photos else {
+        return Ok(Vec::new());
+    };
     let cameras = epoch.read_cameras()?;
-    let photos = posed(&cameras, &find_photos(&epoch.images, &cameras)?);
+    let photos = posed(&cameras, &find_photos(&files.images, &cameras)?);
     Ok(photos.into_iter().map(|(view, _)| view.clone()).collect())
 }
 

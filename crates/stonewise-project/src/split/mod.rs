@@ -53,20 +53,22 @@ pub fn split(
     progress: &dyn Progress,
 ) -> Result<Halves> {
     let photos = shuffled_photos(epoch, seed)?;
-    if photos.len() < 2 {
+    if let (Some(files), 0..2) = (&epoch.photos, photos.len()) {
         let message = format!(
             "posed photos in it: {}; two at least are needed to split an epoch",
             photos.len()
         );
         return Err(Error::Input {
-            path: epoch.images.clone(),
+            path: files.images.clone(),
             message,
         });
     }
     let edits = halves_edits(project, epoch, &photos, &out.join(EDITS))?;
     let mut text = head(project, epoch);
     for half in 0..2 {
-        copy_photos(&photos, &epoch.images, half, out, progress)?;
+        if let Some(files) = &epoch.photos {
+            copy_photos(&photos, &files.images, half, out, progress)?;
+        }
         let clouds = write_clouds(epoch, half, seed, out, progress)?;
         text += &epoch_table(epoch, half, &clouds)?;
     }
@@ -102,12 +104,14 @@ fn head(project: &Project, epoch: &Epoch) -> String {
 fn epoch_table(epoch: &Epoch, half: usize, clouds: &[String]) -> Result<String> {
     let clouds: Vec<String> = clouds.iter().map(|name| quoted(name)).collect();
     let mut text = format!(
-        "\n[[epochs]]\nname = {}\nclouds = [{}]\nimages = \"{}/images\"\ncameras = {}\n",
+        "\n[[epochs]]\nname = {}\nclouds = [{}]\n",
         quoted(&half_name(half)),
-        clouds.join(", "),
-        half_folder(half),
-        absolute(&epoch.cameras)?
+        clouds.join(", ")
     );
+    if let Some(files) = &epoch.photos {
+        let (folder, cameras) = (half_folder(half), absolute(&files.cameras)?);
+        let _ = writeln!(text, "images = \"{folder}/images\"\ncameras = {cameras}");
+    }
     if let Some(masks) = &epoch.masks {
         let _ = writeln!(text, "masks = {}", absolute(masks)?);
     }

@@ -20,8 +20,11 @@ pub(super) struct PosedPhoto {
 
 /// Posed photos of the epoch in an order that the seed decides; they go to the halves in turn.
 pub(super) fn shuffled_photos(epoch: &Epoch, seed: u64) -> Result<Vec<PosedPhoto>> {
+    let Some(files) = &epoch.photos else {
+        return Ok(Vec::new());
+    };
     let cameras = epoch.read_cameras()?;
-    let photos = find_photos(&epoch.images, &cameras)?;
+    let photos = find_photos(&files.images, &cameras)?;
     let mut posed: Vec<PosedPhoto> = photos
         .paths
         .into_iter()

@@ -33,7 +33,10 @@ pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
         row(names.points, &|e| {
             count(usize::try_from(e.points).unwrap_or(usize::MAX))
         }),
-        row(names.cameras, &|e| file(&e.cameras, texts)),
+        row(names.cameras, &|e| {
+            let views = || names.views.to_owned();
+            e.cameras.as_ref().map_or_else(views, |c| file(c, texts))
+        }),
         row(names.photos, &|e| count(e.photos)),
         row(names.masks, &|e| {
             e.masks.as_ref().map_or_else(dash, |m| file(m, texts))

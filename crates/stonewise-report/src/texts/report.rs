@@ -263,6 +263,7 @@ in_both! {
         clouds: "point clouds", "Punktwolken";
         points: "points", "Punkte";
         cameras: "camera file", "Kameradatei";
+        views: "none: views of the cloud", "keine: Ansichten der Punktwolke";
         photos: "photos used", "verwendete Fotos";
         masks: "masks", "Masken";
         stones: "stones found", "gefundene Steine";

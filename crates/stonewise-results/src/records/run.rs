@@ -71,17 +71,17 @@ pub struct EpochRecord {
     pub conditions: BTreeMap<String, f64>,
     /// Point clouds.
     pub clouds: Vec<InputRecord>,
-    /// Camera file or folder.
-    pub cameras: InputRecord,
+    /// Camera file or folder; absent where views of the clouds took the place of photos.
+    pub cameras: Option<InputRecord>,
     /// Masks; absent where the detector found the stones.
     pub masks: Option<InputRecord>,
-    /// Folder of the photos.
-    pub images: PathBuf,
+    /// Folder of the photos; absent likewise.
+    pub images: Option<PathBuf>,
     /// Known motion of the points.
     pub motion: Option<MotionField>,
     /// Points with finite coordinates.
     pub points: u64,
-    /// Photos that voted.
+    /// Photos, or views of the clouds, that voted.
     pub photos: usize,
     /// Stones.
     pub stones: usize,

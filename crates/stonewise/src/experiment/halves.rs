@@ -19,14 +19,18 @@ pub(super) fn halves_of(
     store: &StepStore,
     progress: &dyn Progress,
 ) -> Result<Project> {
-    let mut digests = vec![store.digest(&epoch.cameras)?];
+    let mut digests = Vec::new();
+    let mut photos = Vec::new();
+    if let Some(files) = &epoch.photos {
+        digests.push(store.digest(&files.cameras)?);
+        photos = find_photos(&files.images, &epoch.read_cameras()?)?.paths;
+    }
     for cloud in &epoch.clouds {
         digests.push(store.digest(cloud)?);
     }
     if let Some(edits) = &project.edits {
         digests.push(store.digest(&edits.path)?);
     }
-    let photos = find_photos(&epoch.images, &epoch.read_cameras()?)?.paths;
     let key = Key::new(
         "halves",
         &(seed, photos, &epoch.masks),

@@ -7,7 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Run, Task};
 use crate::pipeline::outputs::crs::coordinate_system;
 use crate::pipeline::outputs::m3c2::write_m3c2;
-use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::pipeline::steps::ingest::{INGEST, Ingested, scanners};
 use crate::pipeline::steps::m3c2::{change_field, m3c2};
 use crate::pipeline::until::Until;
 use crate::project::Project;
@@ -19,7 +19,7 @@ use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
 use stonewise_core::surface::{Outside, orient, surface_cells};
-use stonewise_io::cloud::{Dimension, ExtraColumn, cloud_info, read_mesh, write_points_laz};
+use stonewise_io::cloud::{Dimension, ExtraColumn, read_mesh, write_points_laz};
 
 /// Name of the comparison along normals, which a run of the project finds.
 const M3C2: &str = "m3c2-2";
@@ -115,15 +115,7 @@ pub fn compare_clouds(
 /// The outside of the first epoch's surface; tells what it follows from, and notes a doubt where that is weak.
 fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
     let epoch = context.project.epochs.reference();
-    let mut scanners = Vec::new();
-    for cloud in &epoch.clouds {
-        scanners.extend(
-            cloud_info(cloud)?
-                .scans
-                .into_iter()
-                .filter_map(|scan| scan.origin),
-        );
-    }
+    let scanners = scanners(epoch)?;
     let cells = surface_cells::<_, Error>(&first.tiles.surveyed, CELL_M, context.progress)?;
     let found = orient(cells, &scanners);
     let evidence = found.evidence;
@@ -170,7 +162,7 @@ pub fn tile_clouds(project: &Project, folder: &OutputFolder, progress: &dyn Prog
 
 fn views_of(project: &Project) -> Result<Vec<View>> {
     match project.epochs.first() {
-        Some(epoch) if !epoch.cameras.as_os_str().is_empty() => Ok(epoch.read_cameras()?.views),
+        Some(epoch) => Ok(epoch.read_cameras()?.views),
         _ => Ok(Vec::new()),
     }
 }

@@ -59,7 +59,11 @@ impl<'a> Sizes<'a> {
             points.push(records.sum::<Result<u64>>()?);
             let views = epoch.read_cameras()?.views.into_iter();
             let sizes = views.map(|v| u64::from(v.camera.width) * u64::from(v.camera.height));
-            pixels.push(sizes.max().unwrap_or(0));
+            let side = u64::from(project.settings.views.side_px);
+            pixels.push(match epoch.photos {
+                Some(_) => sizes.max().unwrap_or(0),
+                None => side * side,
+            });
         }
         Ok(Self {
             project,

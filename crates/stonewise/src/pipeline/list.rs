@@ -12,6 +12,7 @@ pub static STEPS: &[&Step] = &[
     &steps::check::CHECK,
     &steps::ingest::INGEST,
     &steps::overlap::OVERLAP,
+    &steps::views::VIEWS,
     &steps::segment::SEGMENT,
     &steps::label::LABEL,
     &steps::label::STONES,

@@ -2,7 +2,8 @@
 //!
 //! Each tile is a Parquet file of x, y, z (f32 offsets from the tile's origin, metres), file (which of the
 //! epoch's clouds), index (which record of it), source (which entry of `sources.json`) and time (seconds
-//! since that source's first point). `tiles.json` lists origins, bounds and counts.
+//! since that source's first point). Tiles of an epoch without photos have red, green, blue and intensity,
+//! too. `tiles.json` lists origins, bounds and counts.
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
@@ -20,6 +21,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Bounds, cell_of};
 use stonewise_core::progress::Progress;
+use stonewise_core::views::PointValues;
 use stonewise_io::cloud::{PointChunk, claimed_records, read_cloud};
 use stonewise_io::table::{Table, read_columns, write_parquet};
 
@@ -176,6 +178,62 @@ impl TileSource for DiskTiles {
     }
 }
 
+/// Colours and intensities of the points of a tile, in their order.
+pub struct TileValues {
+    colours: Vec<[u16; 3]>,
+    intensities: Vec<f32>,
+    sources: Vec<u32>,
+}
+
+impl TileValues {
+    /// As core takes them.
+    pub fn borrowed(&self) -> PointValues<'_> {
+        PointValues {
+            colours: &self.colours,
+            intensities: &self.intensities,
+            sources: &self.sources,
+        }
+    }
+}
+
+impl DiskTiles {
+    /// Colours and intensities of the points of a tile, of an epoch whose tiles keep them.
+    pub fn values(&self, tile: usize) -> Result<TileValues> {
+        let path = self.dir.join(format!("{}.parquet", self.tiles[tile].name));
+        let table = read_columns(&path, &["red", "green", "blue", "intensity", "source"])?;
+        let [red, green, blue]: [&[u16]; 3] = [
+            table.required("red")?,
+            table.required("green")?,
+            table.required("blue")?,
+        ];
+        let colours = red.iter().zip(green).zip(blue);
+        Ok(TileValues {
+            colours: colours.map(|((&r, &g), &b)| [r, g, b]).collect(),
+            intensities: table.required("intensity")?.to_vec(),
+            sources: table.required("source")?.to_vec(),
+        })
+    }
+}
+
+/// What tiles keep of the points of an epoch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum Keeps {
+    /// Where they are and where they come from.
+    Places,
+    /// Their colours and intensities, too.
+    Values,
+}
+
+impl Keeps {
+    /// Length of a [`Record`].
+    fn record_bytes(self) -> usize {
+        match self {
+            Self::Places => PLACE_BYTES,
+            Self::Values => PLACE_BYTES + VALUE_BYTES,
+        }
+    }
+}
+
 /// Cuts clouds into tiles in one streaming pass; points of a tile keep the order of files and records.
 ///
 /// `size_m`: edge of a tile, metres. Points that do not take part are in no tile. Returns the number of
@@ -184,7 +242,7 @@ pub fn cut_into_tiles(
     clouds: &[PathBuf],
     rule: SourceRule,
     size_m: f64,
-    takes_part: impl Fn(&Point3<f64>) -> bool + Sync,
+    (keeps, takes_part): (Keeps, impl Fn(&Point3<f64>) -> bool + Sync),
     step: &StepDir,
     progress: &dyn Progress,
 ) -> Result<u64> {
@@ -204,7 +262,7 @@ pub fn cut_into_tiles(
         let summary = read_cloud(path, CHUNK, |chunk| {
             progress.check()?;
             let origins = sources.of_chunk(file, chunk);
-            for run in tile_runs(chunk, &origins, file as u32, size_m, &takes_part) {
+            for run in tile_runs(chunk, &origins, file as u32, size_m, (keeps, &takes_part)) {
                 if spill.push(run.tile, &run.records)? {
                     occupied.add(run.tile, path)?;
                 }
@@ -222,9 +280,10 @@ pub fn cut_into_tiles(
         .map(|key| {
             progress.check()?;
             let bytes = bins.read(key)?;
-            let records: Vec<Record> = bytes.chunks_exact(RECORD).map(Record::decode).collect();
+            let records = bytes.chunks_exact(keeps.record_bytes());
+            let records: Vec<Record> = records.map(Record::decode).collect();
             let name = format!("{}_{}_{}", key[0], key[1], key[2]);
-            let entry = write_tile(step, &name, tile_origin(key, size_m), &records)?;
+            let entry = write_tile(step, &name, tile_origin(key, size_m), &records, keeps)?;
             progress.advance(1);
             Ok(entry)
         })
@@ -247,26 +306,32 @@ fn tile_runs(
     sources: &[PointSource],
     file: u32,
     size_m: f64,
-    takes_part: &(impl Fn(&Point3<f64>) -> bool + Sync),
+    (keeps, takes_part): (Keeps, &(impl Fn(&Point3<f64>) -> bool + Sync)),
 ) -> Vec<TileRun> {
     let of_part = |part: usize| {
         let start = part * PART;
-        let points = chunk.positions.iter().zip(&chunk.indices).zip(sources);
         let mut runs: Vec<TileRun> = Vec::new();
-        for ((p, &index), &source) in points.skip(start).take(PART).filter(|((p, _), _)| takes_part(p)) {
+        for i in start..(start + PART).min(chunk.len()) {
+            let p = &chunk.positions[i];
+            if !takes_part(p) {
+                continue;
+            }
             let tile = cell_of(p, size_m);
             let record = Record {
                 offset: (p - tile_origin(&tile, size_m)).cast::<f32>().into(),
                 file,
-                index,
-                source,
+                index: chunk.indices[i],
+                source: sources[i],
+                colour: chunk.colors.as_ref().map_or([0; 3], |all| all[i]),
+                intensity: chunk.intensities.as_ref().map_or(0.0, |all| all[i]),
             };
             match runs.last_mut() {
-                Some(run) if run.tile == tile => run.records.extend_from_slice(&record.encode()),
-                _ => runs.push(TileRun {
-                    tile,
-                    records: record.encode().to_vec(),
-                }),
+                Some(run) if run.tile == tile => record.encode(keeps, &mut run.records),
+                _ => {
+                    let mut records = Vec::new();
+                    record.encode(keeps, &mut records);
+                    runs.push(TileRun { tile, records });
+                }
             }
         }
         runs
@@ -339,40 +404,61 @@ struct Record {
     file: u32,
     index: u64,
     source: PointSource,
+    colour: [u16; 3],
+    intensity: f32,
 }
 
-const RECORD: usize = 30;
+/// Length of a record without colour and intensity, and of these.
+const PLACE_BYTES: usize = 30;
+const VALUE_BYTES: usize = 10;
 
 impl Record {
-    fn encode(&self) -> [u8; RECORD] {
-        let mut bytes = [0; RECORD];
+    fn encode(&self, keeps: Keeps, into: &mut Vec<u8>) {
+        let mut bytes = [0; PLACE_BYTES + VALUE_BYTES];
         for (axis, value) in self.offset.iter().enumerate() {
             bytes[4 * axis..4 * axis + 4].copy_from_slice(&value.to_le_bytes());
         }
         bytes[12..16].copy_from_slice(&self.file.to_le_bytes());
         bytes[16..24].copy_from_slice(&self.index.to_le_bytes());
         bytes[24..26].copy_from_slice(&self.source.0.to_le_bytes());
-        bytes[26..].copy_from_slice(&self.source.1.to_le_bytes());
-        bytes
+        bytes[26..30].copy_from_slice(&self.source.1.to_le_bytes());
+        for (channel, value) in self.colour.iter().enumerate() {
+            bytes[30 + 2 * channel..32 + 2 * channel].copy_from_slice(&value.to_le_bytes());
+        }
+        bytes[36..].copy_from_slice(&self.intensity.to_le_bytes());
+        into.extend_from_slice(&bytes[..keeps.record_bytes()]);
     }
 
-    /// `bytes`: [`RECORD`] of them.
+    /// `bytes`: as long as a record is.
     fn decode(bytes: &[u8]) -> Self {
         let word = |at: usize| [bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]];
+        let short = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        let has_values = bytes.len() > PLACE_BYTES;
         let long = |at: usize| u64::from(u32::from_le_bytes(word(at)));
         Self {
             offset: [0, 4, 8].map(|at| f32::from_le_bytes(word(at))),
             file: u32::from_le_bytes(word(12)),
             index: long(16) | long(20) << 32,
-            source: (
-                u16::from_le_bytes([bytes[24], bytes[25]]),
-                f32::from_le_bytes(word(26)),
-            ),
+            source: (short(24), f32::from_le_bytes(word(26))),
+            colour: match has_values {
+                true => [30, 32, 34].map(short),
+                false => [0; 3],
+            },
+            intensity: match has_values {
+                true => f32::from_le_bytes(word(36)),
+                false => 0.0,
+            },
         }
     }
 }
 
-fn write_tile(step: &StepDir, name: &str, origin: Point3<f64>, records: &[Record]) -> Result<TileEntry> {
+fn write_tile(
+    step: &StepDir,
+    name: &str,
+    origin: Point3<f64>,
+    records: &[Record],
+    keeps: Keeps,
+) -> Result<TileEntry> {
     let cloud = Cloud::new(origin, records.iter().map(|r| r.offset).collect());
     let mut table = Table::new();
     for (axis, column) in ["x", "y", "z"].into_iter().enumerate() {
@@ -387,6 +473,14 @@ fn write_tile(step: &StepDir, name: &str, origin: Point3<f64>, records: &[Record
     table.push("source", "", "index of the source in sources.json", sources)?;
     let times: Vec<f32> = records.iter().map(|r| r.source.1).collect();
     table.push("time", "s", "time since the first point of its source", times)?;
+    if keeps == Keeps::Values {
+        for (channel, column) in ["red", "green", "blue"].into_iter().enumerate() {
+            let values: Vec<u16> = records.iter().map(|r| r.colour[channel]).collect();
+            table.push(column, "", "colour of the point, 0 to 65535", values)?;
+        }
+        let intensities: Vec<f32> = records.iter().map(|r| r.intensity).collect();
+        table.push("intensity", "", "intensity, as the cloud has it", intensities)?;
+    }
     write_parquet(&step.file(format!("{name}.parquet")), &table)?;
     let points = (0..cloud.len()).map(|i| cloud.world(i));
     let bounds = Bounds::of(points).unwrap_or(Bounds {

@@ -71,7 +71,7 @@ impl DetectorTraining<'_> {
             same.surveys.push(survey.to_owned());
             return Ok(same.model.clone());
         }
-        let photos = LabelledPhotos::open(&self.epoch.images, self.masks()?, self.valid)?;
+        let photos = LabelledPhotos::open(self.images()?, self.masks()?, self.valid)?;
         let training = TrainParams::fine_tuning();
         let crops = PhotoCrops::new(&photos, training.augment.clone(), training.crop_px, training.seed);
         let measured = Measured {
@@ -101,6 +101,17 @@ impl DetectorTraining<'_> {
         Ok(model)
     }
 
+    fn images(&self) -> Result<&Path> {
+        let photos = self.epoch.photos.as_ref().ok_or_else(|| {
+            Error::Parameters(format!(
+                "epoch {:?} has no photos with which a detector could be trained and measured: omit --train-minutes, or add `images`, \
+                 `cameras` and `masks` to the epoch",
+                self.epoch.name
+            ))
+        })?;
+        Ok(&photos.images)
+    }
+
     fn masks(&self) -> Result<&Path> {
         self.epoch.masks.as_deref().ok_or_else(|| {
             Error::Parameters(format!(
@@ -122,7 +133,7 @@ impl DetectorTraining<'_> {
         };
         let mut digests = vec![
             self.store.digest(self.masks()?)?,
-            self.store.digest(&self.epoch.images)?,
+            self.store.digest(self.images()?)?,
             before,
         ];
         if let Some(valid) = self.valid {

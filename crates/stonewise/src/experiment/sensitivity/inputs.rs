@@ -69,7 +69,9 @@ pub(super) fn inputs(
             })?;
             for (_, project) in &mut projects {
                 for (number, epoch) in (1..).zip(project.epochs.iter_mut()) {
-                    epoch.cameras = dir.file(cameras_name(number));
+                    if let Some(photos) = &mut epoch.photos {
+                        photos.cameras = dir.file(cameras_name(number));
+                    }
                 }
             }
         }

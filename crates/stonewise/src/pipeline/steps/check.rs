@@ -46,7 +46,9 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         for cloud in &epoch.clouds {
             inputs.push(context.digest(cloud)?);
         }
-        inputs.extend([context.digest(&epoch.cameras)?, listing(&epoch.images)?]);
+        if let Some(photos) = &epoch.photos {
+            inputs.extend([context.digest(&photos.cameras)?, listing(&photos.images)?]);
+        }
     }
     let names: Vec<&String> = project.epochs.iter().map(|e| &e.name).collect();
     let key = Key::new(

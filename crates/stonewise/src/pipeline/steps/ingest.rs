@@ -4,14 +4,16 @@ use crate::error::{Error, Result};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Run, Step};
+use crate::project::Epoch;
 use crate::storage::epoch_tiles::EpochTiles;
 use crate::storage::step::{Key, StepDir};
-use crate::storage::tiles::{DiskTiles, cut_into_tiles};
+use crate::storage::tiles::{DiskTiles, Keeps, cut_into_tiles};
 use crate::texts::notices::INVALID_POINTS;
 use nalgebra::Point3;
 use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::{EpochId, Pair};
+use stonewise_io::cloud::cloud_info;
 
 /// Cuts the clouds of an epoch into tiles.
 pub static INGEST: Step = Step {
@@ -47,6 +49,16 @@ pub struct Ingested {
     pub tiles: EpochTiles,
 }
 
+/// Positions of the scanners of an epoch, where its files name them.
+pub fn scanners(epoch: &Epoch) -> Result<Vec<Point3<f64>>> {
+    let mut positions = Vec::new();
+    for cloud in &epoch.clouds {
+        let scans = cloud_info(cloud)?.scans.into_iter();
+        positions.extend(scans.filter_map(|scan| scan.origin));
+    }
+    Ok(positions)
+}
+
 fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
     let epoch = &context.project.epochs[id];
     let digests = epoch
@@ -57,9 +69,13 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
     let inputs: Vec<&str> = digests.iter().map(String::as_str).collect();
     let size_m = context.project.settings.ingest.size_m;
     let part = &context.project.part;
+    let keeps = match epoch.photos {
+        Some(_) => Keeps::Places,
+        None => Keeps::Values,
+    };
     let key = Key::new(
         "ingest",
-        &(&context.project.settings.ingest, part, epoch.sources),
+        &(&context.project.settings.ingest, part, epoch.sources, keeps),
         &inputs,
     );
     let step = context.step(&format!("ingest-{id}"), key, |step, warnings| {
@@ -68,7 +84,7 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
             &epoch.clouds,
             epoch.sources,
             size_m,
-            takes_part,
+            (keeps, takes_part),
             step,
             context.progress,
         )?;

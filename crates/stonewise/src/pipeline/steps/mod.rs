@@ -19,3 +19,4 @@ pub mod register;
 pub mod segment;
 mod shapes;
 pub mod stone_outlines;
+pub mod views;

@@ -31,7 +31,7 @@ pub(super) fn inputs_of(context: &Context) -> Result<Vec<PlannedInput>> {
         project
             .epochs
             .iter()
-            .any(|e| e.masks.is_some() && e.images == *path)
+            .any(|e| e.masks.is_some() && e.photos.as_ref().is_some_and(|p| p.images == *path))
     };
     let mut used: Vec<PathBuf> = project.inputs();
     used.retain(|path| !images(path));

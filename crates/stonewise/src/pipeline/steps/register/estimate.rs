@@ -4,6 +4,7 @@ use super::pairs::DiskPairs;
 use super::photos::DiskPhotos;
 use super::registered::Registered;
 use super::tracked;
+use super::tracks_photos;
 use super::windows::align_windows;
 use crate::error::{Error, Result};
 use crate::pipeline::graph::Run;
@@ -53,7 +54,7 @@ fn adjust(
     let context = run.context;
     let params = &context.project.settings.registration;
     let pairs = DiskPairs::gather(labelled, matches, params.border_noises, step, context.progress)?;
-    let photos = match params.photos.enabled {
+    let photos = match tracks_photos(context.project, later) {
         true => {
             let photos = Pair::new(run.segmented(EpochId::REFERENCE)?, run.segmented(later)?);
             let photos = photos.each_ref().map(|p| &**p);

@@ -20,6 +20,7 @@ use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::MATCH;
 use crate::pipeline::until::Until;
+use crate::project::Project;
 use crate::settings::Estimator;
 use crate::storage::step::Key;
 pub use datum::datum;
@@ -29,6 +30,7 @@ pub use notices::note_registration;
 pub use registered::Registered;
 use registered::STEP;
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
@@ -45,14 +47,15 @@ pub static REGISTER: Step = Step {
     needs: &[Need::same(&MATCH)],
     wanted: |until| until >= Until::Registered,
     cost: Some(|sizes, epoch| {
-        let photos = match sizes.project.settings.registration.photos.enabled {
-            true => sizes
-                .project
-                .epochs
-                .pair(epoch)
-                .map(|e| e.images.clone())
-                .into_array()
-                .into(),
+        let photos: Vec<PathBuf> = match tracks_photos(sizes.project, epoch) {
+            true => {
+                let epochs = sizes.project.epochs.pair(epoch).into_array();
+                epochs
+                    .into_iter()
+                    .flat_map(|e| &e.photos)
+                    .map(|p| p.images.clone())
+                    .collect()
+            }
             false => Vec::new(),
         };
         Cost::of(8, POINT_BYTES * sizes.pair_points(epoch)).reading(photos)
@@ -95,6 +98,13 @@ fn register(run: &Run, later: EpochId, labelled: Pair<&Labelled>) -> Result<Regi
     })
 }
 
+/// Whether stones are tracked in photos of the reference and of a later epoch. Views of clouds measure nothing
+/// that the clouds do not.
+pub(super) fn tracks_photos(project: &Project, later: EpochId) -> bool {
+    let photographed = project.epochs.pair(later).map(|e| e.photos.is_some());
+    project.settings.registration.photos.enabled && photographed.into_array() == [true; 2]
+}
+
 /// What the step found, in its folder.
 const MOTIONS: &str = "motions.json";
 
@@ -102,7 +112,7 @@ fn key(run: &Run, later: EpochId, labelled: Pair<&Labelled>, matches: &[(StoneId
     let project = run.context.project;
     let params = &project.settings.registration;
     let mut inputs = Vec::from(labelled.map(|l| l.key.as_str().to_owned()).into_array());
-    if params.photos.enabled {
+    if tracks_photos(project, later) {
         for epoch in [EpochId::REFERENCE, later] {
             for photo in &run.segmented(epoch)?.photos {
                 inputs.push(run.context.digest(&photo.path)?);

@@ -31,7 +31,8 @@ const LABELS: &str = "labels.png";
 /// The step of one epoch: every posed photo is a part of it.
 pub struct Detection<'a> {
     context: &'a Context<'a>,
-    epoch: &'a Epoch,
+    /// With photos, or with views in their place.
+    epoch: Arc<Epoch>,
     name: String,
     key: Key,
     weights: Weights,
@@ -54,14 +55,14 @@ impl<'a> Detection<'a> {
     /// The step of an epoch.
     pub fn new(run: &Run<'a>, id: EpochId) -> Result<Self> {
         let context = run.context;
-        let epoch = &context.project.epochs[id];
+        let epoch = run.pictured(id)?;
         let params = &context.project.settings.segment;
         let weights = Weights::named(&params.model);
         let digest = match &weights {
             Weights::BuiltIn => blake3::hash(
                 &weights
                     .bytes()
-                    .map_err(|error| no_masks(context, epoch, &error))?,
+                    .map_err(|error| no_masks(context, &epoch, &error))?,
             )
             .to_hex()
             .to_string(),
@@ -72,11 +73,10 @@ impl<'a> Detection<'a> {
             // An error is told where the detector is opened.
             Ok(false) | Err(_) => None,
         };
-        let mut digests = vec![
-            context.digest(&epoch.cameras)?,
-            context.digest(&epoch.images)?,
-            digest,
-        ];
+        let mut digests = vec![digest];
+        if let Some(files) = &epoch.photos {
+            digests.extend([context.digest(&files.cameras)?, context.digest(&files.images)?]);
+        }
         digests.extend(ingested.as_ref().map(|i| i.step.key().as_str().to_owned()));
         let digests: Vec<&str> = digests.iter().map(String::as_str).collect();
         Ok(Self {
@@ -104,7 +104,7 @@ impl<'a> Detection<'a> {
 
     /// Finds the stones of one posed photo, counted from 0.
     pub fn photo(&self, number: usize) -> Result<()> {
-        let candidates = posed_photos(self.epoch, &Warnings::default())?;
+        let candidates = posed_photos(&self.epoch, &Warnings::default())?;
         let Some((view, path)) = candidates.get(number) else {
             return Err(Error::Survey(format!(
                 "epoch {:?} has {} posed photos",
@@ -123,7 +123,7 @@ impl<'a> Detection<'a> {
     }
 
     fn gather(&self, step: &StepDir, warnings: &Warnings) -> Result<Vec<VotingPhoto>> {
-        let candidates = posed_photos(self.epoch, warnings)?;
+        let candidates = posed_photos(&self.epoch, warnings)?;
         let total = candidates.iter().map(|(view, _)| self.tiles(view)).sum();
         self.context.progress.begin("tiles", total);
         let mut photos: Vec<VotingPhoto> = Vec::new();
@@ -147,7 +147,7 @@ impl<'a> Detection<'a> {
                 instances,
             });
         }
-        check_any(&photos, self.epoch, warnings)?;
+        check_any(&photos, &self.epoch, warnings)?;
         Ok(photos)
     }
 

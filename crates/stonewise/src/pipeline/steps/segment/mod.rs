@@ -10,6 +10,7 @@ use crate::pipeline::cost::{Cost, Sizes};
 use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
 use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::INGEST;
+use crate::pipeline::steps::views::{VIEWS, has_no_photos};
 use crate::project::{Epoch, Project};
 use crate::storage::step::{Key, StepDir};
 use crate::warnings::Warnings;
@@ -32,18 +33,23 @@ pub static SEGMENT: Step = Step {
     name: STEP,
     words: |_| "stones in the photos of",
     about: About::Epoch,
-    // A detector that takes relief looks at the clouds, too.
-    needs: &[Need::same(&INGEST).when(takes_relief)],
+    needs: &[
+        Need::same(&VIEWS).when(has_no_photos),
+        // A detector that takes relief looks at the clouds, too.
+        Need::same(&INGEST).when(takes_relief),
+    ],
     cost: Some(|sizes, epoch| {
         let own = &sizes.project.epochs[epoch];
-        let inputs = [own.cameras.clone()].into_iter().chain(own.masks.clone());
+        let cameras = own.photos.as_ref().map(|p| p.cameras.clone());
+        let inputs = cameras.into_iter().chain(own.masks.clone());
         Cost::of(2, photo_bytes(sizes, epoch)).reading(inputs)
     }),
     parts: Some(Parts {
         kind: PartKind::Photos(photos_to_segment),
         cost: |sizes, epoch| {
-            let own = &sizes.project.epochs[epoch];
-            Cost::of(4, photo_bytes(sizes, epoch)).reading([own.cameras.clone(), own.images.clone()])
+            let photos = sizes.project.epochs[epoch].photos.iter();
+            let inputs = photos.flat_map(|p| [p.cameras.clone(), p.images.clone()]);
+            Cost::of(4, photo_bytes(sizes, epoch)).reading(inputs)
         },
         make: |run, epoch, part| match part {
             Part::Photo(number) => Detection::new(run, epoch)?.photo(number),
@@ -94,14 +100,14 @@ impl Segmented {
 
 fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
     let context = run.context;
-    let epoch = &context.project.epochs[id];
-    let step = match &epoch.masks {
-        None => Detection::new(run, id)?.all()?,
-        Some(masks) => {
+    let epoch = &*run.pictured(id)?;
+    let step = match (&epoch.masks, &epoch.photos) {
+        (None, _) | (_, None) => Detection::new(run, id)?.all()?,
+        (Some(masks), Some(files)) => {
             let digests = [
-                context.digest(&epoch.cameras)?,
+                context.digest(&files.cameras)?,
                 context.digest(masks)?,
-                listing(&epoch.images)?,
+                listing(&files.images)?,
             ];
             let key = Key::new(STEP, &(), &digests.each_ref().map(String::as_str));
             context.step(&format!("{STEP}-{id}"), key, |step, warnings| {
@@ -123,10 +129,11 @@ fn segment(run: &Run, id: EpochId) -> Result<Segmented> {
     Ok(Segmented { step, photos, views })
 }
 
-/// Photos of an epoch that the detector has to look at; none where it has masks.
+/// Photos of an epoch that the detector has to look at; none where it has masks. How many views of clouds there
+/// will be is not known before.
 fn photos_to_segment(project: &Project, epoch: EpochId) -> Result<usize> {
     match &project.epochs[epoch].masks {
-        None => Ok(posed_photos(&project.epochs[epoch], &Warnings::default())?.len()),
+        None => Ok(photo_files(&project.epochs[epoch])?.len()),
         Some(_) => Ok(0),
     }
 }

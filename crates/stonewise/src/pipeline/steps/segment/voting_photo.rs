@@ -67,13 +67,16 @@ pub fn check_any(photos: &[VotingPhoto], epoch: &Epoch, warnings: &Warnings) -> 
 
 /// Views with their photos; whatever cannot be used is named.
 pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, PathBuf)>> {
+    let Some(files) = &epoch.photos else {
+        return Ok(Vec::new());
+    };
     let cameras = epoch.read_cameras()?;
-    let file = epoch.cameras.to_string_lossy();
+    let file = files.cameras.to_string_lossy();
     cameras
         .warnings
         .iter()
         .for_each(|w| warnings.notice(STEP, file.clone(), w.clone()));
-    let photos = find_photos(&epoch.images, &cameras)?;
+    let photos = find_photos(&files.images, &cameras)?;
     for path in &photos.without_camera {
         let message = without_camera(path, &cameras.skipped, &file);
         warnings.skipped(STEP, path.to_string_lossy(), message);
@@ -88,7 +91,7 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
             None => warnings.notice(
                 STEP,
                 view.name,
-                NO_SUCH_PHOTO.say(&[("folder", &epoch.images.to_string_lossy())]),
+                NO_SUCH_PHOTO.say(&[("folder", &files.images.to_string_lossy())]),
             ),
         }
     }

@@ -1,0 +1,157 @@
+//! A project from scans alone, one an epoch.
+
+use crate::Project;
+use crate::init::quoted;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::{Error, Result};
+use stonewise_base::files::write_text;
+use stonewise_io::cloud::CloudFormat;
+
+/// Whether a file is a point cloud, and no project.
+pub fn is_scan(path: &Path) -> bool {
+    path.is_file() && path.extension().is_none_or(|e| e != "toml") && CloudFormat::of(path).is_ok()
+}
+
+/// A project of scans and the text of its file, which [`ScansProject::write`] writes.
+#[derive(Clone, Debug)]
+pub struct ScansProject {
+    /// The project.
+    pub project: Project,
+    text: String,
+}
+
+impl ScansProject {
+    /// One epoch for each scan, in this order, in a project file `DIR/stonewise.toml`. Where that file is there
+    /// already and names the same scans, it is taken as it is.
+    ///
+    /// # Errors
+    /// Fewer than two scans, one of them twice or not there; `dir` holds another project file.
+    pub fn new(scans: &[PathBuf], dir: &Path) -> Result<Self> {
+        let path = dir.join("stonewise.toml");
+        if let [only] = scans {
+            return Err(Error::Input {
+                path: only.clone(),
+                message: "a single scan shows no motion: name those of two epochs, or more, in order of time"
+                    .to_owned(),
+            });
+        }
+        let scans: Vec<PathBuf> = scans
+            .iter()
+            .map(|scan| scan.canonicalize().map_err(Error::io("finding", scan)))
+            .collect::<Result<_>>()?;
+        if path.exists() {
+            let project = Project::read(&path)?;
+            let named: Vec<PathBuf> = project.epochs.iter().flat_map(|e| e.clouds.clone()).collect();
+            if named != scans {
+                let message =
+                    "this is the project of other scans: run it itself, or give another --out".to_owned();
+                return Err(Error::Input { path, message });
+            }
+            let text = std::fs::read_to_string(&path).map_err(Error::io("reading", &path))?;
+            return Ok(Self { project, text });
+        }
+        let text = text_of(&scans);
+        Ok(Self {
+            project: Project::parse(&path, &text, 2)?,
+            text,
+        })
+    }
+
+    /// Writes the project file, into a folder that exists.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn write(&self) -> Result<()> {
+        write_text(&self.project.path, &self.text)
+    }
+}
+
+fn text_of(scans: &[PathBuf]) -> String {
+    let mut text = String::from(
+        "# Written by `stonewise run`; edits stay. Parameters: docs/src/project-file.md.\n[project]\nname = \"scans\"\n",
+    );
+    for (name, scan) in names(scans).iter().zip(scans) {
+        let scan = quoted(&scan.to_string_lossy());
+        let _ = writeln!(text, "\n[[epochs]]\nname = {}\nclouds = [{scan}]", quoted(name));
+    }
+    text
+}
+
+/// Names of epochs: those of the files, or of their folders, if these tell them apart, else numbers.
+fn names(scans: &[PathBuf]) -> Vec<String> {
+    let text = |part: Option<&std::ffi::OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let files: Vec<String> = scans.iter().map(|s| text(s.file_stem())).collect();
+    let folders: Vec<String> = scans
+        .iter()
+        .map(|s| text(s.parent().and_then(Path::file_name)))
+        .collect();
+    let tell_apart = |names: &[String]| {
+        let mut sorted = names.to_vec();
+        sorted.sort();
+        sorted.dedup();
+        sorted.len() == names.len() && names.iter().all(|n| !n.trim().is_empty())
+    };
+    let choices = [files, folders].into_iter();
+    let numbers = || (1..=scans.len()).map(|n| format!("epoch {n}")).collect();
+    choices
+        .into_iter()
+        .find(|n| tell_apart(n))
+        .unwrap_or_else(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn scans(dir: &Path, names: &[&str]) -> Vec<PathBuf> {
+        let write = |name: &&str| {
+            let path = dir.join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(&path, "0 0 0\n").unwrap();
+            path
+        };
+        names.iter().map(write).collect()
+    }
+
+    #[test]
+    fn epochs_are_named_by_what_tells_the_files_apart() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let epochs = |names: &[&str]| -> Vec<String> {
+            let made = ScansProject::new(&scans(dir.path(), names), &out).unwrap();
+            made.project.epochs.iter().map(|e| e.name.clone()).collect()
+        };
+        assert_eq!(epochs(&["b 2025.xyz", "a.xyz"]), ["b 2025", "a"]);
+        assert_eq!(epochs(&["2024/x.xyz", "2025/x.xyz"]), ["2024", "2025"]);
+        assert_eq!(
+            epochs(&["2024/x.xyz", "2024/y.xyz", "2025/x.xyz"]),
+            ["epoch 1", "epoch 2", "epoch 3"]
+        );
+    }
+
+    #[test]
+    fn a_file_that_names_other_scans_is_refused_and_edits_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let all = scans(dir.path(), &["a.xyz", "b.xyz", "c.xyz"]);
+        assert!(ScansProject::new(&all[..1], dir.path()).is_err());
+        let made = ScansProject::new(&all[..2], dir.path()).unwrap();
+        made.write().unwrap();
+        let path = dir.path().join("stonewise.toml");
+        let edited = fs::read_to_string(&path).unwrap() + "\n[thresholds]\nalarm_mm = 7.5\n";
+        fs::write(&path, edited).unwrap();
+        let again = ScansProject::new(&all[..2], dir.path()).unwrap();
+        assert_eq!(again.project.settings.thresholds.wall.length.alarm_mm, Some(7.5));
+        assert!(ScansProject::new(&all, dir.path()).is_err());
+    }
+
+    #[test]
+    fn project_files_are_no_scans() {
+        let dir = tempfile::tempdir().unwrap();
+        let scan = &scans(dir.path(), &["a.xyz"])[0];
+        let project = dir.path().join("stonewise.toml");
+        fs::write(&project, "").unwrap();
+        assert!(is_scan(scan) && !is_scan(&project) && !is_scan(dir.path()));
+    }
+}
