@@ -35,6 +35,10 @@ messages! {
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
              jede Punktwolke nur einmal angeben";
+        ROUGH: "the coordinates are in steps of {step} mm, which adds {noise} mm to the noise of the points: export them with more digits if \
+                the scanner measures better",
+            "die Koordinaten sind in Schritten von {step} mm angegeben, was dem Rauschen der Punkte {noise} mm hinzufügt: sie mit mehr Stellen \
+             ausgeben, wenn der Scanner genauer misst";
         ROUNDED: "the coordinates are in steps of {step} mm, and the points lie {spacing} mm apart: export the coordinates with \
                   more digits",
             "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: die \

@@ -8,7 +8,7 @@ use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
 use nalgebra::Point3;
-use stonewise_base::messages::findings::{CLOUDS, ROUNDED, SAME_POINTS, TWICE};
+use stonewise_base::messages::findings::{CLOUDS, ROUGH, ROUNDED, SAME_POINTS, TWICE};
 use stonewise_core::geometry::cell_of;
 use stonewise_core::statistics::{split_mix, upper_median};
 
@@ -27,33 +27,49 @@ const CHANCE_STEP: f64 = 0.25;
 /// their intervals: on a cloud of 7.5 mm spacing, steps of 20 mm gave errors of 1.4 standard deviations, and
 /// steps of 10 mm gave errors of 0.3.
 const COARSE_STEP: f64 = 2.0;
+/// Steps of the coordinates, metres, above which they add more than a millimetre to the noise of the points (a
+/// step is 3.5 standard deviations of its rounding): more than a terrestrial scanner's own.
+const ROUGH_STEP_M: f64 = 3.5e-3;
+/// Standard deviations of its rounding in a step: the root of twelve.
+const STEP_SDS: f64 = 3.464;
 
 /// Looks for repeated points and for coarse steps of the coordinates.
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
     let mut earlier: Vec<(&str, Cells)> = Vec::new();
     for (epoch, survey) in read(project, surveys) {
-        let mut doubt =
-            |text: String| found.push(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
+        let mut say = |verdict: Verdict, text: String| {
+            found.push(Finding::new(&epoch.name, CLOUDS.english, verdict, text));
+        };
         let (step_m, spacing_m) = (step(&survey.points), survey.spacing_m.unwrap_or(0.0));
+        let is_coarse = survey.spacing_m.is_some() && step_m > spacing_m * COARSE_STEP;
+        let [step, spacing, noise] =
+            [step_m, spacing_m, step_m / STEP_SDS].map(|m| format!("{:.1}", 1e3 * m));
+        match step_m > ROUGH_STEP_M {
+            _ if is_coarse => say(
+                Verdict::Doubt,
+                ROUNDED.say(&[("step", &*step), ("spacing", &*spacing)]),
+            ),
+            true => say(Verdict::Note, ROUGH.say(&[("step", &*step), ("noise", &*noise)])),
+            false => {}
+        }
         if step_m > spacing_m * CHANCE_STEP {
-            if survey.spacing_m.is_some() && step_m > spacing_m * COARSE_STEP {
-                let [step, spacing] = [step_m, spacing_m].map(|m| format!("{:.1}", 1e3 * m));
-                doubt(ROUNDED.say(&[("step", &*step), ("spacing", &*spacing)]));
-            }
             continue;
         }
         let cells = Cells::of(&survey.points);
         let twice = cells.share_of_repeats();
         if twice > TOO_MANY {
-            doubt(TWICE.say(&[("share", &*percent(twice))]));
+            say(Verdict::Doubt, TWICE.say(&[("share", &*percent(twice))]));
         }
         // A known motion moves the points after this look.
         let is_moved = epoch.motion.is_some();
         for (name, other) in earlier.iter().filter(|_| !is_moved) {
             let same = cells.share_in(other);
             if same > TOO_MANY {
-                doubt(SAME_POINTS.say(&[("share", &*percent(same)), ("first", *name)]));
+                say(
+                    Verdict::Doubt,
+                    SAME_POINTS.say(&[("share", &*percent(same)), ("first", *name)]),
+                );
             }
         }
         earlier.push((&epoch.name, cells));
