@@ -5,12 +5,28 @@ use super::message::{Message, messages};
 messages! {
     DOUBTS {
         NOT_CONVERGED:
-            "the adjustment did not converge in {iterations} iterations, so its motions and their intervals must not be relied \
-            on. Most often the clouds of one epoch do not fit its photos: run `stonewise check` on the project and look at its \
-            pictures",
-            "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert, auf ihre Bewegungen und deren Intervalle ist kein \
-            Verlass. Meist passen die Punktwolken einer Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und \
-            die Bilder ansehen";
+            "the adjustment did not converge in {iterations} iterations: more than a tenth of the stones still move, so its motions and \
+            their intervals must not be relied on. {cause}",
+            "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert: mehr als ein Zehntel der Steine bewegt sich noch, auf \
+            ihre Bewegungen und deren Intervalle ist kein Verlass. {cause}";
+
+        CAUSE_NOT_FIT:
+            "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them; so few speak for \
+            cameras and clouds that do not fit each other (frame, direction of an axis, focal length)",
+            "Die Fotos finden {found} der {sought} Steine, die sie zeigen müssten, dort, wo Punktwolken und Kameras sie vermuten lassen; so \
+            wenige sprechen dafür, dass Kameras und Punktwolken nicht zueinander passen (System, Richtung einer Achse, Brennweite)";
+
+        CAUSE_FIT:
+            "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them, so cameras and clouds fit \
+            each other; masks that are no stones, or surfaces that changed, are more likely",
+            "Die Fotos finden {found} der {sought} Steine, die sie zeigen müssten, dort, wo Punktwolken und Kameras sie vermuten lassen; Kameras \
+            und Punktwolken passen also zueinander. Wahrscheinlicher sind Masken, die keine Steine sind, oder veränderte Oberflächen";
+
+        CAUSE_OPEN:
+            "Either the epochs' clouds do not fit each other or their masks, or the masks are of something else than stones: no photos \
+            tell these apart",
+            "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen anderes als \
+            Steine: keine Fotos unterscheiden das";
 
         SIDE_UNSURE:
             "no camera or scanner position says which side of the wall is outside, and the cloud shows it too weakly: out-of-plane \
@@ -37,14 +53,12 @@ messages! {
             System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
         TORN:
-            "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, so \
-            stones are cut out of the cloud beside their place, and their motions must not be relied on. \
-            Cameras and clouds do not fit each other (frame, direction of an axis, focal length), or the masks are poor; \
-            `stonewise check` shows the edges of the cloud over a photo",
+            "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, and one \
+            that the most photos show {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
+            be relied on. {cause}",
             "die Fotos stimmen nicht darin überein, wo die Steine liegen: ein typischer Stein erhält nur {share} % der Stimmen der \
-            Fotos zu seinen Punkten; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen \
-            ist kein Verlass. Kameras und Punktwolken passen nicht zueinander (System, Richtung einer Achse, Brennweite), oder \
-            die Masken sind schlecht; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
+            Fotos zu seinen Punkten, einer, den die meisten Fotos zeigen, {best} %. Steine sind also neben ihrem Platz aus der Wolke \
+            geschnitten, auf ihre Bewegungen ist kein Verlass. {cause}";
 
         MISREGISTERED_EPOCH:
             "{cells} pieces of plane surfaces off the wall appear shifted by {shown} mm (x, y, z) against the first epoch. The stations \
@@ -59,19 +73,15 @@ messages! {
 
         FEW_MEASURED:
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
-            the others does not mean that they did not move. Most often the clouds of an epoch do not fit its photos: run \
-            `stonewise check` on the project and look at its pictures",
+            the others does not mean that they did not move. {cause}",
             "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
-            anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. Meist passen die Punktwolken einer \
-            Epoche nicht zu deren Fotos: `stonewise check` auf das Projekt anwenden und die Bilder ansehen";
+            anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. {cause}";
 
         BLIND:
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
-            of the points allow: a small motion would not be seen. Clouds, photos and masks probably do not fit each other; run \
-            `stonewise check` on the project",
+            of the points allow: a small motion would not be seen. {cause}",
             "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
-            Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. Punktwolken, Fotos und Masken passen \
-            wahrscheinlich nicht zueinander; `stonewise check` auf das Projekt anwenden";
+            Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. {cause}";
 
         STRETCHED:
             "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \

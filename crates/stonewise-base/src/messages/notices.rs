@@ -25,11 +25,20 @@ messages! {
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
             "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";
 
+        STONES_MISSED:
+            "a typical stone gets {share} % of the photos' votes on its points: the detector misses it in some of the photos that show it. Where \
+            the most photos show a stone, that is {best} %, and photos find {found} of {sought} stones where clouds and cameras put them, so these \
+            fit each other and motions do not suffer",
+            "ein typischer Stein erhält {share} % der Stimmen der Fotos zu seinen Punkten: in manchen Fotos, die ihn zeigen, findet ihn der Detektor \
+            nicht. Zeigen die meisten Fotos einen Stein, sind es {best} %, und die Fotos finden {found} von {sought} Steinen dort, wo Punktwolken und \
+            Kameras sie vermuten lassen; diese passen also zueinander, und Bewegungen leiden nicht darunter";
+
         COMPONENT_AT_BOUND:
             "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
-            masonry. Most often the clouds of the epochs do not fit each other or their photos",
+            masonry. Parts of the wall moved unlike the rest, clouds of the epochs do not fit each other, or masks are no stones",
             "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
-            zu erwarten sind. Meist passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Fotos";
+            zu erwarten sind. Teile der Mauer haben sich anders bewegt als der Rest, Punktwolken der Epochen passen nicht zueinander, oder Masken \
+            sind keine Steine";
 
         COULD_BE_STABLE:
             "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \

@@ -12,7 +12,7 @@ const NUMBERS: [&str; 11] = [
     "error_mm", "excess", "found", "limit", "mean", "ratio", "share", "spacing", "x", "y", "z",
 ];
 /// Values that are messages of their own.
-const NESTED: [&str; 3] = ["reason", "unit", "which"];
+const NESTED: [&str; 4] = ["cause", "reason", "unit", "which"];
 
 fn all() -> impl Iterator<Item = &'static Message> {
     DOUBTS.iter().chain(NOTICES).chain(FINDINGS).copied()

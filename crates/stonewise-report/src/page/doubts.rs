@@ -47,10 +47,11 @@ mod tests {
             "2027",
             stonewise_base::messages::NOT_CONVERGED
                 .english
-                .replace("{iterations}", "30"),
+                .replace("{iterations}", "30")
+                .replace("{cause}", stonewise_base::messages::CAUSE_OPEN.english),
         );
         let html = doubts(&warnings.sorted(), german);
         assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));
-        assert!(html.contains("<code>stonewise check</code> auf das Projekt") && !html.contains('`'));
+        assert!(html.contains("keine Fotos unterscheiden das"), "{html}");
     }
 }

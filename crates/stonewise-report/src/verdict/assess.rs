@@ -81,7 +81,11 @@ fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thre
         judged.length = Level::of(length, moved, &measures.length);
         judged.neighbours = Level::of(neighbours, measured.loose, &measures.neighbours);
         let verdict = &mut judged.verdict;
-        (verdict.moved, verdict.loose, verdict.above_limit) = (moved, measured.loose, measured.above_limit);
+        // Of a run in doubt no stone can be named.
+        let sound = case.is_sound();
+        verdict.moved = moved && sound;
+        verdict.loose = measured.loose && sound;
+        verdict.above_limit = measured.above_limit;
         verdict.length_mm = Some(millimetres(measured.motion.vector.norm()));
         verdict.interval_mm = finite(length);
         verdict.neighbours_mm = Some(millimetres(measured.neighbours.vector.norm()));

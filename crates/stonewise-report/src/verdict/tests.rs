@@ -123,7 +123,13 @@ fn a_run_in_doubt_cannot_tell_whatever_it_shows() {
         let verdict = judge(&case, &thresholds);
         assert_eq!(verdict.state, State::CannotTell);
         assert_eq!(codes(&verdict)[0], ReasonCode::InDoubt);
-        assert!(verdict.stones.iter().all(|s| s.state == State::CannotTell));
+        assert!(
+            verdict
+                .stones
+                .iter()
+                .all(|s| s.state == State::CannotTell && !s.moved && !s.loose)
+        );
+        assert_eq!((verdict.wall.moved, verdict.wall.largest), (0, None));
         case.not_converged = true;
         let verdict = judge(&case, &thresholds);
         assert!(

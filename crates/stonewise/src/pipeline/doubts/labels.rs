@@ -1,7 +1,9 @@
 //! Doubts about where the stones are.
 
+use super::fit::Fit;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
+use crate::texts::notices::STONES_MISSED;
 use crate::texts::{BESIDE, BESIDE_COMPARED, Message, TORN};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::statistics::upper_median;
@@ -18,8 +20,9 @@ const UNLIKE: f64 = 0.6;
 const LIKE: f64 = 0.3;
 
 /// Median over the stones of their share of the photos' votes on their points, below which the photos
-/// disagree on where the stones are. Cameras in one frame with the cloud gave 0.94 to 0.99 (simulated) and
-/// 0.87 (the real photos of `fountain`); a focal length wrong by a tenth gave 0.6, swapped axes gave 0.7.
+/// disagree on where the stones are, or the detector misses stones in some photos. Cameras in one frame with the
+/// cloud gave 0.94 to 0.99 (simulated) and 0.87 (the real photos of `fountain`); a focal length wrong by a tenth
+/// gave 0.6, swapped axes gave 0.7.
 const AGREED: f64 = 0.8;
 /// Least number of stones whose median is not left to chance.
 const LEAST_STONES: usize = 8;
@@ -59,16 +62,69 @@ fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Strin
     is_off.then(|| doubt.say(&values))
 }
 
-/// The photos of an epoch disagree on where its stones are.
-pub(super) fn torn(stones: &[Stone]) -> Option<String> {
-    // A single photo agrees with itself.
-    let seen_twice = stones.iter().filter(|s| s.photos >= 2);
-    let mut shares: Vec<f64> = seen_twice.map(|s| s.confidence).collect();
-    let median = upper_median(&mut shares)?;
-    (shares.len() >= LEAST_STONES && median < AGREED).then(|| {
-        let share = format!("{:.0}", 100.0 * median);
-        TORN.say(&[("share", &*share)])
-    })
+/// The photos' votes on the stones of an epoch.
+///
+/// Two causes lower a stone's share. A photo in which the detector misses the stone votes against it: the share
+/// then grows with the number of photos that show it, and is high where that is largest. Photos that do not fit
+/// the cloud vote for other places: then it stays low, however many photos there are, and they do not find the
+/// stones again.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Votes {
+    /// Share of a typical stone.
+    share: f64,
+    /// The same of stones that the most photos show.
+    best: f64,
+}
+
+impl Votes {
+    /// `None` where too few stones are shown by two photos or more: a single photo agrees with itself.
+    pub fn of(stones: &[Stone]) -> Option<Self> {
+        let mut seen: Vec<&Stone> = stones.iter().filter(|s| s.photos >= 2).collect();
+        seen.sort_by_key(|s| std::cmp::Reverse(s.photos));
+        let median =
+            |stones: &[&Stone]| upper_median(&mut stones.iter().map(|s| s.confidence).collect::<Vec<_>>());
+        let fewest = seen.get(seen.len() / 4)?.photos;
+        let most = seen.partition_point(|s| s.photos >= fewest);
+        let votes = Self {
+            share: median(&seen)?,
+            best: median(&seen[..most])?,
+        };
+        (seen.len() >= LEAST_STONES).then_some(votes)
+    }
+
+    /// Whether a typical stone gets fewer than it should.
+    pub fn are_few(self) -> bool {
+        self.share < AGREED
+    }
+
+    /// Whether that speaks for photos that do not fit the cloud.
+    pub fn are_torn(self, fit: Fit) -> bool {
+        let is_misfit = match fit.holds() {
+            Some(holds) => !holds,
+            None => self.best < AGREED,
+        };
+        self.are_few() && is_misfit
+    }
+
+    pub fn torn(self, fit: Fit) -> String {
+        let [share, best] = self.percent();
+        TORN.say(&[("share", &*share), ("best", &*best), ("cause", &*fit.cause())])
+    }
+
+    pub fn missed(self, fit: Fit) -> String {
+        let ([share, best], [found, sought]) = (self.percent(), fit.values());
+        let values = [
+            ("share", &*share),
+            ("best", &*best),
+            (found.0, &*found.1),
+            (sought.0, &*sought.1),
+        ];
+        STONES_MISSED.say(&values)
+    }
+
+    fn percent(self) -> [String; 2] {
+        [self.share, self.best].map(|share| format!("{:.0}", 100.0 * share))
+    }
 }
 
 #[cfg(test)]
@@ -90,14 +146,35 @@ mod tests {
         (0..count).map(stone).collect()
     }
 
+    const FOUND: Fit = Fit::of_counts(90, 100);
+    const NOT_FOUND: Fit = Fit::of_counts(10, 100);
+    const UNKNOWN: Fit = Fit::of_counts(0, 0);
+
     #[test]
-    fn photos_that_do_not_agree_about_most_stones_are_a_doubt() {
-        let message = torn(&stones(21, 3, |i| 0.5 + 0.01 * f64::from(i))).unwrap();
-        assert!(message.contains("only 60 %"), "{message}");
+    fn photos_that_do_not_fit_the_cloud_are_a_doubt_and_missed_stones_are_none() {
+        let votes = |stones: &[Stone]| Votes::of(stones).unwrap();
+        // As few votes however many photos there are.
+        let low = votes(&stones(21, 3, |i| 0.5 + 0.01 * f64::from(i)));
+        assert!(low.are_torn(UNKNOWN) && low.are_torn(NOT_FOUND));
+        let message = low.torn(NOT_FOUND);
+        assert!(
+            message.contains("only 60 %") && message.contains("10 of the 100 stones"),
+            "{message}"
+        );
+        // The photos find the stones all the same.
+        assert!(low.are_few() && !low.are_torn(FOUND));
+        // A detector that finds a stone in n of eight photos: n eighths of the votes.
+        let mut missed = Vec::new();
+        for photos in 2..=8 {
+            missed.extend(stones(9, photos, |_| f64::from(photos) / 8.0));
+        }
+        assert!(votes(&missed).are_few() && !votes(&missed).are_torn(UNKNOWN));
+        let message = votes(&missed).missed(FOUND);
+        assert!(message.contains("62 %") && message.contains("100 %"), "{message}");
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
-        assert_eq!(torn(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })), None);
-        assert_eq!(torn(&stones(21, 1, |_| 0.5)), None);
-        assert_eq!(torn(&stones(7, 3, |_| 0.5)), None);
-        assert_eq!(torn(&[]), None);
+        assert!(!votes(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })).are_few());
+        assert!(Votes::of(&stones(21, 1, |_| 0.5)).is_none());
+        assert!(Votes::of(&stones(7, 3, |_| 0.5)).is_none());
+        assert!(Votes::of(&[]).is_none());
     }
 }

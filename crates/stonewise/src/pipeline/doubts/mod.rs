@@ -1,5 +1,6 @@
 //! Doubts about the results of a pair of epochs as a whole.
 
+mod fit;
 mod labels;
 mod motions;
 mod registration;
@@ -14,7 +15,8 @@ use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::steps::offsets::OFFSETS;
 use crate::pipeline::steps::register::{Registered, note_registration};
 use crate::pipeline::until::Until;
-use labels::{beside, torn};
+use fit::Fit;
+use labels::{Votes, beside};
 use motions::{blind, few_measured, unsettled};
 use scale::stretched;
 use stonewise_core::epoch::EpochId;
@@ -36,20 +38,27 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     let (datum, rows) = (&measured.datum, &measured.rows);
     note_registration(context, later, &registered, datum);
     let epochs = context.project.epochs.pair(later);
+    let fit = Fit::of(&registered);
     // The first epoch takes part in every pair.
     let first_time = usize::from(later != EpochId::at(1));
     for (epoch, labels) in epochs.zip(labelled).into_iter().skip(first_time) {
-        if let Some(message) = torn(&labels.stones) {
-            context.warnings.doubt("label", &epoch.name, message);
+        match Votes::of(&labels.stones) {
+            Some(votes) if votes.are_torn(fit) => {
+                context.warnings.doubt("label", &epoch.name, votes.torn(fit));
+            }
+            Some(votes) if votes.are_few() => {
+                context.warnings.notice("label", &epoch.name, votes.missed(fit));
+            }
+            _ => {}
         }
     }
     for (name, message) in beside(context, later, &*run.offsets(later)?) {
         context.warnings.doubt("label", name, message);
     }
     let of_motions = [
-        unsettled(&registered),
-        few_measured(rows),
-        blind(&registered, rows),
+        unsettled(&registered, fit),
+        few_measured(rows, fit),
+        blind(&registered, rows, fit),
         turned(rows),
     ];
     let of_epochs = match known_motion(context.project, later).is_some() {

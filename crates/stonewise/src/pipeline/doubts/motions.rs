@@ -1,5 +1,6 @@
 //! Doubts about the motions of a pair of epochs.
 
+use super::fit::Fit;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
@@ -14,16 +15,17 @@ const LIMIT_EXCESS: f64 = 100.0;
 const SIGMAS_95: f64 = 1.96;
 
 /// The adjustment stopped before its motions had settled.
-pub(super) fn unsettled(registered: &Registered) -> Option<String> {
+pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<String> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
     let iterations = adjustment.iterations.to_string();
-    (!adjustment.converged).then(|| NOT_CONVERGED.say(&[("iterations", &*iterations)]))
+    (!adjustment.converged)
+        .then(|| NOT_CONVERGED.say(&[("iterations", &*iterations), ("cause", &*fit.cause())]))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
-pub(super) fn few_measured(rows: &[StoneRow]) -> Option<String> {
+pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<String> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     (2 * measured < matched).then(|| {
@@ -38,13 +40,14 @@ pub(super) fn few_measured(rows: &[StoneRow]) -> Option<String> {
             ("measured", &*measured.to_string()),
             ("matched", &*matched.to_string()),
             ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
+            ("cause", &*fit.cause()),
         ];
         FEW_MEASURED.say(&values)
     })
 }
 
 /// Motions are far less certain than the points allow.
-pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String> {
+pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Option<String> {
     let points: BTreeMap<u32, [f64; 2]> = rows
         .iter()
         .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
@@ -63,7 +66,8 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow]) -> Option<String
     let &(excess, sd) = all.get(all.len() / 2)?;
     (excess > LIMIT_EXCESS).then(|| {
         let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
-        let values = [("limit", &*limit), ("excess", &*format!("{excess:.0}"))];
+        let excess = format!("{excess:.0}");
+        let values = [("limit", &*limit), ("excess", &*excess), ("cause", &*fit.cause())];
         BLIND.say(&values)
     })
 }
@@ -93,6 +97,7 @@ mod tests {
             rmse_m,
         };
         let pair = |row: &StoneRow| PairResult {
+            body: 1,
             first: StoneId(row.stone_id),
             second: StoneId(row.stone_id),
             motion: match row.status {
@@ -114,28 +119,28 @@ mod tests {
     #[test]
     fn an_adjustment_that_did_not_converge_is_a_doubt() {
         let mut registered = registered(&rows(), 0.001, 0.001);
-        let message = unsettled(&registered).unwrap();
+        let message = unsettled(&registered, Fit::default()).unwrap();
         assert!(message.contains("did not converge in 32 iterations"), "{message}");
         if let EstimatorRecord::Adjustment(adjustment) = &mut registered.estimator {
             adjustment.converged = true;
         }
-        assert_eq!(unsettled(&registered), None);
+        assert_eq!(unsettled(&registered, Fit::default()), None);
     }
 
     #[test]
     fn less_than_half_of_the_matched_stones_measured_is_a_doubt() {
         // 22 of 24 stones are matched and 20 measured.
         let mut rows = rows();
-        assert_eq!(few_measured(&rows), None);
+        assert_eq!(few_measured(&rows, Fit::default()), None);
         let measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
         measured
             .take(9)
             .for_each(|r| r.status = Status::FailedConvergence);
         // 11 of 22 are half.
-        assert_eq!(few_measured(&rows), None);
+        assert_eq!(few_measured(&rows, Fit::default()), None);
         let mut measured = rows.iter_mut().filter(|r| r.status == Status::Ok);
         measured.next().unwrap().status = Status::FailedDisagreement;
-        let message = few_measured(&rows).unwrap();
+        let message = few_measured(&rows, Fit::default()).unwrap();
         for part in [
             "only 10 of the 22 stones",
             "1 failed_points",
@@ -152,14 +157,17 @@ mod tests {
     fn limits_a_hundred_times_what_the_points_allow_are_a_doubt() {
         // About 2,000 and 1,900 points with residuals of 1 mm allow 0.032 mm.
         let rows = rows();
-        assert_eq!(blind(&registered(&rows, 0.0031, 0.001), &rows), None);
-        let message = blind(&registered(&rows, 0.0033, 0.001), &rows).unwrap();
+        assert_eq!(
+            blind(&registered(&rows, 0.0031, 0.001), &rows, Fit::default()),
+            None
+        );
+        let message = blind(&registered(&rows, 0.0033, 0.001), &rows, Fit::default()).unwrap();
         assert!(
             message.contains("below about 6 mm") && message.contains("103 times"),
             "{message}"
         );
         // A wall without measured stones, and stones whose residuals are zero, show no limit.
-        assert_eq!(blind(&registered(&[], 1.0, 0.001), &rows), None);
-        assert_eq!(blind(&registered(&rows, 1.0, 0.0), &rows), None);
+        assert_eq!(blind(&registered(&[], 1.0, 0.001), &rows, Fit::default()), None);
+        assert_eq!(blind(&registered(&rows, 1.0, 0.0), &rows, Fit::default()), None);
     }
 }
