@@ -151,6 +151,7 @@ fn row(stone_id: u32) -> StoneRow {
         photos: 5,
         confidence: 0.875,
         matched_id: matched.then_some(100 + stone_id),
+        body_id: matched.then_some(1),
         status,
         motion: (status == Status::Ok).then(|| motion(stone_id)),
         edited: None,

@@ -128,6 +128,7 @@ impl Wall {
             photos: 3 + (i % 5) as u32,
             confidence: 0.85 + 0.1 * (i % 10) as f64 / 10.0,
             matched_id: matched.then_some(i as u32 + 1),
+            body_id: matched.then_some(1),
             status,
             motion: (status == Status::Ok).then(|| self.row_motion(place, i)),
             edited: None,

@@ -113,6 +113,10 @@ pub struct PairResult {
     pub first: StoneId,
     /// Its partner in the second.
     pub second: StoneId,
+    /// The part of the wall, joined by ties between neighbours, that the stone belongs to: 1 the largest, 0
+    /// where the estimator knows no parts.
+    #[serde(default)]
+    pub body: u32,
     /// The motion.
     pub motion: Result<StoneMotion, MotionFailure>,
 }

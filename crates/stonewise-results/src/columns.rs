@@ -103,6 +103,7 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Motion "cov_rel_yy", "m2", "covariance of rel_dy and rel_dy", relative_covariance.m22),
     column!(Motion "cov_rel_yz", "m2", "covariance of rel_dy and rel_dz", relative_covariance.m23),
     column!(Motion "cov_rel_zz", "m2", "covariance of rel_dz and rel_dz", relative_covariance.m33),
+    column!(OptionalCount "body_id", "", "part of the wall that ties between neighbours join, 1 the largest; empty where no motion was sought", body_id),
 ];
 
 /// Columns that tables have only where a row fills them, after all others: stones that were edited by hand or

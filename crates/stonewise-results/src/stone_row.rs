@@ -32,6 +32,8 @@ pub struct StoneRow {
     pub confidence: f64,
     /// Partner in the later epoch.
     pub matched_id: Option<u32>,
+    /// The part of the wall that ties join, 1 the largest; `None` where no motion was sought.
+    pub body_id: Option<u32>,
     /// What became of the stone.
     pub status: Status,
     /// The motion, where there is one.
@@ -223,6 +225,7 @@ impl StoneRow {
             photos: first.photos,
             confidence: first.confidence,
             matched_id,
+            body_id: pair.map(|p| p.body).filter(|body| *body > 0),
             status: status(outcome, pair),
             motion: motion.map(|m| RowMotion::new(m, &first.normal, reference)),
             edited: None,
@@ -344,6 +347,7 @@ mod tests {
             rmse_m: 0.001,
         };
         PairResult {
+            body: 1,
             first: StoneId(7),
             second: StoneId(9),
             motion: Ok(motion),
@@ -454,6 +458,7 @@ mod tests {
     fn every_failure_has_its_word() {
         let matched = MatchOutcome::Matched { second: StoneId(9) };
         let failed = |failure| PairResult {
+            body: 1,
             first: StoneId(7),
             second: StoneId(9),
             motion: Err(failure),

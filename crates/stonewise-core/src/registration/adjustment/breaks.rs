@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 /// (chi-square with three degrees of freedom).
 const EXCESS: f64 = 30.0;
 /// A tie weaker than this is broken: its strain is ten times what the heavy tails of the ties allow.
-const BROKEN: f64 = 0.1;
+pub(crate) const BROKEN: f64 = 0.1;
 /// Share of a crack's jump that a tie over it must show in the crack's direction to be listed.
 const CRACK_SHARE: f64 = 0.5;
 

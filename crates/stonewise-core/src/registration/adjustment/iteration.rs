@@ -63,6 +63,11 @@ impl<'a, S: PairSource> Run<'a, S> {
         self.adjustment.forget_swings();
     }
 
+    /// Gives up on stones that still move, see [`Adjustment::give_up_on_moving`].
+    pub fn give_up_on_moving(&mut self) -> bool {
+        self.adjustment.give_up_on_moving()
+    }
+
     /// Parts the wall along its most significant crack, where it has one and fewer than `most`; whether it
     /// did. As many iterations as at the start are then left.
     pub fn part_along_crack(&mut self, most: usize) -> bool {
@@ -101,6 +106,13 @@ impl<'r, 'a, S: PairSource> Iteration<'r, 'a, S> {
 pub(super) struct Evaluated<'r, 'a, S>(&'r mut Run<'a, S>);
 
 impl<'r, 'a, S: PairSource> Evaluated<'r, 'a, S> {
+    /// Returns stones from false optima to where their surroundings moved, and evaluates them there.
+    pub fn restart(self) -> Result<Self, AdjustError<S::Error>> {
+        self.0.adjustment.restart(&self.0.points)?;
+        self.0.adjustment.evaluate(&self.0.points)?;
+        Ok(self)
+    }
+
     /// Tries stones far from the field's motion; the best place found is followed from then on.
     pub fn probe(&mut self) -> Result<(), AdjustError<S::Error>> {
         self.0.adjustment.probe(&self.0.points)

@@ -6,6 +6,7 @@
 //! stone moved with it or on its own from `hypothesis`; `state` is what changes between iterations.
 
 mod adjust;
+mod bodies;
 mod breaks;
 mod candidate;
 mod equations;
@@ -20,6 +21,7 @@ pub(crate) mod observation;
 mod outcome;
 mod params;
 mod phases;
+mod restart;
 mod significance;
 mod solution;
 mod state;

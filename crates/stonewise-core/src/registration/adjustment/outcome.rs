@@ -1,5 +1,6 @@
 //! From the adjusted stones to one row per pair, with tests and uncertainties.
 
+use super::bodies::{bodies, refuse_unconfirmed};
 use super::breaks::find_breaks;
 use super::candidate::Moving;
 use super::estimate::Estimate;
@@ -74,7 +75,8 @@ impl Found {
         let tested = test_stones(adjustment, solution);
         let shared = adjustment.shared_variances(1.0);
         let estimates = estimates(adjustment, solution, &shared);
-        let results = results(adjustment, solution, &tested, &estimates);
+        let mut results = results(adjustment, solution, &tested, &estimates);
+        refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &shared),
@@ -122,11 +124,13 @@ fn results(
     estimates: &[Result<Estimate, MotionFailure>],
 ) -> Vec<PairResult> {
     let shared = adjustment.shared_variances(adjustment.octaves());
+    let bodies = bodies(adjustment);
     let stones = adjustment.stones.iter().zip(estimates).enumerate();
     stones
         .map(|(i, (stone, estimate))| PairResult {
             first: stone.info.first,
             second: stone.info.second,
+            body: bodies[i],
             motion: match estimate {
                 Err(failure) => Err(failure.clone()),
                 Ok(estimate) => observable(
@@ -204,12 +208,18 @@ fn motion(
     let turned = UnitQuaternion::from_scaled_axis(rotation);
     let arm = node.centroid.coords;
     let mut local = estimate.covariance;
-    for (k, variance) in shared.iter().enumerate() {
+    for (k, variance) in shared.iter().enumerate().skip(3) {
         local[(k, k)] += variance;
     }
-    if let Some(photos) = adjustment.photo_part(i) {
-        let mut of_poses = local.fixed_view_mut::<3, 3>(0, 0);
-        of_poses += photos.pose_covariance(&photos);
+    let of_points = Matrix3::from_diagonal(&Vector3::new(shared[0], shared[1], shared[2]));
+    let mut translation = local.fixed_view_mut::<3, 3>(0, 0);
+    match adjustment.photo_part(i) {
+        Some(photos) => {
+            // Light shifts neighbours alike: the least bias of appearance is shared over all lengths, too.
+            let of_light = photos.least_error() * adjustment.octaves();
+            translation += photos.left_of(&of_points) + photos.pose_covariance(&photos) + of_light;
+        }
+        None => translation += of_points,
     }
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];

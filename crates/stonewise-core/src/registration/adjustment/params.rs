@@ -104,7 +104,7 @@ pub struct AdjustmentReport {
     pub common_covariance: Matrix3<f64>,
     /// Iterations made.
     pub iterations: usize,
-    /// Whether the last iteration moved no stone beyond the tolerance.
+    /// Whether the stones came to rest: all but a few, which have no motion.
     pub converged: bool,
     /// Number of loose stones.
     pub loose: usize,

@@ -61,12 +61,13 @@ impl<'a, S: PairSource> Surveyed<'a, S> {
 pub(super) struct Aligned<'a, S>(Run<'a, S>);
 
 impl<'a, S: PairSource> Aligned<'a, S> {
-    /// Estimates the noise for good, and tries stones far from the field's motion.
+    /// Estimates the noise for good, returns stones from false optima, and tries stones far from the field's
+    /// motion.
     pub fn probe(self) -> Phase<Probed<'a, S>, S> {
         let mut run = self.0;
         if let Some(mut iteration) = run.begin() {
             iteration.estimate_noise();
-            let mut evaluated = iteration.evaluate()?;
+            let mut evaluated = iteration.evaluate()?.restart()?;
             evaluated.probe()?;
             evaluated.solve_and_reweight()?.step();
         }
@@ -116,15 +117,15 @@ impl<'a, S: PairSource> Weighed<'a, S> {
     pub fn settle(self) -> Phase<Settled<'a, S>, S> {
         let mut run = self.0;
         run.forget_swings();
+        let mut is_begun = false;
         while let Some(iteration) = run.begin() {
+            is_begun = true;
             if iteration.evaluate()?.solve()?.step() {
                 return Ok(Settled { run, converged: true });
             }
         }
-        Ok(Settled {
-            run,
-            converged: false,
-        })
+        let converged = is_begun && run.give_up_on_moving();
+        Ok(Settled { run, converged })
     }
 }
 

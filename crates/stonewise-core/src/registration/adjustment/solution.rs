@@ -18,6 +18,10 @@ const ROUNDS: usize = 4;
 /// quarter of the variance at most.
 const UNCERTAIN_SHARE: f64 = 0.85;
 
+/// Share of stones that photos do not find up to which the others determine the variance components: a third
+/// less raises their standard deviations by a fifth.
+const MOST_UNCONFIRMED: f64 = 1.0 / 3.0;
+
 /// The last iteration's equations and the field that solves them.
 pub(crate) struct Solution {
     /// One per stone.
@@ -31,10 +35,13 @@ impl Adjustment {
     /// # Errors
     /// The caller stopped the work.
     pub fn components_of_wall(&self, progress: &dyn Progress) -> Result<VarianceComponents, Interrupted> {
-        let equations = match &self.photos {
+        let mut equations = match &self.photos {
             None => self.equations_with_field(0.0),
             Some(_) => self.cloud_equations(0.0),
         };
+        for i in self.unconfirmed() {
+            equations[i] = NormalEquations::nothing();
+        }
         let mut problem = self.problem(equations.iter());
         problem.photos = self.photos.as_ref().map(|photos| PhotoTerms {
             stones: (0..self.stones.len())
@@ -47,6 +54,27 @@ impl Adjustment {
         match Subgraph::new(&self.prior.graph, &self.displacements()) {
             None => most_likely_components(&problem, progress),
             Some(part) => most_likely_components(&part.restrict(&problem), progress),
+        }
+    }
+
+    /// Stones that photos do not find, where they find most: what their clouds show may be no motion, and a few
+    /// of them must not decide how unlike neighbours move.
+    fn unconfirmed(&self) -> Vec<usize> {
+        let Some(photos) = &self.photos else {
+            return Vec::new();
+        };
+        let usable: Vec<usize> = (0..self.stones.len())
+            .filter(|&i| self.stones[i].info.usable)
+            .collect();
+        let all = usable.len() as f64;
+        let lost: Vec<usize> = usable
+            .into_iter()
+            .filter(|&i| photos.stone(i).is_none())
+            .collect();
+        if lost.len() as f64 <= MOST_UNCONFIRMED * all {
+            lost
+        } else {
+            Vec::new()
         }
     }
 

@@ -25,6 +25,8 @@ pub(crate) struct Adjustment {
 /// A stone between iterations.
 pub(crate) struct StoneState {
     pub info: StoneInfo,
+    /// Where the centroids of its neighbours' masks and its own put it beforehand, in its frame, metres.
+    pub start: Vector3<f64>,
     /// Moving with the field.
     pub with_field: CandidateMotion,
     /// Moving on its own, where that is followed.
@@ -36,6 +38,8 @@ pub(crate) struct StoneState {
     /// Whether its observations are too weak, or contradict each other too much, to tell a loose stone from
     /// one that moves with the field.
     pub is_undecided: bool,
+    /// Whether its last step exceeded a tenth of the uncertainty of its motion.
+    pub moves: bool,
     /// Whether its last step exceeded the uncertainty of its motion.
     pub swings: bool,
     /// Effective degrees of freedom: how many unknowns the stone's own points determine.
@@ -77,11 +81,13 @@ impl StoneState {
     fn new(info: StoneInfo, translation: Vector3<f64>) -> Self {
         Self {
             info,
+            start: translation,
             with_field: CandidateMotion::new(StoneVector::from_translation(translation)),
             on_own: None,
             ratio: LikelihoodRatio::default(),
             p_with_field: 1.0,
             is_undecided: false,
+            moves: false,
             swings: false,
             effective_freedom: 0.0,
         }

@@ -17,6 +17,12 @@ const SUSPECT: f64 = 1.5;
 const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.
 const SETTLED: f64 = 0.01;
+/// Where no iteration is left, a stone whose last step stayed within this share of its standard deviation has
+/// a motion: what is missing does not change its interval.
+const NEARLY_SETTLED: f64 = 0.1;
+/// Where no iteration is left, the wall has converged if at most one stone in so many has not: those have no
+/// motion.
+const UNSETTLED: usize = 10;
 
 impl Adjustment {
     /// Moves every stone to its posterior mean; whether the adjustment has settled.
@@ -36,8 +42,19 @@ impl Adjustment {
             let on_own = self.step_on_own(i, &solution.equations[i], &solution.field);
             restless += usize::from(with_field.counts) + usize::from(on_own.counts);
             self.stones[i].swings = with_field.swings || on_own.swings;
+            self.stones[i].moves = with_field.moves || on_own.moves;
         }
         restless * RESTLESS <= self.stones.len()
+    }
+
+    /// Gives up on stones that still move, for no iteration is left; whether all others are enough.
+    pub fn give_up_on_moving(&mut self) -> bool {
+        let mut moving = 0;
+        for stone in &mut self.stones {
+            stone.swings |= stone.moves;
+            moving += usize::from(stone.swings);
+        }
+        moving * UNSETTLED <= self.stones.len()
     }
 
     /// Returns to full steps for all stones once the weights and variance components are frozen. Before that,
@@ -72,6 +89,7 @@ impl Adjustment {
         }
         Step {
             counts: is_suspect,
+            moves: false,
             swings: false,
         }
     }
@@ -82,6 +100,8 @@ impl Adjustment {
 struct Step {
     /// The stone still moves.
     counts: bool,
+    /// It moves further than a small share of what its motion is uncertain.
+    moves: bool,
     /// It moves further than its motion is uncertain.
     swings: bool,
 }
@@ -114,6 +134,7 @@ impl StepLimits {
         let sd = posterior.covariance.fixed_view::<3, 3>(0, 0).trace().sqrt();
         Step {
             counts: step > self.tolerance_m.max(SETTLED * sd),
+            moves: step > self.tolerance_m.max(NEARLY_SETTLED * sd),
             swings: step > self.tolerance_m.max(SWINGING * sd),
         }
     }

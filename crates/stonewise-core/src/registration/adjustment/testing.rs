@@ -22,6 +22,16 @@ const HALF_M: [f64; 2] = [0.1, 0.08];
 ///
 /// `noise_m`: standard deviation along the normal, per epoch. `motion`: of each stone, world, metres.
 pub(super) fn wall(rows: u32, noise_m: [f64; 2], motion: impl Fn(u32) -> Vector3<f64>) -> Vec<PairPoints> {
+    wall_apart(rows, noise_m, |_| Vector3::zeros(), motion)
+}
+
+/// The same with stones that stand `apart` from their place in the wall, world, metres.
+pub(super) fn wall_apart(
+    rows: u32,
+    noise_m: [f64; 2],
+    apart: impl Fn(u32) -> Vector3<f64>,
+    motion: impl Fn(u32) -> Vector3<f64>,
+) -> Vec<PairPoints> {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let mut scan = |stone: u32, noise_m: f64, shift: Vector3<f64>| {
         let point = |_| {
@@ -37,7 +47,8 @@ pub(super) fn wall(rows: u32, noise_m: [f64; 2], motion: impl Fn(u32) -> Vector3
         (0..POINTS).map(point).collect::<Vec<[f32; 3]>>()
     };
     let pair = |k: u32| {
-        let centroid = Point3::new(0.0, 0.3 * f64::from(k % COLUMNS), 0.2 * f64::from(k / COLUMNS));
+        let (column, row) = (f64::from(k % COLUMNS), f64::from(k / COLUMNS));
+        let centroid = Point3::new(0.0, 0.3 * column, 0.2 * row) + apart(k);
         PairPoints {
             first: StoneId(k + 1),
             second: StoneId(k + 1),

@@ -12,7 +12,7 @@ use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
 use super::survey::Points;
 use crate::progress::Interrupted;
-use crate::registration::photos::{FaceMotion, PhotoSource, Track, Tracker};
+use crate::registration::photos::{FaceMotion, PhotoSource, PhotoStatus, Track, Tracker};
 use crate::registration::points::PairSource;
 use crate::stone::PairResult;
 use nalgebra::{Matrix3, Vector3};
@@ -40,6 +40,13 @@ impl PhotoPart<'_> {
         self.share * self.model.pose_covariance(self.stone, other.stone) * other.share.transpose()
     }
 
+    /// What is left of a covariance of errors of the points in the stone's displacement, in its frame: the
+    /// photos do not share them.
+    pub fn left_of(&self, of_points: &Matrix3<f64>) -> Matrix3<f64> {
+        let rest = Matrix3::identity() - self.share;
+        rest * of_points * rest.transpose()
+    }
+
     /// Covariance of the stone's displacement, in its frame, that the least appearance bias causes.
     pub fn least_error(&self) -> Matrix3<f64> {
         let variance = LEAST_APPEARANCE_M.powi(2) * self.stone.bias_factor;
@@ -56,32 +63,46 @@ impl Adjustment {
         photos: &dyn PhotoSource<S::Error>,
     ) -> Result<(), AdjustError<S::Error>> {
         let mut tracks: Vec<Track> = Vec::with_capacity(self.stones.len());
+        let surroundings = self.surroundings();
         let progress = points.progress;
         progress.begin("track stones in photos", self.stones.len() as u64);
         for (batch, range) in points.batches.iter().enumerate() {
             let pairs = points.load(batch)?;
             let chips = photos.load(batch).map_err(AdjustError::Source)?;
-            let found: Vec<Track> = pairs
+            let found = pairs
                 .par_iter()
                 .zip(&chips)
                 .zip(range.clone())
                 .map(|((pair, chips), i)| {
                     progress.check()?;
-                    let tracker = Tracker {
-                        pair,
-                        face_from_world: &self.prior.graph.nodes[i].face_from_world,
-                        start: self.face_motion(i),
-                        search_m: self.search_m(i, photos),
-                        photos: photos.photos(),
-                        chips,
-                        params: photos.params(),
-                        picture_px: photos.picture_px(),
+                    let search_m = self.search_m(i, photos);
+                    let from = |start: FaceMotion| {
+                        let tracker = Tracker {
+                            pair,
+                            face_from_world: &self.prior.graph.nodes[i].face_from_world,
+                            start,
+                            search_m,
+                            photos: photos.photos(),
+                            chips,
+                            params: photos.params(),
+                            picture_px: photos.picture_px(),
+                        };
+                        tracker.track()
                     };
-                    Ok(tracker.track())
+                    let starts = self.starts(i, surroundings[i], search_m);
+                    Ok(Track::best_of(starts.into_iter().map(from).collect()))
                 })
-                .collect::<Result<_, Interrupted>>()?;
-            tracks.extend(found);
+                .collect::<Result<Vec<Option<Track>>, Interrupted>>()?;
+            tracks.extend(found.into_iter().flatten());
             progress.advance(range.len() as u64);
+        }
+        for (i, track) in tracks.iter().enumerate() {
+            let found = track.start.translation;
+            let reach_m = self.search_m(i, photos).max(self.params.max_step_m);
+            let is_far = (found - self.face_motion(i).translation).norm() > reach_m;
+            if track.status == PhotoStatus::Tracked && is_far {
+                self.put(i, StoneVector::from_translation(found));
+            }
         }
         let stones = self.stones_in_photos(|i| tracks[i].place);
         self.photos = Some(PhotoModel::new(
@@ -249,6 +270,26 @@ impl Adjustment {
             mean,
             covariance: 0.5 * (covariance + covariance.transpose()),
         })
+    }
+
+    /// Motions from which a stone is sought: its own, then those that in the face are the motion of its
+    /// surroundings, of the wall as a whole and of the masks' centroids, each unless a search from one before
+    /// reaches it. Out of the face the clouds know where it is.
+    fn starts(&self, i: usize, surroundings: [Vector3<f64>; 2], search_m: f64) -> Vec<FaceMotion> {
+        let frame = &self.prior.graph.nodes[i].face_from_world;
+        let own = self.face_motion(i);
+        let mut starts = vec![own];
+        let [around, of_wall] = surroundings.map(|moved| frame * moved);
+        for moved in [around, of_wall, self.stones[i].start] {
+            let is_new = |s: &FaceMotion| (s.translation - moved).xy().norm() > search_m;
+            if starts.iter().all(is_new) {
+                starts.push(FaceMotion {
+                    translation: Vector3::new(moved.x, moved.y, own.translation.z),
+                    ..own
+                });
+            }
+        }
+        starts
     }
 
     fn face_motion(&self, i: usize) -> FaceMotion {

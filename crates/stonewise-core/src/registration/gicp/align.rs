@@ -48,6 +48,7 @@ pub fn align(
     params: &GicpParams,
 ) -> Vec<PairResult> {
     let measure = |stone: &GicpStone| PairResult {
+        body: 0,
         first: stone.first,
         second: stone.second,
         motion: align_one(first, second, stone, params),

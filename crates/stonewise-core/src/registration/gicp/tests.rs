@@ -249,6 +249,7 @@ fn one_stone_among_still_ones_is_loose() {
             Vector3::zeros()
         };
         let result = PairResult {
+            body: 0,
             first: StoneId(id),
             second: StoneId(id),
             motion: Ok(StoneMotion {

@@ -9,9 +9,9 @@ use super::placed::{FaceMotion, Placed};
 use super::surface::Surface;
 use super::template::{Face, Mean, median_shift};
 use super::turn::turn_by_rotation;
-use super::verify::{Verification, is_beyond_chance};
+use super::verify::{Verification, beyond_chance};
 use crate::registration::points::PairPoints;
-use nalgebra::{Matrix2, Matrix3, Vector2};
+use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Rounds in which the second epoch's patches follow the stone.
@@ -52,7 +52,7 @@ pub enum PhotoStatus {
     NoTemplate,
     /// The second epoch's photos do not show the template.
     NotFound,
-    /// The way back, or another normalisation of contrast, leads elsewhere.
+    /// The way back, or another normalisation of contrast, leads elsewhere, or another place is as much alike.
     Ambiguous,
 }
 
@@ -65,6 +65,8 @@ pub(crate) struct Track {
     pub place: [f64; 2],
     /// Root mean square distance of the face from that place, metres.
     pub radius_m: f64,
+    /// By how many standard deviations the epochs' correlation lies above none.
+    pub likeness: f64,
     /// Change of the shift between the epochs under another normalisation of contrast, metres.
     pub apart_m: [f64; 2],
     /// The motion about which patches of the second epoch were taken.
@@ -98,6 +100,38 @@ struct Second {
     matches: Vec<Option<Match>>,
 }
 
+/// Two places are the same one if they lie nearer to each other than this, metres: each is known to a pixel.
+const SAME_PLACE_M: f64 = 0.005;
+/// Difference of two likenesses that chance exceeds once in a hundred: 2.33 times the root of two variances.
+const LIKELIER: f64 = 3.3;
+
+impl Track {
+    /// The track of a stone that was sought from several places, the most probable one beforehand first: the first
+    /// that was found, unless its photos are clearly more alike at another. None counts where they are more alike
+    /// at another place, but not clearly.
+    pub fn best_of(tracks: Vec<Self>) -> Option<Self> {
+        let is_tracked = |t: &Self| t.status == PhotoStatus::Tracked;
+        let Some(first) = tracks.iter().position(is_tracked) else {
+            return tracks.into_iter().next();
+        };
+        let likeliest = (0..tracks.len())
+            .filter(|&k| is_tracked(&tracks[k]))
+            .max_by(|&a, &b| tracks[a].likeness.total_cmp(&tracks[b].likeness).then(b.cmp(&a)))?;
+        let apart_m = (tracks[first].start.translation - tracks[likeliest].start.translation)
+            .xy()
+            .norm();
+        let gain = tracks[likeliest].likeness - tracks[first].likeness;
+        let is_ambiguous = apart_m > SAME_PLACE_M && gain < LIKELIER;
+        let mut best = tracks.into_iter().nth(likeliest)?;
+        if is_ambiguous {
+            best.status = PhotoStatus::Ambiguous;
+            best.sights.clear();
+            best.pictures = None;
+        }
+        Some(best)
+    }
+}
+
 impl Tracker<'_> {
     pub fn track(&self) -> Track {
         let mut track = Track {
@@ -105,6 +139,7 @@ impl Tracker<'_> {
             sights: Vec::new(),
             place: [0.0; 2],
             radius_m: 0.0,
+            likeness: 0.0,
             apart_m: [0.0; 2],
             start: self.start,
             pictures: None,
@@ -129,9 +164,8 @@ impl Tracker<'_> {
         let before = self.normalised(&first, &face.surface, 1.0);
         let mean = self.agreeing(face.template(&before))?;
         let second = self.followed(&face, &mean.template, &chips[1], &mut track.start)?;
-        if !is_beyond_chance(&face, &mean.template, &second.matches) {
-            return Err(PhotoStatus::NotFound);
-        }
+        track.likeness =
+            beyond_chance(&face, &mean.template, &second.matches).ok_or(PhotoStatus::NotFound)?;
         let others = [&first, &second.grey].map(|grey| self.normalised(grey, &face.surface, OTHER_WINDOW));
         let verification = Verification {
             face: &face,
@@ -299,7 +333,7 @@ impl Tracker<'_> {
             _ => *start,
         };
         let moved = taken.at(surface.middle);
-        let local = nalgebra::Vector3::new(surface.middle[0], surface.middle[1], 0.0) + moved;
+        let local = Vector3::new(surface.middle[0], surface.middle[1], 0.0) + moved;
         let at = self.pair.centroid + self.face_from_world.transpose() * local;
         let parallax = self.photos[photo].parallax(&at, self.face_from_world)?;
         let by_rows = self.photos[photo].by_rows(&at, self.face_from_world)?;
@@ -327,5 +361,58 @@ fn start_after(found: &Option<Match>, shift: Vector2<f64>) -> Warp {
             ..found.warp
         },
         None => Warp::shift(Vector2::zeros()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn track(status: PhotoStatus, place_m: f64, likeness: f64) -> Track {
+        Track {
+            status,
+            sights: Vec::new(),
+            place: [0.0; 2],
+            radius_m: 0.1,
+            likeness,
+            apart_m: [0.0; 2],
+            start: FaceMotion {
+                translation: Vector3::new(place_m, 0.0, 0.0),
+                ..FaceMotion::none()
+            },
+            pictures: None,
+        }
+    }
+
+    #[test]
+    fn another_place_counts_where_the_photos_are_clearly_more_alike() {
+        use PhotoStatus::{Ambiguous, NotFound, Tracked};
+        let best = |tracks: &[(PhotoStatus, f64, f64)]| {
+            let tracks = tracks
+                .iter()
+                .map(|&(status, place, likeness)| track(status, place, likeness));
+            let best = Track::best_of(tracks.collect()).unwrap();
+            (best.status, best.start.translation.x)
+        };
+        assert_eq!(
+            best(&[(Tracked, 0.05, 6.0), (Tracked, 0.0, 12.0)]),
+            (Tracked, 0.0)
+        );
+        assert_eq!(best(&[(Tracked, 0.05, 11.0), (Tracked, 0.0, 12.0)]).0, Ambiguous);
+        assert_eq!(
+            best(&[(Tracked, 0.05, 6.0), (Tracked, 0.0, 5.0)]),
+            (Tracked, 0.05)
+        );
+        // Two searches that end at one place.
+        assert_eq!(
+            best(&[(Tracked, 0.001, 11.0), (Tracked, 0.0, 12.0)]),
+            (Tracked, 0.0)
+        );
+        assert_eq!(
+            best(&[(NotFound, 0.05, 20.0), (Tracked, 0.0, 5.0)]),
+            (Tracked, 0.0)
+        );
+        assert_eq!(best(&[(NotFound, 0.05, 0.0)]), (NotFound, 0.05));
+        assert!(Track::best_of(Vec::new()).is_none());
     }
 }

@@ -68,18 +68,19 @@ impl Verification<'_> {
     }
 }
 
-/// Whether matches found as far as the face is searched for correlate better with a template than the best of chance.
+/// How far matches' correlation with a template lies above none, in standard deviations; `None` where the best
+/// place of a search as far as the face is searched for correlates as well by chance.
 ///
 /// A face of n independent grains has Fisher's z with a standard deviation of 1 / sqrt(n) (Fisher 1921); the
 /// search tries as many independent places as grains fit into its circle.
-pub(super) fn is_beyond_chance(face: &Face, template: &Template, matches: &[Option<Match>]) -> bool {
+pub(super) fn beyond_chance(face: &Face, template: &Template, matches: &[Option<Match>]) -> Option<f64> {
     let correlations: Vec<f64> = matches.iter().flatten().map(|m| m.correlation).collect();
     let mean = correlations.iter().sum::<f64>() / correlations.len() as f64;
     let grain_area = grain_cells(face, &template.patch).powi(2);
     let grains = face.cells.count() as f64 / grain_area;
     let places = (PI * (face.reach * face.reach) as f64 / grain_area).max(1.0);
     let z = mean.clamp(-MOST_CORRELATION, MOST_CORRELATION).atanh() * grains.sqrt();
-    z > Normal::standard().inverse_cdf(1.0 - CHANCE / places)
+    (z > Normal::standard().inverse_cdf(1.0 - CHANCE / places)).then_some(z)
 }
 
 /// Keeps Fisher's z finite.
@@ -141,12 +142,12 @@ mod tests {
             let other = grained(2 * seed + 1, 3.0, [0.0; 2]);
             let search = Search::new(&template, &face.surface, &face.cells);
             let (_, best) = search.best_shift(&other, face.reach).unwrap();
-            passed += usize::from(is_beyond_chance(&face, &template, &[matched(best)]));
+            passed += usize::from(beyond_chance(&face, &template, &[matched(best)]).is_some());
         }
         // 5 % of 120 are 6, standard deviation 2.4.
         assert!(passed <= 14, "{passed}");
         let template = Template::new(grained(1, 3.0, [0.0; 2]), &face.surface);
-        assert!(is_beyond_chance(&face, &template, &[matched(0.8)]));
+        assert!(beyond_chance(&face, &template, &[matched(0.8)]).is_some());
     }
 
     #[test]
@@ -155,8 +156,8 @@ mod tests {
         let [fine, coarse] =
             [2.0, 9.0].map(|grain| Template::new(grained(3, grain, [0.0; 2]), &face.surface));
         let found = [matched(0.5)];
-        assert!(is_beyond_chance(&face, &fine, &found));
-        assert!(!is_beyond_chance(&face, &coarse, &found));
+        assert!(beyond_chance(&face, &fine, &found).is_some());
+        assert!(beyond_chance(&face, &coarse, &found).is_none());
     }
 
     #[test]

@@ -343,6 +343,7 @@ mod tests {
 
     fn model(stones: &[(f64, f64)]) -> PhotoModel {
         let track = |&(sd_m, apart_m): &(f64, f64)| Track {
+            likeness: 10.0,
             status: PhotoStatus::Tracked,
             sights: [0, 1]
                 .map(|photo| Sight {

@@ -162,6 +162,7 @@ mod tests {
 
     fn track(sights: Vec<Sight>, place: [f64; 2]) -> Track {
         Track {
+            likeness: 10.0,
             status: PhotoStatus::Tracked,
             sights,
             place,

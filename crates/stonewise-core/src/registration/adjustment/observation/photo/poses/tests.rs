@@ -9,6 +9,7 @@ use rand_chacha::ChaCha8Rng;
 
 fn track(sights: Vec<Sight>) -> Track {
     Track {
+        likeness: 10.0,
         status: PhotoStatus::Tracked,
         sights,
         place: [0.0; 2],
