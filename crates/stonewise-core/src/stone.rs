@@ -49,6 +49,8 @@ pub enum UnmatchedReason {
     Ambiguous,
     /// The nearest candidate's face is too large or too small: masks merged or split.
     AreaMismatch,
+    /// The clouds show something else than masonry, such as a panel of a door.
+    NotMasonry,
 }
 
 /// The rigid motion of one stone, second epoch minus first, world frame.

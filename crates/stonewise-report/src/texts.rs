@@ -32,7 +32,7 @@ pub(crate) struct Texts {
     pub method: MethodTexts,
     pub audit: AuditTexts,
     /// What became of stones, in the order of [`Status::ALL`].
-    pub statuses: [&'static str; 9],
+    pub statuses: [&'static str; 10],
 }
 
 /// Words for the states.
@@ -323,9 +323,10 @@ static ENGLISH: Texts = Texts {
         "the later epoch shows the place, but no stone was found there",
         "several stones of the later epoch fit equally well",
         "the best candidate's face is much larger or smaller: masks merged or split",
+        "no stone of the wall: fields of one relief that stand back from it, as of a door or a shutter",
         "too few points for an estimate",
         "the estimate did not settle",
-        "the two epochs do not show the same surface: probably a wrong mask",
+        "the two epochs do not show the same surface, or nothing confirms a motion unlike the rest of the wall",
         "the surface is too flat to show the motion",
     ],
 };
@@ -507,9 +508,10 @@ static GERMAN: Texts = Texts {
         "die sp\u{e4}tere Epoche zeigt die Stelle, aber dort wurde kein Stein gefunden",
         "mehrere Steine der sp\u{e4}teren Epoche passen gleich gut",
         "die Fl\u{e4}che des besten Kandidaten ist viel gr\u{f6}\u{df}er oder kleiner: Masken verschmolzen oder geteilt",
+        "kein Stein der Mauer: Felder mit gleichem Relief, die hinter ihr liegen, wie die einer T\u{fc}r oder eines Ladens",
         "zu wenige Punkte f\u{fc}r eine Sch\u{e4}tzung",
         "die Sch\u{e4}tzung ist nicht zur Ruhe gekommen",
-        "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che: wahrscheinlich eine falsche Maske",
+        "die beiden Epochen zeigen nicht dieselbe Oberfl\u{e4}che, oder nichts best\u{e4}tigt eine Bewegung, die der \u{fc}brigen Mauer widerspricht",
         "die Oberfl\u{e4}che ist zu eben, um die Bewegung zu zeigen",
     ],
 };

@@ -122,6 +122,8 @@ pub enum Status {
     UnmatchedAmbiguous,
     /// The candidate's face has another size.
     UnmatchedArea,
+    /// No stone of the wall.
+    NotMasonry,
     /// Too few points.
     FailedPoints,
     /// The estimate did not settle.
@@ -134,12 +136,13 @@ pub enum Status {
 
 impl Status {
     /// Every status, in the order of reports.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Ok,
         Self::UnmatchedUnseen,
         Self::UnmatchedLost,
         Self::UnmatchedAmbiguous,
         Self::UnmatchedArea,
+        Self::NotMasonry,
         Self::FailedPoints,
         Self::FailedConvergence,
         Self::FailedDisagreement,
@@ -154,6 +157,7 @@ impl Status {
             Self::UnmatchedLost => "unmatched_lost",
             Self::UnmatchedAmbiguous => "unmatched_ambiguous",
             Self::UnmatchedArea => "unmatched_area",
+            Self::NotMasonry => "not_masonry",
             Self::FailedPoints => "failed_points",
             Self::FailedConvergence => "failed_convergence",
             Self::FailedDisagreement => "failed_disagreement",
@@ -171,9 +175,14 @@ impl Status {
             Self::UnmatchedArea => {
                 "the best candidate's face is much larger or smaller: masks merged or split"
             }
+            Self::NotMasonry => {
+                "no stone of the wall: fields of one relief that stand back from it, as of a door or a shutter"
+            }
             Self::FailedPoints => "too few points for an estimate",
             Self::FailedConvergence => "the estimate did not settle",
-            Self::FailedDisagreement => "the two epochs do not show the same surface: probably a wrong mask",
+            Self::FailedDisagreement => {
+                "the two epochs do not show the same surface, or nothing confirms a motion unlike the rest of the wall"
+            }
             Self::Unobservable => "the surface is too flat to show the motion",
         }
     }
@@ -302,6 +311,7 @@ fn status(outcome: &MatchOutcome, pair: Option<&PairResult>) -> Status {
             UnmatchedReason::Lost => Status::UnmatchedLost,
             UnmatchedReason::Ambiguous => Status::UnmatchedAmbiguous,
             UnmatchedReason::AreaMismatch => Status::UnmatchedArea,
+            UnmatchedReason::NotMasonry => Status::NotMasonry,
         },
         MatchOutcome::Matched { .. } => match pair.map(|p| &p.motion) {
             Some(Ok(_)) => Status::Ok,

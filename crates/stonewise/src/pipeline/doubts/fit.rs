@@ -42,7 +42,7 @@ impl Fit {
 
     /// Whether cameras and clouds fit each other; `None` where too few stones were sought.
     pub fn holds(self) -> Option<bool> {
-        (self.sought >= LEAST_STONES).then(|| self.found as f64 >= FITS * self.sought as f64)
+        (self.sought >= LEAST_STONES).then_some(self.found as f64 >= FITS * self.sought as f64)
     }
 
     /// The cause of a doubt that this favours, in words.

@@ -5,13 +5,14 @@ use crate::files::write_readable_json;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
+use crate::pipeline::steps::panels::panels_among;
 use crate::pipeline::until::Until;
 use crate::results::names::PairFile;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
-use stonewise_core::stone::MatchOutcome;
+use stonewise_core::stone::{MatchOutcome, UnmatchedReason};
 
 /// Finds the stones of the reference in a later epoch.
 pub static MATCH: Step = Step {
@@ -47,7 +48,7 @@ impl Matched {
 }
 
 impl Run<'_> {
-    /// The stones of the reference in a later epoch.
+    /// The stones of the reference in a later epoch; panels of doors and the like are none.
     ///
     /// # Errors
     /// There are none; the clouds lie apart.
@@ -55,7 +56,15 @@ impl Run<'_> {
         self.once(&MATCH, later, || {
             self.require_overlap(later)?;
             let labelled = self.labelled_pair(later)?;
-            let report = self.matches("match", labelled.each_ref().map(|l| &**l), later)?;
+            let mut report = self.matches("match", labelled.each_ref().map(|l| &**l), later)?;
+            let panels = panels_among(self.context, &labelled.first)?;
+            if !panels.is_empty() {
+                for (stone, outcome) in &mut Arc::make_mut(&mut report).outcomes {
+                    if panels.binary_search(stone).is_ok() {
+                        *outcome = MatchOutcome::Unmatched(UnmatchedReason::NotMasonry);
+                    }
+                }
+            }
             let matched = Matched { report };
             match matched.pairs().is_empty() {
                 false => Ok(matched),
