@@ -17,9 +17,8 @@ messages! {
             "keine Fotos: Steine werden in {n} Ansichten der Intensitäten der Punktwolke gesucht";
 
         VIEWS_OF_RELIEF:
-            "no photos: stones are looked for in {n} views of the cloud's relief, shaded, as neither colours nor intensities show any",
-            "keine Fotos: Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht, da weder Farben noch \
-            Intensitäten welche zeigen";
+            "no photos: stones are looked for in {n} views of the cloud's relief, shaded",
+            "keine Fotos: Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
 
         AUTO_STABLE:
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",

@@ -1,6 +1,6 @@
 //! Which parts of a surface are walls.
 
-use crate::geometry::{CellSet, cell_of};
+use crate::geometry::{CellMap, cell_of};
 use crate::surface::SurfaceCell;
 use nalgebra::Point3;
 
@@ -10,12 +10,16 @@ const LEVEL: f64 = 0.8;
 /// pitched slope.
 const LEAST_WALLS: f64 = 0.05;
 
+/// Distance from the plane of the ground within which points belong to it, metres: the foot of a wall stands
+/// in cells of the ground.
+const GROUND_M: f64 = 0.05;
+
 /// The surfaces that views are made of.
 pub struct Walls<'a> {
     /// Their cells.
     pub(super) cells: Vec<&'a SurfaceCell>,
     cell_m: f64,
-    level: CellSet<[i64; 3]>,
+    level: CellMap<[i64; 3], &'a SurfaceCell>,
 }
 
 impl<'a> Walls<'a> {
@@ -27,18 +31,55 @@ impl<'a> Walls<'a> {
             return Self {
                 cells: cells.iter().collect(),
                 cell_m,
-                level: CellSet::default(),
+                level: CellMap::default(),
             };
         }
         Self {
             cells: upright,
             cell_m,
-            level: level.iter().map(|c| c.cell).collect(),
+            level: level.into_iter().map(|c| (c.cell, c)).collect(),
         }
     }
 
     /// Whether a point lies on the ground or another level surface, which views leave black.
     pub fn is_level(&self, point: &Point3<f64>) -> bool {
-        self.level.contains(&cell_of(point, self.cell_m))
+        let cell = self.level.get(&cell_of(point, self.cell_m));
+        cell.is_some_and(|c| (point - c.centroid).dot(&c.normal).abs() < GROUND_M)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn the_foot_of_a_wall_is_no_ground() {
+        let cell = |x: f64, z: f64, normal: Vector3<f64>| {
+            let centroid = Point3::new(x, 0.1, z);
+            SurfaceCell {
+                cell: cell_of(&centroid, 0.25),
+                centroid,
+                normal,
+                spacing_m: 0.01,
+                skewness: 0.0,
+            }
+        };
+        let cells = [
+            cell(0.1, 0.02, Vector3::z()),
+            cell(0.4, 0.02, Vector3::z()),
+            cell(0.1, 0.4, -Vector3::y()),
+        ];
+        let walls = Walls::among(&cells, 0.25);
+        assert_eq!(walls.cells.len(), 1);
+        assert!(walls.is_level(&Point3::new(0.2, 0.2, 0.03)));
+        assert!(
+            !walls.is_level(&Point3::new(0.2, 0.2, 0.2)),
+            "the foot of the wall"
+        );
+        assert!(!walls.is_level(&Point3::new(0.1, 0.1, 0.41)));
+        // A pavement alone is what the survey shows.
+        let pavement = Walls::among(&cells[..2], 0.25);
+        assert!(pavement.cells.len() == 2 && !pavement.is_level(&Point3::new(0.2, 0.2, 0.03)));
     }
 }
