@@ -103,6 +103,17 @@ pub enum Estimator {
     Gicp,
 }
 
+/// How epochs come into the frame of the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Align {
+    /// Their clouds lie in it.
+    #[default]
+    None,
+    /// By a rigid motion that brings their stones together.
+    Stones,
+}
+
 /// Which estimator measures the stones, and its parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -122,6 +133,9 @@ pub struct RegistrationParams {
     /// Whether surfaces off the wall that both epochs show serve as stable areas, too. false, because
     /// clouds alone do not show whether ground and rock kept their place.
     pub auto_stable: bool,
+    /// Whether the stones bring epochs of other frames to the frame of the reference. none: all clouds are taken
+    /// as they lie. stones: the motion of the wall as a whole stays unknown, its deformation does not.
+    pub align: Align,
     /// Width of a stone's border, in noise levels of its points, where a point belongs to the stone by its
     /// place and not by its label. 3: farther inside, noise does not change a label; with 0 (labels alone)
     /// the whole wall of a UAV survey seems to move by 1 to 2 mm.
@@ -144,6 +158,7 @@ impl Default for RegistrationParams {
             epoch_error_m: None,
             stable: Vec::new(),
             auto_stable: false,
+            align: Align::None,
             border_noises: 3.0,
             adjustment: AdjustmentParams::default(),
             photos: PhotoParams::default(),

@@ -133,6 +133,12 @@ pub struct NeighbourCovariance {
     pub covariance: Matrix3<f64>,
 }
 
+/// The mean of the stones' centroids; the origin for none.
+pub fn middle(stones: &[Stone]) -> Point3<f64> {
+    let sum: Vector3<f64> = stones.iter().map(|s| s.centroid.coords).sum();
+    Point3::from(sum / stones.len().max(1) as f64)
+}
+
 /// The common rigid motion of the measured stones that are not loose; `None` where three stones or fewer show
 /// none.
 ///

@@ -285,21 +285,19 @@ impl Source<'_> {
         if raw.name.get_ref().trim().is_empty() {
             return Err(self.error(raw.name.span(), "an epoch needs a name"));
         }
+        let clouds = raw.clouds.into_inner().into_iter().map(|c| self.existing(c));
+        let clouds = clouds.collect::<Result<_>>()?;
         let photos = self.photos(raw.images, raw.cameras)?;
         if let (Some(masks), None) = (&raw.masks, &photos) {
             let message = "masks need the photos in which they were drawn: add `images` and `cameras` to this epoch, or remove \
                            `masks`";
             return Err(self.error(masks.span(), message));
         }
-        let clouds = raw.clouds.into_inner();
         Ok(Epoch {
             name: raw.name.into_inner(),
             date: raw.date.map(|d| d.into_inner().to_string()),
             conditions: raw.conditions,
-            clouds: clouds
-                .into_iter()
-                .map(|c| self.existing(c))
-                .collect::<Result<_>>()?,
+            clouds,
             photos,
             masks: raw.masks.map(|m| self.existing(m)).transpose()?,
             motion: raw.motion,

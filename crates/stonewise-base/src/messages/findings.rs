@@ -23,11 +23,13 @@ messages! {
         SYSTEMS: "the clouds are in different systems, {systems}: transform them to one",
             "die Punktwolken liegen in verschiedenen Systemen, {systems}: sie in eines umrechnen";
         NO_OVERLAP: "the clouds do not overlap those of {first}: they reach from {low} to {high} m, {first} from {first_low} to {first_high} m; \
-                     bring both into one frame",
+                     bring both into one frame, or let a run do so by their stones (registration.align = \"stones\")",
             "die Punktwolken überlappen die von {first} nicht: sie reichen von {low} bis {high} m, {first} von {first_low} bis {first_high} m; \
-             beide in ein System bringen";
-        LITTLE_OVERLAP: "{share} % of the smaller epoch with {first}: are both in one frame?",
-            "{share} % der kleineren Epoche mit {first}: sind beide in einem System?";
+             beide in ein System bringen, oder einen Lauf das anhand der Steine tun lassen (registration.align = \"stones\")";
+        LITTLE_OVERLAP: "{share} % of the smaller epoch with {first}: are both in one frame? If not, \
+                         registration.align = \"stones\" brings them together by their stones",
+            "{share} % der kleineren Epoche mit {first}: sind beide in einem System? Wenn nicht, bringt registration.align = \"stones\" \
+             sie anhand der Steine zusammen";
         SAME_FILE: "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
         SAME_POINTS: "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
             "{share} % der Punkte sind die der Epoche {first}: ist die Punktwolke einer Epoche eine Kopie der anderen?";

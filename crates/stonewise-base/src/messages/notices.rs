@@ -84,6 +84,18 @@ messages! {
             "der Registrierungsfehler der Epochen ist unbekannt: Grenzen, Intervalle und Signifikanz gelten für Bewegungen gegen die \
             gemeinsame starre Bewegung der gemessenen Steine";
 
+        ALIGNED:
+            "aligned by {stones} of {covered} stones: turned by {degrees} degrees and moved by {metres} m at the middle of the wall, \
+            centroids agree within {rms_mm} mm; the motion of the wall as a whole is not known, its deformation is",
+            "an {stones} von {covered} Steinen ausgerichtet: um {degrees} Grad gedreht und in der Mitte der Mauer um {metres} m bewegt, \
+            Schwerpunkte stimmen auf {rms_mm} mm überein; die Bewegung der Mauer als Ganzes ist nicht bekannt, ihre Verformung ist es";
+
+        DATUM_ALIGNED:
+            "the epochs were aligned by their stones: how the wall moved as a whole is not known; limits, intervals and significance hold \
+            for motions against the common rigid motion of the measured stones",
+            "die Epochen wurden an ihren Steinen ausgerichtet: wie sich die Mauer als Ganzes bewegt hat, ist nicht bekannt; Grenzen, \
+            Intervalle und Signifikanz gelten für Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine";
+
         DATUM_STABLE:
             "the stable areas show a registration error of {error_mm} mm at the middle of the wall: it is taken off the motions, and what \
             stays uncertain of it is in limits and intervals",

@@ -4,7 +4,9 @@
 //! still match; then a smooth field of local shifts follows settlements and bulges. Distances in the ratio
 //! test are what remains.
 
+mod align;
 mod centroids;
+mod constellation;
 mod face_patch;
 mod field;
 mod footprints;
@@ -13,6 +15,7 @@ mod offset;
 mod params;
 mod shift;
 
+pub use align::{AlignError, Alignment, align_stones};
 pub use face_patch::{FaceGrid, FacePatch};
 pub use footprints::{Footprints, footprint_overlap};
 pub use match_stones::{MatchQuality, MatchReport, Overlap, Surroundings, match_stones};

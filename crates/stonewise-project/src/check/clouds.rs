@@ -10,6 +10,7 @@ use stonewise_base::messages::findings::{
     NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS,
     THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
 };
+use stonewise_base::settings::Align;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::crs::{Crs, is_in_feet};
 
@@ -45,7 +46,9 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
     let Some(first) = boxes.first().copied().flatten() else {
         return found;
     };
-    for (epoch, bounds) in project.epochs.iter().zip(&boxes).skip(1) {
+    // Boxes of other frames say nothing about each other.
+    let is_one_frame = project.settings.registration.align == Align::None;
+    for (epoch, bounds) in project.epochs.iter().zip(&boxes).skip(1).filter(|_| is_one_frame) {
         let Some(bounds) = bounds else { continue };
         let names = [project.epochs.reference().name.as_str(), epoch.name.as_str()];
         match unit_ratio(&first, bounds) {

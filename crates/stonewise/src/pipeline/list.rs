@@ -15,6 +15,7 @@ pub static STEPS: &[&Step] = &[
     &steps::views::VIEWS,
     &steps::segment::SEGMENT,
     &steps::label::LABEL,
+    &steps::label::ALIGN,
     &steps::label::STONES,
     &steps::join::JOIN,
     &steps::carry::CARRY,

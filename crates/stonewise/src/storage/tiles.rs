@@ -19,7 +19,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use stonewise_core::cloud::{Cloud, TileSource};
-use stonewise_core::geometry::{Bounds, cell_of};
+use stonewise_core::geometry::{Bounds, Rigid3, cell_of};
 use stonewise_core::progress::Progress;
 use stonewise_core::views::PointValues;
 use stonewise_io::cloud::{PointChunk, claimed_records, read_cloud};
@@ -54,6 +54,8 @@ pub struct Provenance {
 pub struct DiskTiles {
     dir: PathBuf,
     tiles: Vec<TileEntry>,
+    /// Brings the points into another frame.
+    frame: Option<Rigid3>,
     cache: Mutex<VecDeque<(usize, Arc<Cloud>)>>,
 }
 
@@ -64,8 +66,19 @@ impl DiskTiles {
         Ok(Self {
             dir: dir.to_path_buf(),
             tiles,
+            frame: None,
             cache: Mutex::new(VecDeque::new()),
         })
+    }
+
+    /// The same tiles with every point moved by `frame`; their order, names and provenance stay.
+    pub fn in_frame(&self, frame: &Rigid3) -> Self {
+        Self {
+            dir: self.dir.clone(),
+            tiles: self.tiles.clone(),
+            frame: Some(*frame),
+            cache: Mutex::default(),
+        }
     }
 
     /// Number of points in all tiles.
@@ -147,7 +160,11 @@ impl TileSource for DiskTiles {
     }
 
     fn bounds(&self, tile: usize) -> Bounds {
-        self.tiles[tile].bounds
+        let bounds = self.tiles[tile].bounds;
+        let moved = self
+            .frame
+            .and_then(|frame| Bounds::of(bounds.corners().map(|c| frame * c)));
+        moved.unwrap_or(bounds)
     }
 
     fn load(&self, tile: usize) -> Result<Cloud> {
@@ -168,7 +185,14 @@ impl TileSource for DiskTiles {
             table.required("z")?,
         );
         let offsets = x.iter().zip(y).zip(z).map(|((&x, &y), &z)| [x, y, z]).collect();
-        let cloud = Arc::new(Cloud::new(entry.origin, offsets));
+        let cloud = Cloud::new(entry.origin, offsets);
+        let cloud = Arc::new(match &self.frame {
+            Some(frame) => Cloud::from_world(
+                frame * cloud.origin(),
+                (0..cloud.len()).map(|i| frame * cloud.world(i)),
+            ),
+            None => cloud,
+        });
         let mut queue = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
         queue.push_back((tile, Arc::clone(&cloud)));
         if queue.len() > CACHED_TILES {

@@ -123,7 +123,7 @@ fn results(
     tested: &[Tested],
     estimates: &[Result<Estimate, MotionFailure>],
 ) -> Vec<PairResult> {
-    let shared = adjustment.shared_variances(adjustment.octaves());
+    let [of_stone, shared] = [1.0, adjustment.octaves()].map(|octaves| adjustment.shared_variances(octaves));
     let bodies = bodies(adjustment);
     let stones = adjustment.stones.iter().zip(estimates).enumerate();
     stones
@@ -134,7 +134,7 @@ fn results(
             motion: match estimate {
                 Err(failure) => Err(failure.clone()),
                 Ok(estimate) => observable(
-                    motion(adjustment, i, solution, tested[i], estimate, &shared),
+                    motion(adjustment, i, solution, tested[i], estimate, [&of_stone, &shared]),
                     adjustment.params.max_sd_m,
                 ),
             },
@@ -191,14 +191,15 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
-/// `shared`: variances of errors that all points of a stone share, against the other epoch.
+/// `of_stone`, `shared`: variances of errors that all points of a stone share, over the shortest octave of length
+/// and against the other epoch.
 fn motion(
     adjustment: &Adjustment,
     i: usize,
     solution: &Solution,
     tested: Tested,
     estimate: &Estimate,
-    shared: &[f64; 9],
+    [of_stone, shared]: [&[f64; 9]; 2],
 ) -> StoneMotion {
     let node = &adjustment.prior.graph.nodes[i];
     let world = node.face_from_world.transpose();
@@ -211,13 +212,17 @@ fn motion(
     for (k, variance) in shared.iter().enumerate().skip(3) {
         local[(k, k)] += variance;
     }
-    let of_points = Matrix3::from_diagonal(&Vector3::new(shared[0], shared[1], shared[2]));
+    let translations = |v: &[f64; 9]| Matrix3::from_diagonal(&Vector3::new(v[0], v[1], v[2]));
+    let of_points = translations(shared);
     let mut translation = local.fixed_view_mut::<3, 3>(0, 0);
     match adjustment.photo_part(i) {
         Some(photos) => {
             // Light shifts neighbours alike: the least bias of appearance is shared over all lengths, too.
             let of_light = photos.least_error() * adjustment.octaves();
-            translation += photos.left_of(&of_points) + photos.pose_covariance(&photos) + of_light;
+            // What is wrong over the length of a stone, a mask or a stain, photos see like the points.
+            let of_stone = translations(of_stone);
+            translation += of_stone + photos.left_of(&(of_points - of_stone));
+            translation += photos.pose_covariance(&photos) + of_light;
         }
         None => translation += of_points,
     }

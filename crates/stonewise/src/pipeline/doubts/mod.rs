@@ -15,6 +15,7 @@ use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::steps::offsets::OFFSETS;
 use crate::pipeline::steps::register::{Registered, note_registration};
 use crate::pipeline::until::Until;
+use crate::settings::Align;
 use fit::Fit;
 use labels::{Votes, beside};
 use motions::{blind, few_measured, unsettled};
@@ -73,8 +74,11 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     Ok(())
 }
 
-/// See [`registration::misregistered`].
+/// See [`registration::misregistered`]. Where the stones aligned the epochs, nothing is claimed that surfaces off
+/// the wall could contradict.
 fn misregistered(context: &Context, registered: &Registered) -> Option<String> {
+    let params = &context.project.settings.registration;
     let check = registered.epoch_errors.as_ref()?.cross_check.as_ref()?;
-    registration::misregistered(context.project.settings.registration.epoch_error_m, check)
+    let check = Some(check).filter(|_| params.align == Align::None)?;
+    registration::misregistered(params.epoch_error_m, check)
 }

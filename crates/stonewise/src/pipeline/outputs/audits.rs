@@ -22,12 +22,7 @@ pub static AUDITS: Step = Step {
         write_carry_audit(run.context, &attempts)?;
         write_edits_audit(run.context, run.corrected()?.edited.as_ref())?;
         epochs.ids().try_for_each(|epoch| {
-            write_audit(
-                run.context,
-                epoch,
-                &*run.segmented(epoch)?,
-                &*run.labelled(epoch)?,
-            )
+            write_audit(run.context, epoch, &*run.posed(epoch)?, &*run.labelled(epoch)?)
         })
     },
     ..Step::PLAIN

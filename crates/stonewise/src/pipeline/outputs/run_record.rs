@@ -62,7 +62,7 @@ fn write_run_record(run: &Run) -> Result<()> {
 
 fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
     let (context, epoch) = (run.context, &run.context.project.epochs[id]);
-    let (photos, labelled) = (run.segmented(id)?, run.labelled(id)?);
+    let (photos, labelled) = (run.posed(id)?, run.labelled(id)?);
     let input = |path: &Path| input(context, path);
     Ok(EpochRecord {
         name: epoch.name.clone(),

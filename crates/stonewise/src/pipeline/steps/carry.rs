@@ -140,7 +140,7 @@ impl Wish {
         let steepest = run.context.project.settings.label.max_incidence_rad;
         let facing = |epoch: EpochId, shift: Vector3<f64>| {
             let place = stone.centroid + shift;
-            let views = &run.segmented(epoch)?.views;
+            let views = &run.posed(epoch)?.views;
             Result::Ok(photos_facing(views, &place, &stone.normal, steepest) as u32)
         };
         let facing = [facing(from, Vector3::zeros())?, facing(to, shift)?];

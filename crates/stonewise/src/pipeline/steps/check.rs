@@ -53,7 +53,7 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
     let names: Vec<&String> = project.epochs.iter().map(|e| &e.name).collect();
     let key = Key::new(
         STEP,
-        &names,
+        &(&names, &project.settings),
         &inputs.iter().map(String::as_str).collect::<Vec<_>>(),
     );
     let step = context.step(STEP, key, |step, _| {

@@ -32,12 +32,9 @@ impl Run<'_> {
         self.once(&INGEST, epoch, || ingest(self.context, epoch))
     }
 
-    /// The tiles of the reference and of a later epoch.
+    /// The tiles of the reference and of a later epoch, in the frame of the reference.
     pub fn clouds(&self, later: EpochId) -> Result<Pair<Arc<Ingested>>> {
-        Ok(Pair::new(
-            self.ingested(EpochId::REFERENCE)?,
-            self.ingested(later)?,
-        ))
+        Ok(Pair::new(self.placed(EpochId::REFERENCE)?, self.placed(later)?))
     }
 }
 

@@ -80,7 +80,7 @@ fn join_reference(run: &Run) -> Result<JoinedEpoch> {
         let pair = Pair::new(&*first, &*labelled);
         let report = run.matches("join-match", pair, later)?;
         let matching = Matching::new(pair, later, &report);
-        asked.extend(matching.whole_in_later(&*run.segmented(later)?, steepest));
+        asked.extend(matching.whole_in_later(&*run.posed(later)?, steepest));
         others.insert(later, labelled);
     }
     join_into(run, EpochId::REFERENCE, first, &others, asked)
@@ -97,7 +97,7 @@ fn join_later(run: &Run, later: EpochId) -> Result<JoinedEpoch> {
     let pair = Pair::new(&*first.labelled, &*own);
     let report = run.matches(name, pair, later)?;
     let matching = Matching::new(pair, later, &report);
-    let mut asked = matching.whole_in_first(&*run.segmented(EpochId::REFERENCE)?, steepest);
+    let mut asked = matching.whole_in_first(&*run.posed(EpochId::REFERENCE)?, steepest);
     let shown: BTreeMap<StoneId, Shown> = { first.joined.iter() }
         .filter_map(|joined| Some((*joined.parts.first()?, joined.shown)))
         .collect();

@@ -1,5 +1,6 @@
 //! The steps that compute, in their order: `../list.rs`.
 
+mod align;
 pub mod carry;
 pub mod change;
 pub mod check;

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
+use crate::settings::Align;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::Bounds;
@@ -11,6 +12,7 @@ use stonewise_core::geometry::Bounds;
 pub static OVERLAP: Step = Step {
     name: "overlap",
     about: About::Later,
+    applies: |project, _| project.settings.registration.align == Align::None,
     needs: &[Need::reference(&INGEST), Need::same(&INGEST)],
     make: |run, epoch| run.require_overlap(epoch),
     ..Step::PLAIN
@@ -36,7 +38,7 @@ impl Run<'_> {
         let names = self.context.project.epochs.pair(later).map(|e| &e.name);
         Err(Error::Survey(format!(
             "epochs {:?} and {:?} do not overlap: one reaches from {:.1?} to {:.1?} m, the other from {:.1?} to {:.1?} m; \
-             are they in one frame?",
+             are they in one frame? If not, `align = \"stones\"` under [registration] finds how they lie by their stones",
             names.first,
             names.later,
             first.min.coords.as_slice(),

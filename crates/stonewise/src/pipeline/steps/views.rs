@@ -6,6 +6,7 @@ use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::ingest::{INGEST, Ingested, scanners};
 use crate::project::{Epoch, PhotoFiles, Project};
+use crate::settings::Align;
 use crate::storage::step::{Key, StepDir};
 use crate::storage::tiles::{DiskTiles, TileValues};
 use crate::texts::SIDE_UNSURE;
@@ -71,7 +72,8 @@ impl Run<'_> {
     /// Places from which the wall of an epoch is seen: those of its scanners, else of cameras: of photos, or of
     /// the views of the reference, so that all epochs have the same outside. None where nothing is known.
     fn outside(&self, id: EpochId) -> Result<Vec<Point3<f64>>> {
-        let epochs = &self.context.project.epochs;
+        let project = self.context.project;
+        let epochs = &project.epochs;
         let scanners = scanners(&epochs[id])?;
         if !scanners.is_empty() {
             return Ok(scanners);
@@ -79,6 +81,10 @@ impl Run<'_> {
         let centres = |epoch: &Epoch| -> Result<Vec<Point3<f64>>> {
             Ok(epoch.read_cameras()?.views.iter().map(View::centre).collect())
         };
+        if project.settings.registration.align == Align::Stones {
+            // Cameras of another epoch lie in another frame.
+            return Ok(Vec::new());
+        }
         match epochs.iter().find(|e| e.photos.is_some()) {
             Some(photographed) => centres(photographed),
             None if id == EpochId::REFERENCE => Ok(Vec::new()),

@@ -42,7 +42,7 @@ fn write_evidence(run: &Run) -> Result<()> {
     let first = run.labelled(EpochId::REFERENCE)?;
     let windows = windows(&first.stones, &run.outlined()?.outlines);
     for epoch in context.project.epochs.ids() {
-        let (photos, labelled) = (run.segmented(epoch)?, run.labelled(epoch)?);
+        let (photos, labelled) = (run.posed(epoch)?, run.labelled(epoch)?);
         let measured = match epoch.is_reference() {
             true => None,
             false => Some(run.measured(epoch)?),

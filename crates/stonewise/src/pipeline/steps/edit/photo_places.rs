@@ -57,7 +57,7 @@ pub(super) fn photo_places(
         let key = Key::new("edit-places", &(&shapes, wall), &[labelled.key.as_str()]);
         let step = context.step(&format!("edit-places-{id}"), key, |step, _| {
             let mut found: Vec<Places> = Vec::new();
-            let photos = run.segmented(id)?;
+            let photos = run.posed(id)?;
             for (_, edit) in &drawn {
                 found.push(carry(context, edit, wall, &photos, labelled)?);
             }

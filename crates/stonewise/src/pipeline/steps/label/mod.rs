@@ -13,6 +13,7 @@ use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::segment::{SEGMENT, Segmented};
 use crate::pipeline::until::Until;
+use crate::settings::Align;
 use crate::storage::step::{Key, StepDir};
 use batches::LabelBatches;
 pub use disk_labels::DiskLabels;
@@ -44,11 +45,24 @@ pub static LABEL: Step = Step {
     ..Step::PLAIN
 };
 
+/// Finds how a later epoch lies in the frame of the reference, where the project asks for it.
+pub static ALIGN: Step = Step {
+    name: "align",
+    words: |_| "alignment of",
+    about: About::Later,
+    needs: &[Need::reference(&LABEL), Need::same(&LABEL)],
+    wanted: |until| until >= Until::Labelled,
+    applies: |project, epoch| !epoch.is_reference() && project.settings.registration.align == Align::Stones,
+    cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
+    make: |run, epoch| run.frame(epoch).map(drop),
+    ..Step::PLAIN
+};
+
 /// Tabulates the stones of an epoch.
 pub static STONES: Step = Step {
     name: "stones",
     about: About::Epoch,
-    needs: &[Need::same(&LABEL)],
+    needs: &[Need::same(&LABEL), Need::same(&ALIGN)],
     wanted: |until| until >= Until::Labelled,
     cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
     make: |run, epoch| run.found(epoch).map(drop),
@@ -75,14 +89,32 @@ impl Run<'_> {
     /// The stones of an epoch as its photos show them.
     pub fn found(&self, epoch: EpochId) -> Result<Arc<Labelled>> {
         self.once(&STONES, epoch, || {
-            let step = StepDir::clone(&*self.voted(epoch)?);
-            let labels = Labels {
-                transfer: read_json(&step.file(TRANSFER))?,
-                store: DiskLabels::new(step.path(), &self.ingested(epoch)?.tiles.surveyed),
-                step,
-            };
+            let labels = self.votes(epoch)?;
             tabulate(self, epoch, "stones", labels)
         })
+    }
+
+    fn votes(&self, epoch: EpochId) -> Result<Labels> {
+        let step = StepDir::clone(&*self.voted(epoch)?);
+        Ok(Labels {
+            transfer: read_json(&step.file(TRANSFER))?,
+            store: DiskLabels::new(step.path(), &self.ingested(epoch)?.tiles.surveyed),
+            step,
+        })
+    }
+
+    /// The key of an epoch's votes, and the stones that they make in the frame of its own files.
+    pub(super) fn found_in_own_frame(&self, epoch: EpochId) -> Result<(Key, Vec<Stone>)> {
+        let (labels, ingested) = (self.votes(epoch)?, self.ingested(epoch)?);
+        let stones = build_stones(
+            &ingested.tiles.surveyed,
+            &labels.store,
+            &self.segmented(epoch)?.views,
+            &labels.transfer.stones,
+            &self.context.project.settings.stones,
+            self.context.progress,
+        )?;
+        Ok((labels.step.key().clone(), stones))
     }
 }
 
@@ -182,7 +214,7 @@ pub(super) struct Labels {
 
 /// Tabulates the stones of an epoch in a step of this name; then moves the points, where the project says so.
 pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) -> Result<Labelled> {
-    let (context, ingested, photos) = (run.context, run.ingested(epoch)?, run.segmented(epoch)?);
+    let (context, ingested, photos) = (run.context, run.placed(epoch)?, run.posed(epoch)?);
     let Labels {
         transfer,
         store,
@@ -191,7 +223,7 @@ pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) ->
     let params = &context.project.settings.stones;
     let key = Key::new(
         "stones",
-        &(params, &ingested.tiles.motion),
+        &(params, &ingested.tiles.motion, run.frame(epoch)?),
         &[labelled.key().as_str()],
     );
     let step = context.step(&format!("{name}-{epoch}"), key, |step, _| {

@@ -3,13 +3,14 @@
 use super::Registered;
 use crate::project::Project;
 use crate::results::records::{Datum, DatumState, SourceError};
+use crate::settings::Align;
 use crate::texts::notices::{
-    DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
+    DATUM_ALIGNED, DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
 };
-use nalgebra::{Matrix6, Point3};
+use nalgebra::Matrix6;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::registration::observers::{self, EpochErrors};
-use stonewise_core::stone::Stone;
+use stonewise_core::stone::{Stone, middle};
 
 /// The registration error of a later epoch, from the first of these that there is: stable areas, the error
 /// that the project states, differences between the sources of each epoch.
@@ -44,6 +45,9 @@ fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, st
         return known(DatumState::Stable, errors, note);
     }
     let centre = middle(stones);
+    if project.settings.registration.align == Align::Stones {
+        return Datum::unknown(&centre, DATUM_ALIGNED.say(&[]));
+    }
     if let Some(error_m) = project.settings.registration.epoch_error_m {
         // Both epochs carry the error of their registration.
         let variance = 2.0 * error_m * error_m;
@@ -61,9 +65,4 @@ fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, st
         return known(DatumState::Sources, errors, note);
     }
     Datum::unknown(&centre, REGISTRATION_UNKNOWN.say(&[]))
-}
-
-fn middle(stones: &[Stone]) -> Point3<f64> {
-    let sum: nalgebra::Vector3<f64> = stones.iter().map(|s| s.centroid.coords).sum();
-    Point3::from(sum / stones.len().max(1) as f64)
 }

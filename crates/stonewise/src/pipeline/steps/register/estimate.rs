@@ -1,10 +1,9 @@
 //! The motions of matched stones, by the estimator of the project.
 
 use super::pairs::DiskPairs;
-use super::photos::DiskPhotos;
+use super::photos::{DiskPhotos, tracks_photos};
 use super::registered::Registered;
 use super::tracked;
-use super::tracks_photos;
 use super::windows::align_windows;
 use crate::error::{Error, Result};
 use crate::pipeline::graph::Run;
@@ -56,7 +55,7 @@ fn adjust(
     let pairs = DiskPairs::gather(labelled, matches, params.border_noises, step, context.progress)?;
     let photos = match tracks_photos(context.project, later) {
         true => {
-            let photos = Pair::new(run.segmented(EpochId::REFERENCE)?, run.segmented(later)?);
+            let photos = Pair::new(run.posed(EpochId::REFERENCE)?, run.posed(later)?);
             let photos = photos.each_ref().map(|p| &**p);
             DiskPhotos::gather(context, photos, labelled, &pairs, step, warnings)?
         }

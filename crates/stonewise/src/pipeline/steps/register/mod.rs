@@ -20,13 +20,13 @@ use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::steps::label::Labelled;
 use crate::pipeline::steps::r#match::MATCH;
 use crate::pipeline::until::Until;
-use crate::project::Project;
 use crate::settings::Estimator;
 use crate::storage::step::Key;
 pub use datum::datum;
 use epoch_error::add_epoch_error;
 use estimate::estimate;
 pub use notices::note_registration;
+use photos::tracks_photos;
 pub use registered::Registered;
 use registered::STEP;
 use std::collections::BTreeSet;
@@ -98,13 +98,6 @@ fn register(run: &Run, later: EpochId, labelled: Pair<&Labelled>) -> Result<Regi
     })
 }
 
-/// Whether stones are tracked in photos of the reference and of a later epoch. Views of clouds measure nothing
-/// that the clouds do not.
-pub(super) fn tracks_photos(project: &Project, later: EpochId) -> bool {
-    let photographed = project.epochs.pair(later).map(|e| e.photos.is_some());
-    project.settings.registration.photos.enabled && photographed.into_array() == [true; 2]
-}
-
 /// What the step found, in its folder.
 const MOTIONS: &str = "motions.json";
 
@@ -114,7 +107,7 @@ fn key(run: &Run, later: EpochId, labelled: Pair<&Labelled>, matches: &[(StoneId
     let mut inputs = Vec::from(labelled.map(|l| l.key.as_str().to_owned()).into_array());
     if tracks_photos(project, later) {
         for epoch in [EpochId::REFERENCE, later] {
-            for photo in &run.segmented(epoch)?.photos {
+            for photo in &run.posed(epoch)?.photos {
                 inputs.push(run.context.digest(&photo.path)?);
             }
         }

@@ -15,13 +15,20 @@ use crate::warnings::Warnings;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use stonewise_core::epoch::Pair;
+use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::evaluate::SeenBeforeMotion;
 use stonewise_core::geometry::{Bounds, FaceFrame, View};
 use stonewise_core::raster::RgbImage;
 use stonewise_core::registration::PairSource;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoCamera, PhotoParams, PhotoSource};
 use stonewise_io::image_io::read_rgb;
+
+/// Whether stones are tracked in photos of the reference and of a later epoch. Views of clouds measure nothing
+/// that the clouds do not.
+pub(super) fn tracks_photos(project: &Project, later: EpochId) -> bool {
+    let photographed = project.epochs.pair(later).map(|e| e.photos.is_some());
+    project.settings.registration.photos.enabled && photographed.into_array() == [true; 2]
+}
 
 /// Largest tangent of the angle between a photo's ray and the face's normal: beyond 63 degrees a stone shows
 /// its joints.
