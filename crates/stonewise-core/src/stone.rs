@@ -116,7 +116,7 @@ pub struct PairResult {
     /// Its partner in the second.
     pub second: StoneId,
     /// The part of the wall, joined by ties between neighbours, that the stone belongs to: 1 the largest, 0
-    /// where the estimator knows no parts.
+    /// where the estimator forms no parts.
     #[serde(default)]
     pub body: u32,
     /// The motion.

@@ -1,8 +1,8 @@
 //! Panels: masks that are fields of a door, a shutter or a grille instead of stones.
 //!
-//! A detector that knows stones takes framed fields for them. Two things together tell them apart: what was made
-//! in one piece stands back from the masonry all around it, and its fields have the same relief, while no two
-//! stones are alike. Neither is enough: walls have niches, and some ashlar was dressed to a pattern.
+//! The detector was trained on stones and reports framed fields as such. Two things together tell them apart: what
+//! was made in one piece stands back from the masonry all around it, and its fields have the same relief, while no
+//! two stones are alike. Neither is enough: walls have niches, and some ashlar was dressed to a pattern.
 
 use crate::cloud::GridIndex;
 use crate::geometry::{Bounds, FaceFrame};

@@ -274,7 +274,7 @@ impl Adjustment {
 
     /// Motions from which a stone is sought: its own, then those that in the face are the motion of its
     /// surroundings, of the wall as a whole and of the masks' centroids, each unless a search from one before
-    /// reaches it. Out of the face the clouds know where it is.
+    /// reaches it. Out of the face the clouds alone measure it.
     fn starts(&self, i: usize, surroundings: [Vector3<f64>; 2], search_m: f64) -> Vec<FaceMotion> {
         let frame = &self.prior.graph.nodes[i].face_from_world;
         let own = self.face_motion(i);
