@@ -8,12 +8,13 @@
 //! A module uses only those before it, and those in braces never each other:
 //!
 //! ```text
-//! id < epoch < statistics < linalg < progress < parallel < geometry < raster < cloud < stone
+//! id < epoch < statistics < linalg < components < progress < parallel < geometry < raster < cloud < stone
 //!    < surface < {transfer | matching | registration | change | views} < evaluate
 //! ```
 
 pub mod change;
 pub mod cloud;
+mod components;
 pub mod epoch;
 pub mod evaluate;
 pub mod geometry;

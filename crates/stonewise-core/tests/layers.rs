@@ -3,7 +3,15 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 8] = [
-    &["id", "epoch", "statistics", "linalg", "progress", "parallel"],
+    &[
+        "id",
+        "epoch",
+        "statistics",
+        "linalg",
+        "components",
+        "progress",
+        "parallel",
+    ],
     &["geometry"],
     &["raster"],
     &["cloud"],

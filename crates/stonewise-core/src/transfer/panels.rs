@@ -5,6 +5,7 @@
 //! two stones are alike. Neither is enough: walls have niches, and some ashlar was dressed to a pattern.
 
 use crate::cloud::GridIndex;
+use crate::components::components;
 use crate::geometry::{Bounds, FaceFrame};
 use crate::id::StoneId;
 use crate::stone::Stone;
@@ -113,8 +114,6 @@ fn leaves(stones: &[Stone], near: &[Vec<usize>]) -> Vec<Vec<usize>> {
             && a.normal.dot(&b.normal) > SAME_TURN
             && apart.dot(&a.normal).abs().max(apart.dot(&b.normal).abs()) < SAME_PLANE_M
     };
-    let mut leaves = Vec::new();
-    let mut is_taken = vec![false; stones.len()];
     let mut next: Vec<Vec<usize>> = vec![Vec::new(); stones.len()];
     for (i, near) in near.iter().enumerate() {
         for &j in near.iter().filter(|j| is_joined(i, **j)) {
@@ -122,25 +121,8 @@ fn leaves(stones: &[Stone], near: &[Vec<usize>]) -> Vec<Vec<usize>> {
             next[j].push(i);
         }
     }
-    for start in 0..stones.len() {
-        if is_taken[start] {
-            continue;
-        }
-        is_taken[start] = true;
-        let mut leaf = vec![start];
-        let mut done = 0;
-        while done < leaf.len() {
-            for &j in &next[leaf[done]] {
-                if !std::mem::replace(&mut is_taken[j], true) {
-                    leaf.push(j);
-                }
-            }
-            done += 1;
-        }
-        if leaf.len() >= LEAST_FIELDS {
-            leaves.push(leaf);
-        }
-    }
+    let mut leaves = components(&next);
+    leaves.retain(|leaf| leaf.len() >= LEAST_FIELDS);
     leaves
 }
 

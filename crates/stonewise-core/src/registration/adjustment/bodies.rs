@@ -5,6 +5,7 @@
 
 use super::breaks::BROKEN;
 use super::state::Adjustment;
+use crate::components::components;
 use crate::geometry::{DisplacementSample, SmallMotion};
 use crate::stone::{MotionFailure, PairResult, StoneMotion};
 use nalgebra::{Matrix3, Vector3};
@@ -34,27 +35,9 @@ pub(crate) fn bodies(adjustment: &Adjustment) -> Vec<u32> {
             next[edge.high].push(edge.low);
         }
     }
-    let mut parts: Vec<Vec<usize>> = Vec::new();
-    let mut is_reached = vec![false; next.len()];
-    for start in 0..next.len() {
-        if is_reached[start] {
-            continue;
-        }
-        is_reached[start] = true;
-        let mut part = vec![start];
-        let mut done = 0;
-        while done < part.len() {
-            for &j in &next[part[done]] {
-                if !is_reached[j] {
-                    is_reached[j] = true;
-                    part.push(j);
-                }
-            }
-            done += 1;
-        }
-        parts.push(part);
-    }
-    parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part.iter().min().copied()));
+    let mut parts = components(&next);
+    // Of equally large ones the one with the lowest stone stays first.
+    parts.sort_by_key(|part| std::cmp::Reverse(part.len()));
     let mut body = vec![0; next.len()];
     for (number, part) in (1..).zip(&parts) {
         for &i in part {
