@@ -67,17 +67,18 @@ impl Run<'_> {
 
 fn aligned(run: &Run, later: EpochId) -> Result<Alignment> {
     let context = run.context;
-    let [(first_key, first), (second_key, second)] = [
-        run.found_in_own_frame(EpochId::REFERENCE)?,
-        run.found_in_own_frame(later)?,
-    ];
+    let [first_votes, second_votes] = [run.voted(EpochId::REFERENCE)?, run.voted(later)?];
     let key = Key::new(
         "align",
         &context.project.settings.stones,
-        &[first_key.as_str(), second_key.as_str()],
+        &[first_votes.key().as_str(), second_votes.key().as_str()],
     );
     let step = context.step(&format!("align-{later}"), key, |step, warnings| {
         let names = context.project.epochs.pair(later).map(|e| &e.name);
+        let [first, second] = [
+            run.found_in_own_frame(EpochId::REFERENCE)?,
+            run.found_in_own_frame(later)?,
+        ];
         let alignment = align_stones(&first, &second).map_err(|reason| {
             Error::Survey(format!(
                 "the stones of epoch {:?} do not show how it lies in the frame of {:?}: {reason}",
