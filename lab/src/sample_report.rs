@@ -23,6 +23,8 @@ use stonewise::results::{
     crop_side_px, detection_limit_m, most_pictured, track_side_px, write_cameras, write_crops,
     write_outlines, write_sections, write_stones, write_thin_cloud, write_tracks,
 };
+use stonewise_base::messages::Said;
+use stonewise_base::messages::notices::DATUM_STABLE;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::registration::photos::FacePictures;
 use stonewise_core::registration::{FaceShift, PhotoShift, StoneEvidence};
@@ -364,14 +366,12 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         stones: 200,
     };
     let datum = match case {
-        "unknown" => Datum::unknown(&Point3::origin(), "unknown".to_owned()),
+        "unknown" => Datum::unknown(&Point3::origin(), "unknown"),
         _ => Datum::known(
             DatumState::Stable,
             &Point3::origin(),
             &Matrix6::from_diagonal_element(1e-10),
-            "the stable areas show a registration error of 0.20 mm at the middle of the wall: it is taken off the \
-             motions, and what stays uncertain of it is in limits and intervals"
-                .to_owned(),
+            DATUM_STABLE.say(&[("error_mm", Said::numbers("0.20".to_owned()))]),
         ),
     };
     let run = RunRecord {
@@ -403,6 +403,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
             step: "segment".to_owned(),
             subject: "<script>.jpg".to_owned(),
             message: "cut off: \"'&".to_owned(),
+            german: None,
             skipped_input: true,
             doubt: false,
         }],

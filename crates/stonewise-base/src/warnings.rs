@@ -1,5 +1,7 @@
 //! What went wrong without stopping the run.
 
+use crate::messages::Said;
+use crate::report_params::Language;
 use serde::{Deserialize, Serialize};
 use std::sync::{Mutex, PoisonError};
 
@@ -12,6 +14,9 @@ pub struct Warning {
     pub subject: String,
     /// What happened, and what to do about it.
     pub message: String,
+    /// The message in German; in a record, only where its report is in German and there are German words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub german: Option<String>,
     /// An input of the project was left out: the run ends with exit code 3.
     pub skipped_input: bool,
     /// The results as a whole cannot be relied on: the run ends with exit code 3, and says so before anything
@@ -24,37 +29,39 @@ pub struct Warning {
 #[derive(Default)]
 pub struct Warnings(Mutex<Vec<Warning>>);
 
-impl Warnings {
-    /// Something worth knowing that left nothing out.
-    pub fn notice(&self, step: &str, subject: impl Into<String>, message: impl Into<String>) {
-        self.push(Warning {
+impl Warning {
+    fn new(step: &str, subject: impl Into<String>, message: impl Into<Said>) -> Self {
+        let message = message.into();
+        Self {
             step: step.into(),
             subject: subject.into(),
-            message: message.into(),
+            message: message.english,
+            german: message.german,
             skipped_input: false,
             doubt: false,
-        });
+        }
+    }
+}
+
+impl Warnings {
+    /// Something worth knowing that left nothing out.
+    pub fn notice(&self, step: &str, subject: impl Into<String>, message: impl Into<Said>) {
+        self.push(Warning::new(step, subject, message));
     }
 
     /// An input was left out.
-    pub fn skipped(&self, step: &str, subject: impl Into<String>, message: impl Into<String>) {
+    pub fn skipped(&self, step: &str, subject: impl Into<String>, message: impl Into<Said>) {
         self.push(Warning {
-            step: step.into(),
-            subject: subject.into(),
-            message: message.into(),
             skipped_input: true,
-            doubt: false,
+            ..Warning::new(step, subject, message)
         });
     }
 
     /// The results as a whole cannot be relied on.
-    pub fn doubt(&self, step: &str, subject: impl Into<String>, message: impl Into<String>) {
+    pub fn doubt(&self, step: &str, subject: impl Into<String>, message: impl Into<Said>) {
         self.push(Warning {
-            step: step.into(),
-            subject: subject.into(),
-            message: message.into(),
-            skipped_input: false,
             doubt: true,
+            ..Warning::new(step, subject, message)
         });
     }
 
@@ -64,6 +71,15 @@ impl Warnings {
         if !all.contains(&warning) {
             all.push(warning);
         }
+    }
+
+    /// The sorted warnings as the record of a run keeps them whose report is in this language.
+    pub fn recorded(&self, language: Language) -> Vec<Warning> {
+        let recorded = |warning: Warning| Warning {
+            german: Said::german_in(warning.german, language),
+            ..warning
+        };
+        self.sorted().into_iter().map(recorded).collect()
     }
 
     /// All warnings so far, sorted, so that their order does not depend on threads.

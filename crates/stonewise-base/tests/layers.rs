@@ -3,9 +3,9 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 4] = [
-    &["report_params", "stable", "thresholds", "warnings"],
+    &["report_params", "stable", "thresholds"],
     &["error", "messages", "settings"],
-    &["address_space", "files", "limits", "part"],
+    &["address_space", "files", "limits", "part", "warnings"],
     &["parameters"],
 ];
 

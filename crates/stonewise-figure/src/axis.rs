@@ -11,6 +11,8 @@ pub struct Axis {
     pub range: [f64; 2],
     /// Whether equal steps are equal ratios.
     pub logarithmic: bool,
+    /// What stands before the decimals of its numbers.
+    pub decimal: &'static str,
 }
 
 impl Axis {
@@ -26,6 +28,7 @@ impl Axis {
             label: label.to_owned(),
             range,
             logarithmic: false,
+            decimal: ".",
         }
     }
 
@@ -63,6 +66,7 @@ impl Axis {
             label: label.to_owned(),
             range,
             logarithmic: true,
+            decimal: ".",
         }
     }
 
@@ -83,14 +87,17 @@ impl Axis {
 
     /// Round values with their texts, about `wanted` of them.
     pub fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
-        if self.logarithmic {
+        let ticks = if self.logarithmic {
             self.decade_ticks(wanted)
         } else {
             self.even_ticks(wanted)
-        }
+        };
+        let text = |(value, decimals)| (value, number(value, decimals).replace('.', self.decimal));
+        ticks.into_iter().map(text).collect()
     }
 
-    fn even_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+    /// Values and how many decimals they need.
+    fn even_ticks(&self, wanted: usize) -> Vec<(f64, usize)> {
         let [low, high] = self.range;
         let step = nice_above((high - low) / wanted.max(1) as f64);
         let (first, last) = (
@@ -98,11 +105,10 @@ impl Axis {
             (high / step + 1e-9).floor() as i64,
         );
         let decimals = decimals_of(step);
-        let tick = |i: i64| (i as f64 * step, number(i as f64 * step, decimals));
-        (first..=last).map(tick).collect()
+        (first..=last).map(|i| (i as f64 * step, decimals)).collect()
     }
 
-    fn decade_ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+    fn decade_ticks(&self, wanted: usize) -> Vec<(f64, usize)> {
         let [low, high] = self.range;
         let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
         let with = |factors: &[f64]| {
@@ -119,10 +125,7 @@ impl Axis {
         };
         chosen
             .into_iter()
-            .map(|v| {
-                let decimals = (-v.log10() - 1e-9).ceil().max(0.0) as usize;
-                (v, number(v, decimals))
-            })
+            .map(|v| (v, (-v.log10() - 1e-9).ceil().max(0.0) as usize))
             .collect()
     }
 }
@@ -167,7 +170,10 @@ mod tests {
         );
         assert_eq!(texts(&Axis::linear("", [-3.0, 12.0]), 3), ["0", "5", "10"]);
         assert_eq!(texts(&Axis::linear("", [-1.0, 4.2]), 5), ["0", "2", "4"]);
-        assert_eq!(texts(&Axis::linear("", [0.0, 0.5]), 2), ["0.00", "0.25", "0.50"]);
+        let mut fine = Axis::linear("", [0.0, 0.5]);
+        assert_eq!(texts(&fine, 2), ["0.00", "0.25", "0.50"]);
+        fine.decimal = ",";
+        assert_eq!(texts(&fine, 2), ["0,00", "0,25", "0,50"]);
         assert_eq!(texts(&Axis::linear("", [f64::NAN, 1.0]), 1), ["0", "1"]);
         let decades = Axis::decades("", [0.05, 30.0]);
         assert_eq!(texts(&decades, 4), ["0.1", "1", "10"]);

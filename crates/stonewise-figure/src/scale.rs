@@ -61,11 +61,9 @@ impl Scale {
         (first..=STEPS).map(|step| self.colour(step)).collect()
     }
 
-    /// An upright bar with ticks in thousandths, which `unit` names; needs 55 pixels to the right.
-    pub fn draw_bar(self, out: &mut String, unit: &str, [left, top, height]: [f64; 3]) {
-        let (low, high) = self.range_m();
-        let axis = Axis::linear(unit, [low * 1e3, high * 1e3]);
-        colour_bar(out, [left, top, height], &self.colours(), &axis);
+    /// An upright bar whose `axis` runs over [`Self::range_m`] in any unit, see [`colour_bar`].
+    pub fn draw_bar(self, out: &mut String, axis: &Axis, place: [f64; 3]) {
+        colour_bar(out, place, &self.colours(), axis);
     }
 }
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
 use stonewise_core::id::ImageId;
-use stonewise_io::cameras::{CameraError, CameraFile, read_cameras, write_colmap, write_metashape};
+use stonewise_io::cameras::{CameraError, CameraFile, Remark, read_cameras, write_colmap, write_metashape};
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -58,10 +58,10 @@ fn metashape_puts_points_where_its_formulae_do() {
     assert_pixels(&file, &expected("metashape"));
     let names: Vec<&str> = file.views.iter().map(|v| v.name.as_str()).collect();
     assert_eq!(names, ["DJI_0001", "DJI_0002.v2", "DJI_0003", "DJI & 4"]);
-    let skipped = [("unaligned", "not aligned"), ("off", "disabled in Metashape")];
-    let skipped = skipped.map(|(name, reason)| (name.to_owned(), reason.to_owned()));
+    let skipped = [("unaligned", Remark::NotAligned), ("off", Remark::Disabled)];
+    let skipped = skipped.map(|(name, reason)| (name.to_owned(), reason));
     assert_eq!(file.skipped, skipped);
-    assert_eq!(file.warnings, ["chunk old try is disabled and was not read"]);
+    assert_eq!(file.warnings, [Remark::ChunkDisabled("old try".to_owned())]);
     assert!(file.crs.unwrap().starts_with("LOCAL_CS"));
 }
 
@@ -75,7 +75,7 @@ fn metashape_says_that_a_shutter_is_rolling() {
         std::fs::write(&path, text).unwrap();
         let file = read_cameras(&path).unwrap();
         assert_eq!(file.rolling_shutter, says);
-        let warned = file.warnings.iter().any(|w| w.contains("rolling shutter"));
+        let warned = file.warnings.contains(&Remark::RollingShutter);
         assert_eq!(warned, says, "{:?}", file.warnings);
     }
 }

@@ -7,7 +7,7 @@
 )]
 
 use nalgebra::Point3;
-use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
+use stonewise_io::cameras::{CameraFile, Remark, find_photos, read_cameras};
 use stonewise_testing::survey;
 
 /// Largest distance, pixels, between where two files put the same points.
@@ -80,7 +80,7 @@ fn dam_metashape_and_colmap_agree_and_the_unaligned_camera_is_named() {
                 metashape
                     .skipped
                     .iter()
-                    .all(|(_, reason)| reason == "not aligned")
+                    .all(|(_, reason)| *reason == Remark::NotAligned)
             );
             assert_eq!(metashape.skipped.len(), 1);
             let photos = find_photos(&folder.join(epoch).join("images"), &metashape).unwrap();

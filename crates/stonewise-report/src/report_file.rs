@@ -186,6 +186,7 @@ mod tests {
             step: "label".to_owned(),
             subject: "<script>.jpg".to_owned(),
             message: "'&'".to_owned(),
+            german: None,
             skipped_input: true,
             doubt: false,
         }];

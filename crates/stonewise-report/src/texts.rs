@@ -7,7 +7,7 @@ pub(crate) use report::{
 };
 pub(crate) use stonewise_base::messages::fill;
 use stonewise_base::report_params::Language;
-use stonewise_figure::{count, mm, number, percent};
+use stonewise_figure::{Axis, count, mm, number, percent};
 use stonewise_results::Status;
 use stonewise_results::records::State;
 
@@ -604,6 +604,14 @@ impl Texts {
     /// A share as a percentage.
     pub(crate) fn percent(&self, part: usize, whole: usize) -> String {
         percent(part, whole).replace('.', self.decimal)
+    }
+
+    /// A linear axis whose numbers are written as in this language.
+    pub(crate) fn axis(&self, label: &str, range: [f64; 2]) -> Axis {
+        Axis {
+            decimal: self.decimal,
+            ..Axis::linear(label, range)
+        }
     }
 
     /// A threshold in millimetres, as short as it can be.

@@ -61,12 +61,12 @@ messages! {
             geschnitten, auf ihre Bewegungen ist kein Verlass. {cause}";
 
         MISREGISTERED_EPOCH:
-            "{cells} pieces of plane surfaces off the wall appear shifted by {shown} mm (x, y, z) against the first epoch. The stations \
-            and strips alone give a shift of {found} mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
+            "{cells} pieces of plane surfaces off the wall appear shifted by ({shown}) mm (x, y, z) against the first epoch. The stations \
+            and strips alone give a shift of ({found}) mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
             motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
             [[registration.stable]]. If they did move, state the registration error as epoch_error_m",
-            "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um {shown} mm (x, y, z) verschoben. Aus \
-            den Standpunkten und Streifen allein folgt eine Verschiebung von {found} mm mit einer Standardabweichung von {sd} mm. \
+            "{cells} ebene Flächenstücke neben der Mauer erscheinen gegenüber der ersten Epoche um ({shown}) mm (x, y, z) verschoben. Aus \
+            den Standpunkten und Streifen allein folgt eine Verschiebung von ({found}) mm mit einer Standardabweichung von {sd} mm. \
             Haben sich diese Flächen nicht bewegt, so sind alle Bewegungen um den Unterschied falsch: die Flächen mit auto_stable = true \
             verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
             epoch_error_m angeben";

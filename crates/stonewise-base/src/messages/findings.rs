@@ -22,9 +22,9 @@ messages! {
              Koordinaten in Metern ausgeben";
         SYSTEMS: "the clouds are in different systems, {systems}: transform them to one",
             "die Punktwolken liegen in verschiedenen Systemen, {systems}: sie in eines umrechnen";
-        NO_OVERLAP: "the clouds do not overlap those of {first}: they reach from {low} to {high} m, {first} from {first_low} to {first_high} m; \
+        NO_OVERLAP: "the clouds do not overlap those of {first}: they reach from [{low}] to [{high}] m, {first} from [{first_low}] to [{first_high}] m; \
                      bring both into one frame, or let a run do so by their stones (registration.align = \"stones\")",
-            "die Punktwolken überlappen die von {first} nicht: sie reichen von {low} bis {high} m, {first} von {first_low} bis {first_high} m; \
+            "die Punktwolken überlappen die von {first} nicht: sie reichen von [{low}] bis [{high}] m, {first} von [{first_low}] bis [{first_high}] m; \
              beide in ein System bringen, oder einen Lauf das anhand der Steine tun lassen (registration.align = \"stones\")";
         LITTLE_OVERLAP: "{share} % of the smaller epoch with {first}: are both in one frame? If not, \
                          registration.align = \"stones\" brings them together by their stones",

@@ -1,5 +1,6 @@
-//! A sentence that a run says in English and a report in its own language.
+//! A sentence with words left open, in both languages.
 
+use super::Said;
 use super::braces::fill;
 
 /// A sentence in both languages; words in braces are filled in.
@@ -12,14 +13,25 @@ pub struct Message {
 }
 
 impl Message {
-    /// The sentence as a run says it.
-    pub fn say(&self, values: &[(&str, &str)]) -> String {
-        fill(self.english, values)
+    /// The sentence with these values: names and counts as they are ([`Said::from`]), numbers with decimals
+    /// ([`Said::numbers`]), other messages.
+    pub fn say(&self, values: &[(&str, Said)]) -> Said {
+        let english: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, &*v.english)).collect();
+        let german: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, v.in_german())).collect();
+        Said {
+            english: fill(self.english, &english),
+            german: Some(fill(self.german, &german)),
+        }
     }
 }
 
-/// Declares messages and the list of all of them: a name, the English and the German text of each. Of two that
-/// fit the same words the more particular one comes first.
+impl From<&Message> for Said {
+    fn from(message: &Message) -> Self {
+        message.say(&[])
+    }
+}
+
+/// Declares messages and, for tests, the list of all of them: a name, the English and the German text of each.
 macro_rules! messages {
     ($all:ident { $($name:ident: $english:expr, $german:expr;)* }) => {
         $(
@@ -27,7 +39,62 @@ macro_rules! messages {
             pub static $name: Message = Message { english: $english, german: $german };
         )*
 
+        #[cfg(test)]
         pub(super) static $all: &[&Message] = &[$(&$name),*];
     };
 }
 pub(super) use messages;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::messages::{doubts::DOUBTS, findings::FINDINGS, notices::NOTICES};
+    use std::collections::BTreeSet;
+
+    fn braces(text: &str) -> BTreeSet<&str> {
+        text.split('{')
+            .skip(1)
+            .filter_map(|t| Some(t.split_once('}')?.0))
+            .collect()
+    }
+
+    #[test]
+    fn both_languages_leave_the_same_words_open_and_differ() {
+        for message in [DOUBTS, FINDINGS, NOTICES].concat() {
+            assert_eq!(
+                braces(message.english),
+                braces(message.german),
+                "{}",
+                message.english
+            );
+            assert_ne!(message.english, message.german);
+        }
+    }
+
+    #[test]
+    fn numbers_and_sentences_are_those_of_the_language() {
+        let message = Message {
+            english: "{share} % of {file} are in {unit} at ({place})",
+            german: "{share} % von {file} sind in {unit} bei ({place})",
+        };
+        let feet = Message {
+            english: "feet",
+            german: "Fuß",
+        };
+        let said = message.say(&[
+            ("share", Said::numbers("2.5".to_owned())),
+            ("file", "a.laz".into()),
+            ("unit", Said::from(&feet)),
+            ("place", Said::list(&["1.0".to_owned(), "-2.0".to_owned()])),
+        ]);
+        assert_eq!(said.english, "2.5 % of a.laz are in feet at (1.0, -2.0)");
+        let german = "2,5 % von a.laz sind in Fuß bei (1,0; -2,0)";
+        assert_eq!(said.german.as_deref(), Some(german));
+        let units = Said::from("units");
+        assert_eq!(Said::about(&units, &said).german, None);
+        assert_eq!(
+            Said::about(&Said::from(&feet), &said).german,
+            Some(format!("Fuß: {german}"))
+        );
+    }
+}

@@ -5,7 +5,8 @@ mod doubts;
 pub mod findings;
 mod message;
 pub mod notices;
-mod translation;
+mod remarks;
+mod said;
 
 pub use braces::fill;
 pub use doubts::{
@@ -13,4 +14,4 @@ pub use doubts::{
     NOT_CONVERGED, SIDE_UNSURE, STRETCHED, TORN, TURNED,
 };
 pub use message::Message;
-pub use translation::message_in;
+pub use said::Said;

@@ -136,15 +136,6 @@ messages! {
             "camera not used: {reason}",
             "Kamera nicht verwendet: {reason}";
 
-        // Reasons as `stonewise-io` gives them.
-        NOT_ALIGNED:
-            "not aligned",
-            "nicht ausgerichtet";
-
-        DISABLED:
-            "disabled in Metashape",
-            "in Metashape abgeschaltet";
-
         PHOTO_NOT_TRACKED:
             "{error}: it does not help to measure stones",
             "{error}: es hilft nicht, Steine zu messen";
@@ -156,26 +147,5 @@ messages! {
         PHOTO_SIZE:
             "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: give the photo as it was posed",
             "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: das Foto so geben, wie es orientiert wurde";
-
-        // What `stonewise-io` notes about a camera file.
-        SMALLER_RECONSTRUCTION:
-            "in a separate, smaller reconstruction",
-            "in einer getrennten, kleineren Rekonstruktion";
-
-        SEVERAL_RECONSTRUCTIONS:
-            "{n} reconstructions in the file; only the largest was read",
-            "{n} Rekonstruktionen in der Datei; nur die größte wurde gelesen";
-
-        CHUNK_DISABLED:
-            "chunk {chunk} is disabled and was not read",
-            "Chunk {chunk} ist abgeschaltet und wurde nicht gelesen";
-
-        CHUNK_NOT_READ:
-            "chunk {chunk} was not read, only {used}, the first with aligned cameras",
-            "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras";
-
-        ROLLING_SHUTTER:
-            "the camera's rolling shutter is not corrected when stones are transferred from photos to clouds: points may be assigned to places a few pixels off in the photo",
-            "der Rolling Shutter der Kamera wird nicht korrigiert, wenn Steine aus den Fotos in die Punktwolken übertragen werden: Punkte können im Foto um einige Pixel versetzt liegen";
     }
 }

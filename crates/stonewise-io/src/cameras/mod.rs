@@ -12,6 +12,7 @@ mod metashape;
 mod opensfm;
 mod photos;
 mod read;
+mod remark;
 mod xml;
 
 pub use camera_file::CameraFile;
@@ -21,5 +22,6 @@ pub use map_frame::MapFrame;
 pub use metashape::write_metashape;
 pub use photos::{Photos, find_photos};
 pub use read::{read_cameras, read_cameras_on_map};
+pub use remark::Remark;
 
 use error::{malformed, read_text};

@@ -4,7 +4,7 @@
 //! of the longer image side, the principal point counted from the image centre (OpenSfM documentation,
 //! "Coordinate Systems").
 
-use super::{CameraError, CameraFile, malformed, read_text};
+use super::{CameraError, CameraFile, Remark, malformed, read_text};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -48,17 +48,15 @@ pub fn read(path: &Path) -> Result<CameraFile, CameraError> {
         if Some(index) == largest {
             read_part(part, path, &mut file)?;
         } else {
-            let reason = "in a separate, smaller reconstruction";
-            let names = part.shots.keys().map(|name| (name.clone(), reason.to_owned()));
+            let names = part
+                .shots
+                .keys()
+                .map(|name| (name.clone(), Remark::SmallerReconstruction));
             file.skipped.extend(names);
         }
     }
     if parts.len() > 1 {
-        let warning = format!(
-            "{} reconstructions in the file; only the largest was read",
-            parts.len()
-        );
-        file.warnings.push(warning);
+        file.warnings.push(Remark::SeveralReconstructions(parts.len()));
     }
     Ok(file)
 }

@@ -11,6 +11,7 @@ use image::codecs::jpeg::JpegEncoder;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::path::Path;
 use stonewise_base::error::Result;
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{CAMERAS, NOT_SEEN};
 use stonewise_core::geometry::View;
 use stonewise_io::image_io::{image_size, read_rgb};
@@ -56,7 +57,7 @@ pub(super) fn look(
     survey: &Sample,
     depth: Depth,
 ) -> Result<(Vec<Finding>, Option<Picture>)> {
-    let finding = |verdict, text: String| vec![Finding::new(&epoch.name, CAMERAS.english, verdict, text)];
+    let finding = |verdict, text: Said| vec![Finding::new(&epoch.name, &CAMERAS, verdict, text)];
     let candidates = candidates(photos, survey);
     if candidates.is_empty() {
         // Points that were not read may be seen.
@@ -72,7 +73,7 @@ pub(super) fn look(
             1 => "1 photo sees the cloud".to_owned(),
             n => format!("{n} photos see the cloud"),
         };
-        return Ok((finding(Verdict::Fine, text), None));
+        return Ok((finding(Verdict::Fine, text.into()), None));
     }
     let compared: Vec<Compared> = candidates
         .into_iter()
@@ -83,10 +84,10 @@ pub(super) fn look(
         .max_by(|a, b| a.shift.clearness.total_cmp(&b.shift.clearness))
     else {
         let text = "too few points or no readable photo to compare";
-        return Ok((finding(Verdict::Note, text.to_owned()), None));
+        return Ok((finding(Verdict::Note, text.into()), None));
     };
     let (verdict, text) = judge(&compared, best);
-    Ok((finding(verdict, text), picture(epoch, best)))
+    Ok((finding(verdict, text.into()), picture(epoch, best)))
 }
 
 /// The photos that see most of the cloud, with a size that fits their cameras.

@@ -3,13 +3,13 @@
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::{Epoch, Project};
-use nalgebra::Vector3;
-use stonewise_base::messages::Message;
+use nalgebra::{Point3, Vector3};
 use stonewise_base::messages::findings::{
     CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
     NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS,
     THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
 };
+use stonewise_base::messages::{Message, Said};
 use stonewise_base::settings::Align;
 use stonewise_core::geometry::Bounds;
 use stonewise_io::crs::{Crs, is_in_feet};
@@ -52,7 +52,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         let Some(bounds) = bounds else { continue };
         let names = [project.epochs.reference().name.as_str(), epoch.name.as_str()];
         match unit_ratio(&first, bounds) {
-            Some(why) => found.push(Finding::new(names[1], UNITS.english, Verdict::Wrong, why)),
+            Some(why) => found.push(Finding::new(names[1], &UNITS, Verdict::Wrong, why)),
             None => found.push(overlap(names, &first, bounds)),
         }
     }
@@ -75,33 +75,37 @@ fn size(bounds: &Bounds) -> Vector3<f64> {
 
 fn extent(name: &str, survey: &Sample) -> Finding {
     let Some(bounds) = &survey.bounds else {
-        return Finding::new(name, EXTENT.english, Verdict::Wrong, NO_POINTS.say(&[]));
+        return Finding::new(name, &EXTENT, Verdict::Wrong, NO_POINTS.say(&[]));
     };
     let size = size(bounds);
     let [x, y, z] = [size.x, size.y, size.z].map(|m| format!("{m:.1}"));
     let points = survey.records.to_string();
-    let values = [("x", &*x), ("y", &*y), ("z", &*z), ("points", &*points)];
+    let values = [("x", &x), ("y", &y), ("z", &z)].map(|(name, m)| (name, Said::numbers(m.clone())));
+    let values = [values.as_slice(), &[("points", points.as_str().into())]].concat();
     let longest = size.max();
     let (verdict, text) = if longest > LONGEST_M {
         (Verdict::Wrong, TOO_LONG.say(&values))
     } else if longest < SMALLEST_M {
         (Verdict::Doubt, TOO_SMALL.say(&values))
     } else {
-        (Verdict::Fine, format!("{x} x {y} x {z} m, {points} points"))
+        (
+            Verdict::Fine,
+            format!("{x} x {y} x {z} m, {points} points").into(),
+        )
     };
-    Finding::new(name, EXTENT.english, verdict, text)
+    Finding::new(name, &EXTENT, verdict, text)
 }
 
 fn spacing(name: &str, survey: &Sample) -> Finding {
     let (verdict, text) = match survey.spacing_m {
-        Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m)),
+        Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m).into()),
         Some(m) => {
             let spacing = format!("{:.0}", 1e3 * m);
-            (Verdict::Doubt, SPACING_WIDE.say(&[("spacing", &*spacing)]))
+            (Verdict::Doubt, SPACING_WIDE.say(&[("spacing", spacing.into())]))
         }
         None => (Verdict::Doubt, SPACING_UNKNOWN.say(&[])),
     };
-    Finding::new(name, SPACING.english, verdict, text)
+    Finding::new(name, &SPACING, verdict, text)
 }
 
 /// A coordinate system whose unit is not the metre.
@@ -130,8 +134,8 @@ fn unit_of_system(name: &str, survey: &Sample) -> Option<Finding> {
         }
     };
     let unit: &Message = survey.crs.iter().flatten().filter_map(unit).next()?;
-    let text = SYSTEM_UNIT.say(&[("unit", unit.english)]);
-    Some(Finding::new(name, UNITS.english, Verdict::Wrong, text))
+    let text = SYSTEM_UNIT.say(&[("unit", unit.into())]);
+    Some(Finding::new(name, &UNITS, Verdict::Wrong, text))
 }
 
 /// One system for all clouds.
@@ -149,7 +153,7 @@ fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
             }
         }
     }
-    let topic = SYSTEM.english;
+    let topic = &SYSTEM;
     match codes.as_slice() {
         [] => Finding::new("", topic, Verdict::Fine, "none named: a local frame"),
         [(code, _)] if named == all => Finding::new("", topic, Verdict::Fine, format!("EPSG:{code}")),
@@ -163,14 +167,14 @@ fn systems(project: &Project, surveys: &[Option<Sample>]) -> Finding {
                 .iter()
                 .map(|(code, epoch)| format!("EPSG:{code} ({epoch})"))
                 .collect();
-            let text = SYSTEMS.say(&[("systems", &*list.join(", "))]);
+            let text = SYSTEMS.say(&[("systems", list.join(", ").into())]);
             Finding::new("", topic, Verdict::Wrong, text)
         }
     }
 }
 
 /// Says so where one epoch is as much larger than the other as one unit than another.
-fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<String> {
+fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<Said> {
     let mut axes: Vec<(f64, f64)> = size(first)
         .iter()
         .copied()
@@ -185,12 +189,12 @@ fn unit_ratio(first: &Bounds, second: &Bounds) -> Option<String> {
             () if near(*metres) => (&FIRST_EPOCH, *metres),
             () => return None,
         };
-        let [found, ratio] = [ratios[0], ratio].map(|r| format!("{r:.3}"));
+        let [found, ratio] = [ratios[0], ratio].map(|r| Said::numbers(format!("{r:.3}")));
         Some(UNIT_RATIO.say(&[
-            ("found", &*found),
-            ("ratio", &*ratio),
-            ("which", which.english),
-            ("unit", unit.english),
+            ("found", found),
+            ("ratio", ratio),
+            ("which", which.into()),
+            ("unit", (*unit).into()),
         ]))
     })
 }
@@ -202,15 +206,16 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
     });
     if shared.min() < 0.0 {
         let corners = [second.min, second.max, first.min, first.max];
-        let [low, high, first_low, first_high] = corners.map(|p| format!("{:.1?}", p.coords.as_slice()));
+        let place = |p: Point3<f64>| Said::list(&[p.x, p.y, p.z].map(|m| format!("{m:.1}")));
+        let [low, high, first_low, first_high] = corners.map(place);
         let text = NO_OVERLAP.say(&[
-            ("first", one),
-            ("low", &*low),
-            ("high", &*high),
-            ("first_low", &*first_low),
-            ("first_high", &*first_high),
+            ("first", one.into()),
+            ("low", low),
+            ("high", high),
+            ("first_low", first_low),
+            ("first_high", first_high),
         ]);
-        return Finding::new(other, OVERLAP.english, Verdict::Wrong, text);
+        return Finding::new(other, &OVERLAP, Verdict::Wrong, text);
     }
     // A wall is thin in one direction: the two longer ones count.
     let face = |v: Vector3<f64>| v.x * v.y + v.y * v.z + v.z * v.x;
@@ -224,14 +229,14 @@ fn overlap([one, other]: [&str; 2], first: &Bounds, second: &Bounds) -> Finding 
     let (verdict, text) = match share < LEAST_OVERLAP {
         true => (
             Verdict::Doubt,
-            LITTLE_OVERLAP.say(&[("share", &*percent), ("first", one)]),
+            LITTLE_OVERLAP.say(&[("share", percent.into()), ("first", one.into())]),
         ),
         false => (
             Verdict::Fine,
-            format!("{percent} % of the smaller epoch with {one}"),
+            format!("{percent} % of the smaller epoch with {one}").into(),
         ),
     };
-    Finding::new(other, OVERLAP.english, verdict, text)
+    Finding::new(other, &OVERLAP, verdict, text)
 }
 
 /// Two epochs that read the same cloud show no motion.
@@ -246,8 +251,8 @@ fn same_file(project: &Project) -> Option<Finding> {
             let files: Vec<_> = earlier.clouds.iter().map(canonical).collect();
             if let Some(twice) = epoch.clouds.iter().find(|c| files.contains(&canonical(c))) {
                 let (file, name) = (twice.display().to_string(), format!("{:?}", earlier.name));
-                let text = SAME_FILE.say(&[("file", &*file), ("first", &*name)]);
-                return Some(Finding::new(&epoch.name, CLOUDS.english, Verdict::Doubt, text));
+                let text = SAME_FILE.say(&[("file", file.into()), ("first", name.into())]);
+                return Some(Finding::new(&epoch.name, &CLOUDS, Verdict::Doubt, text));
             }
         }
     }
@@ -274,12 +279,14 @@ mod tests {
             assert!(
                 unit_ratio(&metres, &other)
                     .unwrap()
+                    .english
                     .contains(&format!("this epoch is in {name}")),
                 "{name}"
             );
             assert!(
                 unit_ratio(&other, &metres)
                     .unwrap()
+                    .english
                     .contains(&format!("first epoch is in {name}")),
                 "{name}"
             );

@@ -3,6 +3,7 @@
 use crate::Project;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
+use stonewise_base::messages::Said;
 
 /// What a finding means for a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -44,15 +45,28 @@ pub struct Finding {
     pub verdict: Verdict,
     /// What was seen, and what to do about it.
     pub text: String,
+    /// Topic and text in German, where there are German words.
+    german: Option<String>,
 }
 
 impl Finding {
-    pub(super) fn new(epoch: &str, topic: &str, verdict: Verdict, text: impl Into<String>) -> Self {
+    pub(super) fn new(epoch: &str, topic: impl Into<Said>, verdict: Verdict, text: impl Into<Said>) -> Self {
+        let (topic, text) = (topic.into(), text.into());
+        let german = Said::about(&topic, &text).german;
         Self {
             epoch: epoch.to_owned(),
-            topic: topic.to_owned(),
+            topic: topic.english,
             verdict,
-            text: text.into(),
+            text: text.english,
+            german,
+        }
+    }
+
+    /// Topic and text in one sentence.
+    pub fn said(&self) -> Said {
+        Said {
+            english: format!("{}: {}", self.topic, self.text),
+            german: self.german.clone(),
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::Epoch;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use stonewise_base::error::Result;
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{FLAT_PHOTOS, PHOTOS, UNLIKE_ALL, UNLIKE_PHOTOS};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
@@ -88,12 +89,12 @@ pub(super) fn look(
         })
         .collect::<Result<Vec<_>>>()?;
     let (flat, photos): (Vec<Seen>, Vec<Seen>) = photos.into_iter().flatten().partition(|seen| seen.is_flat);
-    let doubt = |text| Finding::new(&epoch.name, PHOTOS.english, Verdict::Doubt, text);
+    let doubt = |text| Finding::new(&epoch.name, &PHOTOS, Verdict::Doubt, text);
     let names = |photos: &[&Seen]| some(&photos.iter().map(|p| p.name.clone()).collect::<Vec<_>>());
     let mut found = Vec::new();
     if !flat.is_empty() {
         let flat: Vec<&Seen> = flat.iter().collect();
-        found.push(doubt(FLAT_PHOTOS.say(&[("photos", &*names(&flat))])));
+        found.push(doubt(FLAT_PHOTOS.say(&[("photos", names(&flat).into())])));
     }
     let likenesses = likenesses(&photos);
     let best: Vec<Option<f64>> = (0..photos.len())
@@ -114,18 +115,18 @@ pub(super) fn look(
                 "unlike the few photos that see the same points (correlation {least:.2}), which may be wrong themselves: {}",
                 names(&unlike)
             );
-            found.push(Finding::new(&epoch.name, PHOTOS.english, Verdict::Note, text));
+            found.push(Finding::new(&epoch.name, &PHOTOS, Verdict::Note, text));
         }
         (Judgement::Sound, Some(least)) => {
             let text = format!("each shows the same as another (correlation {least:.2} or more)");
-            found.push(Finding::new(&epoch.name, PHOTOS.english, Verdict::Fine, text));
+            found.push(Finding::new(&epoch.name, &PHOTOS, Verdict::Fine, text));
         }
         (Judgement::AllUnlike, _) => found.push(doubt(UNLIKE_ALL.say(&[]))),
         (Judgement::Outliers(which), _) => {
             let most = which.iter().filter_map(|i| best[*i]).max_by(f64::total_cmp);
-            let most = format!("{:.2}", most.unwrap_or(0.0));
+            let most = Said::numbers(format!("{:.2}", most.unwrap_or(0.0)));
             let which: Vec<&Seen> = which.into_iter().map(|i| &photos[i]).collect();
-            let values = [("photos", &*names(&which)), ("most", &*most)];
+            let values = [("photos", names(&which).into()), ("most", most)];
             found.push(doubt(UNLIKE_PHOTOS.say(&values)));
         }
     }

@@ -5,6 +5,7 @@ use super::photos::{PosedPhoto, some};
 use crate::Epoch;
 use rayon::prelude::*;
 use stonewise_base::error::{Error, Result};
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{BROKEN_MASKS, MASKS, NO_MASK_FITS, WITHOUT_MASKS};
 use stonewise_core::progress::Progress;
 use stonewise_io::masks::MaskSource;
@@ -42,7 +43,7 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
     };
     let masks = photos.par_iter().map(of_photo).collect::<Result<Vec<_>>>()?;
     let file = file.to_string_lossy();
-    let finding = |verdict, text| Finding::new(&epoch.name, MASKS.english, verdict, text);
+    let finding = |verdict, text: Said| Finding::new(&epoch.name, &MASKS, verdict, text);
     let (mut found, mut missing, mut broken) = (Vec::new(), Vec::new(), Vec::new());
     let mut there = 0;
     for masks in masks {
@@ -53,12 +54,12 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         }
     }
     if there == 0 && broken.is_empty() {
-        let text = NO_MASK_FITS.say(&[("file", &*file)]);
+        let text = NO_MASK_FITS.say(&[("file", (&*file).into())]);
         return Ok(vec![finding(Verdict::Unreadable, text)]);
     }
     if let Some((_, reason)) = broken.first() {
         let photos: Vec<String> = broken.iter().map(|(photo, _)| photo.clone()).collect();
-        let text = BROKEN_MASKS.say(&[("photos", &*some(&photos)), ("reason", reason)]);
+        let text = BROKEN_MASKS.say(&[("photos", some(&photos).into()), ("reason", (&**reason).into())]);
         let verdict = match there {
             0 => Verdict::Unreadable,
             _ => Verdict::Doubt,
@@ -66,11 +67,14 @@ pub(super) fn look(epoch: &Epoch, photos: &[PosedPhoto], progress: &dyn Progress
         found.push(finding(verdict, text));
     }
     if !missing.is_empty() {
-        let text = WITHOUT_MASKS.say(&[("file", &*file), ("photos", &*some(&missing))]);
+        let text = WITHOUT_MASKS.say(&[("file", (&*file).into()), ("photos", some(&missing).into())]);
         found.push(finding(Verdict::Doubt, text));
     }
     if found.is_empty() {
-        found.push(finding(Verdict::Fine, format!("there for every photo ({there})")));
+        found.push(finding(
+            Verdict::Fine,
+            format!("there for every photo ({there})").into(),
+        ));
     }
     Ok(found)
 }

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{BROKEN_PHOTOS, MISSING_PHOTOS, NO_PHOTOS, PHOTO_SIZES, PHOTOS};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraFile, Photos, find_photos};
@@ -31,7 +32,7 @@ pub(super) fn none(epoch: &Epoch, spacing_m: Option<f64>) -> Finding {
             "{text}; those below {cm:.0} cm across (square root of the area) are found less often at this spacing"
         );
     }
-    Finding::new(&epoch.name, PHOTOS.english, Verdict::Fine, text)
+    Finding::new(&epoch.name, &PHOTOS, Verdict::Fine, text)
 }
 
 /// Looks at the header and the end of every photo that a camera names; the photos that are there.
@@ -63,8 +64,7 @@ pub(super) fn look<'a>(
         }
     }
     let mut out = Vec::new();
-    let mut add =
-        |verdict: Verdict, text: String| out.push(Finding::new(&epoch.name, PHOTOS.english, verdict, text));
+    let mut add = |verdict: Verdict, text: Said| out.push(Finding::new(&epoch.name, &PHOTOS, verdict, text));
     let (verdict, text) = presence(project, epoch, files, cameras, &photos);
     add(verdict, text);
     if !photos.without_camera.is_empty() {
@@ -74,14 +74,20 @@ pub(super) fn look<'a>(
             .collect();
         add(
             Verdict::Note,
-            format!("without a camera, left out: {}", some(&names)),
+            format!("without a camera, left out: {}", some(&names)).into(),
         );
     }
     if !broken.is_empty() {
-        add(Verdict::Doubt, BROKEN_PHOTOS.say(&[("photos", &*some(&broken))]));
+        add(
+            Verdict::Doubt,
+            BROKEN_PHOTOS.say(&[("photos", some(&broken).into())]),
+        );
     }
     if !sizes.is_empty() {
-        add(Verdict::Doubt, PHOTO_SIZES.say(&[("photos", &*some(&sizes))]));
+        add(
+            Verdict::Doubt,
+            PHOTO_SIZES.say(&[("photos", some(&sizes).into())]),
+        );
     }
     Ok((out, posed))
 }
@@ -94,18 +100,25 @@ fn presence(
     files: &PhotoFiles,
     cameras: &CameraFile,
     photos: &Photos,
-) -> (Verdict, String) {
+) -> (Verdict, Said) {
     let mut found: Vec<bool> = photos.paths.iter().map(Option::is_some).collect();
     let here = found.iter().filter(|found| **found).count();
     let total = found.len().to_string();
     let folder = files.images.to_string_lossy();
     if here == 0 {
         let file = files.cameras.to_string_lossy();
-        let values = [("total", &*total), ("file", &*file), ("folder", &*folder)];
+        let values = [
+            ("total", total.into()),
+            ("file", (&*file).into()),
+            ("folder", (&*folder).into()),
+        ];
         return (Verdict::Wrong, NO_PHOTOS.say(&values));
     }
     if here == found.len() {
-        return (Verdict::Fine, format!("all {total} posed photos are there"));
+        return (
+            Verdict::Fine,
+            format!("all {total} posed photos are there").into(),
+        );
     }
     for other in project.epochs.iter().filter(|e| e.name != epoch.name) {
         // One that cannot be read is named where its own epoch is looked at.
@@ -118,14 +131,14 @@ fn presence(
     let missing: Vec<String> = missing.map(|(view, _)| view.name.clone()).collect();
     if missing.is_empty() {
         let text = format!("{here} of the {total} posed photos are there, the others in another epoch");
-        return (Verdict::Fine, text);
+        return (Verdict::Fine, text.into());
     }
     let (number, names) = (missing.len().to_string(), some(&missing));
     let values = [
-        ("missing", &*number),
-        ("total", &*total),
-        ("folder", &*folder),
-        ("photos", &*names),
+        ("missing", number.into()),
+        ("total", total.into()),
+        ("folder", (&*folder).into()),
+        ("photos", names.into()),
     ];
     (Verdict::Doubt, MISSING_PHOTOS.say(&values))
 }

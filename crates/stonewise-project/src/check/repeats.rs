@@ -8,6 +8,7 @@ use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
 use nalgebra::Point3;
+use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{CLOUDS, ROUGH, ROUNDED, SAME_POINTS, TWICE};
 use stonewise_core::geometry::cell_of;
 use stonewise_core::statistics::{split_mix, upper_median};
@@ -38,19 +39,18 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
     let mut found = Vec::new();
     let mut earlier: Vec<(&str, Cells)> = Vec::new();
     for (epoch, survey) in read(project, surveys) {
-        let mut say = |verdict: Verdict, text: String| {
-            found.push(Finding::new(&epoch.name, CLOUDS.english, verdict, text));
-        };
+        let mut say =
+            |verdict: Verdict, text: Said| found.push(Finding::new(&epoch.name, &CLOUDS, verdict, text));
         let (step_m, spacing_m) = (step(&survey.points), survey.spacing_m.unwrap_or(0.0));
         let is_coarse = survey.spacing_m.is_some() && step_m > spacing_m * COARSE_STEP;
         let [step, spacing, noise] =
-            [step_m, spacing_m, step_m / STEP_SDS].map(|m| format!("{:.1}", 1e3 * m));
+            [step_m, spacing_m, step_m / STEP_SDS].map(|m| Said::numbers(format!("{:.1}", 1e3 * m)));
         match step_m > ROUGH_STEP_M {
             _ if is_coarse => say(
                 Verdict::Doubt,
-                ROUNDED.say(&[("step", &*step), ("spacing", &*spacing)]),
+                ROUNDED.say(&[("step", step), ("spacing", spacing)]),
             ),
-            true => say(Verdict::Note, ROUGH.say(&[("step", &*step), ("noise", &*noise)])),
+            true => say(Verdict::Note, ROUGH.say(&[("step", step), ("noise", noise)])),
             false => {}
         }
         if step_m > spacing_m * CHANCE_STEP {
@@ -59,7 +59,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         let cells = Cells::of(&survey.points);
         let twice = cells.share_of_repeats();
         if twice > TOO_MANY {
-            say(Verdict::Doubt, TWICE.say(&[("share", &*percent(twice))]));
+            say(Verdict::Doubt, TWICE.say(&[("share", percent(twice).into())]));
         }
         // A known motion moves the points after this look.
         let is_moved = epoch.motion.is_some();
@@ -68,7 +68,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
             if same > TOO_MANY {
                 say(
                     Verdict::Doubt,
-                    SAME_POINTS.say(&[("share", &*percent(same)), ("first", *name)]),
+                    SAME_POINTS.say(&[("share", percent(same).into()), ("first", (*name).into())]),
                 );
             }
         }

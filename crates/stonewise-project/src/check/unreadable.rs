@@ -34,7 +34,7 @@ impl Unreadable {
         if self.depth == Depth::Quick || matches!(error, Error::Interrupted) {
             return Err(error);
         }
-        let finding = Finding::new(&epoch.name, topic.english, Verdict::Unreadable, error.to_string());
+        let finding = Finding::new(&epoch.name, topic, Verdict::Unreadable, error.to_string());
         self.findings.push(finding);
         Ok(None)
     }

@@ -21,20 +21,13 @@ pub(crate) enum Guide {
     Diagonal,
 }
 
-/// A square scatter plot with equal scales, millimetres.
+/// A square scatter plot.
 ///
 /// `key`: what the page's program calls the plot; empty where its points are no stones.
-pub(crate) fn scatter(
-    key: &str,
-    title: &str,
-    labels: [&str; 2],
-    series: &[Series],
-    limits_mm: [[f64; 2]; 2],
-    guide: Guide,
-) -> String {
+pub(crate) fn scatter(key: &str, title: &str, [x, y]: [Axis; 2], series: &[Series], guide: Guide) -> String {
     let axes = Axes {
-        x: Axis::linear(labels[0], limits_mm[0]),
-        y: Axis::linear(labels[1], limits_mm[1]),
+        x,
+        y,
         area: [52.0, 8.0, 320.0, 320.0],
     };
     let live = if key.is_empty() {
@@ -80,20 +73,24 @@ pub(crate) fn scatter(
     out
 }
 
-/// A histogram of values in millimetres, with labels below and beside it, between two limits; values beyond
-/// are counted in the end bars.
-pub(crate) fn histogram(title: &str, labels: [&str; 2], values_mm: &[f64], limits_mm: [f64; 2]) -> String {
+/// A histogram of values between the ends of the axis `x`; values beyond are counted in the end bars. `counted`:
+/// what is counted.
+pub(crate) fn histogram(title: &str, x: Axis, counted: &str, values: &[f64]) -> String {
     const BARS: usize = 40;
-    let span = limits_mm[1] - limits_mm[0];
+    let [low, high] = x.range;
+    let span = high - low;
     let mut bars = [0usize; BARS];
-    for v in values_mm.iter().filter(|v| v.is_finite()) {
-        let place = (v - limits_mm[0]) / span * BARS as f64;
+    for v in values.iter().filter(|v| v.is_finite()) {
+        let place = (v - low) / span * BARS as f64;
         bars[(place.max(0.0) as usize).min(BARS - 1)] += 1;
     }
     let highest = bars.iter().copied().max().unwrap_or(0).max(1) as f64;
     let axes = Axes {
-        x: Axis::linear(labels[0], limits_mm),
-        y: Axis::linear(labels[1], [0.0, highest * 1.08]),
+        y: Axis {
+            decimal: x.decimal,
+            ..Axis::linear(counted, [0.0, highest * 1.08])
+        },
+        x,
         area: [52.0, 8.0, 320.0, 150.0],
     };
     let mut out = format!(
@@ -103,7 +100,7 @@ pub(crate) fn histogram(title: &str, labels: [&str; 2], values_mm: &[f64], limit
     axes.draw(&mut out);
     let mut path = String::new();
     for (i, n) in bars.iter().enumerate().filter(|(_, n)| **n > 0) {
-        let [a, b] = [i, i + 1].map(|i| axes.px(limits_mm[0] + span * i as f64 / BARS as f64));
+        let [a, b] = [i, i + 1].map(|i| axes.px(low + span * i as f64 / BARS as f64));
         let y = axes.py(*n as f64);
         let _ = write!(
             path,

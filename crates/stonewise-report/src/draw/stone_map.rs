@@ -4,7 +4,7 @@ use crate::texts::{Texts, fill};
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-use stonewise_figure::{Axes, Axis, Scale, escape, mm, nice_above};
+use stonewise_figure::{Axes, Scale, escape, nice_above};
 use stonewise_results::{ResultSet, RowMotion, Sorted, StoneRow};
 
 /// Room beside the wall, pixels: left, top, right, bottom.
@@ -81,8 +81,8 @@ impl<'a> MapLayout<'a> {
             texts.maps.axis_up
         };
         let axes = Axes {
-            x: Axis::linear(texts.maps.axis_along, [low.x, low.x + size.x]),
-            y: Axis::linear(up, [low.y, low.y + size.y]),
+            x: texts.axis(texts.maps.axis_along, [low.x, low.x + size.x]),
+            y: texts.axis(up, [low.y, low.y + size.y]),
             area,
         };
         let (width, height) = (
@@ -128,9 +128,10 @@ impl<'a> MapLayout<'a> {
 
     /// Draws the colour bar to the right of the wall; `unit`: of a thousandth.
     pub(crate) fn draw_bar(&self, out: &mut String, scale: Scale, unit: &str) {
+        let (low, high) = scale.range_m();
         scale.draw_bar(
             out,
-            unit,
+            &self.texts.axis(unit, [low * 1e3, high * 1e3]),
             [
                 self.axes.area[0] + self.axes.area[2] + 12.0,
                 MARGIN[1],
@@ -340,7 +341,10 @@ fn draw_arrows(layout: &MapLayout, only_significant: bool, out: &mut String) {
         r#"<path class="arrow halo" d="{shafts}{reference}"/><path class="arrow" d="{shafts}{reference}"/><text x="{:.1}" y="{:.1}">{}</text>"#,
         left + ARROW_PX + 8.0,
         bottom + 4.0,
-        fill(layout.texts.maps.in_plane, &[("length", &*mm(reference_m))])
+        fill(
+            layout.texts.maps.in_plane,
+            &[("length", &*layout.texts.mm(reference_m))]
+        )
     );
 }
 

@@ -33,9 +33,9 @@ pub(super) fn distributions(
             &title,
             &histogram(
                 &title,
-                ["mm", texts.stones.stones],
+                texts.axis("mm", own_limits_mm(component)),
+                texts.stones.stones,
                 &values,
-                own_limits_mm(component),
             ),
             "",
         ));
@@ -52,6 +52,7 @@ pub(super) fn distributions(
         let truth = if truth_mm.is_some() { names.cross } else { "" };
         format!("{}{truth}", fill(text, &[("n", &*count(n))]))
     };
+    let axes = |[x, y]: [&str; 2], [across, up]: [[f64; 2]; 2]| [texts.axis(x, across), texts.axis(y, up)];
     let labels = [names.axis_along, names.axis_up];
     let plot = |key, title: &str, class, points: &Vec<[f64; 2]>| {
         let series = [Series {
@@ -59,7 +60,7 @@ pub(super) fn distributions(
             points: points.clone(),
         }];
         let guide = truth_mm.map_or(Guide::None, Guide::Cross);
-        scatter(key, title, labels, &series, limits, guide)
+        scatter(key, title, axes(labels, limits), &series, guide)
     };
     grid.push_str(&figure(
         names.stones_title,
@@ -91,9 +92,8 @@ pub(super) fn distributions(
         let picture = scatter(
             "out-of-plane",
             names.out_title,
-            [names.axis_out, "M3C2 (mm)"],
+            axes([names.axis_out, "M3C2 (mm)"], limits),
             &series,
-            limits,
             Guide::Diagonal,
         );
         grid.push_str(&figure(names.out_title, &picture, &text));
@@ -190,7 +190,7 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
             )
         };
         let values = [
-            ("note", &*said(&datum.note, texts)),
+            ("note", &*said(&datum.note, datum.german.as_deref(), texts)),
             ("parts", &*axes.map(part).collect::<Vec<_>>().join(", ")),
             ("cells", &*count(observers.stable_cells)),
             ("compared", &*observers.compared_stones.map(count).join(names.and)),
@@ -198,9 +198,10 @@ fn registration(results: &ResultSet, texts: &Texts) -> String {
         return fill(names.estimated, &values);
     }
     match results.datum() {
-        Some(datum) if datum.state != DatumState::Unknown => {
-            fill(names.known, &[("note", &*said(&datum.note, texts))])
-        }
+        Some(datum) if datum.state != DatumState::Unknown => fill(
+            names.known,
+            &[("note", &*said(&datum.note, datum.german.as_deref(), texts))],
+        ),
         _ => names.unknown.to_owned(),
     }
 }

@@ -17,7 +17,7 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
         texts.page.doubts
     );
     for warning in all {
-        let message = said(&warning.message, texts);
+        let message = said(&warning.message, warning.german.as_deref(), texts);
         let _ = write!(out, "<li>{}: {message}</li>", escape(&warning.subject));
     }
     out.push_str("</ul></div>");
@@ -27,6 +27,7 @@ pub(super) fn doubts(warnings: &[Warning], texts: &Texts) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stonewise_base::messages::{CAUSE_OPEN, NOT_CONVERGED};
     use stonewise_base::report_params::Language;
     use stonewise_base::warnings::Warnings;
 
@@ -45,10 +46,7 @@ mod tests {
         warnings.doubt(
             "register",
             "2027",
-            stonewise_base::messages::NOT_CONVERGED
-                .english
-                .replace("{iterations}", "30")
-                .replace("{cause}", stonewise_base::messages::CAUSE_OPEN.english),
+            NOT_CONVERGED.say(&[("iterations", "30".into()), ("cause", (&CAUSE_OPEN).into())]),
         );
         let html = doubts(&warnings.sorted(), german);
         assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));

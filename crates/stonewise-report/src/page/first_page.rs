@@ -9,7 +9,7 @@ use crate::texts::{Texts, counted, fill};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fmt::Write;
-use stonewise_base::messages::message_in;
+use stonewise_base::report_params::Language;
 use stonewise_figure::{count, escape};
 use stonewise_results::records::{Datum, DatumState, EpochRecord, State};
 use stonewise_results::{ResultSet, Status};
@@ -231,7 +231,10 @@ pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
                 true => page.registration_included,
                 false => page.registration_in_doubt,
             };
-            fill(text, &[("note", &*said(&datum.note, texts))])
+            fill(
+                text,
+                &[("note", &*said(&datum.note, datum.german.as_deref(), texts))],
+            )
         }
         Some(_) if is_sound => page.registration_unknown.to_owned(),
         Some(_) => page.registration_unknown_in_doubt.to_owned(),
@@ -241,10 +244,11 @@ pub(super) fn registration(datum: Option<&Datum>, facts: &Summary) -> String {
 
 /// What a run said, as HTML in the language of the report, or marked as English; commands between backticks
 /// as code.
-pub(super) fn said(message: &str, texts: &Texts) -> String {
-    match message_in(texts.language(), message) {
-        Some(message) => with_code(&message),
-        None => format!("<span lang=\"en\">{}</span>", with_code(message)),
+pub(super) fn said(english: &str, german: Option<&str>, texts: &Texts) -> String {
+    match (texts.language(), german) {
+        (Language::English, _) => with_code(english),
+        (Language::German, Some(german)) => with_code(german),
+        (Language::German, None) => format!("<span lang=\"en\">{}</span>", with_code(english)),
     }
 }
 

@@ -35,31 +35,6 @@ pub(super) fn figure(title: &str, picture: &str, note: &str) -> String {
     )
 }
 
-/// The page with another mark before the decimals of numbers in its pictures, which are drawn with a point.
-pub(super) fn with_decimals(page: String, mark: &str) -> String {
-    if mark == "." {
-        return page;
-    }
-    let mut out = String::with_capacity(page.len());
-    let mut rest = page.as_str();
-    while let Some(start) = rest.find("<text") {
-        let (before, element) = rest.split_at(start);
-        let end = element.find("</text>").unwrap_or(element.len());
-        let begin = element[..end].find('>').map_or(end, |i| i + 1);
-        out.push_str(before);
-        out.push_str(&element[..begin]);
-        let label = &element[begin..end];
-        let is_number = label.contains(|c: char| c.is_ascii_digit()) && !label.contains(". ");
-        match is_number {
-            true => out.push_str(&label.replace('.', mark)),
-            false => out.push_str(label),
-        }
-        rest = &element[end..];
-    }
-    out.push_str(rest);
-    out
-}
-
 /// A text whose numbers and units stay in one line, "95-%-" as well.
 pub(super) fn with_units(text: &str) -> String {
     const UNITS: [&str; 5] = ["mm", "cm", "m", "s", "%"];
@@ -108,13 +83,5 @@ mod tests {
             "<b>5.0</b>\u{a0}mm, <b>a</b> mm"
         );
         assert_eq!(with_units("(95-%-Intervall"), "(95-\u{2060}%-Intervall");
-    }
-
-    #[test]
-    fn only_numbers_of_pictures_get_another_mark() {
-        let page = "<td>0.1.0</td><svg><text x=\"1.5\">\u{2212}2.5 mm</text><path d=\"M1.5 2\"/><text>up (m)</text></svg>".to_owned();
-        assert_eq!(with_decimals(page.clone(), "."), page);
-        let german = with_decimals(page.clone(), ",");
-        assert_eq!(german, page.replace("2.5 mm", "2,5 mm"));
     }
 }

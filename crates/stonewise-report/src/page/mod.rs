@@ -19,7 +19,6 @@ mod tracked;
 
 use super::summary::Summary;
 use crate::texts::{Texts, fill};
-use html::with_decimals;
 use pair::{epoch_names, known_translation_mm};
 use std::fmt::Write;
 use stonewise_base::error::Error;
@@ -143,7 +142,7 @@ fn content(
     if appendix {
         body.push_str(&audit::audit(results, facts.texts()));
     }
-    with_decimals(body, facts.texts().decimal)
+    body
 }
 
 /// Patterns that the pictures use.

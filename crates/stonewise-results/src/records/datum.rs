@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use stonewise_base::messages::Said;
+use stonewise_base::report_params::Language;
 use stonewise_core::geometry::{SmallMotion, lever};
 
 /// Where the error of an epoch's registration is known from, in order of precedence.
@@ -56,6 +58,9 @@ pub struct Datum {
     pub sources: Vec<SourceError>,
     /// The same in one sentence.
     pub note: String,
+    /// The sentence in German; in a record, only where its report is in German.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub german: Option<String>,
 }
 
 /// The estimated error of one station or strip against the mean of its epoch's sources, world.
@@ -73,19 +78,27 @@ pub struct SourceError {
 
 impl Datum {
     /// A registration of which nothing is known.
-    pub fn unknown(centre: &Point3<f64>, note: String) -> Self {
+    pub fn unknown(centre: &Point3<f64>, note: impl Into<Said>) -> Self {
+        let note = note.into();
         Self {
             state: DatumState::Unknown,
             centre: centre.coords.into(),
             covariance_6x6: None,
             common_motion: None,
             sources: Vec::new(),
-            note,
+            note: note.english,
+            german: note.german,
         }
     }
 
     /// A registration whose error has this covariance at the centre, see [`Self::covariance_6x6`].
-    pub fn known(state: DatumState, centre: &Point3<f64>, covariance: &Matrix6<f64>, note: String) -> Self {
+    pub fn known(
+        state: DatumState,
+        centre: &Point3<f64>,
+        covariance: &Matrix6<f64>,
+        note: impl Into<Said>,
+    ) -> Self {
+        let note = note.into();
         Self {
             state,
             centre: centre.coords.into(),
@@ -94,7 +107,8 @@ impl Datum {
             })),
             common_motion: None,
             sources: Vec::new(),
-            note,
+            note: note.english,
+            german: note.german,
         }
     }
 
@@ -110,6 +124,22 @@ impl Datum {
             });
         }
         self
+    }
+
+    /// [`Self::note`] in the languages that there are words of it in.
+    pub fn said(&self) -> Said {
+        Said {
+            english: self.note.clone(),
+            german: self.german.clone(),
+        }
+    }
+
+    /// The registration as a record keeps it whose report is in this language.
+    pub fn recorded(self, language: Language) -> Self {
+        Self {
+            german: Said::german_in(self.german, language),
+            ..self
+        }
     }
 
     /// Whether the error was estimated, so that it can be taken off the motions.

@@ -90,7 +90,7 @@ impl<'a> Context<'a> {
         create_results_folder(out)?;
         let warnings = Warnings::default();
         for note in &project.notes {
-            warnings.notice("project", project.path.to_string_lossy(), note);
+            warnings.notice("project", project.path.to_string_lossy(), note.as_str());
         }
         Ok(Self {
             project,

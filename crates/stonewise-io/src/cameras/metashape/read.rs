@@ -2,17 +2,13 @@
 
 use super::super::map_frame::{MapFrame, Placing};
 use super::super::xml::{Element, parse};
-use super::super::{CameraError, CameraFile, malformed, read_text};
+use super::super::{CameraError, CameraFile, Remark, malformed, read_text};
 use super::frame::{Frames, Similarity};
 use super::sensor;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, View};
 use stonewise_core::id::ImageId;
-
-/// Warning about sensors with `<rolling_shutter>`.
-const ROLLING_SHUTTER: &str = "the camera's rolling shutter is not corrected when stones are transferred from photos to \
-    clouds: points may be assigned to places a few pixels off in the photo";
 
 /// Reads the first enabled chunk that has aligned cameras, and brings them to the clouds.
 pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
@@ -32,13 +28,12 @@ pub fn read(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
     for chunk in chunks {
         let label = chunk.attribute("label").unwrap_or("without label");
         if is_disabled(chunk) {
-            fallback
-                .warnings
-                .push(format!("chunk {label} is disabled and was not read"));
+            fallback.warnings.push(Remark::ChunkDisabled(label.to_owned()));
         } else if let Some(file) = &mut chosen {
-            let warning =
-                format!("chunk {label} was not read, only {used_label}, the first with aligned cameras");
-            file.warnings.push(warning);
+            file.warnings.push(Remark::ChunkNotRead {
+                chunk: label.to_owned(),
+                used: used_label.to_owned(),
+            });
         } else {
             let file = read_chunk(chunk, path, map)?;
             if file.views.is_empty() {
@@ -97,7 +92,7 @@ fn read_chunk(chunk: &Element, path: &Path, map: &MapFrame) -> Result<CameraFile
         });
     }
     if file.rolling_shutter {
-        file.warnings.push(ROLLING_SHUTTER.to_owned());
+        file.warnings.push(Remark::RollingShutter);
     }
     if file.crs.is_some() && !file.views.is_empty() {
         place(&mut file, path, map)?;
@@ -140,19 +135,19 @@ struct Posed<'a> {
 }
 
 /// The camera's own transform and the frame it is in, or why it has none.
-fn posed<'a>(camera: &'a Element, frames: &'a Frames) -> Result<Posed<'a>, String> {
+fn posed<'a>(camera: &'a Element, frames: &'a Frames) -> Result<Posed<'a>, Remark> {
     if is_disabled(camera) {
-        return Err("disabled in Metashape".to_owned());
+        return Err(Remark::Disabled);
     }
     let Some(transform) = camera.child("transform") else {
         return Err(match camera.attribute("master_id") {
-            Some(master) if camera.attribute("id") != Some(master) => {
-                "slave of a multi-camera rig, stored without a pose of its own".to_owned()
-            }
-            _ => "not aligned".to_owned(),
+            Some(master) if camera.attribute("id") != Some(master) => Remark::RigSlave,
+            _ => Remark::NotAligned,
         });
     };
-    let frame = frames.of(camera.attribute("component_id"))?;
+    let frame = frames
+        .of(camera.attribute("component_id"))
+        .map_err(Remark::NotPlaced)?;
     Ok(Posed { transform, frame })
 }
 

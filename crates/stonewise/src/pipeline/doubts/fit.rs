@@ -3,7 +3,7 @@
 
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
-use crate::texts::{CAUSE_FIT, CAUSE_NOT_FIT, CAUSE_OPEN};
+use crate::texts::{CAUSE_FIT, CAUSE_NOT_FIT, CAUSE_OPEN, Said};
 use stonewise_core::registration::photos::PhotoStatus;
 
 /// Least number of stones whose share is not left to chance.
@@ -46,26 +46,18 @@ impl Fit {
     }
 
     /// The cause of a doubt that this favours, in words.
-    pub fn cause(self) -> String {
+    pub fn cause(self) -> Said {
         let message = match self.holds() {
             Some(true) => &CAUSE_FIT,
             Some(false) => &CAUSE_NOT_FIT,
             None => &CAUSE_OPEN,
         };
-        message.say(
-            &self
-                .values()
-                .each_ref()
-                .map(|(name, value)| (*name, value.as_str())),
-        )
+        message.say(&self.values())
     }
 
     /// Both numbers by their names in messages.
-    pub fn values(self) -> [(&'static str, String); 2] {
-        [
-            ("found", self.found.to_string()),
-            ("sought", self.sought.to_string()),
-        ]
+    pub fn values(self) -> [(&'static str, Said); 2] {
+        [("found", self.found), ("sought", self.sought)].map(|(name, n)| (name, n.to_string().into()))
     }
 
     /// Of numbers that a test chooses.

@@ -4,7 +4,7 @@ use super::fit::Fit;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
 use crate::texts::notices::STONES_MISSED;
-use crate::texts::{BESIDE, BESIDE_COMPARED, Message, TORN};
+use crate::texts::{BESIDE, BESIDE_COMPARED, Message, Said, TORN};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::Stone;
@@ -28,14 +28,14 @@ const AGREED: f64 = 0.8;
 const LEAST_STONES: usize = 8;
 
 /// Labels beside the stones: cameras and clouds do not fit each other.
-pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, String)> {
+pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, Said)> {
     let [first, second] = context.project.epochs.pair(later).map(|e| &e.name).into_array();
     // The first epoch takes part in every pair.
     let of_first = offsets.first.filter(|_| later == EpochId::at(1));
     let within = [(first, &of_first), (second, &offsets.second)]
         .into_iter()
         .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
-    let within: Vec<(String, String)> = within.collect();
+    let within: Vec<(String, Said)> = within.collect();
     let between = || {
         let offset = offsets.between.as_ref()?;
         Some((second.clone(), off_place(&BESIDE_COMPARED, offset, first)?))
@@ -47,17 +47,17 @@ pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) 
 }
 
 /// An offset in words, if it is clear and large.
-fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<String> {
+fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Said> {
     let is_clear = offset.likeness >= LIKE && offset.likeness_unmoved < UNLIKE * offset.likeness;
     let is_off = is_clear && offset.length_m() > OFFSET_M;
     let [along, up] = offset.along_up_m.map(|m| format!("{:+.0}", 1e3 * m));
     let length = format!("{:.0}", 1e3 * offset.length_m());
     let first = format!("{first:?}");
     let values = [
-        ("length", &*length),
-        ("along", &*along),
-        ("up", &*up),
-        ("first", &*first),
+        ("length", length.into()),
+        ("along", along.into()),
+        ("up", up.into()),
+        ("first", first.into()),
     ];
     is_off.then(|| doubt.say(&values))
 }
@@ -106,24 +106,18 @@ impl Votes {
         self.are_few() && is_misfit
     }
 
-    pub fn torn(self, fit: Fit) -> String {
+    pub fn torn(self, fit: Fit) -> Said {
         let [share, best] = self.percent();
-        TORN.say(&[("share", &*share), ("best", &*best), ("cause", &*fit.cause())])
+        TORN.say(&[("share", share), ("best", best), ("cause", fit.cause())])
     }
 
-    pub fn missed(self, fit: Fit) -> String {
+    pub fn missed(self, fit: Fit) -> Said {
         let ([share, best], [found, sought]) = (self.percent(), fit.values());
-        let values = [
-            ("share", &*share),
-            ("best", &*best),
-            (found.0, &*found.1),
-            (sought.0, &*sought.1),
-        ];
-        STONES_MISSED.say(&values)
+        STONES_MISSED.say(&[("share", share), ("best", best), found, sought])
     }
 
-    fn percent(self) -> [String; 2] {
-        [self.share, self.best].map(|share| format!("{:.0}", 100.0 * share))
+    fn percent(self) -> [Said; 2] {
+        [self.share, self.best].map(|share| format!("{:.0}", 100.0 * share).into())
     }
 }
 
@@ -158,7 +152,7 @@ mod tests {
         assert!(low.are_torn(UNKNOWN) && low.are_torn(NOT_FOUND));
         let message = low.torn(NOT_FOUND);
         assert!(
-            message.contains("only 60 %") && message.contains("10 of the 100 stones"),
+            message.english.contains("only 60 %") && message.english.contains("10 of the 100 stones"),
             "{message}"
         );
         // The photos find the stones all the same.
@@ -170,7 +164,10 @@ mod tests {
         }
         assert!(votes(&missed).are_few() && !votes(&missed).are_torn(UNKNOWN));
         let message = votes(&missed).missed(FOUND);
-        assert!(message.contains("62 %") && message.contains("100 %"), "{message}");
+        assert!(
+            message.english.contains("62 %") && message.english.contains("100 %"),
+            "{message}"
+        );
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
         assert!(!votes(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })).are_few());
         assert!(Votes::of(&stones(21, 1, |_| 0.5)).is_none());

@@ -16,6 +16,7 @@ use crate::pipeline::steps::offsets::OFFSETS;
 use crate::pipeline::steps::register::{Registered, note_registration};
 use crate::pipeline::until::Until;
 use crate::settings::Align;
+use crate::texts::Said;
 use fit::Fit;
 use labels::{Votes, beside};
 use motions::{blind, few_measured, unsettled};
@@ -76,7 +77,7 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
 
 /// See [`registration::misregistered`]. Where the stones aligned the epochs, nothing is claimed that surfaces off
 /// the wall could contradict.
-fn misregistered(context: &Context, registered: &Registered) -> Option<String> {
+fn misregistered(context: &Context, registered: &Registered) -> Option<Said> {
     let params = &context.project.settings.registration;
     let check = registered.epoch_errors.as_ref()?.cross_check.as_ref()?;
     let check = Some(check).filter(|_| params.align == Align::None)?;

@@ -4,7 +4,7 @@ use super::fit::Fit;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED};
+use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, Said};
 use std::collections::BTreeMap;
 use stonewise_core::stone::StoneMotion;
 
@@ -15,17 +15,17 @@ const LIMIT_EXCESS: f64 = 100.0;
 const SIGMAS_95: f64 = 1.96;
 
 /// The adjustment stopped before its motions had settled.
-pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<String> {
+pub(super) fn unsettled(registered: &Registered, fit: Fit) -> Option<Said> {
     let EstimatorRecord::Adjustment(adjustment) = &registered.estimator else {
         return None;
     };
     let iterations = adjustment.iterations.to_string();
     (!adjustment.converged)
-        .then(|| NOT_CONVERGED.say(&[("iterations", &*iterations), ("cause", &*fit.cause())]))
+        .then(|| NOT_CONVERGED.say(&[("iterations", iterations.into()), ("cause", fit.cause())]))
 }
 
 /// Most of the stones that were found in both epochs could not be measured.
-pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<String> {
+pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
     let matched = rows.iter().filter(|r| r.matched_id.is_some()).count();
     let measured = rows.iter().filter(|r| r.status == Status::Ok).count();
     (2 * measured < matched).then(|| {
@@ -37,17 +37,17 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<String> {
             (n > 0).then(|| format!("{n} {}", status.word()))
         });
         let values = [
-            ("measured", &*measured.to_string()),
-            ("matched", &*matched.to_string()),
-            ("reasons", &*counts.collect::<Vec<_>>().join(", ")),
-            ("cause", &*fit.cause()),
+            ("measured", measured.to_string().into()),
+            ("matched", matched.to_string().into()),
+            ("reasons", counts.collect::<Vec<_>>().join(", ").into()),
+            ("cause", fit.cause()),
         ];
         FEW_MEASURED.say(&values)
     })
 }
 
 /// Motions are far less certain than the points allow.
-pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Option<String> {
+pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Option<Said> {
     let points: BTreeMap<u32, [f64; 2]> = rows
         .iter()
         .filter_map(|r| Some((r.stone_id, [f64::from(r.points_1), f64::from(r.points_2?)])))
@@ -67,8 +67,11 @@ pub(super) fn blind(registered: &Registered, rows: &[StoneRow], fit: Fit) -> Opt
     (excess > LIMIT_EXCESS).then(|| {
         let limit = format!("{:.0}", 1e3 * SIGMAS_95 * sd);
         let excess = format!("{excess:.0}");
-        let values = [("limit", &*limit), ("excess", &*excess), ("cause", &*fit.cause())];
-        BLIND.say(&values)
+        BLIND.say(&[
+            ("limit", limit.into()),
+            ("excess", excess.into()),
+            ("cause", fit.cause()),
+        ])
     })
 }
 
@@ -120,7 +123,10 @@ mod tests {
     fn an_adjustment_that_did_not_converge_is_a_doubt() {
         let mut registered = registered(&rows(), 0.001, 0.001);
         let message = unsettled(&registered, Fit::default()).unwrap();
-        assert!(message.contains("did not converge in 32 iterations"), "{message}");
+        assert!(
+            message.english.contains("did not converge in 32 iterations"),
+            "{message}"
+        );
         if let EstimatorRecord::Adjustment(adjustment) = &mut registered.estimator {
             adjustment.converged = true;
         }
@@ -148,9 +154,9 @@ mod tests {
             "1 failed_disagreement",
             "1 unobservable",
         ] {
-            assert!(message.contains(part), "{part}: {message}");
+            assert!(message.english.contains(part), "{part}: {message}");
         }
-        assert!(!message.contains("unmatched"), "{message}");
+        assert!(!message.english.contains("unmatched"), "{message}");
     }
 
     #[test]
@@ -163,7 +169,7 @@ mod tests {
         );
         let message = blind(&registered(&rows, 0.0033, 0.001), &rows, Fit::default()).unwrap();
         assert!(
-            message.contains("below about 6 mm") && message.contains("103 times"),
+            message.english.contains("below about 6 mm") && message.english.contains("103 times"),
             "{message}"
         );
         // A wall without measured stones, and stones whose residuals are zero, show no limit.

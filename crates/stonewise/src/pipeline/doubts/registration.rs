@@ -1,6 +1,6 @@
 //! Doubts about the registration of an epoch.
 
-use crate::texts::MISREGISTERED_EPOCH;
+use crate::texts::{MISREGISTERED_EPOCH, Said};
 use nalgebra::Vector3;
 use stonewise_core::registration::observers::CrossCheck;
 
@@ -10,17 +10,17 @@ const MISREGISTERED: f64 = 1e-3;
 
 /// Surfaces off the wall show a registration error that differs significantly from the one found without
 /// them. An error that the project states is not questioned.
-pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<String> {
+pub(super) fn misregistered(stated_m: Option<f64>, check: &CrossCheck) -> Option<Said> {
     if stated_m.is_some() || check.p >= MISREGISTERED {
         return None;
     }
-    let mm = |v: &Vector3<f64>| format!("({:+.1}, {:+.1}, {:+.1})", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
+    let mm = |v: &Vector3<f64>| Said::list(&[v.x, v.y, v.z].map(|m| format!("{:+.1}", 1e3 * m)));
     let sd = check.covariance.diagonal().max().max(0.0).sqrt();
     let values = [
-        ("cells", &*check.cells.to_string()),
-        ("shown", &*mm(&check.error)),
-        ("found", &*mm(&check.found)),
-        ("sd", &*format!("{:.1}", 1e3 * sd)),
+        ("cells", check.cells.to_string().into()),
+        ("shown", mm(&check.error)),
+        ("found", mm(&check.found)),
+        ("sd", Said::numbers(format!("{:.1}", 1e3 * sd))),
     ];
     Some(MISREGISTERED_EPOCH.say(&values))
 }
@@ -42,7 +42,7 @@ mod tests {
         assert_eq!(misregistered(Some(0.02), &with(1e-9)), None);
         let message = misregistered(None, &with(1e-9)).unwrap();
         for part in ["30 pieces", "(+20.0, +0.0, -1.0) mm", "of 0.5 mm"] {
-            assert!(message.contains(part), "{message}");
+            assert!(message.english.contains(part), "{message}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::results::records::Datum;
 use crate::results::{Status, StoneRow};
-use crate::texts::STRETCHED;
+use crate::texts::{STRETCHED, Said};
 use nalgebra::{Point3, Vector3};
 use stonewise_core::geometry::Strain;
 
@@ -18,7 +18,7 @@ const THERMAL_STRAIN: f64 = 3e-4;
 const STRAIN_SIGMAS_95: f64 = 2.306;
 
 /// The wall as a whole grew or shrank by more than masonry can.
-pub(super) fn stretched(rows: &[StoneRow], datum: &Datum) -> Option<String> {
+pub(super) fn stretched(rows: &[StoneRow], datum: &Datum) -> Option<Said> {
     let measured = rows.iter().filter(|r| r.status == Status::Ok);
     let measured = measured.filter_map(|r| Some((r.centroid, r.motion.as_ref()?)));
     let (places, displacements): (Vec<Point3<f64>>, Vec<Vector3<f64>>) = measured
@@ -38,11 +38,11 @@ pub(super) fn stretched(rows: &[StoneRow], datum: &Datum) -> Option<String> {
     let is_all_round = sign * strain.lesser - half_width(strain.lesser_sd) > THERMAL_STRAIN;
     (is_large && is_all_round).then(|| {
         let values = [
-            ("strain", &*format!("{:+.1}", 1e3 * strain.mean)),
-            ("half_width", &*format!("{:.1}", 1e3 * half_width(strain.mean_sd))),
-            ("lesser", &*format!("{:+.1}", 1e3 * strain.lesser)),
+            ("strain", format!("{:+.1}", 1e3 * strain.mean)),
+            ("half_width", format!("{:.1}", 1e3 * half_width(strain.mean_sd))),
+            ("lesser", format!("{:+.1}", 1e3 * strain.lesser)),
         ];
-        STRETCHED.say(&values)
+        STRETCHED.say(&values.map(|(name, value)| (name, Said::numbers(value))))
     })
 }
 
@@ -84,11 +84,11 @@ mod tests {
         let unknown = Datum::unknown(&Point3::origin(), String::new());
         let grown = strained([[0.003, 0.0], [0.0, 0.003]], false);
         let message = stretched(&grown, &unknown).unwrap();
-        assert!(message.contains("+3.0 +- 0.0 mm per metre"), "{message}");
+        assert!(message.english.contains("+3.0 +- 0.0 mm per metre"), "{message}");
         let shrunk = strained([[-0.003, 0.0], [0.0, -0.003]], false);
-        assert!(stretched(&shrunk, &unknown).is_some_and(|m| m.contains("-3.0 +- 0.0")));
+        assert!(stretched(&shrunk, &unknown).is_some_and(|m| m.english.contains("-3.0 +- 0.0")));
         // A drone whose strips turn against each other by a milliradian may as well have this scale.
-        assert!(stretched(&grown, &datum(1e-4)).is_some_and(|m| m.contains("+3.0 +- 0.2")));
+        assert!(stretched(&grown, &datum(1e-4)).is_some_and(|m| m.english.contains("+3.0 +- 0.2")));
         assert_eq!(stretched(&grown, &datum(1e-3)), None);
         // The scale beside one end that settles by 2 mm per metre.
         assert!(stretched(&strained([[0.003, 0.0], [0.002, 0.003]], false), &unknown).is_some());

@@ -1,7 +1,7 @@
 //! Doubts about epochs that are turned against each other.
 
 use crate::results::{Status, StoneRow};
-use crate::texts::TURNED;
+use crate::texts::{Said, TURNED};
 use nalgebra::Matrix3;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::statistics::median;
@@ -9,7 +9,7 @@ use stonewise_core::statistics::median;
 /// The wall as a whole turned by so much that displacements are not linear in the rotation any more, as the
 /// adjustment and the common rigid motion take them: the term of second order, |w x (w x a)| / 2 for a rotation
 /// vector w and an arm a, exceeds the typical standard deviation of a stone.
-pub(super) fn turned(rows: &[StoneRow]) -> Option<String> {
+pub(super) fn turned(rows: &[StoneRow]) -> Option<Said> {
     let measured = rows.iter().filter(|r| r.status == Status::Ok);
     let measured = measured.filter_map(|r| Some((r.centroid, r.motion.as_ref()?)));
     let (samples, mut sds): (Vec<DisplacementSample>, Vec<f64>) = measured
@@ -31,11 +31,11 @@ pub(super) fn turned(rows: &[StoneRow]) -> Option<String> {
     let error = samples.iter().map(second_order).fold(0.0, f64::max);
     (error > sd).then(|| {
         let values = [
-            ("angle", &*format!("{:.2}", turn.norm().to_degrees())),
-            ("error", &*format!("{:.2}", 1e3 * error)),
-            ("sd", &*format!("{:.2}", 1e3 * sd)),
+            ("angle", turn.norm().to_degrees()),
+            ("error", 1e3 * error),
+            ("sd", 1e3 * sd),
         ];
-        TURNED.say(&values)
+        TURNED.say(&values.map(|(name, value)| (name, Said::numbers(format!("{value:.2}")))))
     })
 }
 
@@ -72,7 +72,7 @@ mod tests {
         // 1 - cos 2 degrees = 6.1e-4, at 1.9 m: 1.16 mm.
         let message = turned(&wall(2.0, 1e-4)).unwrap();
         assert!(
-            message.contains("2.00 degrees") && message.contains("up to 1.16 mm"),
+            message.english.contains("2.00 degrees") && message.english.contains("up to 1.16 mm"),
             "{message}"
         );
         // A millimetre and a half of registration error hides it.

@@ -55,7 +55,7 @@ fn write_run_record(run: &Run) -> Result<()> {
             .transpose()?,
         parameters: project.settings.clone(),
         steps: context.times(),
-        warnings: context.warnings.sorted(),
+        warnings: context.warnings.recorded(project.settings.report.language),
     };
     write_readable_json(&context.out.join(RUN), &record)
 }

@@ -8,6 +8,7 @@ use crate::pipeline::steps::label::ALIGN;
 use crate::pipeline::steps::segment::Segmented;
 use crate::storage::epoch_tiles::EpochTiles;
 use crate::storage::step::Key;
+use crate::texts::Said;
 use crate::texts::notices::ALIGNED;
 use crate::warnings::Warnings;
 use std::sync::Arc;
@@ -94,12 +95,16 @@ fn aligned(run: &Run, later: EpochId) -> Result<Alignment> {
 fn tell(alignment: &Alignment, second: &[Stone], epoch: &str, warnings: &Warnings) {
     let motion = &alignment.first_from_second;
     let middle = middle(second);
+    let degrees = motion.rotation.angle().to_degrees();
     let message = ALIGNED.say(&[
-        ("stones", &alignment.stones.to_string()),
-        ("covered", &alignment.covered.to_string()),
-        ("degrees", &format!("{:.1}", motion.rotation.angle().to_degrees())),
-        ("metres", &format!("{:.1}", (motion * middle - middle).norm())),
-        ("rms_mm", &format!("{:.0}", 1e3 * alignment.rms_m)),
+        ("stones", alignment.stones.to_string().into()),
+        ("covered", alignment.covered.to_string().into()),
+        ("degrees", Said::numbers(format!("{degrees:.1}"))),
+        (
+            "metres",
+            Said::numbers(format!("{:.1}", (motion * middle - middle).norm())),
+        ),
+        ("rms_mm", format!("{:.0}", 1e3 * alignment.rms_m).into()),
     ]);
     warnings.notice("align", epoch, message);
 }

@@ -78,13 +78,10 @@ pub fn look(context: &Context, forced: bool) -> Result<()> {
         } else {
             &finding.epoch
         };
-        let message = format!("{}: {}", finding.topic, finding.text);
-        context.warnings.doubt(STEP, subject, message);
+        context.warnings.doubt(STEP, subject, finding.said());
     }
     for finding in report.doubtful().filter(|f| is_about_this_machine(f)) {
-        context
-            .progress
-            .note(&format!("{}: {}", finding.topic, finding.text));
+        context.progress.note(&finding.said().english);
     }
     Ok(())
 }

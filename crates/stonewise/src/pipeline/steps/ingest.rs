@@ -86,7 +86,7 @@ fn ingest(context: &Context, id: EpochId) -> Result<Ingested> {
             context.progress,
         )?;
         if invalid > 0 {
-            let message = INVALID_POINTS.say(&[("n", &invalid.to_string())]);
+            let message = INVALID_POINTS.say(&[("n", invalid.to_string().into())]);
             warnings.notice("ingest", epoch.name.clone(), message);
         }
         Ok(())

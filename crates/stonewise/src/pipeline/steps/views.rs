@@ -105,7 +105,7 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
         let cells = surface_cells::<_, Error>(tiles, params.cell_m, context.progress)?;
         let surface = orient(cells, outside);
         if outside.is_empty() && !surface.is_sure() {
-            warnings.doubt(STEP, &epoch.name, SIDE_UNSURE.say(&[]));
+            warnings.doubt(STEP, &epoch.name, &SIDE_UNSURE);
         }
         let views = plan_views(&surface.cells, params);
         if views.is_empty() {
@@ -122,7 +122,7 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
             Shade::Relief => &VIEWS_OF_RELIEF,
         };
         let count = views.len().to_string();
-        warnings.notice(STEP, &epoch.name, notice.say(&[("n", &*count)]));
+        warnings.notice(STEP, &epoch.name, notice.say(&[("n", count.into())]));
         let images = step.file(IMAGES);
         fs::create_dir_all(&images).map_err(Error::io("making a folder", &images))?;
         let walls = Walls::among(&surface.cells, params.cell_m);

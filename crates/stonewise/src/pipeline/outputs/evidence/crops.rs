@@ -96,7 +96,7 @@ pub fn write_epoch_crops(
                 Ok(picture) => picture,
                 Err(error) => {
                     let subject = photos.photos[photo].path.to_string_lossy();
-                    let message = PHOTO_NOT_SHOWN.say(&[("error", &error.to_string())]);
+                    let message = PHOTO_NOT_SHOWN.say(&[("error", error.to_string().into())]);
                     context.warnings.skipped("evidence", subject, message);
                     context.progress.advance(1);
                     return Ok((photo, Vec::new(), None));

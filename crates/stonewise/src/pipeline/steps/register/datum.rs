@@ -4,6 +4,7 @@ use super::Registered;
 use crate::project::Project;
 use crate::results::records::{Datum, DatumState, SourceError};
 use crate::settings::Align;
+use crate::texts::Said;
 use crate::texts::notices::{
     DATUM_ALIGNED, DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
 };
@@ -32,7 +33,7 @@ pub fn datum(project: &Project, later: EpochId, registered: &Registered, stones:
             })
             .collect();
     }
-    datum
+    datum.recorded(project.settings.report.language)
 }
 
 fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {
@@ -41,28 +42,29 @@ fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, st
     };
     let shift_mm = |errors: &EpochErrors| 1e3 * errors.rigid.error.fixed_rows::<3>(0).norm();
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Stable) {
-        let note = DATUM_STABLE.say(&[("error_mm", &*format!("{:.2}", shift_mm(errors)))]);
+        let note = DATUM_STABLE.say(&[("error_mm", Said::numbers(format!("{:.2}", shift_mm(errors))))]);
         return known(DatumState::Stable, errors, note);
     }
     let centre = middle(stones);
     if project.settings.registration.align == Align::Stones {
-        return Datum::unknown(&centre, DATUM_ALIGNED.say(&[]));
+        return Datum::unknown(&centre, &DATUM_ALIGNED);
     }
     if let Some(error_m) = project.settings.registration.epoch_error_m {
         // Both epochs carry the error of their registration.
         let variance = 2.0 * error_m * error_m;
         let covariance = Matrix6::from_diagonal(&[variance, variance, variance, 0.0, 0.0, 0.0].into());
-        let note = DATUM_STATED.say(&[("error_mm", &*format!("{:.1}", 1e3 * error_m))]);
+        let note = DATUM_STATED.say(&[("error_mm", Said::numbers(format!("{:.1}", 1e3 * error_m)))]);
         return Datum::known(DatumState::Stated, &centre, &covariance, note);
     }
     if project.epochs[later].is_of_reference_survey()
         && let Some(errors) = errors
     {
-        return known(DatumState::Stated, errors, DATUM_ONE_SURVEY.say(&[]));
+        return known(DatumState::Stated, errors, Said::from(&DATUM_ONE_SURVEY));
     }
     if let Some(errors) = errors.filter(|e| e.datum == observers::Datum::Sources) {
-        let note = DATUM_SOURCES.say(&[("error_mm", &*format!("{:.1}", 1e3 * errors.shared_error_m))]);
+        let shared_mm = Said::numbers(format!("{:.1}", 1e3 * errors.shared_error_m));
+        let note = DATUM_SOURCES.say(&[("error_mm", shared_mm)]);
         return known(DatumState::Sources, errors, note);
     }
-    Datum::unknown(&centre, REGISTRATION_UNKNOWN.say(&[]))
+    Datum::unknown(&centre, &REGISTRATION_UNKNOWN)
 }

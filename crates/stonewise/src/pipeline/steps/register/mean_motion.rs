@@ -1,6 +1,7 @@
 //! How the stones moved on the mean, in a sentence.
 
 use crate::results::records::{AdjustmentRecord, Datum};
+use crate::texts::Said;
 use crate::texts::notices::{MEAN_MOTION, MEAN_MOTION_OF_UNKNOWN_DATUM};
 
 /// The mean motion as measured, with its standard deviations: these hold the error of the registration where
@@ -8,7 +9,7 @@ use crate::texts::notices::{MEAN_MOTION, MEAN_MOTION_OF_UNKNOWN_DATUM};
 ///
 /// Its name differs from that of the common rigid motion, against which stones are tested: that one turns,
 /// and weights stones by their own covariances.
-pub(super) fn mean_motion(adjustment: &AdjustmentRecord, datum: &Datum) -> String {
+pub(super) fn mean_motion(adjustment: &AdjustmentRecord, datum: &Datum) -> Said {
     let of_datum = datum.covariance_at(&datum.centre.into());
     let part = |axis: usize| {
         let shared = of_datum.map_or(0.0, |c| c[(axis, axis)]);
@@ -21,7 +22,7 @@ pub(super) fn mean_motion(adjustment: &AdjustmentRecord, datum: &Datum) -> Strin
         false => &MEAN_MOTION_OF_UNKNOWN_DATUM,
     };
     let mean = format!("x {}, y {}, z {} mm", part(0), part(1), part(2));
-    message.say(&[("mean", &*mean)])
+    message.say(&[("mean", Said::numbers(mean))])
 }
 
 #[cfg(test)]
@@ -41,11 +42,11 @@ mod tests {
         let covariance = Matrix6::from_diagonal(&[8e-6, 8e-6, 8e-6, 1e-6, 1e-6, 1e-6].into());
         let known = Datum::known(DatumState::Stated, &centre, &covariance, String::new());
         assert_eq!(
-            mean_motion(&adjustment, &known),
+            mean_motion(&adjustment, &known).english,
             "mean motion of the measured stones that are not loose, as measured: x 1.00 +- 3.00, y 0.00 +- 3.00, \
              z -2.00 +- 3.00 mm (standard deviations with the error of the epochs' registration)"
         );
-        let unknown = mean_motion(&adjustment, &Datum::unknown(&centre, String::new()));
+        let unknown = mean_motion(&adjustment, &Datum::unknown(&centre, String::new())).english;
         assert!(unknown.contains("x 1.00 +- 1.00,"), "{unknown}");
         assert!(unknown.ends_with(
             "(standard deviations without the error of the epochs' registration, which is unknown)"

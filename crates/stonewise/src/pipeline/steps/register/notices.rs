@@ -4,6 +4,7 @@ use super::mean_motion::mean_motion;
 use super::registered::{Registered, STEP};
 use crate::pipeline::context::Context;
 use crate::results::records::{Datum, DatumState, EstimatorRecord};
+use crate::texts::Said;
 use crate::texts::notices::{
     AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
     STABLE_TOO_FEW,
@@ -20,7 +21,7 @@ pub fn note_registration(context: &Context, later: EpochId, registered: &Registe
     report_off_wall(context, later, registered);
     if datum.state == DatumState::Unknown {
         let epoch = &context.project.epochs[later].name;
-        context.warnings.notice(STEP, epoch, &datum.note);
+        context.warnings.notice(STEP, epoch, datum.said());
     }
 }
 
@@ -41,7 +42,7 @@ fn report_off_wall(context: &Context, later: EpochId, registered: &Registered) {
         true => &AUTO_STABLE,
         false => &COULD_BE_STABLE,
     };
-    let message = message.say(&[("count", &*count), ("corners", &*corners)]);
+    let message = message.say(&[("count", count.into()), ("corners", corners.into())]);
     context.warnings.notice(STEP, epoch, message);
 }
 
@@ -52,7 +53,7 @@ fn report_components(context: &Context, later: EpochId, registered: &Registered)
     };
     let epoch = &context.project.epochs[later].name;
     for name in adjustment.variance_components.at_upper_bound() {
-        let message = COMPONENT_AT_BOUND.say(&[("name", name)]);
+        let message = COMPONENT_AT_BOUND.say(&[("name", name.into())]);
         context.warnings.notice(STEP, epoch, message);
     }
 }
@@ -81,18 +82,18 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
     for &area in moved {
         match area.checked_sub(named).and_then(|k| registered.off_wall.get(k)) {
             None => {
-                let message = STABLE_MOVED.say(&[("n", &*(area + 1).to_string())]);
+                let message = STABLE_MOVED.say(&[("n", (area + 1).to_string().into())]);
                 context.warnings.skipped(STEP, epoch, message);
             }
             Some([low, high]) => {
-                let [x, y, z]: [f64; 3] = nalgebra::center(low, high).into();
-                let message = OFF_WALL_MOVED.say(&[("place", &*format!("{x:.1}, {y:.1}, {z:.1}"))]);
+                let middle: [f64; 3] = nalgebra::center(low, high).into();
+                let place = Said::list(&middle.map(|m| format!("{m:.1}")));
+                let message = OFF_WALL_MOVED.say(&[("place", place)]);
                 context.warnings.notice(STEP, epoch, message);
             }
         }
     }
-    let cells = cells.to_string();
-    let values = [("cells", &*cells)];
+    let values = [("cells", cells.to_string().into())];
     if named > 0 && !is_stable {
         context.warnings.skipped(STEP, epoch, STABLE_TOO_FEW.say(&values));
     }

@@ -108,7 +108,7 @@ impl DiskPhotos {
                     Err(error) => warnings.notice(
                         STEP,
                         path.to_string_lossy(),
-                        PHOTO_NOT_TRACKED.say(&[("error", &error.to_string())]),
+                        PHOTO_NOT_TRACKED.say(&[("error", error.to_string().into())]),
                     ),
                 }
             }

@@ -9,6 +9,7 @@ use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::Ingested;
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
+use crate::texts::Said;
 use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
@@ -48,7 +49,7 @@ struct Outcome {
     /// Its stones; absent where it is left out.
     instances: Option<Vec<Instance>>,
     /// Why it is left out.
-    reason: Option<String>,
+    reason: Option<Said>,
 }
 
 impl<'a> Detection<'a> {
@@ -182,12 +183,12 @@ impl<'a> Detection<'a> {
         if found != expected {
             progress.advance(self.tiles(view));
             let [[width, height], [camera_width, camera_height]] =
-                [found, expected].map(|size| size.map(|px| px.to_string()));
+                [found, expected].map(|size| size.map(|px| px.to_string().into()));
             return Ok(Outcome::left_out(PHOTO_SIZE.say(&[
-                ("width", &*width),
-                ("height", &*height),
-                ("camera_width", &*camera_width),
-                ("camera_height", &*camera_height),
+                ("width", width),
+                ("height", height),
+                ("camera_width", camera_width),
+                ("camera_height", camera_height),
             ])));
         }
         let tiling = &self.context.project.settings.segment.tiling;
@@ -217,10 +218,10 @@ impl<'a> Detection<'a> {
 }
 
 impl Outcome {
-    fn left_out(reason: String) -> Self {
+    fn left_out(reason: impl Into<Said>) -> Self {
         Self {
             instances: None,
-            reason: Some(reason),
+            reason: Some(reason.into()),
         }
     }
 }

@@ -35,7 +35,7 @@ pub fn write_labels(
                     warnings.skipped(
                         STEP,
                         path.to_string_lossy(),
-                        NO_MASKS.say(&[("file", &masks.to_string_lossy())]),
+                        NO_MASKS.say(&[("file", (&*masks.to_string_lossy()).into())]),
                     );
                     None
                 }

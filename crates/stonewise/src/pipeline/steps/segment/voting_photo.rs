@@ -3,12 +3,13 @@
 use crate::error::{Error, Result};
 use crate::project::Epoch;
 use crate::storage::step::StepDir;
+use crate::texts::Said;
 use crate::texts::notices::{CAMERA_NOT_USED, NO_CAMERA, NO_SUCH_PHOTO, UNUSABLE_CAMERA};
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
-use stonewise_io::cameras::find_photos;
+use stonewise_io::cameras::{Remark, find_photos};
 use stonewise_io::masks::InstanceInfo;
 
 /// Name of the step.
@@ -75,14 +76,18 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
     cameras
         .warnings
         .iter()
-        .for_each(|w| warnings.notice(STEP, file.clone(), w.clone()));
+        .for_each(|w| warnings.notice(STEP, file.clone(), w));
     let photos = find_photos(&files.images, &cameras)?;
     for path in &photos.without_camera {
         let message = without_camera(path, &cameras.skipped, &file);
         warnings.skipped(STEP, path.to_string_lossy(), message);
     }
     for (name, reason) in &cameras.skipped {
-        warnings.notice(STEP, name.clone(), CAMERA_NOT_USED.say(&[("reason", reason)]));
+        warnings.notice(
+            STEP,
+            name.clone(),
+            CAMERA_NOT_USED.say(&[("reason", reason.into())]),
+        );
     }
     let mut posed = Vec::new();
     for (view, path) in cameras.views.into_iter().zip(photos.paths) {
@@ -91,21 +96,21 @@ pub fn posed_photos(epoch: &Epoch, warnings: &Warnings) -> Result<Vec<(View, Pat
             None => warnings.notice(
                 STEP,
                 view.name,
-                NO_SUCH_PHOTO.say(&[("folder", &files.images.to_string_lossy())]),
+                NO_SUCH_PHOTO.say(&[("folder", (&*files.images.to_string_lossy()).into())]),
             ),
         }
     }
     Ok(posed)
 }
 
-fn without_camera(photo: &Path, skipped: &[(String, String)], file: &str) -> String {
+fn without_camera(photo: &Path, skipped: &[(String, Remark)], file: &str) -> Said {
     let stem = |name: &str| Path::new(name).file_stem().map(|s| s.to_ascii_lowercase());
     let reason = skipped
         .iter()
         .find(|(name, _)| stem(name) == stem(&photo.to_string_lossy()));
     match reason {
-        Some((_, reason)) => UNUSABLE_CAMERA.say(&[("reason", reason), ("file", file)]),
-        None => NO_CAMERA.say(&[("file", file)]),
+        Some((_, reason)) => UNUSABLE_CAMERA.say(&[("file", file.into()), ("reason", reason.into())]),
+        None => NO_CAMERA.say(&[("file", file.into())]),
     }
 }
 

@@ -1,0 +1,34 @@
+//! What a reader of a camera file has to say, in both languages.
+
+use super::Said;
+use stonewise_io::cameras::Remark;
+
+impl From<&Remark> for Said {
+    fn from(remark: &Remark) -> Self {
+        Self {
+            english: remark.to_string(),
+            german: german(remark),
+        }
+    }
+}
+
+fn german(remark: &Remark) -> Option<String> {
+    Some(match remark {
+        Remark::NotAligned => "nicht ausgerichtet".to_owned(),
+        Remark::Disabled => "in Metashape abgeschaltet".to_owned(),
+        Remark::SmallerReconstruction => "in einer getrennten, kleineren Rekonstruktion".to_owned(),
+        Remark::SeveralReconstructions(n) => {
+            format!("{n} Rekonstruktionen in der Datei; nur die größte wurde gelesen")
+        }
+        Remark::ChunkDisabled(chunk) => format!("Chunk {chunk} ist abgeschaltet und wurde nicht gelesen"),
+        Remark::ChunkNotRead { chunk, used } => format!(
+            "Chunk {chunk} wurde nicht gelesen, nur {used}, der erste mit ausgerichteten Kameras"
+        ),
+        Remark::RollingShutter => {
+            "der Rolling Shutter der Kamera wird nicht korrigiert, wenn Steine aus den Fotos in die Punktwolken \
+             übertragen werden: Punkte können im Foto um einige Pixel versetzt liegen"
+                .to_owned()
+        }
+        Remark::RigSlave | Remark::NotPlaced(_) => return None,
+    })
+}

@@ -1,0 +1,74 @@
+//! A sentence in the languages that there are words of it in.
+
+use crate::report_params::Language;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// A sentence, or a value of one, that a run says in English and a report in its own language.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Said {
+    /// As a run says it.
+    pub english: String,
+    /// As a German report says it; absent where there are no German words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub german: Option<String>,
+}
+
+impl Said {
+    /// Numbers, written with a point before their decimals, which is a comma in German.
+    pub fn numbers(english: String) -> Self {
+        Self {
+            german: Some(english.replace('.', ",")),
+            english,
+        }
+    }
+
+    /// Numbers one after the other: German, whose numbers hold commas, has semicolons between them.
+    pub fn list(numbers: &[String]) -> Self {
+        Self {
+            english: numbers.join(", "),
+            german: Some(numbers.join("; ").replace('.', ",")),
+        }
+    }
+
+    /// As a report in German says it: in English where there are no German words.
+    pub fn in_german(&self) -> &str {
+        self.german.as_deref().unwrap_or(&self.english)
+    }
+
+    /// The German sentence, where a report is in German.
+    pub fn german_in(german: Option<String>, language: Language) -> Option<String> {
+        german.filter(|_| language == Language::German)
+    }
+
+    /// What was looked at, and what was seen, with a colon between them; in German where both are.
+    pub fn about(topic: &Self, text: &Self) -> Self {
+        let german = topic.german.as_ref().zip(text.german.as_ref());
+        Self {
+            english: format!("{}: {}", topic.english, text.english),
+            // Half a translation would be worse than none.
+            german: german.map(|(topic, text)| format!("{topic}: {text}")),
+        }
+    }
+}
+
+impl fmt::Display for Said {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.english)
+    }
+}
+
+impl From<String> for Said {
+    fn from(english: String) -> Self {
+        Self {
+            english,
+            german: None,
+        }
+    }
+}
+
+impl From<&str> for Said {
+    fn from(english: &str) -> Self {
+        english.to_owned().into()
+    }
+}

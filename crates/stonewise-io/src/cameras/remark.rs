@@ -1,0 +1,54 @@
+//! What a reader of a camera file has to say.
+
+use std::fmt;
+
+/// Why a photo cannot be used, or how a camera file was read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Remark {
+    /// The photo was not aligned.
+    NotAligned,
+    /// The photo is disabled in Metashape.
+    Disabled,
+    /// The photo has its pose from another camera of its rig.
+    RigSlave,
+    /// The photo's component has no place in the world, for this reason.
+    NotPlaced(String),
+    /// The photo belongs to another reconstruction than the largest.
+    SmallerReconstruction,
+    /// The file holds so many reconstructions, of which only the largest was read.
+    SeveralReconstructions(usize),
+    /// This chunk is disabled and was not read.
+    ChunkDisabled(String),
+    /// A chunk was not read, because another was.
+    ChunkNotRead {
+        /// The one that was not read.
+        chunk: String,
+        /// The first with aligned cameras.
+        used: String,
+    },
+    /// A camera has a rolling shutter, which is not corrected.
+    RollingShutter,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotAligned => f.write_str("not aligned"),
+            Self::Disabled => f.write_str("disabled in Metashape"),
+            Self::RigSlave => f.write_str("slave of a multi-camera rig, stored without a pose of its own"),
+            Self::NotPlaced(reason) => f.write_str(reason),
+            Self::SmallerReconstruction => f.write_str("in a separate, smaller reconstruction"),
+            Self::SeveralReconstructions(n) => {
+                write!(f, "{n} reconstructions in the file; only the largest was read")
+            }
+            Self::ChunkDisabled(chunk) => write!(f, "chunk {chunk} is disabled and was not read"),
+            Self::ChunkNotRead { chunk, used } => {
+                write!(f, "chunk {chunk} was not read, only {used}, the first with aligned cameras")
+            }
+            Self::RollingShutter => f.write_str(
+                "the camera's rolling shutter is not corrected when stones are transferred from photos to clouds: points may be \
+                 assigned to places a few pixels off in the photo",
+            ),
+        }
+    }
+}
