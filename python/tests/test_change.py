@@ -88,7 +88,7 @@ def test_points_of_other_libraries():
     np.testing.assert_allclose(stonewise.m3c2(first, cloud, core).distances, expected, atol=1e-6)
     with pytest.raises(stonewise.Error, match="shape"):
         stonewise.m3c2(first[:, :2], second, core)
-    with pytest.raises(stonewise.Error, match="positive"):
+    with pytest.raises(stonewise.Error, match="above 0"):
         stonewise.m3c2(first, second, core, cyl_radius=0.0)
 
 

@@ -76,7 +76,7 @@ def test_errors_have_the_words_of_the_command(command, survey, tmp_path):
         ({"match": {"max_ration": 0.5}}, "match: unknown field `max_ration`"),
         ({"matches": {}}, "unknown field `matches`"),
         ({"match": {"max_ratio": "much"}}, "match: invalid type"),
-        ({"match": {"min_area_ratio": 1.5}}, "it is a share, 0 to 1"),
+        ({"match": {"min_area_ratio": 1.5}}, "match.min_area_ratio = 1.5 is not possible: it must be 0 to 1"),
         ({"segment": {"model": "no.safetensors"}}, "no such file"),
     ],
 )

@@ -3,7 +3,6 @@
 pub mod address_space;
 pub mod error;
 pub mod files;
-pub mod limits;
 pub mod messages;
 mod parameters;
 pub mod part;

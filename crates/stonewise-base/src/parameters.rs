@@ -1,9 +1,9 @@
 //! Parameters that a caller gives beside the project file, by the names that the file has for them.
 
 use crate::error::{Error, Result};
-use crate::limits::impossible;
-use crate::settings::{RENAMED, Settings};
+use crate::settings::Settings;
 use serde_json::{Map, Value};
+use stonewise_core::params::Params;
 
 impl Settings {
     /// The settings with other parameters, by the names of the tables in the project file.
@@ -13,9 +13,8 @@ impl Settings {
     pub fn with_parameters(&self, parameters: &Map<String, Value>) -> Result<Self> {
         let mut all = serde_json::to_value(self).map_err(|e| Error::Parameters(e.to_string()))?;
         for (table, value) in parameters {
-            let table = todays_name(table);
             let mut changed = all.clone();
-            merge_into(&mut changed, table, "", value);
+            merge_into(&mut changed, table, value);
             // One table at a time, so that the message can name it.
             let read: std::result::Result<Self, _> = serde_json::from_value(changed.clone());
             if let Err(error) = read {
@@ -24,24 +23,15 @@ impl Settings {
             all = changed;
         }
         let settings: Self = serde_json::from_value(all).map_err(|e| Error::Parameters(e.to_string()))?;
-        if let Some((_, message)) = impossible(&settings) {
-            return Err(Error::Parameters(message));
-        }
-        if let Some((key, what)) = settings.segment.tiling.impossible() {
-            return Err(Error::Parameters(format!("segment.tiling: {key} {what}")));
-        }
+        settings.check().map_err(|e| Error::Parameters(e.to_string()))?;
         Ok(settings)
     }
 }
 
 /// Puts a value into a table: over what is there, key by key where both are tables.
-fn merge_into(table: &mut Value, key: &str, path: &str, value: &Value) {
+fn merge_into(table: &mut Value, key: &str, value: &Value) {
     let Value::Object(map) = table else {
         return;
-    };
-    let path = match path {
-        "" => key.to_owned(),
-        path => format!("{path}.{key}"),
     };
     // A diameter takes the place of the radius that says the same.
     if let Some(stem) = key.strip_suffix("_diameter_m") {
@@ -50,23 +40,13 @@ fn merge_into(table: &mut Value, key: &str, path: &str, value: &Value) {
     match (map.get_mut(key), value) {
         (Some(place @ Value::Object(_)), Value::Object(inner)) => {
             for (key, value) in inner {
-                let key = match path.as_str() {
-                    "registration" if key == "network" => "adjustment",
-                    _ => key.as_str(),
-                };
-                merge_into(place, key, &path, value);
+                merge_into(place, key, value);
             }
         }
         _ => {
             map.insert(key.to_owned(), value.clone());
         }
     }
-}
-
-/// The name that a table of the project file has today.
-fn todays_name(table: &str) -> &str {
-    let renamed = RENAMED.iter().find(|(old, _)| *old == table);
-    renamed.map_or(table, |(_, new)| new)
 }
 
 #[cfg(test)]
@@ -99,14 +79,6 @@ mod tests {
     }
 
     #[test]
-    fn former_names_work() {
-        let changed =
-            with(json!({"tiles": {"size_m": 3.0}, "registration": {"network": {"min_points": 30}}})).unwrap();
-        assert_eq!(changed.ingest.size_m, 3.0);
-        assert_eq!(changed.registration.adjustment.min_points, 30);
-    }
-
-    #[test]
     fn errors_name_table_and_key() {
         let error = |parameters| with(parameters).unwrap_err().to_string();
         let unknown = error(json!({"match": {"max_ration": 0.5}}));
@@ -116,7 +88,10 @@ mod tests {
         );
         assert!(error(json!({"matches": {}})).contains("unknown field `matches`"));
         assert!(error(json!({"match": {"max_ratio": "much"}})).contains("match: invalid type"));
-        assert!(error(json!({"match": {"min_area_ratio": 1.5}})).contains("share"));
+        assert_eq!(
+            error(json!({"match": {"min_area_ratio": 1.5}})),
+            "match.min_area_ratio = 1.5 is not possible: it must be 0 to 1"
+        );
         assert!(
             with(json!({"match": {"max_ratio": -1.0}}))
                 .unwrap_err()

@@ -3,11 +3,13 @@
 use crate::report_params::ReportParams;
 use crate::stable::StableArea;
 use crate::thresholds::Thresholds;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use stonewise_core::change::M3c2Params;
 use stonewise_core::evaluate::EvaluationParams;
 use stonewise_core::matching::MatchParams;
+use stonewise_core::params::{Params, Range, Ranged, with_ranges};
 use stonewise_core::registration::observers::EpochErrorParams;
 use stonewise_core::registration::photos::PhotoParams;
 use stonewise_core::registration::{AdjustmentParams, GicpParams};
@@ -16,7 +18,7 @@ use stonewise_core::views::ViewParams;
 use stonewise_segment::tiling::TilingOptions;
 
 /// How stones are found in photos without masks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SegmentParams {
     /// The detector: `built-in`, or a file that `stonewise train` wrote.
@@ -34,33 +36,35 @@ impl Default for SegmentParams {
     }
 }
 
+impl Params for SegmentParams {
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![("tiling", &self.tiling)]
+    }
+}
+
 /// Parameters of all steps, one table each in the project file.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Settings {
     /// How clouds are cut.
-    #[serde(alias = "tiles")]
     pub ingest: IngestParams,
     /// Views of the clouds of epochs without photos.
     pub views: ViewParams,
     /// Stones in photos without masks.
     pub segment: SegmentParams,
     /// Photo labels to points.
-    #[serde(alias = "transfer")]
     pub label: TransferParams,
     /// The table of stones.
     pub stones: StoneParams,
     /// Stones that the detector missed in one epoch, from others.
     pub carry: CarryParams,
     /// Stones across epochs.
-    #[serde(alias = "matching")]
     pub r#match: MatchParams,
     /// One motion per stone.
     pub registration: RegistrationParams,
     /// Comparison along normals.
     pub m3c2: M3c2Params,
     /// Scoring against a known motion.
-    #[serde(alias = "evaluation")]
     pub evaluate: EvaluationParams,
     /// Which motions call for attention, and which for an alarm.
     pub thresholds: Thresholds,
@@ -68,18 +72,28 @@ pub struct Settings {
     pub report: ReportParams,
 }
 
-/// Tables of the project file by the names that they had, with the names of today; both are read.
-pub const RENAMED: [(&str, &str); 5] = [
-    ("tiles", "ingest"),
-    ("transfer", "label"),
-    ("matching", "match"),
-    ("evaluation", "evaluate"),
-    ("registration.network", "registration.adjustment"),
-];
+impl Params for Settings {
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![
+            ("ingest", &self.ingest),
+            ("views", &self.views),
+            ("segment", &self.segment),
+            ("label", &self.label),
+            ("stones", &self.stones),
+            ("carry", &self.carry),
+            ("match", &self.r#match),
+            ("registration", &self.registration),
+            ("m3c2", &self.m3c2),
+            ("evaluate", &self.evaluate),
+            ("thresholds", &self.thresholds),
+        ]
+    }
+}
 
 /// How clouds are cut into tiles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct IngestParams {
     /// Edge of a tile, metres. 4 m keeps offsets exact to a micrometre and a dense tile under 20 MB.
     pub size_m: f64,
@@ -91,20 +105,27 @@ impl Default for IngestParams {
     }
 }
 
+impl Params for IngestParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        // Offsets in a tile are single precision: at 100 m they are exact to 3 micrometres. Below half a
+        // metre a wall of 200 m falls into more than 20,000 files.
+        vec![Range::between(0.5, 100.0).holds("size_m", self.size_m)]
+    }
+}
+
 /// How the motion of a stone is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Estimator {
     /// All stones together, each sharing with its neighbours as much as the noise demands.
     #[default]
-    #[serde(alias = "network")]
     Adjustment,
     /// Each stone by itself with its surroundings, by plane-to-plane ICP: the paper's way.
     Gicp,
 }
 
 /// How epochs come into the frame of the reference.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Align {
     /// Their clouds lie in it.
@@ -115,8 +136,9 @@ pub enum Align {
 }
 
 /// Which estimator measures the stones, and its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct RegistrationParams {
     /// Which estimator. The adjustment: it is the better by far on noisy clouds, and where stones move
     /// singly.
@@ -141,7 +163,6 @@ pub struct RegistrationParams {
     /// the whole wall of a UAV survey seems to move by 1 to 2 mm.
     pub border_noises: f64,
     /// Parameters of the adjustment of all stones together.
-    #[serde(alias = "network")]
     pub adjustment: AdjustmentParams,
     /// Stones tracked from photo to photo, as part of the adjustment.
     pub photos: PhotoParams,
@@ -165,5 +186,23 @@ impl Default for RegistrationParams {
             gicp: GicpParams::default(),
             observers: EpochErrorParams::default(),
         }
+    }
+}
+
+impl Params for RegistrationParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("epoch_error_m", self.epoch_error_m),
+            Range::NOT_NEGATIVE.holds("border_noises", self.border_noises),
+        ]
+    }
+
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![
+            ("adjustment", &self.adjustment),
+            ("photos", &self.photos),
+            ("gicp", &self.gicp),
+            ("observers", &self.observers),
+        ]
     }
 }

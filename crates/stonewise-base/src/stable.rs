@@ -1,16 +1,17 @@
 //! Areas that did not move between the epochs, as the project file names them.
 
 use nalgebra::Point3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use stonewise_core::geometry::Bounds;
 
 /// A stable area: a box, or a polygon seen from above with a range of heights. World frame, metres.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys", into = "Keys")]
 pub struct StableArea(Keys);
 
 /// The area as files spell it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
     /// Two opposite corners.

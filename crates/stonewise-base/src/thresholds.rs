@@ -1,10 +1,12 @@
 //! `[thresholds]` of the project file: which motions call for attention, and which for an alarm.
 
 use nalgebra::Point2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stonewise_core::params::{ParamError, Params, Range, Ranged, with_ranges};
 
 /// The thresholds of a project; nothing is given by default.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys", into = "Keys")]
 pub struct Thresholds {
     /// Thresholds of the wall.
@@ -25,8 +27,9 @@ pub struct Measures {
 }
 
 /// Two thresholds of one quantity.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Levels>)]
 pub struct Levels {
     /// From here on attention is called for, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -49,33 +52,46 @@ pub struct Zone {
 }
 
 /// The table as files spell it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Levels>)]
 struct Keys {
+    /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     attention_mm: Option<f64>,
+    /// From this length of a stone's motion on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     alarm_mm: Option<f64>,
+    /// The same for the motion of a stone against its neighbours.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     neighbours: Levels,
+    /// The same for the opening of a joint between two stones.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     joints: Levels,
+    /// Parts of the wall with thresholds of their own.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     zones: Vec<ZoneKeys>,
 }
 
-/// A zone as files spell it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// A part of the wall, as files spell it.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Levels>)]
 struct ZoneKeys {
+    /// Name, as the verdict shows it.
     name: String,
+    /// Corners [along, up] in the facade frame, metres: `along_m` and `up_m` of stones.csv.
     polygon: Vec<[f64; 2]>,
+    /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     attention_mm: Option<f64>,
+    /// From this length of a stone's motion on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     alarm_mm: Option<f64>,
+    /// The same for the motion of a stone against its neighbours.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     neighbours: Levels,
+    /// The same for the opening of a joint between two stones.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     joints: Levels,
 }
@@ -99,19 +115,22 @@ impl Levels {
     fn or(self, other: Self) -> Self {
         if self.is_empty() { other } else { self }
     }
+}
 
-    /// `table`: where the keys stand, for the message.
-    fn check(&self, table: &str) -> Result<(), String> {
-        for (key, value) in [("attention_mm", self.attention_mm), ("alarm_mm", self.alarm_mm)] {
-            if let Some(value) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(format!(
-                    "{key} = {value} in {table} is not possible: a threshold is a length above 0, in millimetres"
-                ));
-            }
-        }
+impl Params for Levels {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("attention_mm", self.attention_mm),
+            Range::POSITIVE.holds("alarm_mm", self.alarm_mm),
+        ]
+    }
+
+    fn check_relations(&self) -> Result<(), ParamError> {
         match (self.attention_mm, self.alarm_mm) {
-            (Some(attention), Some(alarm)) if attention >= alarm => Err(format!(
-                "attention_mm = {attention} in {table} must be below alarm_mm = {alarm}: attention comes before the alarm"
+            (Some(attention), Some(alarm)) if attention >= alarm => Err(ParamError::new(
+                "attention_mm",
+                attention,
+                format!("below alarm_mm = {alarm}: attention comes before the alarm"),
             )),
             _ => Ok(()),
         }
@@ -131,11 +150,30 @@ impl Measures {
             joints: self.joints.or(other.joints),
         }
     }
+}
 
-    fn check(&self, table: &str) -> Result<(), String> {
-        self.length.check(table)?;
-        self.neighbours.check(&format!("neighbours of {table}"))?;
-        self.joints.check(&format!("joints of {table}"))
+impl Params for Measures {
+    fn ranges(&self) -> Vec<Ranged> {
+        self.length.ranges()
+    }
+
+    fn check_relations(&self) -> Result<(), ParamError> {
+        self.length.check_relations()
+    }
+
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![("neighbours", &self.neighbours), ("joints", &self.joints)]
+    }
+}
+
+impl Params for Thresholds {
+    fn check_relations(&self) -> Result<(), ParamError> {
+        self.wall.check()?;
+        for (number, zone) in self.zones.iter().enumerate() {
+            let checked = zone.measures.check();
+            checked.map_err(|error| error.within(&format!("zones.{number}")))?;
+        }
+        Ok(())
     }
 }
 
@@ -181,7 +219,6 @@ impl TryFrom<Keys> for Thresholds {
             neighbours: keys.neighbours,
             joints: keys.joints,
         };
-        wall.check("[thresholds]")?;
         let mut zones: Vec<Zone> = Vec::new();
         for keys in keys.zones {
             let name = keys.name.trim();
@@ -198,10 +235,9 @@ impl TryFrom<Keys> for Thresholds {
 
 fn zone(keys: ZoneKeys, wall: &Measures) -> Result<Zone, String> {
     let name = keys.name.trim().to_owned();
-    let table = format!("zone {name:?} of [thresholds]");
     if keys.polygon.len() < 3 || keys.polygon.iter().flatten().any(|v| !v.is_finite()) {
         return Err(format!(
-            "polygon of {table} needs three corners [along, up] at least, metres in the facade frame"
+            "polygon of zone {name:?} of [thresholds] needs three corners [along, up] at least, metres in the facade frame"
         ));
     }
     let own = Measures {
@@ -212,7 +248,6 @@ fn zone(keys: ZoneKeys, wall: &Measures) -> Result<Zone, String> {
         neighbours: keys.neighbours,
         joints: keys.joints,
     };
-    own.check(&table)?;
     Ok(Zone {
         name,
         polygon: keys.polygon,
@@ -245,7 +280,9 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Thresholds, String> {
-        toml::from_str(text).map_err(|e| e.message().to_owned())
+        let thresholds: Thresholds = toml::from_str(text).map_err(|e| e.message().to_owned())?;
+        thresholds.check().map_err(|e| e.to_string())?;
+        Ok(thresholds)
     }
 
     const FULL: &str = "attention_mm = 5\nalarm_mm = 10.0\nneighbours = { attention_mm = 2.0, alarm_mm = 4.0 }\n\
@@ -282,14 +319,21 @@ mod tests {
         for (text, words) in [
             (
                 "attention_mm = 10.0\nalarm_mm = 5.0",
-                "attention_mm = 10 in [thresholds] must be below alarm_mm = 5",
+                "attention_mm = 10 is not possible: it must be below alarm_mm = 5",
             ),
             ("attention_mm = 5.0\nalarm_mm = 5.0", "must be below"),
-            ("alarm_mm = 0.0", "alarm_mm = 0 in [thresholds] is not possible"),
-            ("attention_mm = nan", "a length above 0"),
+            (
+                "alarm_mm = 0.0",
+                "alarm_mm = 0 is not possible: it must be above 0",
+            ),
+            ("attention_mm = nan", "a finite number, above 0"),
             (
                 "joints = { attention_mm = -1.0 }",
-                "attention_mm = -1 in joints of [thresholds]",
+                "joints.attention_mm = -1 is not possible",
+            ),
+            (
+                "[[zones]]\nname = \"a\"\npolygon = [[0, 0], [1, 0], [1, 1]]\nneighbours = { alarm_mm = inf }",
+                "zones.0.neighbours.alarm_mm = inf",
             ),
             ("alarm = 5.0", "unknown field `alarm`"),
             (

@@ -5,7 +5,7 @@
 const LAYERS: [&[&str]; 4] = [
     &["report_params", "stable", "thresholds"],
     &["error", "messages", "settings"],
-    &["address_space", "files", "limits", "part", "warnings"],
+    &["address_space", "files", "part", "warnings"],
     &["parameters"],
 ];
 

@@ -59,6 +59,9 @@ pub enum Command {
     /// Write a project file from the surveys found in a folder.
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
+    /// Print the JSON schema of the project file, with which editors complete and explain its keys.
+    #[command(after_help = "Example:\n  stonewise schema > survey/stonewise.schema.json")]
+    Schema,
     /// Split one epoch into two disjoint halves, to test the method against a known motion.
     #[command(after_help = "Example:\n  stonewise split survey/stonewise.toml --seed 1 --out halves/")]
     Split(SplitArgs),

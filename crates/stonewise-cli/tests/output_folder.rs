@@ -318,7 +318,7 @@ fn impossible_tiles_and_twin_epochs_are_wrong_usage() {
         fs::write(&project, format!("{text}\n[ingest]\nsize_m = {size}\n")).unwrap();
         let (code, log) = run(survey.path(), &out, &[]);
         assert!(
-            code == 2 && log.contains("tiles have edges of 0.5 to 100 m"),
+            code == 2 && log.contains("is not possible: it must be 0.5 to 100"),
             "{log}"
         );
     }

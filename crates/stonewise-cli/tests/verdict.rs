@@ -197,11 +197,11 @@ fn impossible_thresholds_and_logos_are_named_with_their_line() {
     for (lines, words) in [
         (
             "[thresholds]\nattention_mm = 10.0\nalarm_mm = 5.0",
-            "attention_mm = 10 in [thresholds] must be below alarm_mm = 5",
+            "thresholds.attention_mm = 10 is not possible: it must be below alarm_mm = 5",
         ),
         (
             "[thresholds]\nalarm_mm = -1.0",
-            "alarm_mm = -1 in [thresholds] is not possible",
+            "thresholds.alarm_mm = -1 is not possible: it must be above 0",
         ),
         ("[thresholds]\nalarm = 1.0", "unknown field `alarm`"),
         ("[report]\nlogo = \"none.png\"", "no such file or folder"),

@@ -8,8 +8,8 @@
 //! A module uses only those before it, and those in braces never each other:
 //!
 //! ```text
-//! id < epoch < statistics < linalg < components < progress < parallel < geometry < raster < cloud < stone
-//!    < surface < {transfer | matching | registration | change | views} < evaluate
+//! id < epoch < statistics < linalg < components < progress < parallel < params < geometry < raster < cloud
+//!    < stone < surface < {transfer | matching | registration | change | views} < evaluate
 //! ```
 
 pub mod change;
@@ -22,6 +22,7 @@ pub mod id;
 mod linalg;
 pub mod matching;
 pub mod parallel;
+pub mod params;
 pub mod progress;
 pub mod raster;
 pub mod registration;

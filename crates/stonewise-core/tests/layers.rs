@@ -11,6 +11,7 @@ const LAYERS: [&[&str]; 8] = [
         "components",
         "progress",
         "parallel",
+        "params",
     ],
     &["geometry"],
     &["raster"],

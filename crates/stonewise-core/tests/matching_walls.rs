@@ -118,7 +118,7 @@ fn without_shifts_every_decision_follows_from_brute_force() {
         let b = &second[near[0].1];
         let size = a.area_m2.max(b.area_m2).sqrt();
         let area = a.area_m2.min(b.area_m2) / a.area_m2.max(b.area_m2);
-        let expected = if near[0].0 > params.max_offset_sizes * size {
+        let expected = if near[0].0 > params.max_offset_sizes.unwrap() * size {
             MatchOutcome::Unmatched(UnmatchedReason::Lost)
         } else if area < params.min_area_ratio {
             kinds[0] += 1;

@@ -40,6 +40,12 @@ const NOT_READ: &str = "a format that is not read";
 /// Names of masks in a line at most.
 const NAMES: usize = 4;
 
+/// The first lines of a project file. Editors read the first one.
+const HEAD: &str = "#:schema ./stonewise.schema.json
+# Paths are relative to this file. Parameters: docs/src/project-file.md. Editors complete and explain them
+# once the schema is beside this file: stonewise schema > stonewise.schema.json
+";
+
 /// Writes `dir/stonewise.toml`: one epoch for each folder of `dir` that holds a cloud in it or below, else for
 /// each scan that lies in `dir` itself, in order of time as far as names tell it.
 ///
@@ -161,7 +167,7 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
         .canonicalize()
         .ok()
         .and_then(|d| Some(d.file_name()?.to_string_lossy().into_owned()));
-    let mut text = String::from("# Paths are relative to this file. Parameters: docs/src/project-file.md.\n");
+    let mut text = HEAD.to_owned();
     let _ = writeln!(
         text,
         "[project]\nname = {}",
@@ -244,6 +250,7 @@ mod tests {
             "old/epoch1/wall.laz",
             "notes/a.txt.bak",
         ]);
+        assert!(text.starts_with("#:schema ./"), "{text}");
         assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
         for left in [
             "truth/",

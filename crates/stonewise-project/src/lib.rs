@@ -7,10 +7,12 @@ mod project_file;
 mod project_parameters;
 mod project_type;
 mod scans;
+mod schema;
 pub mod sources;
 mod split;
 
 pub use init::{Initialised, init};
 pub use project_type::{Epoch, PhotoFiles, Project};
 pub use scans::{ScansProject, is_scan};
+pub use schema::project_schema;
 pub use split::{Halves, SPLIT_FILES, split};

@@ -3,6 +3,7 @@
 use super::{Epoch, PhotoFiles, Project};
 use crate::edits::EditsFile;
 use crate::sources::SourceRule;
+use schemars::JsonSchema;
 use serde::Deserialize;
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -10,87 +11,118 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
-use stonewise_base::limits::impossible;
 use stonewise_base::report_params::{ReportParams, logo_type};
-use stonewise_base::settings::{IngestParams, RENAMED, RegistrationParams, SegmentParams, Settings};
+use stonewise_base::settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 use stonewise_base::thresholds::Thresholds;
 use stonewise_core::change::M3c2Params;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::{EvaluationParams, MotionField};
 use stonewise_core::matching::MatchParams;
+use stonewise_core::params::Params;
 use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_core::views::ViewParams;
 use stonewise_io::cameras::MapFrame;
 use stonewise_io::crs::MapSystem;
 use stonewise_segment::Weights;
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 use toml::value::Datetime;
 
 /// What to do about backslashes.
 const SLASHES: &str = "use / or single quotes in paths";
 
-#[derive(Deserialize)]
+/// A project file of stonewise: which surveys, and the parameters of every step.
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct RawProject {
+pub(super) struct RawProject {
+    /// The structure.
     project: RawHeader,
+    /// The surveys, two or more, in time order.
     epochs: Vec<RawEpoch>,
-    #[serde(default, alias = "tiles")]
+    #[serde(default)]
     ingest: IngestParams,
     #[serde(default)]
     views: ViewParams,
     #[serde(default)]
     segment: SegmentParams,
-    #[serde(default, alias = "transfer")]
+    #[serde(default)]
     label: TransferParams,
     #[serde(default)]
     stones: StoneParams,
     #[serde(default)]
     carry: CarryParams,
-    #[serde(default, alias = "matching")]
+    #[serde(default)]
     r#match: MatchParams,
     #[serde(default)]
     registration: RegistrationParams,
     #[serde(default)]
     m3c2: M3c2Params,
-    #[serde(default, alias = "evaluation")]
+    #[serde(default)]
     evaluate: EvaluationParams,
     #[serde(default)]
     thresholds: Thresholds,
     #[serde(default)]
     report: ReportParams,
+    /// Corrections of stones by hand.
     edits: Option<RawEdits>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RawEdits {
+    /// A file of corrections by hand, JSON.
+    #[schemars(with = "PathBuf")]
     file: Spanned<PathBuf>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RawHeader {
+    /// Name of the structure, as reports show it.
+    #[schemars(with = "String")]
     name: Spanned<String>,
+    /// Name of the epoch that motions count from. Absent: the first.
+    #[schemars(with = "Option<String>")]
     reference: Option<Spanned<String>>,
+    /// Coordinate system of the clouds: a WKT, or a code such as `EPSG:25832`. Absent: what the clouds name.
+    #[schemars(with = "Option<String>")]
     crs: Option<Spanned<String>>,
+    /// Lengths that were taken off the clouds' coordinates, x, y, z, metres.
     #[serde(default)]
     false_origin: [f64; 3],
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RawEpoch {
+    /// Name, which no other epoch has.
+    #[schemars(with = "String")]
     name: Spanned<String>,
+    /// Date of the survey.
+    #[schemars(with = "Option<String>")]
     date: Option<Spanned<Datetime>>,
+    /// Conditions during the survey: any numbers by name, such as `reservoir_level_m`.
     #[serde(default)]
     conditions: BTreeMap<String, f64>,
+    /// Point clouds, one or more, all in one frame: LAS, LAZ, COPC, E57, PLY or XYZ.
+    #[schemars(with = "Vec<PathBuf>", length(min = 1))]
     clouds: Spanned<Vec<Spanned<PathBuf>>>,
+    /// Folder of the photos that the cameras name. Absent, with `cameras`: views of the clouds are looked at.
+    #[schemars(with = "Option<PathBuf>")]
     images: Option<Spanned<PathBuf>>,
+    /// Cameras: Metashape XML, COLMAP folder or OpenSfM json.
+    #[schemars(with = "Option<PathBuf>")]
     cameras: Option<Spanned<PathBuf>>,
+    /// Masks of the stones: COCO json, or a folder of 16-bit label PNGs. Absent: the detector finds them.
+    #[schemars(with = "Option<PathBuf>")]
     masks: Option<Spanned<PathBuf>>,
+    /// A known motion of the points, applied after labelling, by which the run scores itself.
     motion: Option<MotionField>,
+    /// What counts as one station or strip, which has an error of its own.
     #[serde(default)]
     sources: SourceRule,
+    /// Name of an earlier epoch of the same survey: a source in both has the same error in both.
+    #[schemars(with = "Option<String>")]
     same_survey_as: Option<Spanned<String>>,
 }
 
@@ -168,7 +200,9 @@ impl Project {
             thresholds: raw.thresholds,
             report: source.report(raw.report)?,
         };
-        source.check_settings(&settings)?;
+        settings
+            .check()
+            .map_err(|e| source.error(source.place(&e.key), e.to_string()))?;
         let map = source.map_frame(&raw.project)?;
         source.check_names(&raw.epochs)?;
         source.check_dates(&raw.epochs)?;
@@ -176,7 +210,7 @@ impl Project {
         for epoch in raw.epochs {
             epochs.push(source.epoch(epoch, &map, &epochs)?);
         }
-        let mut notes = renamed_keys(text);
+        let mut notes = Vec::new();
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
@@ -198,27 +232,6 @@ impl Project {
         let table: toml::Table = toml::from_str(&text).ok()?;
         Some(table.get("project")?.get("name")?.as_str()?.to_owned())
     }
-}
-
-/// One sentence for each table or value that still has its former name.
-fn renamed_keys(text: &str) -> Vec<String> {
-    let Ok(file) = text.parse::<toml::Table>() else {
-        return Vec::new();
-    };
-    let at = |path: &str| {
-        let mut names = path.split('.');
-        let first = file.get(names.next()?)?;
-        names.try_fold(first, |value, name| value.get(name))
-    };
-    let mut notes: Vec<String> = RENAMED
-        .iter()
-        .filter(|(old, _)| at(old).is_some())
-        .map(|(old, new)| format!("[{old}] is now called [{new}]; both names work"))
-        .collect();
-    if at("registration.estimator").and_then(toml::Value::as_str) == Some("network") {
-        notes.push("estimator = \"network\" is now called \"adjustment\"; both names work".to_owned());
-    }
-    notes
 }
 
 /// The project file itself, where a folder is given.
@@ -262,6 +275,24 @@ impl Source<'_> {
             line,
             message: message.into(),
         }
+    }
+
+    /// Where a value stands, or else the innermost table that is there. `path`: keys, and numbers in arrays.
+    fn place(&self, path: &str) -> Range<usize> {
+        let Ok(document) = DeTable::parse(self.text) else {
+            return 0..0;
+        };
+        let root = DeValue::Table(document.into_inner());
+        let (mut place, mut value) = (0..0, &root);
+        for key in path.split('.') {
+            let inner = match key.parse::<usize>() {
+                Ok(number) => value.get(number),
+                Err(_) => value.get(key),
+            };
+            let Some(inner) = inner else { break };
+            (place, value) = (inner.span(), inner.get_ref());
+        }
+        place
     }
 
     fn map_frame(&self, header: &RawHeader) -> Result<MapFrame> {
@@ -383,13 +414,8 @@ impl Source<'_> {
 
     /// The detector's file, like all paths, is relative to the project file.
     fn segment(&self, mut params: SegmentParams) -> Result<SegmentParams> {
-        let at = |key: &str| self.text.find(key).unwrap_or(0);
         if let Weights::File(file) = Weights::named(&params.model) {
-            let start = at("model");
-            params.model = self.existing(Spanned::new(start..start, file))?;
-        }
-        if let Some((key, what)) = params.tiling.impossible() {
-            return Err(self.error(at(key)..at(key), format!("{key} {what}")));
+            params.model = self.existing(Spanned::new(self.place("segment.model"), file))?;
         }
         Ok(params)
     }
@@ -405,10 +431,10 @@ impl Source<'_> {
     /// The logo, like all paths, is relative to the project file.
     fn report(&self, mut params: ReportParams) -> Result<ReportParams> {
         if let Some(logo) = params.logo {
-            let start = self.text.find("logo").unwrap_or(0);
-            let path = self.existing(Spanned::new(start..start, logo))?;
+            let place = self.place("report.logo");
+            let path = self.existing(Spanned::new(place.clone(), logo))?;
             if let Err(reason) = logo_type(&path) {
-                return Err(self.error(start..start, format!("logo: {reason}")));
+                return Err(self.error(place, format!("logo: {reason}")));
             }
             params.logo = Some(path);
         }
@@ -491,37 +517,11 @@ impl Source<'_> {
         }
         Ok(())
     }
-
-    /// Values that the types do not exclude.
-    fn check_settings(&self, settings: &Settings) -> Result<()> {
-        let Some((key, message)) = impossible(settings) else {
-            return Ok(());
-        };
-        let at = self.text.find(&key).unwrap_or(0);
-        Err(self.error(at..at, message))
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stonewise_base::settings::Estimator;
-
-    #[test]
-    fn former_names_are_read_and_noted() {
-        let text = "[registration]\nestimator = \"network\"\n[registration.network]\nmin_points = 30\n[tiles]\nsize_m = 3.0\n";
-        let file: toml::Table = text.parse().unwrap();
-        let former: RegistrationParams = file["registration"].clone().try_into().unwrap();
-        assert_eq!(former.estimator, Estimator::Adjustment);
-        assert_eq!(former.adjustment.min_points, 30);
-        let notes = renamed_keys(text);
-        assert_eq!(notes.len(), 3, "{notes:?}");
-        assert!(notes.iter().any(|n| n.contains("[registration.adjustment]")));
-        let today = text.replace("network", "adjustment").replace("tiles", "ingest");
-        assert!(renamed_keys(&today).is_empty());
-        let written = toml::to_string(&former).unwrap();
-        assert!(written.contains("[adjustment]") && !written.contains("network"));
-    }
 
     fn with_reference(reference: &str, same: [Option<&str>; 3]) -> Result<Project> {
         let dir = tempfile::tempdir().unwrap();

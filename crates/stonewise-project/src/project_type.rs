@@ -26,8 +26,7 @@ pub struct Project {
     pub epochs: Epochs<Epoch>,
     /// Parameters of all steps.
     pub settings: Settings,
-    /// Notes for the user on how the file was read, one sentence each: keys with a new name, another
-    /// numbering of epochs.
+    /// Notes for the user on how the file was read, one sentence each: another numbering of epochs.
     pub notes: Vec<String>,
     /// Corrections by hand; absent where the project names none.
     pub edits: Option<EditsFile>,

@@ -1,12 +1,13 @@
 //! The stations and strips of an epoch: which points come from which, and when they were measured.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use stonewise_io::cloud::PointChunk;
 
 /// What counts as one source of an epoch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SourceRule {
     /// The file and the point source ID of LAS, or the scan of an E57; pieces of one strip in several files

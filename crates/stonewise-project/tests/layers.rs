@@ -6,7 +6,7 @@ const LAYERS: [&[&str]; 4] = [
     &["edits", "init", "sources"],
     &["project_type"],
     &["check", "project_file", "project_parameters", "split"],
-    &["scans"],
+    &["scans", "schema"],
 ];
 
 #[test]

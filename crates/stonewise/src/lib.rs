@@ -12,8 +12,8 @@ mod testing;
 mod truth;
 
 use stonewise_base::{
-    address_space, error, files, limits, messages as texts, part, report_params, settings, stable,
-    thresholds, warnings,
+    address_space, error, files, messages as texts, part, report_params, settings, stable, thresholds,
+    warnings,
 };
 use stonewise_figure as figure;
 use stonewise_project::sources;

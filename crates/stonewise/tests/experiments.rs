@@ -78,7 +78,7 @@ fn a_grid_finds_what_single_runs_find_and_resumes() {
     let (dir, mut project) = survey();
     project.epochs[EpochId::at(1)].motion =
         Some(MotionField::translation(Vector3::new(0.0, 0.01, 0.02)).unwrap());
-    project.settings.r#match.min_overlap = 1.0;
+    project.settings.r#match.min_overlap = Some(1.0);
     let options = TuneOptions {
         grid: [
             "match.min_area_ratio=0.9999,0.5",

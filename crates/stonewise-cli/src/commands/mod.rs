@@ -11,6 +11,7 @@ mod outcome;
 mod part;
 mod report;
 mod run;
+mod schema;
 mod segment;
 mod simulate;
 mod split;
@@ -56,6 +57,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Check(args) => check::check(&args, force, printer),
         Command::Edits(which) => edits::edits(&which, printer),
         Command::Init(args) => init::init(&args),
+        Command::Schema => schema::schema(),
         Command::Info(args) => info::info(&args),
     }
 }

@@ -8,6 +8,7 @@ use anyhow::{Result, bail};
 use std::io::Write;
 use stonewise::segmentation::{FolderJob, MaskEvaluation, require_memory, segment_folder};
 use stonewise::{OutputFolder, Owner, Until};
+use stonewise_core::params::Params;
 use stonewise_segment::Weights;
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::evaluation::MaskScore;
@@ -57,9 +58,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     let mut tiling = TilingOptions::default();
     tiling.scales = args.scales.unwrap_or(tiling.scales);
     tiling.min_score = args.min_score.unwrap_or(tiling.min_score);
-    if let Some((key, what)) = tiling.impossible() {
-        bail!("{key} {what}");
-    }
+    tiling.check()?;
     if !force {
         require_memory()?;
     }

@@ -1,6 +1,7 @@
 //! CloudCompare's M3C2 parameter file.
 
-use crate::change::{M3c2Params, M3c2ParamsError};
+use crate::change::M3c2Params;
+use crate::params::{ParamError, Params};
 use std::collections::BTreeMap;
 
 /// Why a CloudCompare parameter file cannot be used.
@@ -39,7 +40,7 @@ pub enum CloudCompareError {
     },
     /// A value out of range.
     #[error(transparent)]
-    Params(#[from] M3c2ParamsError),
+    Params(#[from] ParamError),
 }
 
 /// M3C2 parameters from the text of the file that CloudCompare's M3C2 dialog saves.

@@ -3,6 +3,7 @@
 use super::error::CompareError;
 use crate::change::{ChangeField, CorePoint, M3c2Params, OutwardReference, m3c2};
 use crate::cloud::GridIndex;
+use crate::params::Params;
 use crate::progress::Progress;
 use nalgebra::{Point3, Vector3};
 

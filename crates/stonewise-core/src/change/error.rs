@@ -1,6 +1,6 @@
 //! Errors of comparisons.
 
-use super::params::M3c2ParamsError;
+use crate::params::ParamError;
 use crate::progress::Interrupted;
 
 /// Why clouds could not be compared.
@@ -15,7 +15,7 @@ pub enum CompareError {
     Interrupted(#[from] Interrupted),
     /// Parameters that cannot work.
     #[error(transparent)]
-    Params(#[from] M3c2ParamsError),
+    Params(#[from] ParamError),
     /// Normals that do not belong to the core points.
     #[error("{normals} normals for {core_points} core points: give one normal for each core point")]
     NormalCount {

@@ -29,5 +29,5 @@ pub use field::{ChangeField, ChangePoint};
 pub use m3c2::m3c2;
 pub use mesh::{MeshError, TriangleMesh};
 pub use normals::{OutwardReference, estimate_normals};
-pub use params::{M3c2Params, M3c2ParamsError};
+pub use params::M3c2Params;
 pub use survey::{PointDistances, c2c_survey, c2m_survey, m3c2_survey};

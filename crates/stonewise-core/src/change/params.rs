@@ -1,6 +1,9 @@
 //! Parameters of M3C2.
 
+use crate::params::{ParamError, Params, Range, Ranged, with_ranges};
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 /// Parameters of M3C2.
 ///
@@ -8,8 +11,10 @@ use serde::{Deserialize, Serialize};
 /// `cylinder_radius_m`) or as a diameter (`normal_diameter_m`, `cylinder_diameter_m`, the convention of Lague
 /// et al. and of CloudCompare), never both. `max_depth_m` is a half-length: from the core point to either
 /// end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys")]
+#[schemars(!try_from, default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>, transform = with_diameters)]
 pub struct M3c2Params {
     /// Radius of the neighbourhood whose plane gives a core point its normal, metres.
     pub normal_radius_m: f64,
@@ -52,66 +57,18 @@ impl Default for M3c2Params {
     }
 }
 
-impl M3c2Params {
-    /// Checks that every length is usable.
-    ///
-    /// # Errors
-    /// A length is not positive and finite, or the registration error is negative; the error names it.
-    pub fn check(&self) -> Result<(), M3c2ParamsError> {
-        for (key, value_m) in [
-            ("normal_radius_m", self.normal_radius_m),
-            ("cylinder_radius_m", self.cylinder_radius_m),
-            ("max_depth_m", self.max_depth_m),
-            ("core_spacing_m", self.core_spacing_m),
-        ] {
-            if !(value_m.is_finite() && value_m > 0.0) {
-                return Err(M3c2ParamsError::NotPositive { key, value_m });
-            }
-        }
-        if !(self.registration_error_m.is_finite() && self.registration_error_m >= 0.0) {
-            return Err(M3c2ParamsError::Negative {
-                key: "registration_error_m",
-                value_m: self.registration_error_m,
-            });
-        }
-        if self.ddof > 1 {
-            return Err(M3c2ParamsError::Ddof(self.ddof));
-        }
-        Ok(())
+impl Params for M3c2Params {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("normal_radius_m", self.normal_radius_m),
+            Range::POSITIVE.holds("cylinder_radius_m", self.cylinder_radius_m),
+            Range::POSITIVE.holds("max_depth_m", self.max_depth_m),
+            Range::POSITIVE.holds("core_spacing_m", self.core_spacing_m),
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+            Range::between(0.0, 1.0).holds("ddof", self.ddof),
+            Range::NOT_NEGATIVE.holds("registration_error_m", self.registration_error_m),
+        ]
     }
-}
-
-/// Why M3C2 parameters cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum M3c2ParamsError {
-    /// A length that must be positive.
-    #[error("{key} is {value_m}, it must be a positive length in metres")]
-    NotPositive {
-        /// Name of the parameter.
-        key: &'static str,
-        /// Its value.
-        value_m: f64,
-    },
-    /// A length that must not be negative.
-    #[error("{key} is {value_m}, it must be zero or a positive length in metres")]
-    Negative {
-        /// Name of the parameter.
-        key: &'static str,
-        /// Its value.
-        value_m: f64,
-    },
-    /// Two spellings of one parameter.
-    #[error("{radius} and {diameter} are both given, keep one of them")]
-    RadiusAndDiameter {
-        /// Key of the radius.
-        radius: &'static str,
-        /// Key of the diameter.
-        diameter: &'static str,
-    },
-    /// No such divisor.
-    #[error("ddof is {0}, it must be 0 or 1")]
-    Ddof(u32),
 }
 
 /// The keys as files spell them.
@@ -149,19 +106,13 @@ impl Default for Keys {
 }
 
 impl TryFrom<Keys> for M3c2Params {
-    type Error = M3c2ParamsError;
+    type Error = ParamError;
 
-    fn try_from(keys: Keys) -> Result<Self, M3c2ParamsError> {
+    fn try_from(keys: Keys) -> Result<Self, ParamError> {
         let default = Self::default();
-        let normal = radius_of(
-            (keys.normal_radius_m, "normal_radius_m"),
-            (keys.normal_diameter_m, "normal_diameter_m"),
-        )?;
-        let cylinder = radius_of(
-            (keys.cylinder_radius_m, "cylinder_radius_m"),
-            (keys.cylinder_diameter_m, "cylinder_diameter_m"),
-        )?;
-        let params = Self {
+        let normal = radius_of("normal", keys.normal_radius_m, keys.normal_diameter_m)?;
+        let cylinder = radius_of("cylinder", keys.cylinder_radius_m, keys.cylinder_diameter_m)?;
+        Ok(Self {
             normal_radius_m: normal.unwrap_or(default.normal_radius_m),
             cylinder_radius_m: cylinder.unwrap_or(default.cylinder_radius_m),
             max_depth_m: keys.max_depth_m,
@@ -170,25 +121,38 @@ impl TryFrom<Keys> for M3c2Params {
             min_points: keys.min_points,
             ddof: keys.ddof,
             registration_error_m: keys.registration_error_m,
-        };
-        params.check()?;
-        Ok(params)
+        })
     }
 }
 
-type Key = (Option<f64>, &'static str);
-
-fn radius_of(
-    (radius, radius_key): Key,
-    (diameter, diameter_key): Key,
-) -> Result<Option<f64>, M3c2ParamsError> {
+fn radius_of(scale: &str, radius: Option<f64>, diameter: Option<f64>) -> Result<Option<f64>, ParamError> {
     match (radius, diameter) {
-        (Some(_), Some(_)) => Err(M3c2ParamsError::RadiusAndDiameter {
-            radius: radius_key,
-            diameter: diameter_key,
-        }),
+        (Some(_), Some(diameter)) => Err(ParamError::new(
+            format!("{scale}_diameter_m"),
+            diameter,
+            format!("left out where {scale}_radius_m is given"),
+        )),
         (None, Some(diameter)) => Ok(Some(0.5 * diameter)),
         (radius, None) => Ok(radius),
+    }
+}
+
+/// The schema with the diameters that may be given in place of radii.
+fn with_diameters(schema: &mut Schema) {
+    let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
+        return;
+    };
+    for scale in ["normal", "cylinder"] {
+        let radius = format!("{scale}_radius_m");
+        let Some(mut diameter) = properties.get(&radius).cloned() else {
+            continue;
+        };
+        if let Some(keys) = diameter.as_object_mut() {
+            keys.remove("default");
+            let description = format!("Twice `{radius}`, metres; may be given in its place.");
+            keys.insert("description".to_owned(), json!(description));
+        }
+        properties.insert(format!("{scale}_diameter_m"), diameter);
     }
 }
 
@@ -209,16 +173,17 @@ mod tests {
     }
 
     #[test]
-    fn wrong_keys_and_values_are_named() {
+    fn wrong_keys_are_named() {
         let both = read(r#"{"cylinder_radius_m": 0.1, "cylinder_diameter_m": 0.2}"#).unwrap_err();
-        assert!(both.contains("cylinder_diameter_m are both given"), "{both}");
+        assert!(
+            both.contains("left out where cylinder_radius_m is given"),
+            "{both}"
+        );
         assert!(
             read(r#"{"normal_scale": 1}"#)
                 .unwrap_err()
                 .contains("normal_scale")
         );
-        assert!(read(r#"{"max_depth_m": 0}"#).unwrap_err().contains("max_depth_m"));
-        assert!(read(r#"{"ddof": 2}"#).unwrap_err().contains("0 or 1"));
     }
 
     #[test]

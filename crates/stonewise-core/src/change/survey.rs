@@ -6,6 +6,7 @@ use crate::change::{
 };
 use crate::cloud::{GridIndex, TileSource};
 use crate::geometry::Bounds;
+use crate::params::Params;
 use crate::progress::Progress;
 use nalgebra::Point3;
 use std::ops::Range;

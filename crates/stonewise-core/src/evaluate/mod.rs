@@ -31,7 +31,7 @@ pub use motion_field::{MotionField, MotionFieldError};
 pub use moved_tiles::MovedTiles;
 pub use neighbours::{NeighbourScore, score_neighbours};
 pub use rotations::{RotationAxes, RotationScore, RotationStatistics, score_rotations};
-pub use sample::{EvaluationParams, EvaluationParamsError, MotionSample, RotationEstimate, StoneOutcome};
+pub use sample::{EvaluationParams, MotionSample, RotationEstimate, StoneOutcome};
 pub use score::{Directions, MotionScore, score_change, score_motions, score_stones};
 pub use seen_before_motion::SeenBeforeMotion;
 pub use statistics::ErrorStatistics;

@@ -1,13 +1,14 @@
 //! Known motions for self-checks.
 
 use nalgebra::{Point3, Unit, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A known displacement of every point, a function of where the point was.
 ///
 /// In files a table with `kind`: `{ kind = "translation", d = [x, y, z] }`, or `{ kind = "bulge", centre =
 /// [x, y, z], depth = m, diameter = m, direction = [x, y, z] }`; world frame, metres.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "Keys", into = "Keys")]
 pub struct MotionField(Kind);
 
@@ -137,16 +138,23 @@ fn finite<'a>(what: &'static str, values: impl IntoIterator<Item = &'a f64>) -> 
 }
 
 /// The motion as files spell it.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 enum Keys {
+    /// Every point moves alike.
     Translation {
+        /// The motion, world frame, metres.
         d: [f64; 3],
     },
+    /// A round bulge: depth * cos^2(pi r / diameter) along the direction for r < diameter / 2.
     Bulge {
+        /// Where it is deepest, world frame, metres.
         centre: [f64; 3],
+        /// Motion at the centre, metres.
         depth: f64,
+        /// Diameter, metres.
         diameter: f64,
+        /// Direction of the motion, world frame, of any length.
         direction: [f64; 3],
     },
 }

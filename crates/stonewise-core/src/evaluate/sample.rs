@@ -4,12 +4,15 @@ use super::calibration::Claim;
 use crate::change::ChangePoint;
 use crate::geometry::{DisplacementSample, FaceFrame, SmallMotion};
 use crate::id::StoneId;
+use crate::params::{Params, Range, Ranged, with_ranges};
 use nalgebra::{Matrix3, Point3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the evaluation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct EvaluationParams {
     /// Larger absolute errors are outliers, metres.
     pub outlier_m: f64,
@@ -36,36 +39,15 @@ impl Default for EvaluationParams {
     }
 }
 
-impl EvaluationParams {
-    /// Checks that every limit is usable.
-    ///
-    /// # Errors
-    /// A limit is not usable; the error names it.
-    pub fn check(&self) -> Result<(), EvaluationParamsError> {
-        let limits = [
-            ("outlier_m", self.outlier_m, f64::INFINITY),
-            ("still_m", self.still_m, f64::INFINITY),
-            ("min_visible_share", self.min_visible_share, 1.0),
-            ("owner_reach_m", self.owner_reach_m, f64::INFINITY),
-        ];
-        match limits
-            .iter()
-            .find(|(_, value, most)| !(*value >= 0.0 && value <= most))
-        {
-            Some((key, value, _)) => Err(EvaluationParamsError { key, value: *value }),
-            None => Ok(()),
-        }
+impl Params for EvaluationParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("outlier_m", self.outlier_m),
+            Range::NOT_NEGATIVE.holds("still_m", self.still_m),
+            Range::SHARE.holds("min_visible_share", self.min_visible_share),
+            Range::NOT_NEGATIVE.holds("owner_reach_m", self.owner_reach_m),
+        ]
     }
-}
-
-/// A limit of the evaluation that cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key} is {value}, it must be a length in metres or a share from 0 to 1, not negative")]
-pub struct EvaluationParamsError {
-    /// Name of the parameter.
-    pub key: &'static str,
-    /// Its value.
-    pub value: f64,
 }
 
 /// What a run says about one stone, as far as the evaluation needs it.
@@ -262,24 +244,4 @@ pub(super) fn normalised(error: &Vector3<f64>, covariance: Option<&Matrix3<f64>>
 /// Half-widths of the 95 % intervals along these axes.
 pub(super) fn half_widths(axes: &[Vector3<f64>; 3], covariance: Option<&Matrix3<f64>>) -> [Option<f64>; 3] {
     axes.map(|axis| covariance.map(|c| Z95 * axis.dot(&(c * axis)).max(0.0).sqrt()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn limits_that_cannot_work_are_named() {
-        assert_eq!(EvaluationParams::default().check(), Ok(()));
-        let share = EvaluationParams {
-            min_visible_share: 35.0,
-            ..EvaluationParams::default()
-        };
-        assert_eq!(share.check().unwrap_err().key, "min_visible_share");
-        let nan = EvaluationParams {
-            outlier_m: f64::NAN,
-            ..EvaluationParams::default()
-        };
-        assert_eq!(nan.check().unwrap_err().key, "outlier_m");
-    }
 }

@@ -64,7 +64,7 @@ fn pairs(first: &Centroids, second: &Centroids, shifts: &[Vector3<f64>], params:
             let &(j, distance) = second.nearest(place, 1).first()?;
             let (a, b) = (&first.stones[i], &second.stones[j]);
             let mutual = back.nearest(&b.centroid, 1).first().map(|n| n.0) == Some(i);
-            let near = distance <= params.max_offset_sizes * a.area_m2.max(b.area_m2).sqrt();
+            let near = distance <= params.max_offset_m(a.area_m2.max(b.area_m2));
             let alike = area_ratio(a, b) >= params.min_area_ratio;
             (mutual && near && alike).then(|| (i, b.centroid - a.centroid))
         })

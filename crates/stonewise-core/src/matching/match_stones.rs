@@ -179,7 +179,7 @@ fn try_one(
         area_ratio: area_ratio(stone, candidate),
     };
     let mutual = || back.nearest(&candidate.centroid, 1).first().map(|n| n.0) == Some(i);
-    let outcome = if distance_m > params.max_offset_sizes * stone.area_m2.max(candidate.area_m2).sqrt() {
+    let outcome = if distance_m > params.max_offset_m(stone.area_m2.max(candidate.area_m2)) {
         Err(absent())
     } else if quality.area_ratio < params.min_area_ratio {
         Err(UnmatchedReason::AreaMismatch)
@@ -236,7 +236,7 @@ fn pair_by_overlap(
     for i in (0..outcomes.len()).filter(|&i| partner(&outcomes[i].1).is_none()) {
         for (j, _) in second.nearest(&places[i], OVERLAP_CANDIDATES) {
             let value = overlap(&first.stones[i], &second.stones[j], &shifts[i]);
-            if let Some(value) = value.filter(|v| *v >= params.min_overlap) {
+            if let Some(value) = value.filter(|v| params.min_overlap.is_some_and(|least| *v >= least)) {
                 found.push((value, i, j));
             }
         }

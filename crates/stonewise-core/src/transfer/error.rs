@@ -1,5 +1,6 @@
 //! Why labels could not be transferred.
 
+use crate::params::ParamError;
 use crate::progress::Interrupted;
 
 type Source = Box<dyn std::error::Error + Send + Sync>;
@@ -64,6 +65,9 @@ pub enum TransferError {
         /// Labels stored for it.
         labels: usize,
     },
+    /// A parameter cannot have its value.
+    #[error(transparent)]
+    Params(#[from] ParamError),
     /// The caller stopped the work.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),

@@ -1,10 +1,13 @@
 //! What can be chosen in the transfer of labels.
 
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of [`crate::transfer::transfer_labels`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct TransferParams {
     /// Memory for the depth maps of all photos together, MiB. Where full resolution needs more, all maps are
     /// made at the same smaller resolution. 1 GiB: 78 photos of 12 MP are kept at about half resolution,
@@ -89,5 +92,30 @@ impl Default for TransferParams {
             island_share: 0.2,
             min_points: 30,
         }
+    }
+}
+
+impl Params for TransferParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("depth_memory_mib", self.depth_memory_mib),
+            Range::POSITIVE.holds("cell_m", self.cell_m),
+            Range::POSITIVE.holds("splat_spacings", self.splat_spacings),
+            Range::NOT_NEGATIVE.holds("tolerance_spacings", self.tolerance_spacings),
+            Range::NOT_NEGATIVE.holds("tolerance_noises", self.tolerance_noises),
+            Range::NOT_NEGATIVE.holds("silhouette_step_m", self.silhouette_step_m),
+            Range::NOT_NEGATIVE.holds("silhouette_px", self.silhouette_px),
+            Range::NOT_NEGATIVE.holds("silhouette_weight", self.silhouette_weight),
+            Range::NOT_NEGATIVE.holds("max_incidence_rad", self.max_incidence_rad),
+            Range::POSITIVE.holds("sample_m", self.sample_m),
+            Range::SHARE.holds("min_iou", self.min_iou),
+            Range::SHARE.holds("merged_share", self.merged_share),
+            Range::SHARE.holds("min_won_share", self.min_won_share),
+            Range::NOT_NEGATIVE.holds("missed_weight", self.missed_weight),
+            Range::NOT_NEGATIVE.holds("border_weight", self.border_weight),
+            Range::NOT_NEGATIVE.holds("island_link_m", self.island_link_m),
+            Range::SHARE.holds("island_share", self.island_share),
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+        ]
     }
 }

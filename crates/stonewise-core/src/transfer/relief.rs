@@ -5,6 +5,7 @@ use super::frustum::Cone;
 use super::{TransferError, TransferParams};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
+use crate::params::Params;
 use crate::progress::{Progress, Silent};
 use crate::raster::{RangeImage, ReliefMap};
 
@@ -15,13 +16,14 @@ use crate::raster::{RangeImage, ReliefMap};
 /// one of them and the depth map.
 ///
 /// # Errors
-/// A tile cannot be read, or the caller stopped it.
+/// A tile cannot be read, a parameter cannot have its value, or the caller stopped it.
 pub fn photo_relief<T: TileSource>(
     tiles: &T,
     view: &View,
     params: &TransferParams,
     progress: &dyn Progress,
 ) -> Result<ReliefMap, TransferError> {
+    params.check()?;
     let cone = Cone::of(view);
     let shown = (0..tiles.tile_count()).filter(|&tile| cone.touches(&tiles.bounds(tile)));
     let shown = Shown {

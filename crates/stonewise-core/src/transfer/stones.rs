@@ -8,15 +8,18 @@ use super::{LabelStore, StoneInstances, TileLabels, TransferError};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, FaceFrame, View};
 use crate::id::{ImageId, StoneId};
+use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::progress::Progress;
 use crate::stone::Stone;
 use nalgebra::{Point3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Parameters of [`build_stones`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct StoneParams {
     /// Radius of the wall around a stone whose plane is the stone's face, metres. 0.75: several stones, so
     /// that bumps of single stones average out, yet little of a dam's curvature.
@@ -26,6 +29,12 @@ pub struct StoneParams {
 impl Default for StoneParams {
     fn default() -> Self {
         Self { face_radius_m: 0.75 }
+    }
+}
+
+impl Params for StoneParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![Range::POSITIVE.holds("face_radius_m", self.face_radius_m)]
     }
 }
 
@@ -48,6 +57,7 @@ pub fn build_stones<T: TileSource, S: LabelStore>(
     params: &StoneParams,
     progress: &dyn Progress,
 ) -> Result<Vec<Stone>, TransferError> {
+    params.check()?;
     let mut sums: BTreeMap<u32, Sums> = BTreeMap::new();
     let mut face = FaceCells::new();
     each_tile(tiles, labels, "stones", progress, |_, cloud, labels| {

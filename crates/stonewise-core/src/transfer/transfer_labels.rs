@@ -17,6 +17,7 @@ use super::{AuditEvent, LabelStore, TileLabels, TransferError, TransferParams};
 use crate::cloud::{Cloud, TileSource};
 use crate::geometry::{Bounds, View};
 use crate::id::{ImageId, InstanceId, StoneId};
+use crate::params::Params;
 use crate::progress::Progress;
 use crate::raster::LabelImage;
 use nalgebra::Point3;
@@ -142,6 +143,7 @@ impl<'a> PreparedTransfer<'a> {
         T: TileSource,
         E: std::error::Error + Send + Sync + 'static,
     {
+        params.check()?;
         let masked = load_masks(views, mask, progress)?;
         let of_view: BTreeMap<ImageId, u32> = views.iter().map(|v| v.image).zip(0..).collect();
         let positions = masked.iter().filter_map(|(view, _)| of_view.get(&view.image));

@@ -1,11 +1,14 @@
 //! Parameters of the views of a cloud.
 
 use super::Shade;
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How views of a cloud are made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct ViewParams {
     /// What the pixels show. Absent: the best that the points have.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -40,5 +43,19 @@ impl Default for ViewParams {
             megapixels: 200.0,
             side_px: 1600,
         }
+    }
+}
+
+impl Params for ViewParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("cell_m", self.cell_m),
+            Range::POSITIVE.holds("distance_m", self.distance_m),
+            Range::NOT_NEGATIVE.holds("turn_rad", self.turn_rad),
+            Range::POSITIVE.holds("spread_rad", self.spread_rad),
+            Range::NOT_NEGATIVE.holds("pixel_m", self.pixel_m),
+            Range::POSITIVE.holds("megapixels", self.megapixels),
+            Range::POSITIVE.holds("side_px", self.side_px),
+        ]
     }
 }

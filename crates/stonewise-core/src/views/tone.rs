@@ -26,7 +26,7 @@ const BRIGHT: f64 = 225.0;
 const MOST_BRIGHTENING: f64 = 4.0;
 
 /// What the pixels of views show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Shade {
     /// The colours of the points.

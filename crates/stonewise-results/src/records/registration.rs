@@ -70,7 +70,6 @@ impl From<&EpochErrors> for ObserversRecord {
 #[serde(tag = "estimator", rename_all = "snake_case")]
 pub enum EstimatorRecord {
     /// All stones together.
-    #[serde(alias = "network")]
     Adjustment(Box<AdjustmentRecord>),
     /// Each stone by itself.
     Gicp(GicpRecord),

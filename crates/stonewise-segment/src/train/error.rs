@@ -48,7 +48,10 @@ pub enum TrainError {
     /// The detector cannot be built.
     #[error(transparent)]
     Model(#[from] crate::model::ConfigError),
-    /// Images or parameters that cannot be used.
+    /// A parameter cannot have its value.
+    #[error(transparent)]
+    Params(#[from] stonewise_core::params::ParamError),
+    /// Images that cannot be used.
     #[error("{0}")]
     Data(String),
 }

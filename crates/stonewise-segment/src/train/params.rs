@@ -5,6 +5,7 @@ use super::schedule::{Schedule, Total};
 use crate::augment::AugmentParams;
 use crate::model::MaskRcnnConfig;
 use serde::{Deserialize, Serialize};
+use stonewise_core::params::{Params, Range, Ranged};
 
 /// Everything that decides a training; kept in its checkpoints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,28 +82,19 @@ impl TrainParams {
     pub fn images_per_step(&self) -> usize {
         self.batch * self.accumulate
     }
+}
 
-    /// The first value that cannot be, and what it must be.
-    pub fn impossible(&self) -> Option<String> {
-        let checks = [
-            (self.crop_px >= 64, "crop_px must be at least 64"),
-            (
-                self.images_per_step() > 0,
-                "batch and accumulate must be at least 1",
-            ),
-            (self.schedule.learning_rate > 0.0, "learning_rate must be above 0"),
-            (
-                (0.0..=1.0).contains(&self.schedule.decay_share),
-                "decay_share is a share, 0 to 1",
-            ),
-            (
-                self.checkpoint_minutes > 0.0,
-                "checkpoint_minutes must be above 0",
-            ),
-        ];
-        checks
-            .iter()
-            .find(|(is_possible, _)| !is_possible)
-            .map(|(_, message)| (*message).to_owned())
+impl Params for TrainParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::between(64.0, f64::INFINITY).holds("crop_px", self.crop_px),
+            Range::POSITIVE.holds("batch", self.batch),
+            Range::POSITIVE.holds("accumulate", self.accumulate),
+            Range::POSITIVE.holds("checkpoint_minutes", self.checkpoint_minutes),
+        ]
+    }
+
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![("schedule", &self.schedule)]
     }
 }

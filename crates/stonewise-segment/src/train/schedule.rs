@@ -1,6 +1,7 @@
 //! The learning rate over a training.
 
 use serde::{Deserialize, Serialize};
+use stonewise_core::params::{Params, Range, Ranged};
 
 /// How long a whole training lasts, over however many runs of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,6 +56,15 @@ impl Default for Schedule {
             warmup_steps: 200,
             decay_share: 0.4,
         }
+    }
+}
+
+impl Params for Schedule {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("learning_rate", self.learning_rate),
+            Range::SHARE.holds("decay_share", self.decay_share),
+        ]
     }
 }
 

@@ -8,6 +8,7 @@ use super::trainer::Trainer;
 use crate::built_in::{Weights, open_model};
 use crate::model::{MaskRcnn, MaskRcnnConfig};
 use std::path::Path;
+use stonewise_core::params::Params;
 
 /// What a training starts from.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,9 +58,7 @@ pub fn open_training(
         Start::Nothing(_) => TrainParams::default(),
         Start::Weights(_) => TrainParams::fine_tuning(),
     });
-    if let Some(problem) = training.impossible() {
-        return Err(TrainError::Data(problem));
-    }
+    training.check()?;
     let model = match start {
         Start::Nothing(config) => {
             let config = MaskRcnnConfig::clone(config);

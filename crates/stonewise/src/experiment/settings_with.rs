@@ -1,8 +1,8 @@
 //! Settings with some parameters replaced, by the names that the project file has for them.
 
 use crate::error::{Error, Result};
-use crate::limits::impossible;
 use crate::settings::Settings;
+use stonewise_core::params::Params;
 
 /// The settings with each parameter (`section.key`, as in the project file) set to its value.
 ///
@@ -19,10 +19,8 @@ pub(super) fn settings_with(settings: &Settings, changes: &[(&str, &toml::Value)
         let keys: Vec<String> = changes.iter().map(|(k, v)| format!("{k} = {v}")).collect();
         bad(format!("{}: {}", keys.join(", "), e.message()))
     })?;
-    match impossible(&changed) {
-        Some((_, message)) => Err(bad(message)),
-        None => Ok(changed),
-    }
+    changed.check().map_err(|e| bad(e.to_string()))?;
+    Ok(changed)
 }
 
 /// How many of these values differ from the settings' own.
@@ -129,7 +127,7 @@ mod tests {
         assert!(fail("buffer_m", "1.0").contains("registration.gicp.buffer_m"));
         assert!(fail("match", "1.0").contains("no parameter"));
         assert!(fail("match.max_ratio", "\"much\"").contains("max_ratio"));
-        assert!(fail("match.min_area_ratio", "1.5").contains("share"));
+        assert!(fail("match.min_area_ratio", "1.5").contains("it must be 0 to 1"));
     }
 
     #[test]

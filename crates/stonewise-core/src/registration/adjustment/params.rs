@@ -3,13 +3,16 @@
 use super::field::VarianceComponents;
 use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
+use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::stone::{NeighbourCovariance, PairResult};
 use nalgebra::{Matrix3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of [`adjust`](crate::registration::adjust).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct AdjustmentParams {
     /// Cell of the stones' surface grid in median point spacings of the sparser epoch. 2: four points a cell,
     /// so that the surface follows relief and not noise.
@@ -79,6 +82,30 @@ impl Default for AdjustmentParams {
             tolerance_m: 1e-6,
             max_iterations: 32,
         }
+    }
+}
+
+impl Params for AdjustmentParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("cell_spacings", self.cell_spacings),
+            Range::POSITIVE.holds("min_cell_m", self.min_cell_m),
+            Range::POSITIVE.holds("patch_cells", self.patch_cells),
+            Range::POSITIVE.holds("outlier_sigmas", self.outlier_sigmas),
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+            Range::SHARE.holds("min_overlap", self.min_overlap),
+            Range::NOT_NEGATIVE.holds("neighbours_per_side", self.neighbours_per_side),
+            Range::SHARE.holds("loose_share", self.loose_share),
+            Range::NOT_NEGATIVE.holds("loose_move_m", self.loose_move_m),
+            Range::NOT_NEGATIVE.holds("loose_turn_rad", self.loose_turn_rad),
+            Range::SHARE.holds("false_discovery_rate", self.false_discovery_rate),
+            Range::NOT_NEGATIVE.holds("tie_freedom", self.tie_freedom),
+            Range::SHARE.holds("systematic_share", self.systematic_share),
+            Range::NOT_NEGATIVE.holds("max_sd_m", self.max_sd_m),
+            Range::POSITIVE.holds("max_step_m", self.max_step_m),
+            Range::POSITIVE.holds("tolerance_m", self.tolerance_m),
+            Range::POSITIVE.holds("max_iterations", self.max_iterations),
+        ]
     }
 }
 

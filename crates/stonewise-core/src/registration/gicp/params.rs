@@ -1,9 +1,11 @@
 //! Parameters of plane-to-plane ICP.
 
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where the iteration starts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GicpStart {
     /// At no motion, as in the paper.
@@ -14,8 +16,9 @@ pub enum GicpStart {
 }
 
 /// Parameters of [`super::align`] and [`super::relate_to_neighbours`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct GicpParams {
     /// Points within this distance of any point of the stone take part, metres. 0.6 as in the paper; 0 leaves
     /// the stone's own points.
@@ -48,7 +51,7 @@ pub struct GicpParams {
     pub min_points: usize,
     /// Share of the window's points that must find a partner. 0.3: below it the epochs show different things.
     pub min_overlap: f64,
-    /// Smallest observability (see [`super::align`]) at which a motion is reported. 0.01: relief with a slope
+    /// Smallest observability (`sep_obs` of the stone table) at which a motion is reported. 0.01: relief with a slope
     /// of 1 % of the whole window, after the slope that noise feigns is taken off.
     pub min_observability: f64,
     /// Cell within which residuals may be correlated, metres. 0.05: twice the usual support of a plane.
@@ -80,5 +83,27 @@ impl Default for GicpParams {
             neighbours: 8,
             false_discovery_rate: 0.05,
         }
+    }
+}
+
+impl Params for GicpParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("buffer_m", self.buffer_m),
+            Range::POSITIVE.holds("max_distance_m", self.max_distance_m),
+            Range::NOT_NEGATIVE.holds("voxel_m", self.voxel_m),
+            Range::POSITIVE.holds("plane_neighbours", self.plane_neighbours),
+            Range::NOT_NEGATIVE.holds("plane_radius_m", self.plane_radius_m),
+            Range::POSITIVE.holds("plane_epsilon", self.plane_epsilon),
+            Range::POSITIVE.holds("tolerance_m", self.tolerance_m),
+            Range::NOT_NEGATIVE.holds("tolerance_rad", self.tolerance_rad),
+            Range::POSITIVE.holds("max_iterations", self.max_iterations),
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+            Range::SHARE.holds("min_overlap", self.min_overlap),
+            Range::NOT_NEGATIVE.holds("min_observability", self.min_observability),
+            Range::POSITIVE.holds("correlation_cell_m", self.correlation_cell_m),
+            Range::NOT_NEGATIVE.holds("neighbours", self.neighbours),
+            Range::SHARE.holds("false_discovery_rate", self.false_discovery_rate),
+        ]
     }
 }

@@ -5,6 +5,7 @@ use super::sight::{SeenStone, Sight, Source, SourcePoints, Target};
 use crate::cloud::Cloud;
 use crate::geometry::FaceFrame;
 use crate::id::StoneId;
+use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::registration::adjustment::observation::surface::{
     Equations, Layout, LocalPair, SurfaceNoise, equations::equations, estimate_noise,
 };
@@ -13,12 +14,14 @@ use crate::registration::points::{PairPoints, face_spacing};
 use crate::statistics::upper_median;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Parameters of the comparison of an epoch's sources.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct ContrastParams {
     /// Points that a source needs on a stone.
     pub min_points: usize,
@@ -47,6 +50,20 @@ impl Default for ContrastParams {
             patch_cells: 24,
             outlier_sigmas: 3.5,
         }
+    }
+}
+
+impl Params for ContrastParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+            Range::NOT_NEGATIVE.holds("max_points", self.max_points),
+            Range::NOT_NEGATIVE.holds("max_stones", self.max_stones),
+            Range::POSITIVE.holds("cell_spacings", self.cell_spacings),
+            Range::POSITIVE.holds("min_cell_m", self.min_cell_m),
+            Range::POSITIVE.holds("patch_cells", self.patch_cells),
+            Range::POSITIVE.holds("outlier_sigmas", self.outlier_sigmas),
+        ]
     }
 }
 

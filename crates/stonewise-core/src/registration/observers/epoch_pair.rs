@@ -4,11 +4,14 @@ use super::contrast::ContrastParams;
 use super::observation::Observation;
 use super::sight::{SeenStone, Sight, Source, Target};
 use super::stable::{StableParams, StablePoints};
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of [`epoch_errors`](super::epoch_errors).
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct EpochErrorParams {
     /// Comparison of the sources of an epoch.
     pub contrasts: ContrastParams,
@@ -22,6 +25,19 @@ pub struct EpochErrorParams {
     /// 1 sigma per axis, metres; absent: by the class of the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub merged_error_m: Option<f64>,
+}
+
+impl Params for EpochErrorParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("shared_error_m", self.shared_error_m),
+            Range::NOT_NEGATIVE.holds("merged_error_m", self.merged_error_m),
+        ]
+    }
+
+    fn parts(&self) -> Vec<(&'static str, &dyn Params)> {
+        vec![("contrasts", &self.contrasts), ("stable", &self.stable)]
+    }
 }
 
 /// What is measured and stated about two epochs.

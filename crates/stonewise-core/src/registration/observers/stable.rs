@@ -4,15 +4,18 @@ use super::observation::Observation;
 use super::sight::{Sight, StablePlane, Target};
 use crate::cloud::Cloud;
 use crate::geometry::FaceFrame;
+use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::statistics::upper_median;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Point3, Vector3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Parameters of the stable areas.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct StableParams {
     /// Edge of the cells in which an area is a plane, metres.
     pub cell_m: f64,
@@ -37,6 +40,18 @@ impl Default for StableParams {
             min_cells: 12,
             systematic_share: 0.1,
         }
+    }
+}
+
+impl Params for StableParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::POSITIVE.holds("cell_m", self.cell_m),
+            Range::NOT_NEGATIVE.holds("min_points", self.min_points),
+            Range::NOT_NEGATIVE.holds("max_scatter_m", self.max_scatter_m),
+            Range::NOT_NEGATIVE.holds("min_cells", self.min_cells),
+            Range::SHARE.holds("systematic_share", self.systematic_share),
+        ]
     }
 }
 

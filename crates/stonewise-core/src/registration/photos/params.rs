@@ -1,10 +1,13 @@
 //! Parameters of the photos' part.
 
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How stones are tracked from photo to photo, and how far the photos are trusted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct PhotoParams {
     /// Whether stones are tracked in the photos. Where it is off, the clouds alone measure.
     pub enabled: bool,
@@ -13,7 +16,7 @@ pub struct PhotoParams {
     pub pose_error_px: f64,
     /// Whether the camera has a rolling shutter, which exposes the rows of a photo one after the other. If
     /// true, the shift of each photo's last row relative to its first is estimated. false: for a mechanical
-    /// or global shutter. `None`: true if a camera file says that the camera
+    /// or global shutter. Absent: true if a camera file says that the camera
     /// has a rolling shutter, otherwise false.
     pub rolling_shutter: Option<bool>,
     /// Photos of a stone that are used in each epoch, at most; the sharpest come first. 8: more gain nothing,
@@ -33,7 +36,7 @@ pub struct PhotoParams {
     /// A stone is sought this far from where the clouds put it, metres, and farther by three standard
     /// deviations of that place. 0.01: what poses and epochs may be apart.
     pub search_m: f64,
-    /// It is never sought farther, metres. 0.04: half a course of small bricks, so that a stone is not taken
+    /// A stone is never sought farther, metres. 0.04: half a course of small bricks, so that a stone is not taken
     /// for its neighbour.
     pub max_search_m: f64,
 }
@@ -52,6 +55,21 @@ impl Default for PhotoParams {
             search_m: 0.01,
             max_search_m: 0.04,
         }
+    }
+}
+
+impl Params for PhotoParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("pose_error_px", self.pose_error_px),
+            Range::NOT_NEGATIVE.holds("max_photos", self.max_photos),
+            Range::NOT_NEGATIVE.holds("min_photos", self.min_photos),
+            Range::NOT_NEGATIVE.holds("rim_m", self.rim_m),
+            Range::NOT_NEGATIVE.holds("normalise_m", self.normalise_m),
+            Range::NOT_NEGATIVE.holds("min_correlation", self.min_correlation),
+            Range::NOT_NEGATIVE.holds("search_m", self.search_m),
+            Range::NOT_NEGATIVE.holds("max_search_m", self.max_search_m),
+        ]
     }
 }
 

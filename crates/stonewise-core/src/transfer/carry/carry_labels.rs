@@ -6,6 +6,7 @@ use super::params::CarryParams;
 use super::stone_shape::{Cell, FacePlace, StoneShape};
 use crate::cloud::TileSource;
 use crate::geometry::CellMap;
+use crate::params::Params;
 use crate::progress::Progress;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -133,6 +134,7 @@ pub fn carry_labels<T: TileSource, S: LabelStore>(
     params: &CarryParams,
     progress: &dyn Progress,
 ) -> Result<CarryReport, TransferError> {
+    params.check()?;
     let mut near: Vec<Vec<Near>> = vec![Vec::new(); stones.len()];
     each_tile(
         tiles,

@@ -1,10 +1,13 @@
 //! When a stone is carried into another epoch.
 
+use crate::params::{Params, Range, Ranged, with_ranges};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Parameters of [`carry_labels`](super::carry_labels).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[schemars(transform = with_ranges::<Self>)]
 pub struct CarryParams {
     /// Whether stones that one epoch shows are looked for in the clouds of others, where the detector missed
     /// them, and joined, where it divided them. Epochs with masks stay as they are.
@@ -29,5 +32,15 @@ impl Default for CarryParams {
             min_covered_share: 0.5,
             min_same_share: 0.75,
         }
+    }
+}
+
+impl Params for CarryParams {
+    fn ranges(&self) -> Vec<Ranged> {
+        vec![
+            Range::NOT_NEGATIVE.holds("max_height_m", self.max_height_m),
+            Range::SHARE.holds("min_covered_share", self.min_covered_share),
+            Range::SHARE.holds("min_same_share", self.min_same_share),
+        ]
     }
 }
