@@ -176,11 +176,7 @@ fn scene(seed: u64) -> SceneParams {
         },
     ];
     SceneParams {
-        wall: WallParams {
-            width_m: 4.0,
-            height_m: 3.0,
-            ..WallParams::default()
-        },
+        wall: WallParams::sized([4.0, 3.0]),
         motions,
         tls: None,
         uav: Some(UavParams::default()),

@@ -9,11 +9,7 @@ use stonewise_simulate::{
 
 fn params() -> (SceneParams, PhotoParams) {
     let scene = SceneParams {
-        wall: WallParams {
-            width_m: 1.8,
-            height_m: 1.4,
-            ..WallParams::default()
-        },
+        wall: WallParams::sized([1.8, 1.4]),
         motions: vec![WallMotion::Loose {
             share: 0.1,
             at_least: 2,

@@ -4,29 +4,21 @@
 use nalgebra::{Point3, Vector3};
 use stonewise_core::cloud::GridIndex;
 use stonewise_simulate::{
-    FacePoint, Scan, SceneParams, Sensor, SurroundingsParams, Target, TlsParams, UavParams, WallMotion,
-    WallParams, Window, World, scan_window, simulate_scans, surroundings,
+    EpochScans, FacePoint, Scan, SceneParams, Sensor, SurroundingsParams, Target, TlsParams, UavParams,
+    WallMotion, WallParams, Window, World, scan_window, surroundings,
 };
 
 fn small(seed: u64) -> SceneParams {
     let params = SceneParams {
-        wall: WallParams {
-            width_m: 1.8,
-            height_m: 1.4,
-            ..WallParams::default()
-        },
+        wall: WallParams::sized([1.8, 1.4]),
         ..SceneParams::default()
     };
     params.seeded(seed)
 }
 
-fn nothing_around() -> SurroundingsParams {
-    SurroundingsParams {
-        annex: false,
-        railing: false,
-        shrubs: 0,
-        ..SurroundingsParams::default()
-    }
+fn scans(params: &SceneParams) -> [EpochScans; 2] {
+    let world = World::new(params);
+    [0, 1].map(|epoch| world.scan(params, epoch))
 }
 
 /// A scanner without errors of registration, pointing and footprint.
@@ -140,7 +132,7 @@ fn a_drone_adds_its_own_noise_and_an_error_per_strip() {
 #[test]
 fn points_lie_at_the_stated_distance() {
     let params = SceneParams {
-        surroundings: nothing_around(),
+        surroundings: SurroundingsParams::none(),
         uav: Some(UavParams::default()),
         ..small(4)
     };
@@ -226,7 +218,7 @@ fn nothing_behind_the_annex_is_measured() {
     assert!(wrong < seen.len() / 50, "{wrong} of {} points", seen.len());
 
     let open = SceneParams {
-        surroundings: nothing_around(),
+        surroundings: SurroundingsParams::none(),
         ..params
     };
     let full = World::new(&open).scan(&open, 0).tls.unwrap();
@@ -295,7 +287,7 @@ fn a_dam_scanned_piece_by_piece_is_the_dam_scanned_at_once() {
 #[test]
 fn incidence_follows_from_where_the_station_stands() {
     let params = SceneParams {
-        surroundings: nothing_around(),
+        surroundings: SurroundingsParams::none(),
         wall: WallParams {
             width_m: 12.0,
             height_m: 2.0,
@@ -344,12 +336,8 @@ fn incidence_follows_from_where_the_station_stands() {
 #[test]
 fn a_station_scans_no_further_than_it_reaches() {
     let params = SceneParams {
-        surroundings: nothing_around(),
-        wall: WallParams {
-            width_m: 12.0,
-            height_m: 1.5,
-            ..WallParams::default()
-        },
+        surroundings: SurroundingsParams::none(),
+        wall: WallParams::sized([12.0, 1.5]),
         tls: Some(TlsParams {
             stations: 4,
             reach_m: 3.0,
@@ -382,7 +370,7 @@ fn the_number_of_threads_changes_nothing_and_the_seed_does() {
         uav: Some(UavParams::default()),
         ..small(7)
     };
-    let run = |threads: usize| stonewise_testing::on_threads(threads, || simulate_scans(&params).1);
+    let run = |threads: usize| stonewise_testing::on_threads(threads, || scans(&params));
     let (one, two) = (run(1), run(2));
     for (a, b) in one.iter().zip(&two) {
         let ((a_tls, b_tls), (a_uav, b_uav)) = ((&a.tls, &b.tls), (&a.uav, &b.uav));
@@ -391,7 +379,7 @@ fn the_number_of_threads_changes_nothing_and_the_seed_does() {
         assert_eq!(a_tls.as_ref().unwrap().stone, b_tls.as_ref().unwrap().stone);
         assert_eq!(a_tls.as_ref().unwrap().time, b_tls.as_ref().unwrap().time);
     }
-    let other = simulate_scans(&small(8)).1;
+    let other = scans(&small(8));
     assert_ne!(
         other[0].tls.as_ref().unwrap().cloud,
         one[0].tls.as_ref().unwrap().cloud

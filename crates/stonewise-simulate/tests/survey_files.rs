@@ -20,11 +20,7 @@ fn tiny() -> SurveyParams {
     SurveyParams {
         name: "A \"tiny\" wall".to_owned(),
         scene: SceneParams {
-            wall: WallParams {
-                width_m: 1.2,
-                height_m: 0.9,
-                ..WallParams::default()
-            },
+            wall: WallParams::sized([1.2, 0.9]),
             motions: vec![
                 WallMotion::Translation {
                     d_m: [0.0, 0.01, 0.0],

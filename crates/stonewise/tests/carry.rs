@@ -26,11 +26,7 @@ const LINE_Y_M: f64 = -0.3;
 fn survey(folder: &Path, spoil: impl Fn(usize, &View, &mut RgbImage)) -> PathBuf {
     let params = SurveyParams {
         scene: SceneParams {
-            wall: WallParams {
-                width_m: 1.6,
-                height_m: 0.9,
-                ..WallParams::default()
-            },
+            wall: WallParams::sized([1.6, 0.9]),
             motions: vec![WallMotion::Translation { d_m: MOTION }],
             tls: Some(TlsParams {
                 spacing_m: 0.008,

@@ -30,17 +30,8 @@ fn survey() -> (TempDir, Project) {
 fn survey_with_photos(rendered: bool) -> (TempDir, Project) {
     let params = SurveyParams {
         scene: SceneParams {
-            wall: WallParams {
-                width_m: 1.6,
-                height_m: 1.0,
-                ..WallParams::default()
-            },
-            surroundings: SurroundingsParams {
-                annex: false,
-                railing: false,
-                shrubs: 0,
-                ..SurroundingsParams::default()
-            },
+            wall: WallParams::sized([1.6, 1.0]),
+            surroundings: SurroundingsParams::none(),
             tls: Some(TlsParams {
                 spacing_m: 0.008,
                 ..TlsParams::default()

@@ -19,11 +19,7 @@ use stonewise_simulate::{PhotoParams, SceneParams, SurveyParams, TlsParams, Wall
 fn survey(folder: &Path) -> PathBuf {
     let params = SurveyParams {
         scene: SceneParams {
-            wall: WallParams {
-                width_m: 1.2,
-                height_m: 0.9,
-                ..WallParams::default()
-            },
+            wall: WallParams::sized([1.2, 0.9]),
             tls: Some(TlsParams {
                 spacing_m: 0.008,
                 ..TlsParams::default()

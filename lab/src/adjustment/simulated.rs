@@ -131,11 +131,7 @@ fn params(case: Case, sensor: &str, options: &Options) -> SceneParams {
     };
     let exact = options.exact;
     SceneParams {
-        wall: WallParams {
-            width_m,
-            height_m: options.height_m,
-            ..WallParams::default()
-        },
+        wall: WallParams::sized([width_m, options.height_m]),
         motions: match case {
             Case::Still | Case::Translation | Case::Bulge | Case::Datum => Vec::new(),
             Case::Edge => vec![edge],

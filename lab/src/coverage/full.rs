@@ -43,11 +43,7 @@ fn params(case: &Case, seed: u64) -> SceneParams {
         diameter_m: 1.5,
     };
     SceneParams {
-        wall: WallParams {
-            width_m: 3.0,
-            height_m: 2.0,
-            ..WallParams::default()
-        },
+        wall: WallParams::sized([3.0, 2.0]),
         motions: vec![bulge],
         tls: (case.sensor == Sensor::Tls).then_some(tls),
         uav: (case.sensor == Sensor::Uav).then_some(uav),

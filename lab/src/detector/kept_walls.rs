@@ -15,6 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use stonewise_core::progress::Silent;
 use stonewise_core::raster::{LabelImage, RgbImage};
+use stonewise_segment::evaluation::pair_masks;
 use stonewise_segment::tiling::{TilingOptions, segment_photo};
 use stonewise_segment::train::synth::{MasonryStyle, Survey, masonry_photo_of};
 use stonewise_segment::{Sample, StoneFinder, Weights};
@@ -25,8 +26,6 @@ const FIRST_SEED: u64 = 21_000;
 const COUNT: u64 = 60;
 /// Edge of a photo, pixels: several stones of the largest class.
 const SIDE_PX: u32 = 480;
-/// A found stone fits a reference stone from this intersection over union on.
-const LEAST_IOU: f64 = 0.5;
 /// How far from a stone the joint is looked at, pixels.
 const JOINT_PX: i64 = 3;
 
@@ -128,57 +127,23 @@ fn score(
 ) {
     let found = segment_photo(detector, wall.image(), wall.relief(), options, &Silent);
     let found = found.expect("the detector takes every wall");
-    let ignored = |label: u32, labels: &LabelImage| {
-        let pixels = labels
-            .data()
-            .iter()
-            .zip(wall.ignore().data())
-            .filter(|p| *p.0 == label);
-        let (all, ignored) = pixels.fold((0, 0), |(n, i), p| (n + 1, i + usize::from(*p.1)));
-        2 * ignored > all
-    };
-    let (own, theirs) = (
-        stones(wall.labels(), wall.image()),
-        stones(&found.labels, wall.image()),
-    );
-    let mut common: BTreeMap<(u32, u32), usize> = BTreeMap::new();
-    for (&f, &r) in found.labels.data().iter().zip(wall.labels().data()) {
-        if f != 0 && r != 0 {
-            *common.entry((f, r)).or_default() += 1;
-        }
-    }
-    let fit = |(&(f, r), &n): (&(u32, u32), &usize)| {
-        let union = theirs[&f].pixels + own[&r].pixels - n;
-        (n as f64 / union as f64, f, r)
-    };
-    let mut pairs: Vec<(f64, u32, u32)> = common.iter().map(fit).filter(|p| p.0 >= LEAST_IOU).collect();
-    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let (mut matched, mut hit) = (BTreeMap::new(), BTreeSet::new());
-    for (iou, f, r) in pairs {
-        if !matched.contains_key(&f) && hit.insert(r) {
-            matched.insert(f, (iou, r));
-        }
-    }
-    let counted: BTreeSet<u32> = own
-        .keys()
-        .copied()
-        .filter(|&r| !ignored(r, wall.labels()))
-        .collect();
-    for r in &counted {
+    let pairs = pair_masks(&found, wall.labels(), wall.ignore());
+    let own = stones(wall.labels(), wall.image());
+    let theirs = stones(&found.labels, wall.image());
+    let recalled: BTreeSet<u32> = pairs.found.iter().filter_map(|f| f.reference).collect();
+    for r in &pairs.references {
         for key in own[r].classes() {
             let score = table.entry(key).or_default();
             score.references += 1;
-            score.recalled += usize::from(hit.contains(r));
+            score.recalled += usize::from(recalled.contains(r));
         }
     }
-    for (f, stone) in &theirs {
-        let fits = matched.get(f);
-        let is_unknown = fits.map_or_else(|| ignored(*f, &found.labels), |(_, r)| !counted.contains(r));
-        for key in stone.classes().into_iter().filter(|_| !is_unknown) {
+    for stone in pairs.found.iter().filter(|stone| stone.counts()) {
+        for key in theirs[&stone.label].classes() {
             let score = table.entry(key).or_default();
             score.found += 1;
-            score.right += usize::from(fits.is_some());
-            score.iou += fits.map_or(0.0, |f| f.0);
+            score.right += usize::from(stone.iou.is_some());
+            score.iou += stone.iou.unwrap_or(0.0);
         }
     }
 }

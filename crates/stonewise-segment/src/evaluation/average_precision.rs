@@ -12,7 +12,7 @@ const RECALL_STEPS: usize = 100;
 /// is the best at that recall or a higher one, averaged over recalls 0, 0.01, ... 1. Source: the evaluation
 /// code of COCO (Lin et al. 2014).
 pub fn average_precision(photos: &[PhotoPairs], least_iou: f64) -> Option<f64> {
-    let references: usize = photos.iter().map(|p| p.references).sum();
+    let references: usize = photos.iter().map(|p| p.references.len()).sum();
     if references == 0 {
         return None;
     }

@@ -33,8 +33,8 @@ impl MaskScore {
         let stones = || photos.iter().flat_map(|p| &p.found);
         let ious = || stones().filter_map(|s| s.iou);
         let right = ious().count();
-        let found = stones().filter(|s| s.iou.is_some() || !s.is_unknown).count();
-        let references = photos.iter().map(|p| p.references).sum();
+        let found = stones().filter(|s| s.counts()).count();
+        let references = photos.iter().map(|p| p.references.len()).sum();
         let share = |n: usize, of: usize| (of > 0).then(|| n as f64 / of as f64);
         Self {
             found,

@@ -12,8 +12,8 @@ const LEAST_IOU: f64 = 0.5;
 /// What became of the stones of one photo.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhotoPairs {
-    /// Reference stones that count.
-    pub references: usize,
+    /// Labels of the reference stones that count.
+    pub references: Vec<u32>,
     /// Stones found, by label.
     pub found: Vec<FoundStone>,
 }
@@ -21,13 +21,24 @@ pub struct PhotoPairs {
 /// A stone that was found, and the reference stone that it fits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FoundStone {
+    /// Its label.
+    pub label: u32,
     /// How sure the detector was.
     pub score: f32,
     /// Intersection over union with the reference stone that it fits; `None` where there is none of at least
     /// one half.
     pub iou: Option<f64>,
+    /// Label of that stone.
+    pub reference: Option<u32>,
     /// Nothing is known about it unless it fits a stone that counts.
     pub is_unknown: bool,
+}
+
+impl FoundStone {
+    /// Whether it counts among the stones found, right or wrong.
+    pub fn counts(&self) -> bool {
+        self.iou.is_some() || !self.is_unknown
+    }
 }
 
 /// Pairs the stones found in a photo with reference stones, one to one, by descending overlap.
@@ -56,18 +67,22 @@ pub fn pair_masks(found: &Segmentation, reference: &LabelImage, ignore: &Raster<
     let stone = |(label, extent): (&u32, &Extent)| {
         let partner = partner.get(label);
         let is_counted = |r: &u32| !counts.reference[r].is_mostly_ignored();
+        let fits = partner.filter(|(_, r)| is_counted(r));
         FoundStone {
+            label: *label,
             score: found.scores.get(label).copied().unwrap_or(1.0),
-            iou: partner.filter(|(_, r)| is_counted(r)).map(|p| p.0),
+            iou: fits.map(|fit| fit.0),
+            reference: fits.map(|fit| fit.1),
             is_unknown: extent.is_mostly_ignored() || partner.is_some_and(|(_, r)| !is_counted(r)),
         }
     };
     PhotoPairs {
         references: counts
             .reference
-            .values()
-            .filter(|e| !e.is_mostly_ignored())
-            .count(),
+            .iter()
+            .filter(|(_, extent)| !extent.is_mostly_ignored())
+            .map(|(label, _)| *label)
+            .collect(),
         found: counts.found.iter().map(stone).collect(),
     }
 }
@@ -140,20 +155,21 @@ mod tests {
         let ious: Vec<Option<f64>> = found.iter().map(|f| f.iou).collect();
         assert_eq!(ious, [Some(1.0), Some(0.5), Some(1.0)]);
         let less = paired("1111", "1...", "....");
-        assert_eq!((less.references, less.found[0].iou), (1, None));
+        assert_eq!((less.references, less.found[0].iou), (vec![1], None));
     }
 
     #[test]
     fn a_mask_is_paired_once() {
         // Both halves of the reference stone have an IoU of one half.
         let pairs = paired("1122", "3333", "....");
-        assert_eq!(pairs.found.iter().filter(|f| f.iou.is_some()).count(), 1);
+        let fits: Vec<Option<u32>> = pairs.found.iter().map(|f| f.reference).collect();
+        assert_eq!(fits, [Some(3), None]);
     }
 
     #[test]
     fn what_lies_mostly_outside_is_left_out() {
         let pairs = paired("111.222.333.44", "111.......3.44", "xx...xx.....xx");
-        assert_eq!(pairs.references, 1);
+        assert_eq!(pairs.references, [3]);
         let known: Vec<(Option<f64>, bool)> = pairs.found.iter().map(|f| (f.iou, f.is_unknown)).collect();
         assert_eq!(known, [(None, true), (None, true), (None, false), (None, true)]);
     }
@@ -162,8 +178,8 @@ mod tests {
     fn a_stone_that_counts_is_found_by_a_mask_that_reaches_far_out() {
         let pairs = paired("11111111", ".1111111", "xxxxx...");
         // Five of eight pixels of the mask are unknown, four of seven of the reference stone.
-        assert_eq!(pairs.references, 0);
+        assert!(pairs.references.is_empty());
         let pairs = paired("11111111", "..111111", "xxxxx...");
-        assert_eq!((pairs.references, pairs.found[0].iou), (1, Some(0.75)));
+        assert_eq!((pairs.references, pairs.found[0].iou), (vec![1], Some(0.75)));
     }
 }

@@ -75,6 +75,18 @@ pub struct SurroundingsParams {
     pub seed: u64,
 }
 
+impl SurroundingsParams {
+    /// Nothing before the wall.
+    pub fn none() -> Self {
+        Self {
+            annex: false,
+            railing: false,
+            shrubs: 0,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for SurroundingsParams {
     fn default() -> Self {
         Self {

@@ -174,15 +174,6 @@ const YEAR_S: f64 = 365.0 * 86_400.0;
 /// The drone flies four hours after the terrestrial scans begin, seconds.
 const FLIGHT_AFTER_S: f64 = 4.0 * 3600.0;
 
-/// Clouds only, both epochs, with truth: fast enough for hundreds of seeds.
-///
-/// Cost: about a second for 4 x 3 m at 5 mm on two cores.
-pub fn simulate_scans(params: &SceneParams) -> (World, [EpochScans; 2]) {
-    let world = World::new(params);
-    let scans = [world.scan(params, 0), world.scan(params, 1)];
-    (world, scans)
-}
-
 /// Seed of one sensor in one epoch.
 pub(super) fn epoch_seed(seed: u64, epoch: usize, sensor: u64) -> u64 {
     (Noise::new(seed, 1000 + 16 * epoch as u64 + sensor).uniform(0) * (1u64 << 53) as f64) as u64

@@ -9,7 +9,6 @@ use crate::world::wall::SimStone;
 use crate::world::window::Window;
 use nalgebra::{Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
-use stonewise_core::evaluate::TrueStone;
 use stonewise_core::geometry::Rigid3;
 use stonewise_core::id::StoneId;
 use stonewise_core::raster::LabelImage;
@@ -180,20 +179,6 @@ impl StoneTruth {
     /// Share of the face that was measured where `cells` of its cells were, 0..1.
     pub fn seen_share(&self, cells: u32) -> f64 {
         f64::from(cells) / self.cells.len().max(1) as f64
-    }
-
-    /// The form in which results are scored. `visible_share`: of its face, measured in both epochs.
-    pub fn to_true_stone(&self, visible_share: f64) -> TrueStone {
-        TrueStone {
-            stone_id: self.id,
-            centroid: self.centroid,
-            normal: self.normal,
-            displacement: self.displacement,
-            rotation: self.rotation,
-            loose: self.loose,
-            edge: self.edge,
-            visible_share,
-        }
     }
 }
 

@@ -331,11 +331,7 @@ mod tests {
 
     #[test]
     fn stones_fill_the_wall_and_no_place_belongs_to_two() {
-        let wall = Wall::new(&WallParams {
-            width_m: 3.0,
-            height_m: 2.0,
-            ..WallParams::default()
-        });
+        let wall = Wall::new(&WallParams::sized([3.0, 2.0]));
         let [a0, a1, u0, u1] = wall.extent();
         let (mut covered, mut all) = (0, 0);
         for k in 0..4000 {

@@ -36,6 +36,17 @@ pub struct WallParams {
     pub seed: u64,
 }
 
+impl WallParams {
+    /// The default wall in another width and height, metres.
+    pub fn sized([width_m, height_m]: [f64; 2]) -> Self {
+        Self {
+            width_m,
+            height_m,
+            ..Self::default()
+        }
+    }
+}
+
 impl Default for WallParams {
     fn default() -> Self {
         Self {

@@ -29,3 +29,13 @@ pub(super) fn clip(ring: &mut Ring, normal: [f32; 2], limit: f32) {
     }
     *ring = kept;
 }
+
+/// Whether a convex ring holds a point.
+#[cfg(test)]
+pub(super) fn contains(ring: &Ring, p: [f32; 2]) -> bool {
+    let turn = |i: usize| {
+        let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
+        (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
+    };
+    (0..ring.len()).all(|i| turn(i) >= 0.0)
+}

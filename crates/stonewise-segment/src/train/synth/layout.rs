@@ -280,15 +280,8 @@ fn lay_squared(aspect: f32, jitter: f32, size: f32, extent: Extent, rng: &mut Rn
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::synth::cell::contains;
     use rand::SeedableRng;
-
-    fn contains(ring: &Ring, p: [f32; 2]) -> bool {
-        let turn = |i: usize| {
-            let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
-            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
-        };
-        (0..ring.len()).all(|i| turn(i) >= 0.0)
-    }
 
     #[test]
     fn cells_cover_the_extent_once() {

@@ -150,15 +150,8 @@ impl Bins {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::train::synth::cell::contains;
     use rand::SeedableRng;
-
-    fn contains(ring: &Ring, p: [f32; 2]) -> bool {
-        let turn = |i: usize| {
-            let (a, b) = (ring[i], ring[(i + 1) % ring.len()]);
-            (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
-        };
-        (0..ring.len()).all(|i| turn(i) >= 0.0)
-    }
 
     #[test]
     fn rubble_cells_are_the_nearest_points_by_power_distance() {

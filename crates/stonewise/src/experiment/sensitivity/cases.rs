@@ -161,17 +161,8 @@ pub(super) fn base([width_m, height_m]: [f64; 2], seed: u64) -> SurveyParams {
         name: "Sensitivity".to_owned(),
         masks: MaskFiles::Png,
         scene: SceneParams {
-            wall: WallParams {
-                width_m,
-                height_m,
-                ..WallParams::default()
-            },
-            surroundings: SurroundingsParams {
-                annex: false,
-                railing: false,
-                shrubs: 0,
-                ..SurroundingsParams::default()
-            },
+            wall: WallParams::sized([width_m, height_m]),
+            surroundings: SurroundingsParams::none(),
             motions: vec![shift(SHIFT_M)],
             tls: Some(TlsParams {
                 registration_m: 0.0,
