@@ -22,6 +22,7 @@ pub static STEPS: &[&Step] = &[
     &steps::edit::EDIT,
     &outputs::audits::AUDITS,
     &outputs::outlines::OUTLINES,
+    &steps::panels::PANELS,
     &steps::r#match::MATCH,
     &steps::offsets::OFFSETS,
     &steps::register::REGISTER,

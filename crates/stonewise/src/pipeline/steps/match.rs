@@ -5,7 +5,7 @@ use crate::files::write_readable_json;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
-use crate::pipeline::steps::panels::panels_among;
+use crate::pipeline::steps::panels::PANELS;
 use crate::pipeline::until::Until;
 use crate::results::names::PairFile;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub static MATCH: Step = Step {
     name: "match",
     words: |_| "matches of",
     about: About::Later,
-    needs: &[Need::same(&OUTLINES)],
+    needs: &[Need::same(&OUTLINES), Need::same(&PANELS)],
     wanted: |until| until >= Until::Matched,
     cost: Some(|sizes, epoch| Cost::of(1, sizes.pair_bytes(epoch))),
     make: |run, epoch| {
@@ -57,7 +57,7 @@ impl Run<'_> {
             self.require_overlap(later)?;
             let labelled = self.labelled_pair(later)?;
             let mut report = self.matches("match", labelled.each_ref().map(|l| &**l), later)?;
-            let panels = panels_among(self.context, &labelled.first)?;
+            let panels = self.panels()?;
             if !panels.is_empty() {
                 for (stone, outcome) in &mut Arc::make_mut(&mut report).outcomes {
                     if panels.binary_search(stone).is_ok() {

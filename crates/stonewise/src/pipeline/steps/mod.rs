@@ -16,7 +16,7 @@ mod matching;
 pub mod measure;
 pub mod offsets;
 pub mod overlap;
-mod panels;
+pub mod panels;
 pub mod register;
 pub mod segment;
 mod shapes;
