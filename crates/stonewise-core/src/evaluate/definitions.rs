@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-const WORDS: [(&str, &str); 25] = [
+const WORDS: [(&str, &str); 23] = [
     ("error", "estimate minus truth; all lengths in metres"),
     (
         "truth",
@@ -67,14 +67,6 @@ const WORDS: [(&str, &str); 25] = [
     (
         "m3c2",
         "displacement vector of M3C2 is distance times normal; it claims nothing in the plane",
-    ),
-    (
-        "labels",
-        "a point is right when it carries the label that stands for its true stone; label and stone stand for each other when each is the other's largest overlap",
-    ),
-    (
-        "instances",
-        "found: IoU of at least 0.5, one to one; mean_iou_found over the pairs found, mean_iou_all over all true instances, zero where nothing overlaps",
     ),
 ];
 

@@ -1,8 +1,7 @@
 //! The whole evaluation of one pair of epochs, as written to evaluation.json.
 
 use crate::evaluate::{
-    EvaluationParams, InstanceScore, LabelScore, MatchScore, MotionScore, NeighbourScore, RotationScore,
-    TruthScore, definitions,
+    EvaluationParams, MotionScore, NeighbourScore, RotationScore, TruthScore, definitions,
 };
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -31,15 +30,6 @@ pub struct Evaluation {
     /// Rotations of stones, compared with an external truth.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub rotations: Option<RotationScore>,
-    /// Matches across epochs.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub matches: Option<MatchScore>,
-    /// Point labels of the first epoch.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub labels: Option<LabelScore>,
-    /// Stone instances of the first epoch, counted in points.
-    #[serde(skip_serializing_if = "Option::is_none", default)]
-    pub instances: Option<InstanceScore>,
 }
 
 impl Evaluation {
@@ -54,9 +44,6 @@ impl Evaluation {
             external: None,
             neighbours: None,
             rotations: None,
-            matches: None,
-            labels: None,
-            instances: None,
         }
     }
 }

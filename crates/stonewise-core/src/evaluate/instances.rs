@@ -2,14 +2,13 @@
 
 use crate::evaluate::LabelConfusion;
 use crate::evaluate::detection::share;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Intersection over union from which an instance counts as found.
 const FOUND_IOU: f64 = 0.5;
 
 /// Detection quality of instances, as Mask R-CNN results are scored.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct InstanceScore {
     /// Predicted instances.
     pub predicted: usize,

@@ -1,7 +1,6 @@
 //! Point or pixel labels against true labels.
 
 use crate::evaluate::detection::share;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How often each pair of (predicted, true) label occurs; 0 is no stone.
@@ -14,7 +13,7 @@ pub struct LabelConfusion {
 }
 
 /// How many points carry the right stone.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LabelScore {
     /// Points of the true stones that are scored.
     pub stone_points: u64,

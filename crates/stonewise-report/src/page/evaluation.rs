@@ -3,7 +3,7 @@
 use super::html::{details, section, table};
 use crate::texts::{ScoreTexts, Texts, fill};
 use std::fmt::Write;
-use stonewise_core::evaluate::{Coverage, Directions, ErrorStatistics, Evaluation, MotionScore};
+use stonewise_core::evaluate::{Coverage, Directions, ErrorStatistics, Evaluation, MotionScore, TruthScore};
 use stonewise_figure::{count, escape};
 
 /// The paper's table, the full statistics, and what they mean.
@@ -30,7 +30,7 @@ pub(super) fn evaluation(evaluation: &Evaluation, texts: &Texts) -> String {
     for (name, score) in &methods {
         out.push_str(&statistics(name, score, texts));
     }
-    out.push_str(&identities(evaluation, texts));
+    out.push_str(&found(evaluation, texts));
     let words: String = evaluation
         .definitions
         .iter()
@@ -167,44 +167,17 @@ fn statistics(name: &str, score: &MotionScore, texts: &Texts) -> String {
     out
 }
 
-/// Matches, point labels and instances against truth.
-fn identities(evaluation: &Evaluation, texts: &Texts) -> String {
-    let names = &texts.scores;
-    let mut lines = Vec::new();
-    if let Some(e) = &evaluation.external {
+/// How many stones have a displacement, against an external truth.
+fn found(evaluation: &Evaluation, texts: &Texts) -> String {
+    let line = |e: &TruthScore| {
         let values = [
             ("n", &*count(e.found)),
             ("m", &*count(e.countable)),
             ("share", &*share(e.found_share, texts)),
         ];
-        lines.push(fill(names.found, &values));
-    }
-    if let Some(m) = &evaluation.matches {
-        let values = [
-            ("n", &*count(m.right)),
-            ("m", &*count(m.reference)),
-            ("share", &*share(m.right_share, texts)),
-            ("wrong", &*count(m.wrong)),
-            ("wrong_share", &*share(m.wrong_share, texts)),
-        ];
-        lines.push(fill(names.matched, &values));
-    }
-    if let Some(l) = &evaluation.labels {
-        let points = count(usize::try_from(l.stone_points).unwrap_or(usize::MAX));
-        let values = [("share", &*share(l.right_share, texts)), ("n", &*points)];
-        lines.push(fill(names.labels, &values));
-    }
-    if let Some(i) = &evaluation.instances {
-        let f1 = texts.number(i.f1.unwrap_or(f64::NAN), 2);
-        let values = [("n", &*count(i.found)), ("m", &*count(i.truth)), ("f1", &*f1)];
-        lines.push(fill(names.instances, &values));
-    }
-    let items: String = lines.iter().map(|l| format!("<li>{l}</li>")).collect();
-    if items.is_empty() {
-        items
-    } else {
-        format!("<ul>{items}</ul>")
-    }
+        format!("<ul><li>{}</li></ul>", fill(texts.scores.found, &values))
+    };
+    evaluation.external.as_ref().map(line).unwrap_or_default()
 }
 
 /// A share as a percentage with one decimal.

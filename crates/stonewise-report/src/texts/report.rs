@@ -200,10 +200,6 @@ in_both! {
         chi: " Median of e\u{2032}C<sup>\u{2212}1</sup>e: {chi} (2.37 is right).", " Median von e\u{2032}C<sup>\u{2212}1</sup>e: {chi} (2,37 ist richtig).";
         loose: " Loose stones: {true} true, {reported} reported, {right} right.", " Lose Steine: {true} wahre, {reported} gemeldet, {right} richtig.";
         found: "{n} of {m} countable stones have a displacement ({share}).", "{n} von {m} zählbaren Steinen haben eine Verschiebung ({share}).";
-        matched: "{n} of {m} stones matched to themselves ({share}); {wrong} matches are wrong ({wrong_share}).",
-            "{n} von {m} Steinen sich selbst zugeordnet ({share}); {wrong} Zuordnungen sind falsch ({wrong_share}).";
-        labels: "{share} of {n} stone points carry the right stone.", "{share} von {n} Steinpunkten tragen den richtigen Stein.";
-        instances: "{n} of {m} stone instances found, F1 {f1}.", "{n} von {m} Steininstanzen gefunden, F1 {f1}.";
     }
 }
 
