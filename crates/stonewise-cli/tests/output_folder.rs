@@ -99,7 +99,7 @@ fn other_peoples_folders_are_refused_and_their_files_stay() {
     assert_eq!(run(survey(), out.path(), &[]).0, 0);
     assert_eq!(fs::read(out.path().join("notes.txt")).unwrap(), b"mine");
 
-    // A folder of version 1 has no marker, but a run.json.
+    // Without the marker in work/, run.json tells whose the folder is.
     fs::remove_dir_all(out.path().join("work")).unwrap();
     assert_eq!(run(survey(), out.path(), &[]).0, 0);
 }

@@ -103,7 +103,7 @@ pub(super) fn look(folder: &Path, owner: &Owner) -> Result<Found> {
     if is_empty(folder)? {
         return Ok(Found::Empty);
     }
-    Ok(match of_first_version(folder, owner) {
+    Ok(match recorded_for(folder, owner) {
         true => Found::Ours,
         false => Found::Other(None),
     })
@@ -168,8 +168,9 @@ fn is_empty(folder: &Path) -> Result<bool> {
     })
 }
 
-/// Whether version 1, which wrote no markers, made the folder for this owner: `run.json` of the same project.
-fn of_first_version(folder: &Path, owner: &Owner) -> bool {
+/// Whether a folder whose `work/`, and the marker with it, was deleted holds results of this owner: `run.json`
+/// names the same project.
+fn recorded_for(folder: &Path, owner: &Owner) -> bool {
     if owner.kind != "project" {
         return false;
     }
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_version_1_are_recognised() {
+    fn results_without_their_marker_are_recognised() {
         let dir = tempfile::tempdir().unwrap();
         let project = dir.path().join("stonewise.toml");
         fs::write(&project, "[project]\nname = \"dam\"\n").unwrap();
