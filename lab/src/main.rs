@@ -2,6 +2,7 @@
 
 mod adjustment;
 mod coverage;
+mod deformation;
 mod detector;
 mod epoch_errors;
 mod figures;
@@ -20,9 +21,10 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 14] = [
+const PROGRAMS: [Program; 15] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
+    ("deformation", deformation::run),
     ("epoch-errors", epoch_errors::run),
     ("photo-curves", photo_curves::run),
     ("kept-walls", detector::kept_walls::run),

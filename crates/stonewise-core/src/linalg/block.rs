@@ -21,6 +21,7 @@ pub(crate) struct BlockPattern<const B: usize> {
 }
 
 /// Diagonal blocks and edge blocks; an edge block has rows of the higher node and columns of the lower.
+#[derive(Clone, Debug)]
 pub(crate) struct BlockMatrix<const B: usize> {
     pub diagonal: Vec<SMatrix<f64, B, B>>,
     pub edges: Vec<SMatrix<f64, B, B>>,

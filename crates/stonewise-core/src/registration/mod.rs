@@ -4,6 +4,7 @@
 //! way: every stone by itself, with its surroundings.
 
 pub(crate) mod adjustment;
+mod deformation;
 mod gicp;
 mod moved;
 pub mod observers;
@@ -11,8 +12,11 @@ pub mod photos;
 pub(crate) mod points;
 
 pub use adjustment::{
-    AdjustError, AdjustmentParams, AdjustmentReport, Break, FaceShift, PhotoReport, PhotoShift,
+    AdjustError, AdjustmentParams, AdjustmentReport, Break, FaceShift, JointMotions, PhotoReport, PhotoShift,
     StoneEvidence, StonePhotoReport, VarianceComponents, adjust, adjust_with_photos,
+};
+pub use deformation::{
+    Deformation, DeformationZone, StoneDeformation, ZONE_EXTENTS_M, ZoneKind, deformation,
 };
 pub use gicp::{GicpBlock, GicpParams, GicpStart, GicpStone, align, relate_to_neighbours};
 pub use moved::moved_stones;

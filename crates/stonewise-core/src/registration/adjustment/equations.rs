@@ -115,9 +115,16 @@ impl Adjustment {
     pub fn octaves(&self) -> f64 {
         let places = self.prior.graph.nodes.iter().map(|n| n.centroid);
         let extent_m = Bounds::of(places).map_or(0.0, |b| (b.max - b.min).norm());
+        (extent_m / self.step_m().unwrap_or(extent_m).max(SHORTEST_STEP_M))
+            .log2()
+            .max(0.0)
+            + 1.0
+    }
+
+    /// Median distance of neighbours, metres.
+    pub fn step_m(&self) -> Option<f64> {
         let mut lengths: Vec<f64> = self.prior.graph.edges.iter().map(|e| e.length_m).collect();
-        let step_m = upper_median(&mut lengths).unwrap_or(extent_m);
-        (extent_m / step_m.max(SHORTEST_STEP_M)).log2().max(0.0) + 1.0
+        upper_median(&mut lengths)
     }
 }
 

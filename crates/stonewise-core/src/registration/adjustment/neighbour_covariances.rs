@@ -129,7 +129,7 @@ fn of_poses([a, b]: [&Measured; 2]) -> Matrix3<f64> {
 }
 
 /// Symmetric, and without the negative eigenvalues that rounding leaves.
-fn without_negative(covariance: &Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn without_negative(covariance: &Matrix3<f64>) -> Matrix3<f64> {
     let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
     let values = eigen.eigenvalues.map(|v| v.max(0.0));
     eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose()

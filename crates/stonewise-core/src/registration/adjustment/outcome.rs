@@ -4,6 +4,7 @@ use super::bodies::{bodies, refuse_unconfirmed};
 use super::breaks::find_breaks;
 use super::candidate::Moving;
 use super::estimate::Estimate;
+use super::joint::JointMotions;
 use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
@@ -40,6 +41,7 @@ struct Found {
     breaks: Vec<Break>,
     neighbours: Vec<NeighbourCovariance>,
     common_covariance: Matrix3<f64>,
+    joint: Option<JointMotions>,
 }
 
 /// Results of the last iteration; `None`: there was none.
@@ -67,6 +69,7 @@ pub(crate) fn report(
         converged,
         breaks: found.breaks,
         neighbours: found.neighbours,
+        joint: found.joint,
     }
 }
 
@@ -81,6 +84,7 @@ impl Found {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &shared),
             common_covariance: common_covariance(adjustment, solution, &shared),
+            joint: Some(JointMotions::new(adjustment, solution, &results, &estimates)),
             results,
         }
     }

@@ -1,6 +1,7 @@
 //! Parameters and results of the adjustment.
 
 use super::field::VarianceComponents;
+use super::joint::JointMotions;
 use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
 use crate::params::{Params, Range, Ranged, with_ranges};
@@ -139,6 +140,8 @@ pub struct AdjustmentReport {
     pub breaks: Vec<Break>,
     /// Covariances of the motions of neighbours relative to each other.
     pub neighbours: Vec<NeighbourCovariance>,
+    /// The motions with their joint distribution; `None` where there was no solution.
+    pub joint: Option<JointMotions>,
     /// What photos contributed, where they took part.
     pub photos: Option<PhotoReport>,
 }

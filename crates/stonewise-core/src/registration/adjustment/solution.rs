@@ -143,7 +143,10 @@ impl Adjustment {
         true
     }
 
-    fn problem<'a>(&'a self, equations: impl Iterator<Item = &'a NormalEquations>) -> FieldProblem<'a> {
+    pub(super) fn problem<'a>(
+        &'a self,
+        equations: impl Iterator<Item = &'a NormalEquations>,
+    ) -> FieldProblem<'a> {
         let stones = equations.zip(&self.stones);
         FieldProblem {
             graph: &self.prior.graph,

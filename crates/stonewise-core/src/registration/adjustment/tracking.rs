@@ -40,6 +40,12 @@ impl PhotoPart<'_> {
         self.share * self.model.pose_covariance(self.stone, other.stone) * other.share.transpose()
     }
 
+    /// The unknowns of the poses, and the stone's displacement, in its frame, by each of them.
+    pub fn by_poses(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+        let by_photos = self.stone.by_poses.by_unknown();
+        by_photos.map(|(unknown, by)| (unknown, self.share * by))
+    }
+
     /// What is left of a covariance of errors of the points in the stone's displacement, in its frame: the
     /// photos do not share them.
     pub fn left_of(&self, of_points: &Matrix3<f64>) -> Matrix3<f64> {

@@ -7,6 +7,7 @@ use super::congruence::{reweighted, standing};
 use super::contrast::contrasts;
 use super::cross_check::{CrossCheck, cross_check};
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
+use super::joint::JointErrors;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
@@ -95,6 +96,9 @@ pub struct EpochErrors {
     /// the order of [`EpochPair::neighbours`]; where the datum is unknown, without the rigid motion.
     #[serde(skip)]
     pub between: Vec<Matrix3<f64>>,
+    /// The error at all stones together; `None` where the numbers fail.
+    #[serde(skip)]
+    pub joint: Option<JointErrors>,
 }
 
 /// Twice the log likelihood that sources' errors must gain to be there: one sided 5 % of chi-square with one
@@ -172,9 +176,13 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         Datum::Stable | Datum::Sources => None,
     };
     let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
-    let (relative, between) = match relative {
-        Some(relative) => (relative.at, relative.between),
-        None => (Vec::new(), found.between(pair, &unknowns)),
+    let at = found.at_stones(pair, &unknowns, model.components.nugget_m);
+    let (relative, between, joint) = match relative {
+        Some(relative) => (relative.at, relative.between, relative.joint),
+        None => {
+            let joint = found.joint(pair, &unknowns, model.components.nugget_m);
+            (Vec::new(), found.between(pair, &unknowns), joint)
+        }
     };
     let cross_check = match datum {
         Datum::Sources => cross_check(pair, &within, &rigid, &model, params),
@@ -192,10 +200,11 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
         sources: found.sources(pair, &unknowns),
         rigid,
         cross_check,
-        at: found.at_stones(pair, &unknowns, model.components.nugget_m),
+        at,
         merged_error_m,
         relative,
         between,
+        joint,
     }
 }
 
@@ -314,11 +323,23 @@ impl Averaged {
     fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
         let at = |stone: &SeenStone| {
             let mut error = self.function(&difference_row(stone, pair.sources, unknowns));
-            let squares: f64 = shares(stone, pair.sources).iter().map(|s| s * s).sum();
-            error.covariance += in_face(&stone.normal, nugget_m) * squares;
+            error.covariance += of_stone_alone(stone, pair, nugget_m);
             error
         };
         pair.stones.par_iter().map(at).collect()
+    }
+
+    /// The error at all stones together.
+    fn joint(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Option<JointErrors> {
+        let stones = pair.stones.iter();
+        let rows = stones.clone().map(|s| difference_row(s, pair.sources, unknowns));
+        let weighted: Vec<_> = self
+            .solutions
+            .iter()
+            .map(|(w, s)| (*w, &s.mean, &s.covariance))
+            .collect();
+        let own = stones.map(|s| of_stone_alone(s, pair, nugget_m)).collect();
+        JointErrors::new(rows.collect(), &weighted, own, true)
     }
 
     /// Covariances between neighbours, without the independent error of each source at each stone.
@@ -367,6 +388,13 @@ impl Averaged {
         };
         pair.sources.iter().enumerate().map(describe).collect()
     }
+}
+
+/// Covariance of the independent errors of the sources at a stone, which are `nugget_m` in the face and across
+/// it.
+fn of_stone_alone(stone: &SeenStone, pair: &EpochPair, nugget_m: [f64; 2]) -> Matrix3<f64> {
+    let squares: f64 = shares(stone, pair.sources).iter().map(|s| s * s).sum();
+    in_face(&stone.normal, nugget_m) * squares
 }
 
 /// Factor on the mean variance of a mixture of centred normal laws, (share, variance) each, by which 1.96

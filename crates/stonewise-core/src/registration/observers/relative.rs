@@ -2,6 +2,7 @@
 
 use super::components::{MergedDrift, ObserverComponents, SensorClass};
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
+use super::joint::JointErrors;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::Observation;
 use super::rigid::{RigidRows, difference_row, neighbour_row, rigid_rows};
@@ -18,6 +19,8 @@ pub(super) struct RelativeErrors {
     pub at: Vec<Matrix3<f64>>,
     /// Of the difference between two neighbours, world, m^2.
     pub between: Vec<Matrix3<f64>>,
+    /// The error at all stones together, the rigid motion not taken off.
+    pub joint: Option<JointErrors>,
 }
 
 /// The covariances for the stones and neighbours of `pair`.
@@ -60,7 +63,15 @@ pub(super) fn relative_errors(
         let difference = neighbour_row(pair, stones, &unknowns);
         rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
     };
+    let count = pair.stones.len();
+    let joint = JointErrors::new(
+        (0..count).map(row).collect(),
+        &[(1.0, &solution.mean, &solution.covariance)],
+        vec![Matrix3::zeros(); count],
+        false,
+    );
     Some(RelativeErrors {
+        joint,
         merged_error_m: (0..2).any(is_merged).then_some(sd_m),
         at: (0..pair.stones.len()).into_par_iter().map(at).collect(),
         between: pair.neighbours.par_iter().map(between).collect(),

@@ -31,7 +31,7 @@ pub(crate) use motion_prior::MotionPrior;
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
 pub(crate) use prior::Tie;
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
-pub(crate) use solve::{Field, solve};
+pub(crate) use solve::{Field, information, solve};
 pub(crate) use subgraph::{Displacement, Subgraph};
 pub(crate) use ties::reweight_ties;
 pub use variance_components::VarianceComponents;

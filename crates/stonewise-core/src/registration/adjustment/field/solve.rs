@@ -40,6 +40,21 @@ pub(crate) fn normal_equations<'a>(problem: &FieldProblem<'a>) -> Option<Normal<
     assemble(problem, prior, eliminated)
 }
 
+/// The matrix of these equations: the information of prior and stones together.
+pub(crate) fn information(problem: &FieldProblem) -> BlockMatrix<9> {
+    let eliminated = eliminate_own_motions(problem, &problem.own_variances());
+    let mut matrix = prior(problem.graph, &problem.components, &problem.ties);
+    add_stones(&mut matrix, problem, &eliminated);
+    matrix
+}
+
+fn add_stones(matrix: &mut BlockMatrix<9>, problem: &FieldProblem, eliminated: &[Eliminated]) {
+    for (i, stone) in eliminated.iter().enumerate() {
+        let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
+        matrix.diagonal[i] += a.transpose() * stone.information * a;
+    }
+}
+
 /// `matrix`: the information of the prior.
 pub(crate) fn assemble<'a>(
     problem: &FieldProblem<'a>,
@@ -47,9 +62,9 @@ pub(crate) fn assemble<'a>(
     eliminated: Vec<Eliminated>,
 ) -> Option<Normal<'a>> {
     let mut rhs = vec![Vector9::zeros(); eliminated.len()];
+    add_stones(&mut matrix, problem, &eliminated);
     for (i, stone) in eliminated.iter().enumerate() {
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
-        matrix.diagonal[i] += a.transpose() * stone.information * a;
         rhs[i] = a.transpose() * stone.vector;
     }
     let factor = problem.graph.pattern.factor(&matrix)?;

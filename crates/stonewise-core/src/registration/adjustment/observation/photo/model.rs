@@ -205,6 +205,11 @@ impl PhotoModel {
         }
     }
 
+    /// Covariance of the errors of all poses.
+    pub fn of_poses(&self) -> &DMatrix<f64> {
+        &self.of_poses
+    }
+
     /// Covariance between two stones' displacements by their photos that errors of the poses cause, each
     /// stone in its own frame.
     pub fn pose_covariance(&self, first: &StonePhotos, second: &StonePhotos) -> Matrix3<f64> {

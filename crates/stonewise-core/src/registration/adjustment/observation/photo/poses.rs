@@ -141,6 +141,12 @@ impl PoseInfluence {
         }
     }
 
+    /// The unknowns of the poses, and the displacement, in the frame of the stone, by each of them.
+    pub fn by_unknown(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+        let columns = self.matrix.column_iter().map(|c| c.into_owned());
+        self.columns.iter().copied().zip(columns)
+    }
+
     /// Covariance of this displacement with another stone's, for the covariance of the poses.
     pub fn covariance_with(&self, other: &Self, poses: &DMatrix<f64>) -> Matrix3<f64> {
         let between = DMatrix::from_fn(self.columns.len(), other.columns.len(), |r, c| {

@@ -1,0 +1,217 @@
+//! A part of the wall that ties join: its stones, and the joint distribution of their motions.
+
+use super::shared_errors::SharedErrors;
+use crate::geometry::lever;
+use crate::id::StoneId;
+use crate::linalg::{BlockFactor, BlockPattern};
+use crate::registration::adjustment::JointMotions;
+use crate::registration::adjustment::joint::JointStone;
+use crate::registration::observers::JointErrors;
+use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
+use rayon::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Columns for the six unknowns of a rigid motion.
+pub(super) type Matrix3x6 = SMatrix<f64, 3, 6>;
+
+/// A part of the wall.
+pub(super) struct Body<'a> {
+    motions: &'a JointMotions,
+    pub stones: Vec<BodyStone<'a>>,
+    /// Pairs of neighbours, as indices into the stones.
+    pub neighbours: Vec<[usize; 2]>,
+    pub shared: SharedErrors,
+}
+
+/// A stone of it.
+pub(super) struct BodyStone<'a> {
+    pub id: StoneId,
+    /// Node of the field.
+    node: usize,
+    pub joint: &'a JointStone,
+    /// Its motion less the known error of the epoch, world, metres.
+    pub displacement: Vector3<f64>,
+    /// What its own observations say of that: information and vector.
+    pub information: Matrix3<f64>,
+    pub vector: Vector3<f64>,
+    /// The displacement by a rigid motion about the middle of the body, rotations in metres at `arm_m`.
+    pub lever: Matrix3x6,
+    /// Covariance of what it shares with no other stone.
+    own: Matrix3<f64>,
+}
+
+impl<'a> Body<'a> {
+    /// All parts of at least so many stones that are not loose.
+    pub fn all(
+        motions: &'a JointMotions,
+        errors: Option<(&JointErrors, &[StoneId])>,
+        least_stones: usize,
+    ) -> Vec<Self> {
+        let measured = || motions.stones.iter().flatten();
+        let bodies: BTreeSet<u32> = measured().map(|s| s.body).collect();
+        let is_large =
+            |body: &u32| measured().filter(|s| s.body == *body && !s.is_loose).count() >= least_stones;
+        let bodies = bodies.into_iter().filter(is_large);
+        bodies.map(|body| Self::new(motions, errors, body)).collect()
+    }
+
+    fn new(motions: &'a JointMotions, errors: Option<(&JointErrors, &[StoneId])>, body: u32) -> Self {
+        let of_body = |(node, stone): (usize, &'a Option<JointStone>)| {
+            Some((node, stone.as_ref().filter(|s| s.body == body)?))
+        };
+        let members: Vec<(usize, &JointStone)> =
+            motions.stones.iter().enumerate().filter_map(of_body).collect();
+        let count = members.len().max(1) as f64;
+        let middle = Point3::from(members.iter().map(|(_, s)| s.place.coords).sum::<Vector3<f64>>() / count);
+        let squares: f64 = members
+            .iter()
+            .map(|(_, s)| (s.place - middle).norm_squared())
+            .sum();
+        let arm_m = (squares / count).sqrt().max(f64::MIN_POSITIVE);
+        let number: BTreeMap<StoneId, usize> = errors
+            .iter()
+            .flat_map(|(_, ids)| ids.iter().copied().zip(0..))
+            .collect();
+        let error_of = |id: StoneId| Some((errors?.0, *number.get(&id)?));
+        let stone = |(node, joint): &(usize, &'a JointStone)| {
+            let error = error_of(joint.id);
+            let taken_off = error.map_or_else(Vector3::zeros, |(e, k)| e.mean[k]);
+            // In the face a stone follows its neighbours, and what the field does not share already counts there as an
+            // error of its observations.
+            let out = joint.face_from_world.row(2).transpose();
+            let across = error.map_or(0.0, |(e, k)| out.dot(&(e.own[k] * out)));
+            let of_sources = out * out.transpose() * across;
+            let mut lever = lever(&(joint.place - middle));
+            lever.fixed_columns_mut::<3>(3).unscale_mut(arm_m);
+            let (information, vector) = joint.observed;
+            BodyStone {
+                id: joint.id,
+                node: *node,
+                joint,
+                displacement: joint.displacement - taken_off,
+                information,
+                vector: vector - information * taken_off,
+                lever,
+                own: joint.own + of_sources,
+            }
+        };
+        let stones: Vec<BodyStone> = members.iter().map(stone).collect();
+        let at: BTreeMap<usize, usize> = members.iter().map(|m| m.0).zip(0..).collect();
+        let pair = |(low, high): &(usize, usize)| Some([*at.get(low)?, *at.get(high)?]);
+        let mut shared = SharedErrors::none(stones.len());
+        add_octaves(&mut shared, motions, &stones);
+        if motions.poses.nrows() > 0 {
+            shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
+        }
+        if let Some((errors, _)) = errors {
+            let row = |stone: &BodyStone| {
+                let row = error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]);
+                let columns = |(first, by): &(usize, Matrix3<f64>)| {
+                    let (first, by) = (*first, *by);
+                    (0..3).map(move |c| (first + c, by.column(c).into_owned()))
+                };
+                row.iter().flat_map(columns).collect()
+            };
+            shared.add_joint(&errors.covariance, stones.iter().map(row));
+        }
+        Self {
+            motions,
+            neighbours: motions.edges.iter().filter_map(pair).collect(),
+            stones,
+            shared,
+        }
+    }
+
+    /// The pattern of the equations of the field. `None` where memory does not suffice.
+    pub fn pattern(&self) -> Option<BlockPattern<9>> {
+        BlockPattern::new(self.motions.stones.len(), &self.motions.edges)
+    }
+
+    /// The joint covariance of all displacements. `None` where memory or the numbers fail.
+    pub fn covariance<'b>(&'b self, pattern: &'b BlockPattern<9>) -> Option<Covariance<'b>> {
+        let factor = pattern.factor(&self.motions.information)?;
+        let inverse = factor.selected_inverse()?;
+        let diagonal = |(i, stone): (usize, &BodyStone)| {
+            let by_field = &stone.joint.by_field;
+            by_field * inverse.diagonal[stone.node] * by_field.transpose()
+                + stone.own
+                + self.shared.covariance(i)
+        };
+        let diagonal = self.stones.par_iter().enumerate().map(diagonal).collect();
+        Some(Covariance {
+            body: self,
+            factor,
+            diagonal,
+        })
+    }
+}
+
+/// Errors that points share over octaves of length, from twice the distance of neighbours up: patches of a
+/// checkerboard of each length err alike.
+fn add_octaves(shared: &mut SharedErrors, motions: &JointMotions, stones: &[BodyStone]) {
+    if stones.iter().all(|s| s.joint.octave.norm() == 0.0) {
+        return;
+    }
+    let mut rest = motions.octaves - 1.0;
+    let mut length_m = motions.step_m;
+    while rest > 0.0 {
+        length_m *= 2.0;
+        let share = rest.min(1.0).sqrt();
+        rest -= 1.0;
+        let mut numbers = BTreeMap::new();
+        let cells: Vec<usize> = stones
+            .iter()
+            .map(|s| {
+                let next = numbers.len();
+                let cell = s.joint.place.coords.map(|x| (x / length_m).floor() as i64);
+                *numbers.entry([cell.x, cell.y, cell.z]).or_insert(next)
+            })
+            .collect();
+        let row = |(stone, cell): (&BodyStone, &usize)| {
+            let cell = *cell;
+            let columns = stone.joint.octave * share;
+            (0..3)
+                .map(|c| (3 * cell + c, columns.column(c).into_owned()))
+                .collect()
+        };
+        shared.add_units(3 * numbers.len(), stones.iter().zip(&cells).map(row));
+    }
+}
+
+/// The joint covariance of the displacements of a body's stones.
+pub(super) struct Covariance<'a> {
+    body: &'a Body<'a>,
+    factor: BlockFactor<'a, 9>,
+    /// Of each stone, m^2.
+    pub diagonal: Vec<Matrix3<f64>>,
+}
+
+impl Covariance<'_> {
+    /// The covariance times these columns.
+    pub fn times(&self, columns: &[Matrix3x6]) -> Vec<Matrix3x6> {
+        let (body, nodes) = (self.body, self.body.motions.stones.len());
+        let solve = |c: usize| {
+            let mut rhs = vec![SVector::<f64, 9>::zeros(); nodes];
+            for (stone, x) in body.stones.iter().zip(columns) {
+                rhs[stone.node] = stone.joint.by_field.transpose() * x.column(c);
+            }
+            self.factor.solve(&rhs)
+        };
+        let solved: Vec<Vec<SVector<f64, 9>>> = (0..6).into_par_iter().map(solve).collect();
+        let mut of_unknowns = body.shared.zeros::<6>();
+        for (i, x) in columns.iter().enumerate() {
+            body.shared.add_transposed(i, x, &mut of_unknowns);
+        }
+        let spread = body.shared.spread(&of_unknowns);
+        let of_stone = |(i, (stone, x)): (usize, (&BodyStone, &Matrix3x6))| {
+            let field = SMatrix::<f64, 9, 6>::from_fn(|r, c| solved[c][stone.node][r]);
+            stone.joint.by_field * field + stone.own * x + body.shared.at(i, &spread)
+        };
+        body.stones
+            .iter()
+            .zip(columns)
+            .enumerate()
+            .map(of_stone)
+            .collect()
+    }
+}

@@ -1,0 +1,179 @@
+//! Deformation: what the wall did besides moving as one rigid body.
+//!
+//! The deformation of a stone is its motion less the rigid motion of the part of the wall that kept its shape.
+//! Errors that all stones share, the datum above all, drop out of it; those of single stations, strips and photos
+//! stay in as far as they differ between the stones. The rigid part is the largest congruent one (`rigid_part`).
+//! Whether the wall deformed at all is tested by the most likely bulge of any place, size and direction
+//! (`scan`), and where it did follows from its stones (`zones`). Congruence tests of point networks: Pelzer 1971,
+//! Niemeier 1981.
+
+mod body;
+mod random;
+mod rigid_part;
+mod scan;
+mod shared_errors;
+#[cfg(test)]
+mod tests;
+mod zones;
+
+use super::adjustment::JointMotions;
+use super::observers::JointErrors;
+use crate::id::StoneId;
+use crate::progress::{Interrupted, Progress};
+use body::Body;
+use nalgebra::{Matrix3, Vector3};
+use rigid_part::{RigidPart, rigid_part};
+use scan::{Scan, scan};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use zones::zones;
+
+/// Extents of zones for which detection limits are given, metres.
+pub const ZONE_EXTENTS_M: [f64; 3] = [1.0, 3.0, 10.0];
+
+/// Fewest stones of a part of the wall whose shape is judged: four times what a rigid motion needs.
+const LEAST_STONES: usize = 12;
+/// Probability of a still wall to be called deformed.
+const LEVEL: f64 = 0.05;
+
+/// How the wall deformed between two epochs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deformation {
+    /// Of each measured stone whose part of the wall has stones enough, ascending.
+    pub stones: Vec<StoneDeformation>,
+    /// Probability of so large a deformation by chance; `None` where no part of the wall has stones enough.
+    pub p: Option<f64>,
+    /// Smallest bulge out of the wall that is found in 95 of 100 cases, in the median over the wall, for each of [`ZONE_EXTENTS_M`]; `None` where the wall is smaller. Metres.
+    pub detection_limits_m: [Option<f64>; 3],
+    /// Connected zones that deformed, the one of the largest motion first; none unless `p` is below 5 %.
+    pub zones: Vec<DeformationZone>,
+}
+
+impl Deformation {
+    /// Whether a deformation is shown.
+    pub fn is_shown(&self) -> bool {
+        self.p.is_some_and(|p| p <= LEVEL)
+    }
+}
+
+/// The deformation of a stone; world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoneDeformation {
+    /// Stone of the first epoch.
+    pub stone: StoneId,
+    /// Its motion less that of the rigid part, metres.
+    pub deformation: Vector3<f64>,
+    /// Its covariance, m^2.
+    pub covariance: Matrix3<f64>,
+    /// Number of its zone, 0 for none.
+    pub zone: u32,
+}
+
+/// A zone that deformed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeformationZone {
+    /// From 1.
+    pub number: u32,
+    /// Its stones, ascending.
+    pub stones: Vec<StoneId>,
+    /// Length of the largest deformation, metres.
+    pub largest_m: f64,
+    /// Its 95 % interval, metres.
+    pub interval_m: [f64; 2],
+    /// Mean deformation along the wall, up and out, metres.
+    pub mean_m: Vector3<f64>,
+    /// What it resembles.
+    pub kind: ZoneKind,
+}
+
+/// What a zone of deformation resembles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ZoneKind {
+    /// It moved out of the wall, most in its middle.
+    Bulge,
+    /// It moved into the wall, most in its middle.
+    Dent,
+    /// It moved out of the wall or into it, more and more towards one side.
+    Tilt,
+    /// It sank.
+    Settlement,
+    /// It rose.
+    Heave,
+    /// It moved along the wall.
+    Slide,
+}
+
+impl ZoneKind {
+    /// The word in result files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bulge => "bulge",
+            Self::Dent => "dent",
+            Self::Tilt => "tilt",
+            Self::Settlement => "settlement",
+            Self::Heave => "heave",
+            Self::Slide => "slide",
+        }
+    }
+}
+
+/// How the wall deformed, from the motions of its stones and the error of the later epoch at them.
+///
+/// `error_stones`: the stones at which the error is given, in its order; stones without one count as free of it.
+/// Every part of the wall that ties join is judged by itself; where there are several, `p` is that of the least
+/// probable, times their number (Bonferroni).
+///
+/// Cost: about thirty solves of the field, and a thousand simulations of what the stones show of a still wall;
+/// linear in the stones.
+///
+/// # Errors
+/// The caller stopped the work.
+pub fn deformation(
+    motions: &JointMotions,
+    errors: Option<(&JointErrors, &[StoneId])>,
+    progress: &dyn Progress,
+) -> Result<Deformation, Interrupted> {
+    let mut found = Deformation::default();
+    let bodies = Body::all(motions, errors, LEAST_STONES);
+    let mut judged: Vec<(Body, RigidPart, Scan)> = Vec::new();
+    for body in bodies {
+        progress.check()?;
+        let (Some(rigid), Some(scan)) = (rigid_part(&body), scan(&body)) else {
+            continue;
+        };
+        judged.push((body, rigid, scan));
+    }
+    let count = judged.len() as f64;
+    let least = judged.iter().map(|(_, _, scan)| scan.p).reduce(f64::min);
+    found.p = least.map(|p| (p * count).min(1.0));
+    if let Some((_, _, scan)) = judged.first() {
+        found.detection_limits_m = scan.detection_limits_m;
+    }
+    let mut by_stone: BTreeMap<StoneId, StoneDeformation> = BTreeMap::new();
+    for (body, rigid, scan) in &judged {
+        for (stone, (deformation, covariance)) in body.stones.iter().zip(&rigid.deformations) {
+            let row = StoneDeformation {
+                stone: stone.id,
+                deformation: *deformation,
+                covariance: *covariance,
+                zone: 0,
+            };
+            by_stone.insert(stone.id, row);
+        }
+        if scan.p * count <= LEVEL {
+            found.zones.extend(zones(body, rigid, scan));
+        }
+    }
+    found.zones.sort_by(|a, b| b.largest_m.total_cmp(&a.largest_m));
+    for (number, zone) in (1..).zip(&mut found.zones) {
+        zone.number = number;
+        for stone in &zone.stones {
+            if let Some(row) = by_stone.get_mut(stone) {
+                row.zone = number;
+            }
+        }
+    }
+    found.stones = by_stone.into_values().collect();
+    Ok(found)
+}

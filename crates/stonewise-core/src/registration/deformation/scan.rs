@@ -1,0 +1,250 @@
+//! Did the wall move as one rigid body? The most likely bulge of any place, size and direction, against none.
+//!
+//! A bulge b with amplitude a about a rigid motion: y_i = J_i r + a b_i + L_i u + e_i, where the stone's observations
+//! give y_i with information M_i and L_i u are errors that stones share. With r estimated by least squares, the score
+//! of the bulge is s = sum b_i' (v_i - M_i J_i r), linear in the observations; s^2 / var(s) is twice the log
+//! likelihood ratio of the bulge. The test is the largest of all bulges. No variance is estimated under the
+//! alternative, so that nothing lies at a bound (compare Self & Liang 1987), and what its largest value is on a
+//! wall that moved as one body is simulated from the same model.
+
+use super::ZONE_EXTENTS_M;
+use super::body::{Body, BodyStone};
+use super::random::Random;
+use crate::geometry::Bounds;
+use crate::statistics::upper_median;
+use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, Point3, SMatrix, Vector3, Vector6};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Simulations of a wall that moved as one rigid body.
+const SIMULATIONS: usize = 999;
+/// Diameters of the bulges, metres. The longest that count are twice as long as the wall: half of such a bulge bends
+/// the wall from one end to the other.
+const DIAMETERS_M: [f64; 15] = [
+    0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 120.0,
+];
+/// Distance of the middles of bulges, as a share of their diameter.
+const STRIDE: f64 = 0.25;
+/// Fewest stones of a bulge.
+const LEAST_STONES: usize = 3;
+/// A bulge of which a rigid motion explains all but this share of the information is none.
+const LEAST_SHARE: f64 = 0.02;
+/// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
+const POWER: f64 = 1.645;
+/// Number of the direction out of the wall.
+const OUT: usize = 2;
+/// Share of still walls that are called deformed.
+const LEVEL: f64 = 0.05;
+
+/// What the test found.
+pub(super) struct Scan {
+    /// Probability of so likely a bulge on a wall that moved as one rigid body.
+    pub p: f64,
+    /// Stones of the most likely bulge, all that move by more than a quarter of its amplitude.
+    pub most_likely: Vec<usize>,
+    /// See [`super::Deformation::detection_limits_m`].
+    pub detection_limits_m: [Option<f64>; 3],
+}
+
+/// A bulge of some place and size in three directions: along, up and out.
+struct Bulge {
+    diameter_m: f64,
+    /// Stones and by how much of the amplitude they move.
+    stones: Vec<(usize, f64)>,
+    /// Of each direction: standard deviation of the score, and information on the amplitude; `None` where nothing
+    /// shows it.
+    directions: [Option<(f64, f64)>; 3],
+}
+
+/// Tests a body; `None` where its stones show no bulge.
+pub(super) fn scan(body: &Body) -> Option<Scan> {
+    let firm: Vec<usize> = (0..body.stones.len())
+        .filter(|&i| !body.stones[i].joint.is_loose)
+        .collect();
+    let model = Model::new(body, &firm)?;
+    let bulges = bulges(body, &firm, &model);
+    let observed: Vec<Vector3<f64>> = body.stones.iter().map(|s| s.vector).collect();
+    let (largest, most_likely) = model.largest(&bulges, &observed)?;
+    let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
+    let simulate = |k: usize| {
+        let mut random = Random::new(k as u64 + 1);
+        let u = body.shared.draw(&mut random);
+        let of_stone = |(i, stone): (usize, &BodyStone)| {
+            let noise = Vector3::from_fn(|_, _| random.normal());
+            stone.information * body.shared.at::<1>(i, &u) + roots[i] * noise
+        };
+        let vectors: Vec<Vector3<f64>> = body.stones.iter().enumerate().map(of_stone).collect();
+        model.largest(&bulges, &vectors).map_or(0.0, |(z, _)| z)
+    };
+    let mut still: Vec<f64> = (0..SIMULATIONS).into_par_iter().map(simulate).collect();
+    still.sort_by(f64::total_cmp);
+    let above = still.iter().filter(|z| **z >= largest).count();
+    let simulated = (1 + above) as f64 / (SIMULATIONS + 1) as f64;
+    // Beyond what simulations resolve: the sum of the probabilities of all bulges (Bonferroni).
+    let tested: usize = bulges.iter().map(|b| b.directions.iter().flatten().count()).sum();
+    let sum = 2.0 * tested as f64 * Normal::standard().sf(largest);
+    let limit = still[((1.0 - LEVEL) * SIMULATIONS as f64) as usize];
+    Some(Scan {
+        p: simulated.min(sum),
+        most_likely: bulges[most_likely]
+            .stones
+            .iter()
+            .filter(|(_, share)| *share > 0.25)
+            .map(|(i, _)| *i)
+            .collect(),
+        detection_limits_m: ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, limit)),
+    })
+}
+
+/// The smallest bulge out of the wall of this diameter that is found in 95 of 100 cases, in the median over the wall.
+fn detection_limit_m(bulges: &[Bulge], extent_m: f64, limit: f64) -> Option<f64> {
+    let of_bulge = |bulge: &Bulge| {
+        let (sd, information) = bulge.directions[OUT]?;
+        Some((limit + POWER) * sd / information)
+    };
+    let of_extent = bulges.iter().filter(|b| b.diameter_m == extent_m);
+    let mut limits: Vec<f64> = of_extent.filter_map(of_bulge).collect();
+    upper_median(&mut limits)
+}
+
+/// The rigid motion that all stones but loose ones share, by least squares.
+struct Model<'a> {
+    body: &'a Body<'a>,
+    firm: &'a [usize],
+    /// Inverse of the information of the rigid motion.
+    inverse: Matrix6<f64>,
+    /// Unknowns of shared errors times what the rigid motion takes up of them.
+    of_shared: OMatrix<f64, Dyn, Const<6>>,
+}
+
+impl<'a> Model<'a> {
+    fn new(body: &'a Body, firm: &'a [usize]) -> Option<Self> {
+        let mut information = Matrix6::zeros();
+        let mut of_shared = body.shared.zeros::<6>();
+        for &i in firm {
+            let stone = &body.stones[i];
+            let weighted = stone.information * stone.lever;
+            information += stone.lever.transpose() * weighted;
+            body.shared.add_transposed(i, &weighted, &mut of_shared);
+        }
+        Some(Self {
+            body,
+            firm,
+            inverse: information.try_inverse()?,
+            of_shared,
+        })
+    }
+
+    /// The largest standardised score, and the number of its bulge. `vectors`: of all stones' observations.
+    fn largest(&self, bulges: &[Bulge], vectors: &[Vector3<f64>]) -> Option<(f64, usize)> {
+        let right: Vector6<f64> = self
+            .firm
+            .iter()
+            .map(|&i| self.body.stones[i].lever.transpose() * vectors[i])
+            .sum();
+        let rigid = self.inverse * right;
+        let mut rest = vec![Vector3::zeros(); vectors.len()];
+        for &i in self.firm {
+            let stone = &self.body.stones[i];
+            let residual = vectors[i] - stone.information * (stone.lever * rigid);
+            rest[i] = stone.joint.face_from_world * residual;
+        }
+        let of_bulge = |bulge: &Bulge| {
+            let score: Vector3<f64> = bulge.stones.iter().map(|(i, share)| rest[*i] * *share).sum();
+            let z = |k: usize| bulge.directions[k].map_or(0.0, |(sd, _)| score[k].abs() / sd);
+            z(0).max(z(1)).max(z(2))
+        };
+        let scores = bulges.iter().map(of_bulge).zip(0..);
+        scores.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Standard deviation of the score of each direction, and information on the amplitude.
+    fn directions(&self, stones: &[(usize, f64)]) -> [Option<(f64, f64)>; 3] {
+        let (mut plain, mut with_rigid) = (Matrix3::zeros(), SMatrix::<f64, 6, 3>::zeros());
+        let mut of_shared = self.body.shared.zeros::<3>();
+        for (i, share) in stones {
+            let stone = &self.body.stones[*i];
+            let moved = stone.joint.face_from_world.transpose() * *share;
+            let weighted = stone.information * moved;
+            plain += moved.transpose() * weighted;
+            with_rigid += stone.lever.transpose() * weighted;
+            self.body.shared.add_transposed(*i, &weighted, &mut of_shared);
+        }
+        let explained = self.inverse * with_rigid;
+        let information = plain - with_rigid.transpose() * explained;
+        of_shared -= &self.of_shared * explained;
+        let shared = of_shared.transpose() * self.body.shared.spread(&of_shared);
+        std::array::from_fn(|k| {
+            let left = information[(k, k)];
+            let variance = left + shared[(k, k)];
+            (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| (variance.sqrt(), left))
+        })
+    }
+}
+
+/// All bulges of a body.
+fn bulges(body: &Body, firm: &[usize], model: &Model) -> Vec<Bulge> {
+    let place = |i: usize| body.stones[i].joint.place;
+    let extent_m = Bounds::of(firm.iter().map(|&i| place(i))).map_or(0.0, |b| (b.max - b.min).norm());
+    let mut bulges = Vec::new();
+    for diameter_m in DIAMETERS_M.into_iter().filter(|d| *d < 2.0 * extent_m) {
+        let near = Cells::new(firm, 0.5 * diameter_m, place);
+        let of_middle = |cell: &Vec<usize>| {
+            let middle = place(*cell.first()?);
+            let share = |i: usize| {
+                let r = (place(i) - middle).norm();
+                (r < 0.5 * diameter_m).then(|| (i, (PI * r / diameter_m).cos().powi(2)))
+            };
+            let stones: Vec<(usize, f64)> = near.around(&middle).filter_map(share).collect();
+            (stones.len() >= LEAST_STONES).then(|| Bulge {
+                diameter_m,
+                directions: model.directions(&stones),
+                stones,
+            })
+        };
+        // One middle in each small cell that has stones.
+        let middles: Vec<Vec<usize>> = Cells::new(firm, STRIDE * diameter_m, place)
+            .cells
+            .into_values()
+            .collect();
+        bulges.extend(middles.par_iter().filter_map(of_middle).collect::<Vec<_>>());
+    }
+    bulges
+}
+
+/// Stones by the cube that they lie in.
+struct Cells {
+    side_m: f64,
+    cells: BTreeMap<[i64; 3], Vec<usize>>,
+}
+
+impl Cells {
+    fn new(stones: &[usize], side_m: f64, place: impl Fn(usize) -> Point3<f64>) -> Self {
+        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+        for &i in stones {
+            cells.entry(Self::key(side_m, &place(i))).or_default().push(i);
+        }
+        Self { side_m, cells }
+    }
+
+    fn key(side_m: f64, place: &Point3<f64>) -> [i64; 3] {
+        place.coords.map(|x| (x / side_m).floor() as i64).into()
+    }
+
+    /// The stones in the cube of a place and in those that touch it: all within the side, and some beyond.
+    fn around(&self, place: &Point3<f64>) -> impl Iterator<Item = usize> + '_ {
+        let [x, y, z] = Self::key(self.side_m, place);
+        let keys = (-1..=1)
+            .flat_map(move |a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
+        keys.filter_map(|key| self.cells.get(&key)).flatten().copied()
+    }
+}
+
+/// Symmetric root of an information matrix.
+fn root(information: &Matrix3<f64>) -> Matrix3<f64> {
+    let eigen = information.symmetric_eigen();
+    let roots = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+}

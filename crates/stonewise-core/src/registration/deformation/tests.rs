@@ -1,0 +1,250 @@
+use super::*;
+use crate::geometry::lever;
+use crate::linalg::{BlockMatrix, BlockPattern};
+use crate::progress::Silent;
+use crate::registration::adjustment::joint::JointStone;
+use nalgebra::{DMatrix, Point3, SMatrix, Vector6};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use stonewise_testing::normal;
+
+const COLUMNS: usize = 10;
+const ROWS: usize = 8;
+/// Error of a stone along each axis, metres.
+const SD_M: f64 = 1e-4;
+
+fn place(k: usize) -> Point3<f64> {
+    Point3::new(
+        0.02 * (k % 3) as f64,
+        0.3 * (k % COLUMNS) as f64,
+        0.2 * (k / COLUMNS) as f64,
+    )
+}
+
+/// Neighbours in rows and columns.
+fn edges() -> Vec<(usize, usize)> {
+    let mut edges = Vec::new();
+    for k in 0..COLUMNS * ROWS {
+        if k % COLUMNS + 1 < COLUMNS {
+            edges.push((k, k + 1));
+        }
+        if k + COLUMNS < COLUMNS * ROWS {
+            edges.push((k, k + COLUMNS));
+        }
+    }
+    edges.sort_unstable();
+    edges
+}
+
+/// A wall whose stones moved so, each measured with an error of its own; x is out of the wall.
+fn wall(moved: impl Fn(usize) -> Vector3<f64>, error: impl Fn(usize) -> Vector3<f64>) -> JointMotions {
+    let edges = edges();
+    let mut information = BlockPattern::<9>::new(COLUMNS * ROWS, &edges).unwrap().zeros();
+    information
+        .diagonal
+        .iter_mut()
+        .for_each(|d| *d = SMatrix::identity());
+    let of_stone = Matrix3::identity() / (SD_M * SD_M);
+    let stone = |k: usize| {
+        let displacement = moved(k) + error(k);
+        Some(JointStone {
+            id: StoneId(k as u32 + 1),
+            place: place(k),
+            face_from_world: Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0),
+            body: 1,
+            is_loose: false,
+            displacement,
+            by_field: SMatrix::zeros(),
+            own: Matrix3::identity() * (SD_M * SD_M),
+            octave: Matrix3::zeros(),
+            by_poses: Vec::new(),
+            observed: (of_stone, of_stone * displacement),
+        })
+    };
+    JointMotions {
+        stones: (0..COLUMNS * ROWS).map(stone).collect(),
+        edges,
+        information,
+        poses: DMatrix::zeros(0, 0),
+        octaves: 1.0,
+        step_m: 0.25,
+    }
+}
+
+fn errors(seed: u64) -> Vec<Vector3<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = || Vector3::from_fn(|_, _| SD_M * normal(&mut rng));
+    (0..COLUMNS * ROWS).map(|_| draw()).collect()
+}
+
+fn still(_: usize) -> Vector3<f64> {
+    Vector3::zeros()
+}
+
+/// A bulge of 1.2 m about the middle of the wall.
+fn bulge(k: usize) -> Vector3<f64> {
+    let r = (place(k) - Point3::new(0.02, 1.35, 0.7)).norm();
+    let share = if r < 0.6 {
+        (std::f64::consts::PI * r / 1.2).cos().powi(2)
+    } else {
+        0.0
+    };
+    Vector3::new(0.8e-3 * share, 0.0, 0.0)
+}
+
+fn found(wall: &JointMotions) -> Deformation {
+    deformation(wall, None, &Silent).unwrap()
+}
+
+#[test]
+fn the_covariance_is_that_of_dense_algebra() {
+    // A field that joins the stones, errors of three unknowns that all share, and errors of their own.
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let mut wall = wall(still, |_| Vector3::zeros());
+    let count = COLUMNS * ROWS;
+    let mut dense = DMatrix::<f64>::zeros(9 * count, 9 * count);
+    let mut information: BlockMatrix<9> = BlockPattern::<9>::new(count, &wall.edges).unwrap().zeros();
+    for (i, d) in information.diagonal.iter_mut().enumerate() {
+        let m = SMatrix::<f64, 9, 9>::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        *d = (m * m.transpose() + SMatrix::identity() * 40.0) * 1e7;
+        dense.view_mut((9 * i, 9 * i), (9, 9)).copy_from(d);
+    }
+    for (block, &(low, high)) in information.edges.iter_mut().zip(&wall.edges) {
+        *block = SMatrix::from_fn(|_, _| 1e7 * rng.random_range(-1.0..1.0));
+        dense.view_mut((9 * high, 9 * low), (9, 9)).copy_from(block);
+        dense
+            .view_mut((9 * low, 9 * high), (9, 9))
+            .copy_from(&block.transpose());
+    }
+    wall.information = information;
+    wall.poses = DMatrix::from_fn(3, 3, |r, c| if r == c { 4e-8 } else { 1e-8 });
+    let mut by_field = DMatrix::<f64>::zeros(3 * count, 9 * count);
+    let mut by_poses = DMatrix::<f64>::zeros(3 * count, 3);
+    for (i, stone) in wall.stones.iter_mut().flatten().enumerate() {
+        stone.by_field = SMatrix::from_fn(|_, _| rng.random_range(-1.0..1.0));
+        by_field
+            .view_mut((3 * i, 9 * i), (3, 9))
+            .copy_from(&stone.by_field);
+        stone.by_poses = (0..3)
+            .map(|k| (k, Vector3::from_fn(|_, _| rng.random_range(-1.0..1.0))))
+            .collect();
+        for (k, by) in &stone.by_poses {
+            by_poses.view_mut((3 * i, *k), (3, 1)).copy_from(by);
+        }
+    }
+    let covariance = &by_field * dense.try_inverse().unwrap() * by_field.transpose()
+        + &by_poses * &wall.poses * by_poses.transpose()
+        + DMatrix::identity(3 * count, 3 * count) * (SD_M * SD_M);
+    // Nothing moved, so that all stones count fully: each with the inverse of its own covariance.
+    let mut rigid = DMatrix::<f64>::zeros(3 * count, 6);
+    let mut weights = DMatrix::<f64>::zeros(3 * count, 3 * count);
+    for i in 0..count {
+        rigid
+            .view_mut((3 * i, 0), (3, 6))
+            .copy_from(&lever(&place(i).coords));
+        let own = covariance.view((3 * i, 3 * i), (3, 3)).try_inverse().unwrap();
+        weights.view_mut((3 * i, 3 * i), (3, 3)).copy_from(&own);
+    }
+    let fit = (rigid.transpose() * &weights * &rigid).try_inverse().unwrap() * rigid.transpose() * &weights;
+    let rest = DMatrix::identity(3 * count, 3 * count) - &rigid * fit;
+    let expected = &rest * &covariance * rest.transpose();
+    for (i, stone) in found(&wall).stones.iter().enumerate() {
+        let expected: Matrix3<f64> = expected.fixed_view::<3, 3>(3 * i, 3 * i).into_owned();
+        assert!(
+            (stone.covariance - expected).norm() < 1e-6 * expected.norm(),
+            "{i}"
+        );
+        assert!(stone.deformation.norm() < 1e-12);
+    }
+}
+
+#[test]
+fn a_rigid_motion_of_the_whole_wall_changes_nothing() {
+    let noise = errors(5);
+    let before = found(&wall(bulge, |k| noise[k]));
+    let datum = Vector6::new(0.002, -0.002, 0.002, 1e-3, -1e-3, 1e-3);
+    let after = found(&wall(
+        |k| bulge(k) + lever(&place(k).coords) * datum,
+        |k| noise[k],
+    ));
+    let [a, b] = [&before, &after].map(|d| d.p.unwrap().ln());
+    assert!((a - b).abs() < 1e-6 * a.abs(), "{a} {b}");
+    assert_eq!(before.zones.len(), after.zones.len());
+    for (a, b) in before.stones.iter().zip(&after.stones) {
+        assert!((a.deformation - b.deformation).norm() < 1e-9);
+        assert_eq!(a.zone, b.zone);
+    }
+}
+
+#[test]
+fn still_walls_are_rarely_called_deformed_and_intervals_hold_nothing() {
+    let (mut called, mut held, mut all) = (0, 0, 0);
+    for seed in 0..60 {
+        let noise = errors(100 + seed);
+        let found = found(&wall(still, |k| noise[k]));
+        called += usize::from(found.is_shown());
+        assert_eq!(found.is_shown(), !found.zones.is_empty());
+        for stone in &found.stones {
+            for k in 0..3 {
+                held += usize::from(stone.deformation[k].abs() < 1.96 * stone.covariance[(k, k)].sqrt());
+                all += 1;
+            }
+        }
+    }
+    // 5 % of 60 walls, with three standard deviations.
+    assert!(called <= 8, "{called}");
+    let share = held as f64 / f64::from(all);
+    assert!((share - 0.95).abs() < 0.01, "{share}");
+}
+
+#[test]
+fn a_bulge_is_found_where_it_is_and_the_rest_stands_still() {
+    let noise = errors(7);
+    let found = found(&wall(bulge, |k| noise[k]));
+    assert!(found.p.unwrap() < 1e-6, "{:?}", found.p);
+    let [zone] = &found.zones[..] else {
+        panic!("{:?}", found.zones)
+    };
+    assert_eq!(zone.kind, ZoneKind::Bulge);
+    let [low, high] = zone.interval_m;
+    assert!(low < 0.8e-3 && high > 0.8e-3 && high - low < 5e-4, "{zone:?}");
+    for (k, stone) in found.stones.iter().enumerate() {
+        let share = bulge(k).x / 0.8e-3;
+        assert!(share < 0.6 || stone.zone == 1, "{k}");
+        assert!(share > 0.0 || stone.zone == 0, "{k}");
+        assert!((stone.deformation - bulge(k)).norm() < 5.0 * SD_M, "{k}");
+    }
+    // Such a wall shows a bulge of 1 m well below it.
+    assert!(found.detection_limits_m[0].unwrap() < 0.8e-3);
+    assert_eq!(found.detection_limits_m[2], None);
+}
+
+#[test]
+fn the_larger_part_is_the_one_that_kept_its_shape() {
+    // A third of the wall moved as one body, farther than any error.
+    let noise = errors(8);
+    let moved = |k: usize| match k % COLUMNS < 3 {
+        true => Vector3::new(0.0, 0.0, -0.004),
+        false => Vector3::zeros(),
+    };
+    let found = found(&wall(moved, |k| noise[k]));
+    for (k, stone) in found.stones.iter().enumerate() {
+        assert!(
+            (stone.deformation - moved(k)).norm() < 5.0 * SD_M,
+            "{k} {stone:?}"
+        );
+        assert_eq!(stone.zone, u32::from(k % COLUMNS < 3));
+    }
+    assert_eq!(found.zones[0].kind, ZoneKind::Settlement);
+}
+
+#[test]
+fn a_wall_of_few_stones_is_not_judged() {
+    let mut small = wall(bulge, |_| Vector3::zeros());
+    small
+        .stones
+        .iter_mut()
+        .skip(LEAST_STONES - 1)
+        .for_each(|s| *s = None);
+    assert_eq!(found(&small), Deformation::default());
+}

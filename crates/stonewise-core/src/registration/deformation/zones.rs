@@ -1,0 +1,125 @@
+//! Zones that deformed: connected stones whose deformation is not zero.
+
+use super::body::Body;
+use super::rigid_part::RigidPart;
+use super::scan::Scan;
+use super::{DeformationZone, ZoneKind};
+use crate::components::components;
+use crate::statistics::discoveries;
+use nalgebra::{Matrix3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::collections::BTreeSet;
+
+/// Share of false discoveries that is accepted among the stones of all zones.
+const FALSE_DISCOVERY_RATE: f64 = 0.05;
+/// Fewer connected stones are no zone: one or two that differ from their surroundings are judged as loose stones are.
+const LEAST_STONES: usize = 3;
+/// Standard deviations on either side of an interval of 95 %.
+const QUANTILE: f64 = 1.96;
+/// Share of the variance of the motion across a zone that a plane must explain to call it a tilt.
+const TILTED: f64 = 0.8;
+/// Least standard deviation of the motion across a tilted zone, as a share of its mean: half of what a tilt about one
+/// side has.
+const UNEVEN: f64 = 0.3;
+/// Fewest stones that show a tilt.
+const TILT_STONES: usize = 6;
+
+/// The zones of a body that deformed; their numbers are left open.
+///
+/// Stones are tested one by one with the false discovery rate controlled over the body (Benjamini & Hochberg 1995; tests
+/// of stones that share errors are positively dependent). Where no three connected stones stand out, the zone is that of
+/// the most likely bulge.
+pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
+    let law = ChiSquared::new(3.0).ok();
+    let p = |(i, square): (usize, &f64)| {
+        let is_firm = !body.stones[i].joint.is_loose;
+        law.as_ref().filter(|_| is_firm).map(|law| law.sf(*square))
+    };
+    let p_values: Vec<Option<f64>> = rigid.squares.iter().enumerate().map(p).collect();
+    let moved: BTreeSet<usize> = discoveries(&p_values, FALSE_DISCOVERY_RATE).into_iter().collect();
+    let mut next = vec![Vec::new(); body.stones.len()];
+    for [low, high] in &body.neighbours {
+        if moved.contains(low) && moved.contains(high) {
+            next[*low].push(*high);
+            next[*high].push(*low);
+        }
+    }
+    let mut parts: Vec<Vec<usize>> = components(&next)
+        .into_iter()
+        .filter(|part| part.len() >= LEAST_STONES)
+        .collect();
+    if parts.is_empty() {
+        parts.push(scan.most_likely.clone());
+    }
+    parts
+        .iter()
+        .filter_map(|stones| zone(body, rigid, stones))
+        .collect()
+}
+
+fn zone(body: &Body, rigid: &RigidPart, stones: &[usize]) -> Option<DeformationZone> {
+    let length = |i: &usize| rigid.deformations[*i].0.norm();
+    let largest = *stones.iter().max_by(|a, b| length(a).total_cmp(&length(b)))?;
+    let (deformation, covariance) = &rigid.deformations[largest];
+    let largest_m = deformation.norm();
+    let direction = deformation.try_normalize(0.0).unwrap_or_else(Vector3::x);
+    let half_m = QUANTILE * direction.dot(&(covariance * direction)).max(0.0).sqrt();
+    let in_face: Vec<Vector3<f64>> = stones
+        .iter()
+        .map(|&i| body.stones[i].joint.face_from_world * rigid.deformations[i].0)
+        .collect();
+    let mean_m = in_face.iter().sum::<Vector3<f64>>() / stones.len() as f64;
+    let mut ids: Vec<_> = stones.iter().map(|&i| body.stones[i].id).collect();
+    ids.sort_unstable();
+    Some(DeformationZone {
+        number: 0,
+        stones: ids,
+        largest_m,
+        interval_m: [(largest_m - half_m).max(0.0), largest_m + half_m],
+        mean_m,
+        kind: kind(body, stones, &in_face, &mean_m),
+    })
+}
+
+/// What the motions of a zone (along, up, out) resemble: by their largest mean component, and across the wall by
+/// whether they grow towards one side.
+fn kind(body: &Body, stones: &[usize], in_face: &[Vector3<f64>], mean: &Vector3<f64>) -> ZoneKind {
+    match mean.iamax() {
+        0 => ZoneKind::Slide,
+        1 if mean.y < 0.0 => ZoneKind::Settlement,
+        1 => ZoneKind::Heave,
+        _ if is_tilt(body, stones, in_face) => ZoneKind::Tilt,
+        _ if mean.z > 0.0 => ZoneKind::Bulge,
+        _ => ZoneKind::Dent,
+    }
+}
+
+/// Whether a plane explains how far stones moved out.
+fn is_tilt(body: &Body, stones: &[usize], in_face: &[Vector3<f64>]) -> bool {
+    if stones.len() < TILT_STONES {
+        return false;
+    }
+    let middle = stones
+        .iter()
+        .map(|&i| body.stones[i].joint.place.coords)
+        .sum::<Vector3<f64>>()
+        / stones.len() as f64;
+    let frame = body.stones[stones[0]].joint.face_from_world;
+    let (mut normal, mut right, mut whole) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    let mean = in_face.iter().map(|d| d.z).sum::<f64>() / stones.len() as f64;
+    for (&i, d) in stones.iter().zip(in_face) {
+        let place = frame * (body.stones[i].joint.place.coords - middle);
+        let row = Vector3::new(1.0, place.x, place.y);
+        normal += row * row.transpose();
+        right += row * (d.z - mean);
+        whole += (d.z - mean).powi(2);
+    }
+    let Some(factor) = normal.cholesky() else {
+        return false;
+    };
+    let count = stones.len() as f64;
+    // Per degree of freedom: a plane goes through any three stones.
+    let rest = (whole - right.dot(&factor.solve(&right))) / (count - 3.0);
+    let varies = whole > count * (UNEVEN * mean).powi(2);
+    varies && rest < (1.0 - TILTED) * whole / (count - 1.0)
+}
