@@ -109,6 +109,7 @@ pub fn registration_record() -> RegistrationRecord {
             "the stable areas show a registration error of 3.2 mm".to_owned(),
         ),
         observers: Some(observers),
+        deformation: None,
     }
 }
 
@@ -153,6 +154,7 @@ fn row(stone_id: u32) -> StoneRow {
         matched_id: matched.then_some(100 + stone_id),
         body_id: matched.then_some(1),
         status,
+        zone_id: u32::from(stone_id == 8),
         motion: (status == Status::Ok).then(|| motion(stone_id)),
         edited: None,
         carried_from: None,
@@ -179,6 +181,14 @@ fn motion(stone_id: u32) -> RowMotion {
         significant: displacement.norm() > 0.000_5 * 2.795_483,
         loose: stone_id == 15,
         p_loose: (stone_id != 16).then_some(if stone_id == 15 { 0.99 } else { 0.02 }),
+        deformation: (stone_id != 16)
+            .then_some(displacement)
+            .map_or([None; 3], |d| [Some(d.x), Some(d.y), Some(d.z)]),
+        deformation_sd: if stone_id == 16 {
+            [None; 3]
+        } else {
+            [Some(0.000_3); 3]
+        },
         observability: 0.7,
     }
 }

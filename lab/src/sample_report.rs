@@ -132,6 +132,7 @@ impl Wall {
             matched_id: matched.then_some(i as u32 + 1),
             body_id: matched.then_some(1),
             status,
+            zone_id: 0,
             motion: (status == Status::Ok).then(|| self.row_motion(place, i)),
             edited: None,
             carried_from: None,
@@ -160,6 +161,8 @@ impl Wall {
             detection_limit_m: limit,
             significant: displacement.norm() > limit,
             loose: self.is_loose(i),
+            deformation: [None; 3],
+            deformation_sd: [None; 3],
             p_loose: Some(if self.is_loose(i) { 0.99 } else { 0.01 }),
             observability: 0.6,
         }
@@ -421,6 +424,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         estimator,
         datum,
         observers: None,
+        deformation: None,
     };
     std::fs::write(dir.join(RUN), serde_json::to_string(&run)?)?;
     std::fs::write(

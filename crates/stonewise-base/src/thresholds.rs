@@ -11,6 +11,8 @@ use stonewise_core::params::{ParamError, Params, Range, Ranged, with_ranges};
 pub struct Thresholds {
     /// Thresholds of the wall.
     pub wall: Measures,
+    /// Of the largest deformation of a zone; those of lengths of motions where it has none of its own.
+    pub deformation: Levels,
     /// Parts of the wall with thresholds of their own.
     pub zones: Vec<Zone>,
 }
@@ -54,7 +56,7 @@ pub struct Zone {
 /// The table as files spell it.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = with_ranges::<Levels>)]
+#[schemars(transform = with_ranges::<Thresholds>)]
 struct Keys {
     /// From this length of a stone's motion on attention is called for, millimetres. Absent: the alarm's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,6 +64,13 @@ struct Keys {
     /// From this length of a stone's motion on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     alarm_mm: Option<f64>,
+    /// From this deformation of a zone on attention is called for, millimetres. Absent: the alarm's; where neither is
+    /// given, the thresholds of the length of a motion hold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    deformation_attention_mm: Option<f64>,
+    /// From this deformation of a zone on an alarm is raised, millimetres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    deformation_alarm_mm: Option<f64>,
     /// The same for the motion of a stone against its neighbours.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     neighbours: Levels,
@@ -167,8 +176,21 @@ impl Params for Measures {
 }
 
 impl Params for Thresholds {
+    fn ranges(&self) -> Vec<Ranged> {
+        let mut ranges = self.wall.ranges();
+        ranges.extend([
+            Range::POSITIVE.holds("deformation_attention_mm", self.deformation.attention_mm),
+            Range::POSITIVE.holds("deformation_alarm_mm", self.deformation.alarm_mm),
+        ]);
+        ranges
+    }
+
     fn check_relations(&self) -> Result<(), ParamError> {
         self.wall.check()?;
+        self.deformation.check_relations().map_err(|error| ParamError {
+            key: format!("deformation_{}", error.key),
+            ..error
+        })?;
         for (number, zone) in self.zones.iter().enumerate() {
             let checked = zone.measures.check();
             checked.map_err(|error| error.within(&format!("zones.{number}")))?;
@@ -192,7 +214,14 @@ impl Zone {
 impl Thresholds {
     /// Whether no threshold is given at all.
     pub fn is_empty(&self) -> bool {
-        self.wall.is_empty() && self.zones.iter().all(|z| z.measures.is_empty())
+        self.wall.is_empty()
+            && self.deformation.is_empty()
+            && self.zones.iter().all(|z| z.measures.is_empty())
+    }
+
+    /// The thresholds of a deformation.
+    pub fn of_deformation(&self) -> Levels {
+        self.deformation.or(self.wall.length)
     }
 
     /// The first zone that holds a place (along, up) of the facade.
@@ -229,7 +258,15 @@ impl TryFrom<Keys> for Thresholds {
             }
             zones.push(zone(keys, &wall)?);
         }
-        Ok(Self { wall, zones })
+        let deformation = Levels {
+            attention_mm: keys.deformation_attention_mm,
+            alarm_mm: keys.deformation_alarm_mm,
+        };
+        Ok(Self {
+            wall,
+            deformation,
+            zones,
+        })
     }
 }
 
@@ -268,6 +305,8 @@ impl From<Thresholds> for Keys {
         Self {
             attention_mm: thresholds.wall.length.attention_mm,
             alarm_mm: thresholds.wall.length.alarm_mm,
+            deformation_attention_mm: thresholds.deformation.attention_mm,
+            deformation_alarm_mm: thresholds.deformation.alarm_mm,
             neighbours: thresholds.wall.neighbours,
             joints: thresholds.wall.joints,
             zones: thresholds.zones.into_iter().map(zone).collect(),
@@ -285,7 +324,7 @@ mod tests {
         Ok(thresholds)
     }
 
-    const FULL: &str = "attention_mm = 5\nalarm_mm = 10.0\nneighbours = { attention_mm = 2.0, alarm_mm = 4.0 }\n\
+    const FULL: &str = "attention_mm = 5\nalarm_mm = 10.0\ndeformation_attention_mm = 1.0\nneighbours = { attention_mm = 2.0, alarm_mm = 4.0 }\n\
         [[zones]]\nname = \"crest\"\npolygon = [[0.0, 8.0], [9.0, 8.0], [9.0, 10.0], [0.0, 10.0]]\nalarm_mm = 3.0\n";
 
     #[test]
@@ -302,6 +341,9 @@ mod tests {
         );
         assert_eq!(measures.neighbours.alarm_mm, Some(4.0));
         assert!(measures.joints.is_empty());
+        assert_eq!(thresholds.of_deformation().attention_mm, Some(1.0));
+        let length = read("alarm_mm = 4.0").unwrap();
+        assert_eq!(length.of_deformation().alarm_mm, Some(4.0));
         assert!(read("").unwrap().is_empty() && !thresholds.is_empty());
     }
 
@@ -322,6 +364,14 @@ mod tests {
                 "attention_mm = 10 is not possible: it must be below alarm_mm = 5",
             ),
             ("attention_mm = 5.0\nalarm_mm = 5.0", "must be below"),
+            (
+                "deformation_attention_mm = 2.0\ndeformation_alarm_mm = 1.0",
+                "deformation_attention_mm = 2 is not possible: it must be below",
+            ),
+            (
+                "deformation_alarm_mm = -1.0",
+                "deformation_alarm_mm = -1 is not possible",
+            ),
             (
                 "alarm_mm = 0.0",
                 "alarm_mm = 0 is not possible: it must be above 0",

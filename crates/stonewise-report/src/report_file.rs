@@ -152,7 +152,7 @@ mod tests {
         assert!(html.contains("<code>unmatched_lost</code>") && html.contains("<code>unobservable</code>"));
         assert_eq!(
             html.matches("<svg role=\"img\"").count(),
-            8 + 3 + 3,
+            9 + 3 + 3,
             "maps, histograms, scatter plots"
         );
         assert!(html.contains("<td>Merged instance</td><td class=\"n\">2</td>"));
@@ -256,6 +256,7 @@ mod tests {
         let mut registration = RegistrationRecord {
             datum: unknown,
             observers: None,
+            deformation: None,
             ..registration_record()
         };
         if let EstimatorRecord::Adjustment(adjustment) = &mut registration.estimator {

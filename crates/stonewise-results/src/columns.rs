@@ -104,6 +104,13 @@ pub static STONE_COLUMNS: &[StoneColumn] = &[
     column!(Motion "cov_rel_yz", "m2", "covariance of rel_dy and rel_dz", relative_covariance.m23),
     column!(Motion "cov_rel_zz", "m2", "covariance of rel_dz and rel_dz", relative_covariance.m33),
     column!(OptionalCount "body_id", "", "part of the wall that ties between neighbours join, 1 the largest; empty where no motion was sought", body_id),
+    column!(OptionalMotion "def_dx", "m", "deformation: displacement less the rigid motion of the part of the wall that kept its shape, world x; like all of def_ and sd_def_ without anything of the datum, and empty in parts of the wall of fewer than 12 stones", deformation[0]),
+    column!(OptionalMotion "def_dy", "m", "deformation, world y", deformation[1]),
+    column!(OptionalMotion "def_dz", "m", "deformation, world z", deformation[2]),
+    column!(OptionalMotion "sd_def_along", "m", "standard deviation of the deformation along the wall", deformation_sd[0]),
+    column!(OptionalMotion "sd_def_up", "m", "standard deviation of the deformation up the face", deformation_sd[1]),
+    column!(OptionalMotion "sd_def_out", "m", "standard deviation of the deformation out of the face", deformation_sd[2]),
+    column!(Count "zone_id", "", "zone of deformation, 0 for none", zone_id),
 ];
 
 /// Columns that tables have only where a row fills them, after all others: stones that were edited by hand or

@@ -16,6 +16,8 @@ pub const EDITS_AUDIT: &str = "audit_edits.csv";
 pub const CARRY_AUDIT: &str = "audit_carried.csv";
 /// Rows of all later epochs, where there are more than one.
 pub const SERIES: &str = "series.parquet";
+/// Zones of deformation of all later epochs.
+pub const ZONES: &str = "zones.parquet";
 /// Scores against a table of true stones.
 pub const EVALUATION_TRUTH: &str = "evaluation_truth.json";
 /// Layers for QGIS.

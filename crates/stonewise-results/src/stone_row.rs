@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::fmt;
 use std::str::FromStr;
 use stonewise_core::geometry::{FaceFrame, SmallMotion};
+use stonewise_core::registration::StoneDeformation;
 use stonewise_core::stone::{MatchOutcome, MotionFailure, PairResult, Stone, StoneMotion, UnmatchedReason};
 
 /// 95 % quantile of chi-square with 3 degrees of freedom.
@@ -36,6 +37,8 @@ pub struct StoneRow {
     pub body_id: Option<u32>,
     /// What became of the stone.
     pub status: Status,
+    /// Zone of deformation, 0 for none.
+    pub zone_id: u32,
     /// The motion, where there is one.
     pub motion: Option<RowMotion>,
     /// The last edit by hand that made or changed the stone or its partner: its number in the file of edits.
@@ -72,6 +75,11 @@ pub struct RowMotion {
     pub loose: bool,
     /// Probability that the stone is loose, where the estimator gives one.
     pub p_loose: Option<f64>,
+    /// Displacement less the rigid motion of the part of the wall that kept its shape, world; empty where the stone's
+    /// part of the wall is too small to tell.
+    pub deformation: [Option<f64>; 3],
+    /// Standard deviations of that along the wall, up and out.
+    pub deformation_sd: [Option<f64>; 3],
     /// Smallest observability, 0 to 1.
     pub observability: f64,
 }
@@ -236,6 +244,7 @@ impl StoneRow {
             matched_id,
             body_id: pair.map(|p| p.body).filter(|body| *body > 0),
             status: status(outcome, pair),
+            zone_id: 0,
             motion: motion.map(|m| RowMotion::new(m, &first.normal, reference)),
             edited: None,
             carried_from: None,
@@ -243,7 +252,28 @@ impl StoneRow {
     }
 }
 
+impl StoneRow {
+    /// The row with its deformation.
+    #[must_use]
+    pub fn with_deformation(mut self, normal: &Vector3<f64>, deformation: &StoneDeformation) -> Self {
+        self.zone_id = deformation.zone;
+        if let Some(motion) = &mut self.motion {
+            let face_from_world = FaceFrame::from_normal(normal).face_from_world();
+            let in_face = face_from_world * deformation.covariance * face_from_world.transpose();
+            motion.deformation = <[f64; 3]>::from(deformation.deformation).map(Some);
+            motion.deformation_sd = [0, 1, 2].map(|k| Some(in_face[(k, k)].max(0.0).sqrt()));
+        }
+        self
+    }
+}
+
 impl RowMotion {
+    /// The deformation, world, metres.
+    pub fn deformation(&self) -> Option<Vector3<f64>> {
+        let [x, y, z] = self.deformation;
+        Some(Vector3::new(x?, y?, z?))
+    }
+
     /// Fills the lower triangles of the covariances, which files leave out.
     pub(super) fn mirror(&mut self) {
         for matrix in [
@@ -276,6 +306,8 @@ impl RowMotion {
             significant: tested.norm() > detection_limit_m,
             loose: motion.loose,
             p_loose: motion.p_loose,
+            deformation: [None; 3],
+            deformation_sd: [None; 3],
             observability: motion.observability,
         }
     }

@@ -73,7 +73,8 @@ mod tests {
         dx, dy, dz d_along, d_up, d_out rx, ry, rz cov_xx, cov_xy, cov_xz, cov_yy, cov_yz, cov_zz lod95 significant \
         rel_dx, rel_dy, rel_dz loose sep_obs along_m, up_m length_m sd_along, sd_up, sd_out p_loose \
         cov_rot_xx cov_rot_xy cov_rot_xz cov_rot_yy cov_rot_yz cov_rot_zz \
-        cov_rel_xx cov_rel_xy cov_rel_xz cov_rel_yy cov_rel_yz cov_rel_zz body_id";
+        cov_rel_xx cov_rel_xy cov_rel_xz cov_rel_yy cov_rel_yz cov_rel_zz body_id \
+        def_dx, def_dy, def_dz sd_def_along, sd_def_up, sd_def_out zone_id";
 
     #[test]
     fn columns_are_those_of_the_contract_in_its_order() {

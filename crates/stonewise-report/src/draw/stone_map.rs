@@ -43,8 +43,8 @@ pub(crate) struct MapPicture<'a> {
     /// Name of a thousandth of it: "mm", "mrad".
     pub unit: &'a str,
     pub scale: Scale,
-    /// Fade stones whose motion is not significant.
-    pub fade: bool,
+    /// Fade stones of which this does not hold.
+    pub strong: Option<fn(&StoneRow) -> bool>,
     /// Draw in-plane arrows: of significant motions where the others are faded, else of all.
     pub arrows: bool,
     /// Draw a heavy outline around loose stones.
@@ -193,7 +193,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
         match (picture.value)(stone).filter(|v| v.is_finite()) {
             None => unknown.push_str(path),
             Some(value) => {
-                let shown = !picture.fade || stone.motion.as_ref().is_some_and(|m| m.significant);
+                let shown = picture.strong.is_none_or(|is_strong| is_strong(stone));
                 groups
                     .entry((shown, picture.scale.step(value)))
                     .or_default()
@@ -236,7 +236,7 @@ pub(crate) fn stone_map(layout: &MapLayout, picture: &MapPicture) -> String {
     }
     out.push_str("</g>");
     if picture.arrows {
-        draw_arrows(layout, picture.fade, &mut out);
+        draw_arrows(layout, picture.strong.is_some(), &mut out);
     }
     layout.draw_bar(&mut out, picture.scale, picture.unit);
     out.push_str("</svg>");

@@ -3,7 +3,7 @@
 
 use super::html::{table, with_units};
 use super::look_first::look_first;
-use super::maps::motion_map;
+use super::maps::lead_map;
 use crate::summary::Summary;
 use crate::texts::{Texts, counted, fill};
 use base64::Engine;
@@ -120,7 +120,7 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
     let map = if facts.measured.is_empty() {
         String::new()
     } else {
-        motion_map(results, facts)
+        lead_map(results, facts)
     };
     format!(
         "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}</div><div class=\"first rest\"><h3>{}</h3>{}</div>\

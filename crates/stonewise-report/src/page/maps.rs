@@ -44,13 +44,14 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
             value: &value,
             unit: "mm",
             scale: shared,
-            fade: facts.verdict.is_sound(),
+            strong: facts.verdict.is_sound().then_some(is_significant),
             arrows: false,
             loose: facts.verdict.is_sound(),
         };
         figure(title, &stone_map(&layout, &picture), note)
     };
     let mut grid = String::new();
+    grid.push_str(&shape_map(&layout, facts));
     grid.push_str(&component(names.along, names.along_note, 0));
     grid.push_str(&component(names.up, names.up_note, 1));
     grid.push_str(&component(names.out, names.out_note, 2));
@@ -71,6 +72,58 @@ pub(super) fn maps(results: &ResultSet, facts: &Summary, joints: &[Joint]) -> St
         legend(names, facts.verdict.is_sound())
     );
     section("maps", texts.sections.maps, &body)
+}
+
+fn is_significant(stone: &StoneRow) -> bool {
+    stone.motion.as_ref().is_some_and(|m| m.significant)
+}
+
+/// How far stones moved besides the rigid motion of the part of the wall that kept its shape; empty where that is not
+/// known of any stone.
+fn shape_map(layout: &MapLayout, facts: &Summary) -> String {
+    let length = |s: &StoneRow| Some(s.motion.as_ref()?.deformation()?.norm());
+    let lengths = || {
+        facts
+            .measured
+            .iter()
+            .filter_map(|(_, m)| Some(m.deformation()?.norm()))
+    };
+    if lengths().next().is_none() {
+        return String::new();
+    }
+    let names = &facts.texts().maps;
+    let picture = MapPicture {
+        title: names.shape,
+        value: &length,
+        unit: "mm",
+        scale: Scale::Sequential(nice_scale_m(lengths())),
+        strong: facts.verdict.is_sound().then_some(|s| s.zone_id > 0),
+        arrows: false,
+        loose: false,
+    };
+    let marks = if facts.verdict.is_sound() {
+        names.shape_faded
+    } else {
+        ""
+    };
+    figure(
+        names.shape,
+        &stone_map(layout, &picture),
+        &format!("{}{marks}", names.shape_note),
+    )
+}
+
+/// The first picture: how far stones moved, or, where the datum is unknown, how the wall changed its shape.
+pub(super) fn lead_map(results: &ResultSet, facts: &Summary) -> String {
+    if facts.verdict.has_datum() {
+        return motion_map(results, facts);
+    }
+    let layout = MapLayout::new(results, facts.texts());
+    let class = if layout.is_wide() { "lead wide" } else { "lead" };
+    match shape_map(&layout, facts) {
+        shape if shape.is_empty() => motion_map(results, facts),
+        shape => format!("<div class=\"{class}\">{shape}</div>"),
+    }
 }
 
 /// How joints open and close; empty where no joint has both its stones measured.
@@ -98,7 +151,7 @@ fn opening_map(layout: &MapLayout, joints: &[Joint], facts: &Summary) -> String 
 }
 
 /// How far the stones moved, for the summary: lengths and in-plane arrows.
-pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
+fn motion_map(results: &ResultSet, facts: &Summary) -> String {
     let layout = MapLayout::new(results, facts.texts());
     let norm = |s: &StoneRow| s.motion.as_ref().map(|m| m.displacement.norm());
     let norms = facts.measured.iter().map(|(_, m)| m.displacement.norm());
@@ -111,7 +164,7 @@ pub(super) fn motion_map(results: &ResultSet, facts: &Summary) -> String {
         value: &norm,
         unit: "mm",
         scale: Scale::Sequential(end_m),
-        fade: is_sound,
+        strong: is_sound.then_some(is_significant),
         arrows: true,
         loose: false,
     };
@@ -151,7 +204,7 @@ fn magnitude_maps(layout: &MapLayout, facts: &Summary) -> String {
             value,
             unit,
             scale: Scale::Sequential(limit),
-            fade: false,
+            strong: None,
             arrows: false,
             loose: loose && facts.verdict.is_sound(),
         };

@@ -92,6 +92,10 @@ in_both! {
             "Die Mauer von vorn, abgewickelt. Die Komponenten teilen eine Skala; Millimeter, zweite Epoche minus erste.";
         beyond: " {n} components exceed the scale and have its end colours.",
             " {n} Komponenten gehen über die Skala hinaus und haben ihre Endfarben.";
+        shape: "Deformation", "Verformung";
+        shape_note: "Length of the motion less the rigid motion of the part of the wall that kept its shape; nothing of the datum is in it.",
+            "Betrag der Bewegung abzüglich der starren Bewegung des Teils der Mauer, der seine Form behielt; das geodätische Datum geht nicht ein.";
+        shape_faded: " Pale: outside the zones that changed their shape.", " Blass: außerhalb der Zonen, die ihre Form geändert haben.";
         along: "Along the wall", "Längs der Mauer";
         along_note: "Positive to the right of a viewer who faces the wall.", "Positiv nach rechts für einen Betrachter vor der Mauer.";
         up: "Up the face", "Die Mauerfläche hinauf";

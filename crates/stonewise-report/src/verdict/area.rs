@@ -1,7 +1,7 @@
 //! The state and the numbers of the wall or of a zone.
 
 use super::case::Case;
-use super::judged::{Judged, JudgedStone, Level, millimetres};
+use super::judged::{Judged, JudgedStone, Level, deformed, millimetres};
 use std::collections::BTreeMap;
 use stonewise_base::thresholds::Thresholds;
 use stonewise_results::Sorted;
@@ -79,17 +79,22 @@ fn largest_of(
 fn state_of(reason: ReasonCode) -> State {
     use ReasonCode as R;
     match reason {
-        R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm => State::Alarm,
-        R::LengthAttention | R::NeighboursAttention | R::JointsAttention | R::StonesLost | R::MotionShown => {
-            State::Attention
-        }
+        R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::DeformationAlarm => State::Alarm,
+        R::LengthAttention
+        | R::NeighboursAttention
+        | R::JointsAttention
+        | R::DeformationAttention
+        | R::StonesLost
+        | R::MotionShown
+        | R::DeformationShown => State::Attention,
         R::BelowThresholds | R::NoMotionShown => State::Fine,
         R::NotConverged
         | R::InDoubt
         | R::NothingMeasured
         | R::FewMeasured
         | R::DatumUnknown
-        | R::IntervalReachesThreshold => State::CannotTell,
+        | R::IntervalReachesThreshold
+        | R::DeformationReachesThreshold => State::CannotTell,
     }
 }
 
@@ -106,6 +111,11 @@ fn reason_codes(
     let length = |level: Level| stones().any(|s| s.length == level);
     let neighbours = |level: Level| stones().any(|s| s.neighbours == level);
     let opening = |level: Level| joints().any(|j| j.opening == level);
+    let of_wall = zone.is_none();
+    let deformation = |level: Level| {
+        let zones = judged.deformed_zones();
+        of_wall && zones.iter().any(|z| deformed(z, thresholds) == level)
+    };
     let without = thresholds.is_empty();
     let measured = stones().filter(|s| s.verdict.length_mm.is_some()).count();
     let share = measured as f64 / stones().count().max(1) as f64;
@@ -122,15 +132,19 @@ fn reason_codes(
         (length(Level::Alarm), R::LengthAlarm),
         (neighbours(Level::Alarm), R::NeighboursAlarm),
         (opening(Level::Alarm), R::JointsAlarm),
+        (deformation(Level::Alarm), R::DeformationAlarm),
         (length(Level::Attention), R::LengthAttention),
         (neighbours(Level::Attention), R::NeighboursAttention),
         (opening(Level::Attention), R::JointsAttention),
+        (deformation(Level::Attention), R::DeformationAttention),
         (without && shown, R::MotionShown),
+        (without && deformation(Level::NotAsked), R::DeformationShown),
         (stones().any(|s| s.verdict.lost), R::StonesLost),
         (measured == 0, R::NothingMeasured),
         (measured > 0 && share < LEAST_MEASURED, R::FewMeasured),
         (length_matters && !case.has_datum(), R::DatumUnknown),
         (reaches, R::IntervalReachesThreshold),
+        (deformation(Level::Reaches), R::DeformationReachesThreshold),
     ];
     let mut codes: Vec<R> = all
         .into_iter()

@@ -3,7 +3,7 @@
 use super::area::area;
 use super::case::{Case, JointCase, StoneCase};
 use super::interval::{Estimate, QUANTILE};
-use super::judged::{Judged, JudgedJoint, JudgedStone, Level, millimetres};
+use super::judged::{Judged, JudgedJoint, JudgedStone, Level, deformed, millimetres};
 use super::sentence::{reasons, sentence};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Measures, Thresholds};
@@ -34,6 +34,7 @@ pub(crate) fn assess(case: &Case, thresholds: &Thresholds, language: Language) -
         reasons: reasons(case, thresholds, &judged, &whole, language),
         wall: whole,
         zones,
+        deformation: judged.deformation.clone(),
         joints: noted(&judged, thresholds),
         stones: judged.stones.into_iter().map(|s| s.verdict).collect(),
     }
@@ -53,7 +54,25 @@ fn judge(case: &Case, thresholds: &Thresholds) -> Judged {
     let q = q_values(&case.joints.iter().map(p).collect::<Vec<f64>>());
     let joint = |(j, q)| judge_joint(case, j, q, thresholds);
     let joints = case.joints.iter().zip(q).map(joint).collect();
-    Judged { stones, joints }
+    let deformation = case.deformation.clone().map(|mut found| {
+        for zone in &mut found.zones {
+            let level = deformed(zone, thresholds);
+            zone.state = match level {
+                _ if !case.is_sound() => State::CannotTell,
+                Level::Alarm => State::Alarm,
+                Level::Attention => State::Attention,
+                Level::Reaches => State::CannotTell,
+                Level::NotAsked if thresholds.is_empty() => State::Attention,
+                Level::Below | Level::NotAsked => State::Fine,
+            };
+        }
+        found
+    });
+    Judged {
+        stones,
+        joints,
+        deformation,
+    }
 }
 
 fn judge_stone(case: &Case, stone: &StoneCase, q: Option<f64>, thresholds: &Thresholds) -> JudgedStone {

@@ -2,7 +2,7 @@
 
 use super::interval::Estimate;
 use nalgebra::Point2;
-use stonewise_results::records::DatumState;
+use stonewise_results::records::{DatumState, DeformationVerdict};
 
 /// What is known of one pair of epochs.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +19,8 @@ pub(crate) struct Case {
     pub stones: Vec<StoneCase>,
     /// The joints whose stones were both measured.
     pub joints: Vec<JointCase>,
+    /// Whether and where the wall changed its shape, where that was asked; states of its zones are left open.
+    pub deformation: Option<DeformationVerdict>,
 }
 
 /// What is known of a stone.

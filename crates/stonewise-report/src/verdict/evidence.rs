@@ -3,12 +3,14 @@
 use super::assess::assess;
 use super::case::{Case, JointCase, StoneCase, StoneMeasured};
 use super::interval::Estimate;
+use super::judged::millimetres;
 use super::lost::lost_stones;
 use nalgebra::{Point2, Vector3, center};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::Thresholds;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
-use stonewise_results::records::{DatumState, EpochVerdict};
+use stonewise_core::registration::DeformationZone;
+use stonewise_results::records::{DatumState, DeformationVerdict, DeformedZone, EpochVerdict, State};
 use stonewise_results::{Joint, ResultSet, RowMotion, StoneRow, joints};
 
 /// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
@@ -31,6 +33,7 @@ pub fn verdict_on(
         in_doubt,
         stones: stones(results),
         joints: joints(results).iter().filter_map(|j| joint(results, j)).collect(),
+        deformation: deformation(results),
     };
     assess(&case, thresholds, language)
 }
@@ -71,6 +74,45 @@ fn joint(results: &ResultSet, joint: &Joint) -> Option<JointCase> {
         place: center(&a, &b),
         opening_m: motion.opening_m,
         sigma_m: motion.opening_sigma_m,
+    })
+}
+
+/// Whether and where the wall changed its shape.
+fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
+    let record = results.registration.as_ref()?.deformation.as_ref()?;
+    let zone = |zone: &DeformationZone| {
+        let stones = || results.stones.iter().filter(|s| s.zone_id == zone.number);
+        let area_m2: f64 = stones().map(|s| s.area_m2).sum();
+        let along_up = |of: fn(&StoneRow) -> f64| {
+            let half = |s: &StoneRow| 0.5 * s.area_m2.sqrt();
+            let low = stones().map(|s| of(s) - half(s)).fold(f64::INFINITY, f64::min);
+            let high = stones()
+                .map(|s| of(s) + half(s))
+                .fold(f64::NEG_INFINITY, f64::max);
+            let middle = stones().map(|s| of(s) * s.area_m2).sum::<f64>() / area_m2;
+            (area_m2 > 0.0).then_some((middle, high - low))
+        };
+        let ((along_m, width_m), (up_m, height_m)) = along_up(|s| s.along_m).zip(along_up(|s| s.up_m))?;
+        Some(DeformedZone {
+            zone_id: zone.number,
+            state: State::default(),
+            kind: zone.kind,
+            along_m: millimetres(along_m) / 1e3,
+            up_m: millimetres(up_m) / 1e3,
+            extent_m: [width_m, height_m].map(|m| millimetres(m) / 1e3),
+            area_m2: (1e4 * area_m2).round() / 1e4,
+            largest_mm: millimetres(zone.largest_m),
+            interval_mm: zone.interval_m.map(millimetres),
+        })
+    };
+    let zones: Vec<DeformedZone> = record.zones.iter().filter_map(zone).collect();
+    Some(DeformationVerdict {
+        shown: !zones.is_empty(),
+        p: record.p,
+        largest_mm: zones.first().map(|z| z.largest_mm),
+        interval_mm: zones.first().map(|z| z.interval_mm),
+        detection_limit_mm: record.detection_limits_m.map(|limit| limit.map(millimetres)),
+        zones,
     })
 }
 

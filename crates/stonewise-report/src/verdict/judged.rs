@@ -1,13 +1,14 @@
 //! Stones and joints with their states, and where their intervals lie among the thresholds.
 
-use stonewise_base::thresholds::Levels;
-use stonewise_results::records::{JointVerdict, StoneVerdict};
+use stonewise_base::thresholds::{Levels, Thresholds};
+use stonewise_results::records::{DeformationVerdict, DeformedZone, JointVerdict, StoneVerdict};
 
 /// All stones and joints with their states.
 #[derive(Clone, Debug)]
 pub(super) struct Judged {
     pub stones: Vec<JudgedStone>,
     pub joints: Vec<JudgedJoint>,
+    pub deformation: Option<DeformationVerdict>,
 }
 
 impl Judged {
@@ -15,6 +16,11 @@ impl Judged {
     pub(super) fn apparent_alarms(&self) -> usize {
         let beyond = |s: &&JudgedStone| s.length.max(s.neighbours) == Level::Alarm;
         self.stones.iter().filter(beyond).count()
+    }
+
+    /// Zones of deformation.
+    pub(super) fn deformed_zones(&self) -> &[DeformedZone] {
+        self.deformation.as_ref().map_or(&[], |d| &d.zones)
     }
 
     /// Stones of a zone, or all.
@@ -85,6 +91,15 @@ impl Level {
             Self::Reaches
         }
     }
+}
+
+/// Where the deformation of a zone lies among the thresholds.
+pub(super) fn deformed(zone: &DeformedZone, thresholds: &Thresholds) -> Level {
+    Level::of(
+        zone.interval_mm.map(|mm| mm / 1e3),
+        true,
+        &thresholds.of_deformation(),
+    )
 }
 
 /// Metres as millimetres, to a micrometre.

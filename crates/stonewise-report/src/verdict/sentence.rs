@@ -1,11 +1,12 @@
 //! The verdict in words.
 
 use super::case::Case;
-use super::judged::{Judged, JudgedStone, Level};
+use super::judged::{Judged, JudgedStone, Level, deformed};
 use super::limits::{Compared, Quantity, in_words};
 use crate::texts::{Texts, counted, fill};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::{Levels, Thresholds};
+use stonewise_core::registration::ZONE_EXTENTS_M;
 use stonewise_figure::count;
 use stonewise_results::records::{Area, Largest, Reason, ReasonCode, State};
 
@@ -37,6 +38,7 @@ pub(super) fn sentence(
     };
     let mut clauses: Vec<String> = speaker.deciding().iter().map(|r| speaker.clause(*r)).collect();
     clauses.extend(speaker.numbers(apparent));
+    clauses.extend(speaker.shape());
     format!("{}: {}.", speaker.texts.state(wall.state), clauses.join("; "))
 }
 
@@ -69,15 +71,17 @@ impl Speaker<'_> {
         let wanted = |r: &R| match self.wall.state {
             State::Alarm => matches!(
                 r,
-                R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::StonesLost
+                R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::DeformationAlarm | R::StonesLost
             ),
             State::Attention => matches!(
                 r,
                 R::LengthAttention
                     | R::NeighboursAttention
                     | R::JointsAttention
+                    | R::DeformationAttention
                     | R::StonesLost
                     | R::MotionShown
+                    | R::DeformationShown
             ),
             State::CannotTell | State::Fine => true,
         };
@@ -110,6 +114,10 @@ impl Speaker<'_> {
             }
             R::JointsAlarm => self.beyond(c.joints_alarm, Quantity::Joints, Level::Alarm),
             R::JointsAttention => self.beyond(c.joints_attention, Quantity::Joints, Level::Attention),
+            R::DeformationAlarm => self.deformed(c.deformed_alarm, Level::Alarm),
+            R::DeformationAttention => self.deformed(c.deformed_attention, Level::Attention),
+            R::DeformationReachesThreshold => self.deformed(c.deformed_reaches, Level::Reaches),
+            R::DeformationShown => counted(c.deformed, self.judged.deformed_zones().len(), &[]),
             R::StonesLost => counted(c.lost, wall.lost, &[]),
             R::MotionShown if wall.moved > 0 => {
                 let text = if self.case.has_datum() {
@@ -158,6 +166,61 @@ impl Speaker<'_> {
         counted(text, n, &[("t", &t)])
     }
 
+    /// Zones of which the deformation lies at this level.
+    fn deformed(&self, text: [&'static str; 2], level: Level) -> String {
+        let zones = self.judged.deformed_zones().iter();
+        let n = zones.filter(|z| deformed(z, self.thresholds) == level).count();
+        let t = self.deformation_threshold(level);
+        counted(text, n, &[("t", &t)])
+    }
+
+    fn deformation_threshold(&self, level: Level) -> String {
+        let levels = self.thresholds.of_deformation();
+        let threshold_m = match level {
+            Level::Alarm => levels.alarm_m(),
+            _ => levels.attention_m(),
+        };
+        threshold_m.map_or_else(String::new, |m| format!("{} mm", self.texts.threshold(1e3 * m)))
+    }
+
+    /// What is known of the shape of the wall; nothing of a run in doubt.
+    fn shape(&self) -> Option<String> {
+        let found = self
+            .judged
+            .deformation
+            .as_ref()
+            .filter(|_| self.case.is_sound())?;
+        let c = &self.texts.clauses;
+        let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
+        let Some(zone) = found.zones.first() else {
+            found.p?;
+            let limits = found.detection_limit_mm.iter().zip(ZONE_EXTENTS_M);
+            let known = limits
+                .filter_map(|(limit, extent_m)| Some(((*limit)?, extent_m)))
+                .next();
+            return Some(known.map_or(c.shape_kept.to_owned(), |(limit, extent_m)| {
+                fill(
+                    c.shape_kept_within,
+                    &[("limit", &mm(limit)), ("extent", &self.texts.threshold(extent_m))],
+                )
+            }));
+        };
+        let [width, height] = zone
+            .extent_m
+            .map(|m| self.texts.threshold((10.0 * m).round() / 10.0));
+        let [low, high] = zone.interval_mm.map(mm);
+        Some(fill(
+            c.shape[zone.kind as usize],
+            &[
+                ("width", &*width),
+                ("height", &*height),
+                ("length", &*mm(zone.largest_mm)),
+                ("low", &*low),
+                ("high", &*high),
+            ],
+        ))
+    }
+
     fn reaching(&self) -> String {
         let c = &self.texts.clauses;
         let compared = Quantity::ALL.map(|quantity| self.at(quantity, Level::Reaches));
@@ -182,7 +245,11 @@ impl Speaker<'_> {
         });
         let asked = self.judged.joints.iter().any(|j| j.opening > Level::NotAsked);
         let text = if asked { c.below_with_joints } else { c.below };
-        let t = in_words(self.thresholds, &compared, Levels::attention_m, self.texts);
+        // Where only deformations have thresholds.
+        let t = match in_words(self.thresholds, &compared, Levels::attention_m, self.texts) {
+            t if t.is_empty() => self.deformation_threshold(Level::Attention),
+            t => t,
+        };
         counted(text, self.wall.measured, &[("t", &t)])
     }
 

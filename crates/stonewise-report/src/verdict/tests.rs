@@ -7,9 +7,12 @@ use super::testing::Normal;
 use nalgebra::{Matrix3, Point2, Vector3};
 use stonewise_base::report_params::Language;
 use stonewise_base::thresholds::Thresholds;
+use stonewise_core::registration::ZoneKind;
 use stonewise_core::statistics::q_values;
 use stonewise_results::detection_limit_m;
-use stonewise_results::records::{DatumState, EpochVerdict, ReasonCode, State};
+use stonewise_results::records::{
+    DatumState, DeformationVerdict, DeformedZone, EpochVerdict, ReasonCode, State,
+};
 
 const SD_M: f64 = 0.0005;
 
@@ -357,4 +360,92 @@ fn at_most_five_percent_of_the_stones_said_to_move_stand_still() {
     // 5 % times the share that stands still, with four standard errors of 300 walls.
     assert!(mean < 0.045 + 0.015, "{mean}");
     assert!(mean > 0.02, "{mean}: nothing was tested");
+}
+
+/// A still wall with a zone that bulged by 1.9 mm (1.7 to 2.1), or none.
+fn bulged(is_bulged: bool) -> Case {
+    let zone = DeformedZone {
+        zone_id: 1,
+        state: State::default(),
+        kind: ZoneKind::Bulge,
+        along_m: 4.0,
+        up_m: 2.0,
+        extent_m: [2.13, 1.4],
+        area_m2: 2.2,
+        largest_mm: 1.9,
+        interval_mm: [1.7, 2.1],
+    };
+    let zones = if is_bulged { vec![zone] } else { Vec::new() };
+    Case {
+        deformation: Some(DeformationVerdict {
+            shown: is_bulged,
+            p: Some(if is_bulged { 1e-9 } else { 0.4 }),
+            largest_mm: is_bulged.then_some(1.9),
+            interval_mm: is_bulged.then_some([1.7, 2.1]),
+            detection_limit_mm: [Some(0.6), Some(0.4), None],
+            zones,
+        }),
+        ..wall(0, 0.0, 1)
+    }
+}
+
+#[test]
+fn fine_needs_the_shape_too() {
+    let none = Thresholds::default();
+    let kept = judge(&bulged(false), &none);
+    assert_eq!(kept.state, State::Fine, "{}", kept.sentence);
+    let words = "no change of the wall's shape is shown (detection limit 0.60 mm for a bulge of 1 m)";
+    assert!(kept.sentence.contains(words), "{}", kept.sentence);
+    let changed = judge(&bulged(true), &none);
+    assert_eq!(codes(&changed), [ReasonCode::DeformationShown]);
+    assert_eq!(changed.state, State::Attention);
+    let words = "the wall changed its shape in 1 zone; a zone of 2.1 x 1.4 m bulged by 1.9 mm (95 % interval 1.7 to 2.1 mm)";
+    assert!(changed.sentence.contains(words), "{}", changed.sentence);
+    // Nothing of the datum is in it.
+    let unknown = Case {
+        datum: Some(DatumState::Unknown),
+        ..bulged(true)
+    };
+    assert_eq!(judge(&unknown, &none).state, State::Attention);
+    let german = assess(&bulged(true), &none, Language::German).sentence;
+    let words = "eine Zone von 2,1 x 1,4 m hat sich um 1,9 mm ausgebaucht (95-%-Intervall 1,7 bis 2,1 mm)";
+    assert!(german.contains(words), "{german}");
+}
+
+#[test]
+fn deformations_have_thresholds_of_their_own_or_those_of_lengths() {
+    for (text, state, code) in [
+        (
+            "deformation_attention_mm = 1.0",
+            State::Attention,
+            ReasonCode::DeformationAttention,
+        ),
+        (
+            "deformation_alarm_mm = 1.5",
+            State::Alarm,
+            ReasonCode::DeformationAlarm,
+        ),
+        (
+            "deformation_attention_mm = 2.0",
+            State::CannotTell,
+            ReasonCode::DeformationReachesThreshold,
+        ),
+        ("attention_mm = 5.0", State::Fine, ReasonCode::BelowThresholds),
+    ] {
+        let verdict = judge(&bulged(true), &thresholds(text));
+        assert_eq!(
+            (verdict.state, codes(&verdict)[0]),
+            (state, code),
+            "{text}: {}",
+            verdict.sentence
+        );
+        assert_eq!(verdict.deformation.unwrap().zones[0].state, state, "{text}");
+    }
+    let doubted = Case {
+        in_doubt: true,
+        ..bulged(true)
+    };
+    let verdict = judge(&doubted, &thresholds("deformation_alarm_mm = 1.0"));
+    assert_eq!(verdict.state, State::CannotTell);
+    assert!(!verdict.sentence.contains("bulged"), "{}", verdict.sentence);
 }

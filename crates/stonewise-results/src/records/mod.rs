@@ -8,13 +8,14 @@ mod verdict;
 
 pub use datum::{Datum, DatumState, SourceError};
 pub use registration::{
-    AdjustmentRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord, RegistrationRecord,
+    AdjustmentRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord,
+    RegistrationRecord,
 };
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
 pub use verdict::{
-    Area, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict, Largest, Reason, ReasonCode,
-    State, StoneVerdict, VERDICT_VERSION, Verdict, ZoneVerdict,
+    Area, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict,
+    Largest, Reason, ReasonCode, State, StoneVerdict, VERDICT_VERSION, Verdict, ZoneVerdict,
 };
 
 #[cfg(test)]
@@ -49,6 +50,7 @@ mod tests {
             estimator: EstimatorRecord::Gicp(gicp),
             datum: Datum::unknown(&nalgebra::Point3::new(1.0, 2.0, 3.0), "unknown".to_owned()),
             observers: None,
+            deformation: None,
         });
         let params = EvaluationParams::default();
         let mut evaluation = Evaluation::new("the motion in the project file", &params);

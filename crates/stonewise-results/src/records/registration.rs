@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stonewise_core::registration::observers::{EpochErrors, ObserverComponents, SensorClass};
 use stonewise_core::registration::photos::PhotoStatus;
-use stonewise_core::registration::{AdjustmentReport, Break, StonePhotoReport, VarianceComponents};
+use stonewise_core::registration::{
+    AdjustmentReport, Break, Deformation, DeformationZone, StonePhotoReport, VarianceComponents,
+};
 use stonewise_core::stone::PairResult;
 
 /// What is known about the motions of one pair of epochs as a whole.
@@ -19,6 +21,32 @@ pub struct RegistrationRecord {
     /// What stations, strips and stable areas show of the error of the later epoch; absent where nothing was
     /// compared.
     pub observers: Option<ObserversRecord>,
+    /// Whether and where the wall deformed; absent if the estimator gives no joint distribution of the motions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deformation: Option<DeformationRecord>,
+}
+
+/// Whether and where the wall deformed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeformationRecord {
+    /// Probability of so large a deformation on a wall that moved as one rigid body; absent where no part of the wall
+    /// has stones enough.
+    pub p: Option<f64>,
+    /// Bulge that is found in 95 of 100 cases, of a zone of 1, 3 and 10 m, metres; absent where the wall is
+    /// smaller.
+    pub detection_limits_m: [Option<f64>; 3],
+    /// The zones, the one of the largest deformation first.
+    pub zones: Vec<DeformationZone>,
+}
+
+impl From<&Deformation> for DeformationRecord {
+    fn from(found: &Deformation) -> Self {
+        Self {
+            p: found.p,
+            detection_limits_m: found.detection_limits_m,
+            zones: found.zones.clone(),
+        }
+    }
 }
 
 /// What stations, strips and stable areas show.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Where the results of the last finished run lie until the next one has finished.
 pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 18] = [
+const STEMS: [&str; 19] = [
     "stones",
     "matches",
     "registration",
@@ -19,6 +19,7 @@ const STEMS: [&str; 18] = [
     "displacements",
     "run",
     "series",
+    "zones",
     "verdict",
     "audit_epoch",
     "audit_edits",

@@ -32,6 +32,7 @@ pub static STEPS: &[&Step] = &[
     &steps::m3c2::M3C2,
     &steps::change::CHANGE,
     &steps::evaluate::EVALUATE,
+    &outputs::zones::ZONES,
     &outputs::verdict::VERDICT,
     &outputs::evidence::EVIDENCE,
     &outputs::clouds::CLOUDS,

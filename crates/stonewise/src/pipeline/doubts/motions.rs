@@ -114,6 +114,7 @@ mod tests {
             estimator: registration_record().estimator,
             epoch_errors: None,
             error_stones: Vec::new(),
+            deformation: None,
             off_wall: Vec::new(),
             folder: std::path::PathBuf::new(),
         }

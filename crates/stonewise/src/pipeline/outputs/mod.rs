@@ -16,3 +16,4 @@ pub mod series;
 pub mod stone_rows;
 pub mod tables;
 pub mod verdict;
+pub mod zones;

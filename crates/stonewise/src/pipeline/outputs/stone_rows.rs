@@ -29,6 +29,8 @@ pub fn stone_rows(
         true => registered.errors(),
         false => BTreeMap::new(),
     };
+    let deformed = registered.deformation.iter().flat_map(|d| &d.stones);
+    let deformed: BTreeMap<_, _> = deformed.map(|s| (s.stone, s)).collect();
     let relative = registered.relative_errors();
     // Stones turn with the rigid part of the error; how its drifts turn single stones is not estimated.
     let turn = registered.epoch_errors.as_ref();
@@ -59,6 +61,10 @@ pub fn stone_rows(
         let pair = motions.get(&stone.id).copied();
         let place = facade.place(&stone.centroid);
         let row = StoneRow::new(stone, outcome, partner, pair, &reference, &place);
+        let row = match deformed.get(&stone.id).filter(|_| row.motion.is_some()) {
+            Some(deformation) => row.with_deformation(&stone.normal, deformation),
+            None => row,
+        };
         let of_partner = || edited.later.get(&partner?.id);
         let from = carried.first.get(&stone.id);
         let from = from.or_else(|| carried.later.get(&partner?.id));

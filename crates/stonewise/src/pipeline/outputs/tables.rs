@@ -7,7 +7,7 @@ use crate::pipeline::outputs::evidence::write_tracked_stones;
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
 use crate::results::names::PairFile;
-use crate::results::records::{ObserversRecord, RegistrationRecord};
+use crate::results::records::{DeformationRecord, ObserversRecord, RegistrationRecord};
 use crate::results::{write_neighbours, write_stones};
 use stonewise_core::epoch::EpochId;
 
@@ -33,6 +33,7 @@ fn write_tables(run: &Run, later: EpochId) -> Result<()> {
         estimator: registered.estimator.clone(),
         datum: measured.datum.clone(),
         observers: registered.epoch_errors.as_ref().map(ObserversRecord::from),
+        deformation: registered.deformation.as_ref().map(DeformationRecord::from),
     };
     let name = PairFile::Registration.name(later.index());
     write_readable_json(&out.join(name), &record)?;

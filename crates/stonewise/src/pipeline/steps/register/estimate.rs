@@ -16,10 +16,11 @@ use std::path::PathBuf;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::photos::PhotoSource;
-use stonewise_core::registration::{AdjustmentReport, adjust_with_photos};
+use stonewise_core::registration::{AdjustmentReport, JointMotions, adjust_with_photos};
 use stonewise_core::stone::PairResult;
 
-/// Measures the matched stones in the folder of the step.
+/// Measures the matched stones in the folder of the step; with the joint distribution of their motions, if the
+/// estimator gives one.
 pub(super) fn estimate(
     run: &Run,
     later: EpochId,
@@ -27,7 +28,7 @@ pub(super) fn estimate(
     matches: &[(StoneId, StoneId)],
     step: &StepDir,
     warnings: &Warnings,
-) -> Result<Registered> {
+) -> Result<(Registered, Option<JointMotions>)> {
     let project = run.context.project;
     match project.settings.registration.estimator {
         Estimator::Adjustment => adjust(run, later, labelled, matches, step, warnings),
@@ -35,9 +36,8 @@ pub(super) fn estimate(
             let size_m = project.settings.ingest.size_m;
             let params = &project.settings.registration.gicp;
             let progress = run.context.progress;
-            Ok(of_windows(align_windows(
-                labelled, matches, size_m, params, progress,
-            )?))
+            let results = align_windows(labelled, matches, size_m, params, progress)?;
+            Ok((of_windows(results), None))
         }
     }
 }
@@ -49,7 +49,7 @@ fn adjust(
     matches: &[(StoneId, StoneId)],
     step: &StepDir,
     warnings: &Warnings,
-) -> Result<Registered> {
+) -> Result<(Registered, Option<JointMotions>)> {
     let context = run.context;
     let params = &context.project.settings.registration;
     let pairs = DiskPairs::gather(labelled, matches, params.border_noises, step, context.progress)?;
@@ -62,10 +62,11 @@ fn adjust(
         false => None,
     };
     let photos = photos.as_ref().map(|p| p as &dyn PhotoSource<Error>);
-    let report = adjust_with_photos(&pairs, photos, &params.adjustment, context.progress)?;
+    let mut report = adjust_with_photos(&pairs, photos, &params.adjustment, context.progress)?;
     pairs.remove()?;
     tracked::write(step, &report)?;
-    Ok(of_adjustment(report))
+    let joint = report.joint.take();
+    Ok((of_adjustment(report), joint))
 }
 
 fn of_adjustment(mut report: AdjustmentReport) -> Registered {
@@ -93,6 +94,7 @@ fn of_adjustment(mut report: AdjustmentReport) -> Registered {
         estimator: EstimatorRecord::Adjustment(Box::new(adjustment)),
         epoch_errors: None,
         error_stones: Vec::new(),
+        deformation: None,
         off_wall: Vec::new(),
         folder: PathBuf::new(),
     }
@@ -111,6 +113,7 @@ fn of_windows(results: Vec<PairResult>) -> Registered {
         estimator: EstimatorRecord::Gicp(gicp),
         epoch_errors: None,
         error_stones: Vec::new(),
+        deformation: None,
         off_wall: Vec::new(),
         folder: PathBuf::new(),
     }

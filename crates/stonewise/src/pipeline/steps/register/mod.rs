@@ -34,6 +34,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
+use stonewise_core::registration::deformation;
 use stonewise_core::stone::MotionFailure;
 
 /// Measures the motion of every matched stone.
@@ -88,8 +89,13 @@ fn register(run: &Run, later: EpochId, labelled: Pair<&Labelled>) -> Result<Regi
     let step = run
         .context
         .step(&format!("{STEP}-{later}"), key, |step, warnings| {
-            let mut registered = estimate(run, later, labelled, &matches, step, warnings)?;
+            let (mut registered, joint) = estimate(run, later, labelled, &matches, step, warnings)?;
             add_epoch_error(run.context, later, labelled, &matches, &mut registered)?;
+            if let Some(joint) = joint {
+                let errors = registered.epoch_errors.as_ref().and_then(|e| e.joint.as_ref());
+                let errors = errors.map(|e| (e, registered.error_stones.as_slice()));
+                registered.deformation = Some(deformation(&joint, errors, run.context.progress)?);
+            }
             write_json(&step.file(MOTIONS), &registered)
         })?;
     Ok(Registered {

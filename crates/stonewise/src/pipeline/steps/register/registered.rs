@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use stonewise_core::id::StoneId;
+use stonewise_core::registration::Deformation;
 use stonewise_core::registration::observers::{EpochErrors, ErrorAt};
 use stonewise_core::statistics::upper_median;
 use stonewise_core::stone::{NeighbourCovariance, PairResult};
@@ -29,6 +30,9 @@ pub struct Registered {
     pub epoch_errors: Option<EpochErrors>,
     /// The stones at which that error is given, in its order.
     pub error_stones: Vec<StoneId>,
+    /// How the wall deformed; `None` if the estimator gives no joint distribution of the motions.
+    #[serde(default)]
+    pub deformation: Option<Deformation>,
     /// Lowest and highest corner of the areas off the wall that both epochs show, metres; empty without
     /// `auto_stable`.
     #[serde(default)]
