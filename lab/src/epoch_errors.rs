@@ -24,7 +24,7 @@ pub fn run(words: &Words) -> Outcome {
     let folder = Path::new(folder).join("truth");
     let sensor = if words.has("uav") { "uav" } else { "tls" };
     let epochs = [1, 2].map(|n| read_points(&folder.join(format!("epoch{n}_cloud_{sensor}_truth.laz"))));
-    let truth = read_stones(&folder.join("stones.csv"), sensor);
+    let truth = read_stones(&folder.join("stones.csv"), &[sensor]);
     let is_seen = |id: &u32| {
         let has_points = |e: &Points| e.get(id).is_some_and(|p| p.len() >= LEAST_POINTS);
         epochs.iter().all(has_points)

@@ -20,6 +20,12 @@ fn read_places(path: &Path) -> Places {
     places(&points, &points.keys().copied().collect::<Vec<_>>())
 }
 
+/// The sensors of the epochs: `tls-uav` is a scanner, then a drone.
+fn sensors_of(sensor: &str) -> [&str; 2] {
+    let (first, second) = sensor.split_once('-').unwrap_or((sensor, sensor));
+    [first, second]
+}
+
 /// `None` for the cases that this survey does not have.
 pub fn build(case: Case, sensor: &str) -> Option<Trial> {
     let combo = match case {
@@ -28,8 +34,12 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         Case::Edge | Case::Settlement | Case::Loose => return None,
     };
     let folder = folder().join(if combo { "combo" } else { "split" }).join("truth");
-    let first = read_places(&folder.join(format!("epoch1_cloud_{sensor}_truth.laz")));
-    let mut second = read_places(&folder.join(format!("epoch2_cloud_{sensor}_truth.laz")));
+    let of_epochs = sensors_of(sensor);
+    let cloud = |epoch: usize| {
+        let sensor = of_epochs[epoch];
+        read_places(&folder.join(format!("epoch{}_cloud_{sensor}_truth.laz", epoch + 1)))
+    };
+    let (first, mut second) = (cloud(0), cloud(1));
     let crack = Crack {
         across: Vector3::y(),
         at: 0.2,
@@ -47,7 +57,7 @@ pub fn build(case: Case, sensor: &str) -> Option<Trial> {
         None if case == Case::Crack && crack.distance(p) > 0.0 => Vector3::new(0.003, 0.008, 0.005),
         None => Vector3::zeros(),
     };
-    let rows = read_stones(&folder.join("stones.csv"), sensor);
+    let rows = read_stones(&folder.join("stones.csv"), &of_epochs);
     if !combo {
         // A crack runs along joints: a stone moves as one, what is no stone where it lies.
         for (id, points) in &mut second {

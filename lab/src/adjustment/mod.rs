@@ -4,7 +4,7 @@
 //! `cargo run --release -p stonewise-lab -- adjustment [WORD ...]`. Words, in any order: cases `still
 //! translation bulge edge crack settlement loose combo datum` (default: all; `edge`: one bulge at the end of
 //! a wall that stood still, `datum`: combo with the true motion taken out again), sensors `tls uav` (default:
-//! both), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
+//! both; `tls-uav uav-tls`: another sensor in each epoch, with `dam`), `seeds=N` (simulated walls, default 5), `seed=N` (one of them), `dam` (the section beside the
 //! checkout instead, or that in `STONEWISE_SURVEY`), `exact` (epochs without registration and trajectory
 //! errors), `masks` (15 % of the second epoch's masks merged, halved or swapped), `paper` (the paper's
 //! estimator and M3C2 beside it), `each` (a line for every seed), `width=M height=M` (of the wall, default 4
@@ -106,7 +106,7 @@ impl Options {
 
 pub fn run(words: &Words) -> Outcome {
     let options = Options::new(words);
-    let sensors = words.chosen(&["tls", "uav"]);
+    let sensors = sensors(words);
     if let Some(stones) = words.number("scale=") {
         for sensor in &sensors {
             scale::measure(sensor, stones, &options);
@@ -131,6 +131,15 @@ pub fn run(words: &Words) -> Outcome {
         }
     }
     Ok(())
+}
+
+/// Scanner and drone, unless words choose; mixes only if they do.
+fn sensors(words: &Words) -> Vec<&'static str> {
+    const SENSORS: [&str; 4] = ["tls", "uav", "tls-uav", "uav-tls"];
+    match SENSORS.iter().any(|s| words.has(s)) {
+        true => words.chosen(&SENSORS),
+        false => SENSORS[..2].to_vec(),
+    }
 }
 
 fn measure(case: Case, sensor: &str, seeds: &[u64], options: &Options, table: &Table) {

@@ -35,8 +35,8 @@ pub fn read_points(path: &Path) -> Points {
     points
 }
 
-/// The stones of `truth/stones.csv` by number.
-pub fn read_stones(path: &Path, sensor: &str) -> BTreeMap<u32, StoneRow> {
+/// The stones of `truth/stones.csv` by number; those countable that all of these sensors see.
+pub fn read_stones(path: &Path, sensors: &[&str]) -> BTreeMap<u32, StoneRow> {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -52,7 +52,8 @@ pub fn read_stones(path: &Path, sensor: &str) -> BTreeMap<u32, StoneRow> {
                 displacement: vector("dx", "dy", "dz"),
                 shared: vector("bgx", "bgy", "bgz"),
                 loose: f[column("loose")] > 0.5,
-                countable: f[column(&format!("vis_{sensor}"))] >= 0.35 && f[column("edge")] < 0.5,
+                countable: sensors.iter().all(|s| f[column(&format!("vis_{s}"))] >= 0.35)
+                    && f[column("edge")] < 0.5,
             };
             (f[column("stone_id")] as u32, row)
         })
