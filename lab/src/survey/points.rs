@@ -121,6 +121,7 @@ impl<'a> Surroundings<'a> {
             .map(|(labelled, p)| NearPoint {
                 offset: (p - centroid).cast::<f32>().into(),
                 labelled,
+                source: 0,
             })
             .collect()
     }

@@ -25,7 +25,7 @@ impl Adjustment {
         let sample: Vec<(LocalPair, StoneVector)> = sample
             .par_iter()
             .map(|(i, pair)| {
-                let pair = LocalPair::new(pair, &self.prior.graph.nodes[*i].face_from_world);
+                let pair = self.local_pair(*i, pair);
                 (pair, self.stones[*i].with_field.motion)
             })
             .collect();
@@ -37,6 +37,12 @@ impl Adjustment {
                 own.surface.invalidate();
             }
         }
+    }
+
+    /// The points of a stone in its frame.
+    pub fn local_pair(&self, i: usize, pair: &PairPoints) -> LocalPair {
+        let face_from_world = &self.prior.graph.nodes[i].face_from_world;
+        LocalPair::new(pair, face_from_world, self.stones[i].info.noise_factors)
     }
 
     /// Normal equations of all stones that moved since they were last evaluated.
@@ -83,7 +89,7 @@ impl Adjustment {
         if !self.is_due(stone) {
             return None;
         }
-        let local = LocalPair::new(pair, &self.prior.graph.nodes[i].face_from_world);
+        let local = self.local_pair(i, pair);
         let anew = |candidate: &CandidateMotion| {
             let window = candidate.surface.window(&candidate.motion);
             self.surface.equations(&local, &candidate.motion, &window)
@@ -146,7 +152,7 @@ impl Adjustment {
     fn probe_one(&self, i: usize, pair: &PairPoints) -> Option<StoneVector> {
         let stone = &self.stones[i];
         let probe = Probe {
-            pair: &LocalPair::new(pair, &self.prior.graph.nodes[i].face_from_world),
+            pair: &self.local_pair(i, pair),
             here: placed(&stone.with_field),
             surface: &self.surface,
             inflation: self.surface.inflation_of_all(stone.surface()),
@@ -265,7 +271,7 @@ mod tests {
         assert_eq!([0, 71].map(|i| gradient(&adjustment, i)), [before[0], before[2]]);
         // Brute force: the stone's points alone at its new motion.
         let frame = &adjustment.prior.graph.nodes[70].face_from_world;
-        let local = LocalPair::new(&source.pairs.pairs()[70], frame);
+        let local = LocalPair::new(&source.pairs.pairs()[70], frame, [1.0; 2]);
         let alone = adjustment.surface.equations(&local, &moved, &moved);
         assert_eq!(gradient(&adjustment, 70), alone.gradient);
         assert_ne!(alone.gradient, before[1]);

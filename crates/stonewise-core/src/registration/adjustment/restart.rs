@@ -120,7 +120,7 @@ impl Adjustment {
     /// Where a stone settles from the first of these places at which its points do not contradict it.
     fn returned(&self, i: usize, pair: &PairPoints, places: &[StoneVector]) -> Option<StoneVector> {
         let stone = &self.stones[i];
-        let local = LocalPair::new(pair, &self.prior.graph.nodes[i].face_from_world);
+        let local = self.local_pair(i, pair);
         let inflation = self.surface.inflation_of_all(stone.surface());
         let here = stone.with_field.motion;
         let share = self.prior.loose.share;

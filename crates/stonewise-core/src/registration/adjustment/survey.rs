@@ -5,12 +5,13 @@ use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
 use crate::id::StoneId;
 use crate::progress::Progress;
-use crate::registration::points::{PairPoints, PairSource, face_spacing};
+use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
 use crate::statistics::{component_median, upper_median};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A pair without its points.
 pub(crate) struct StoneInfo {
@@ -21,6 +22,8 @@ pub(crate) struct StoneInfo {
     pub shift: Vector3<f64>,
     pub counts: [usize; 2],
     pub usable: bool,
+    /// Noise of each epoch's points over that of most stones: 1 unless another sensor measured the stone.
+    pub noise_factors: [f64; 2],
 }
 
 /// All pairs, with and without their points.
@@ -68,6 +71,7 @@ pub(crate) fn survey<'a, S: PairSource>(
     let mut stones = Vec::new();
     let mut batches = Vec::new();
     let mut spacings = Vec::new();
+    let mut windows = Vec::new();
     let mut sample: Vec<(usize, PairPoints)> = Vec::new();
     let mut stride = 1;
     for batch in 0..source.batch_count() {
@@ -78,9 +82,11 @@ pub(crate) fn survey<'a, S: PairSource>(
         for pair in pairs {
             let index = stones.len();
             let info = StoneInfo::new(&pair, params);
+            let window = pair.window.clone();
             if info.usable && index % stride == 0 {
                 sample.push((index, pair));
             }
+            windows.push(window);
             stones.push(info);
             if sample.len() > 2 * SAMPLE {
                 stride *= 2;
@@ -88,6 +94,8 @@ pub(crate) fn survey<'a, S: PairSource>(
             }
         }
     }
+    set_noise_factors(&mut stones, &windows);
+    sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);
     Ok(Survey {
         stones,
@@ -110,7 +118,38 @@ impl StoneInfo {
             place: Place::from(pair),
             shift: pair.centroid_second - pair.centroid,
             counts,
+            noise_factors: [1.0; 2],
             usable: counts.iter().all(|&n| n >= params.min_points),
+        }
+    }
+}
+
+/// Compares the noise of stones that sources of another sensor measured with that of most stones: sources whose
+/// stones mostly have another noise.
+fn set_noise_factors(stones: &mut [StoneInfo], windows: &[Option<Arc<Window>>]) {
+    for epoch in 0..2 {
+        let mut all: Vec<f64> = windows.iter().flatten().map(|w| w.noise_m()[epoch]).collect();
+        let Some(usual) = upper_median(&mut all).filter(|usual| *usual > 0.0) else {
+            continue;
+        };
+        let factor = |w: &Window| w.noise_m()[epoch] / usual;
+        let is_usual = |w: &Window| (NOISES_ALIKE.recip()..=NOISES_ALIKE).contains(&factor(w));
+        // Per source, stones of usual noise less the others.
+        let mut votes: BTreeMap<u32, i64> = BTreeMap::new();
+        for w in windows.iter().flatten() {
+            for source in &w.sources()[epoch] {
+                *votes.entry(*source).or_default() += if is_usual(w) { 1 } else { -1 };
+            }
+        }
+        let is_of_another = |source: &u32| votes.get(source).is_some_and(|votes| *votes < 0);
+        for (stone, window) in stones.iter_mut().zip(windows) {
+            if let Some(w) = window.as_deref()
+                && !is_usual(w)
+                && factor(w) > 0.0
+                && w.sources()[epoch].iter().all(is_of_another)
+            {
+                stone.noise_factors[epoch] = factor(w);
+            }
         }
     }
 }

@@ -140,7 +140,7 @@ impl Comparison {
                 nearby_second: Cloud::new(stone.centroid, Vec::new()),
                 window: None,
             };
-            LocalPair::new(&pair, &frame)
+            LocalPair::new(&pair, &frame, [1.0; 2])
         };
         let sight = |s: &&SourcePoints| {
             let sight = Sight {

@@ -12,6 +12,7 @@ use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
 use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
+use super::sensors::Sharpest;
 use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
 use nalgebra::{Matrix3, Vector3};
@@ -116,9 +117,19 @@ const OPEN_M: f64 = 0.03;
 
 /// The error of the later epoch against the reference at every stone.
 ///
+/// Where several sensors show an epoch, the sources of the sharpest one give its datum.
+///
 /// Cost: three evaluations of the compared stones' points; then dense algebra over the unknowns of the
 /// sources.
 pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
+    match Sharpest::of(pair) {
+        Some(sharpest) => of_sources(&sharpest.pair(pair), params),
+        None => of_sources(pair, params),
+    }
+}
+
+/// The same of sources that are all used.
+fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     let class = SensorClass::of_noise(pair.sigma_m);
     let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());
     let mut within: [Vec<Observation>; 2] =

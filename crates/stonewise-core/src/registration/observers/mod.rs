@@ -35,6 +35,7 @@ mod model;
 mod observation;
 mod relative;
 mod rigid;
+mod sensors;
 mod sight;
 mod stable;
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The points of matched stones, chosen from clouds that lie in memory.
 
 use super::matched_pairs::{MatchedPair, PairPlaces, StoneExtents};
+use super::near_point::NearPoint;
 use super::pairs::MemoryPairs;
-use super::stone_points::NearPoint;
 use nalgebra::Point3;
 
 /// The points of matched stones out of all points of the first and of the second epoch, world frame, each with
@@ -95,6 +95,7 @@ mod tests {
                     here.map(|p| NearPoint {
                         offset: (p.0 - pair.first.centroid).cast::<f32>().into(),
                         labelled: p.1 == id.0,
+                        source: 0,
                     })
                     .collect::<Vec<_>>()
                 };

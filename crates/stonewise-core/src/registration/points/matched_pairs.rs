@@ -1,8 +1,9 @@
 //! Matched stones in the order in which they are measured, and the points that each of them may consist of.
 
 use super::local_shifts::local_shifts;
+use super::near_point::NearPoint;
 use super::pairs::PairPoints;
-use super::stone_points::{NearPoint, stone_points};
+use super::stone_points::stone_points;
 use super::window::Window;
 use crate::cloud::Cloud;
 use crate::geometry::{Bounds, cell_of, cells_between};
@@ -165,7 +166,7 @@ impl PairPlaces {
     }
 
     /// The pairs, by their index, that a point may belong to, with the point as they see it: that of its own
-    /// stone, then those in whose box it lies. `stone`: its label, 0 for none.
+    /// stone, then those in whose box it lies, all as of the first source. `stone`: its label, 0 for none.
     pub fn near(&self, point: Point3<f64>, stone: u32) -> impl Iterator<Item = (usize, NearPoint)> + '_ {
         let own = self.of_stone.get(&stone).copied();
         let here = self.cells.get(&cell_of(&point, BOX_CELL_M)).into_iter().flatten();
@@ -175,6 +176,7 @@ impl PairPlaces {
             let near = NearPoint {
                 offset: (point - self.places[k].centre).cast::<f32>().into(),
                 labelled: Some(k) == own,
+                source: 0,
             };
             (k, near)
         })

@@ -7,17 +7,11 @@
 //! stones around moved: those of each, because an outline encloses the stray points of the epoch it was drawn
 //! around and cuts off those of the other, which biases the motion of the whole wall.
 
+use super::best_sensor::of_best_sensor;
+use super::near_point::NearPoint;
 use super::window::Window;
+use crate::geometry::FaceFrame;
 use nalgebra::Vector3;
-
-/// A point near a stone.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct NearPoint {
-    /// Relative to the stone's centroid in the first epoch, metres.
-    pub offset: [f32; 3],
-    /// Whether the point has the label of the stone.
-    pub labelled: bool,
-}
 
 /// The points of a stone, chosen from all points near it, and the window in which they count.
 #[derive(Clone, Debug)]
@@ -38,19 +32,26 @@ pub struct StonePoints {
 /// labelled points belong to the stone. Nearer to an outline all points inside both do, whatever their label,
 /// if they lie no deeper and no farther out than the labelled ones. `shift`: how the stone's place moved,
 /// second epoch minus first, about. Labelled points alone where no outline can be found, or where
-/// `border_noises` is 0.
+/// `border_noises` is 0. Where several sensors show the stone in an epoch, the points are those of the sharpest
+/// one.
 pub fn stone_points(
     near: [&[NearPoint]; 2],
     normal: &Vector3<f64>,
     shift: &Vector3<f64>,
     border_noises: f64,
 ) -> StonePoints {
-    let [first, second] = near.map(labelled);
-    match Window::new([&first, &second], normal, shift, border_noises) {
+    let face_from_world = FaceFrame::from_normal(normal).face_from_world();
+    let near = near.map(|near| of_best_sensor(near, &face_from_world));
+    let [first, second] = near.each_ref().map(|near| labelled(near));
+    let sources = near.each_ref().map(|near| {
+        let own = near.iter().filter(|p| p.labelled);
+        own.map(|p| p.source).collect()
+    });
+    match Window::new([&first, &second], normal, shift, border_noises, sources) {
         Some(window) => StonePoints {
             first: near[0]
                 .iter()
-                .filter(|p| window.holds(&window.place(&p.offset), p.labelled))
+                .filter(|p| window.holds(0, &window.place(&p.offset), p.labelled))
                 .map(|p| p.offset)
                 .collect(),
             second,
@@ -98,6 +99,7 @@ mod tests {
                 NearPoint {
                     offset: p.cast::<f32>().into(),
                     labelled: (y + slant * noise).abs() < 0.2 && z.abs() < 0.2,
+                    source: 0,
                 }
             })
             .collect()
@@ -143,7 +145,7 @@ mod tests {
         };
         let there = |p: &&[f32; 3], labelled: bool| {
             let at = window.face_from_world() * (Vector3::from(p.map(f64::from)) - shift);
-            window.holds(&Point3::from(at), labelled)
+            window.holds(1, &Point3::from(at), labelled)
         };
         let stone = found.second.iter().filter(|p| there(p, true));
         let nearby = found.nearby_second.iter().filter(|p| there(p, false));

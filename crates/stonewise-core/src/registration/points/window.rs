@@ -1,23 +1,18 @@
 //! The part of a stone's face in which points count.
 
-use crate::cloud::GridIndex;
+use super::noise::noise_m;
 use crate::geometry::{FaceFrame, OutlineParams, RingIndex, outlines, signed_area};
-use crate::statistics::upper_median;
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
+use std::collections::BTreeSet;
 
-/// Points of a stone on which its noise is measured: their median is known to some percent, and more only
-/// cost time.
-const NOISE_SAMPLES: usize = 300;
 /// Share of a stone's points, at either end of their depths, that does not set how deep the stone reaches:
 /// mixed pixels and what hangs in front of the stone.
 const DEPTH_TAIL: f64 = 0.02;
-/// Noise levels by which the depth of a stone is widened: normal noise exceeds it in three points in 100,000 on either side.
+/// Noise levels of an epoch by which the depth of a stone is widened for its points: normal noise exceeds it in three points in 100,000 on either side.
 const DEPTH_NOISES: f64 = 4.0;
 /// How much farther than its neighbours' shift a stone may be followed into points without its label, metres:
 /// twice the typical motion of a loose stone.
 const REACH_M: f64 = 0.03;
-/// The median of |a - b| in standard deviations of a, for two values of a normal variable.
-const MEDIAN_DIFFERENCE: f64 = 0.954;
 
 /// The part of a stone's face that both epochs show, about its centroid in the first. In the second epoch it
 /// moves with the stone: a window fixed at the predicted place would cut the points there, and the cut edge
@@ -29,8 +24,12 @@ pub struct Window {
     rings: [RingIndex; 2],
     /// Width of the border along the inside of the rings.
     border_m: f64,
-    /// Lowest and highest place, perpendicular to the face, metres.
-    depth: [f64; 2],
+    /// Lowest and highest place of each epoch's points, perpendicular to the face, metres.
+    depths: [[f64; 2]; 2],
+    /// Noise of each epoch's points, metres.
+    noise_m: [f64; 2],
+    /// The sources of each epoch's labelled points.
+    sources: [BTreeSet<u32>; 2],
 }
 
 impl Window {
@@ -39,6 +38,7 @@ impl Window {
         normal: &Vector3<f64>,
         shift: &Vector3<f64>,
         border_noises: f64,
+        sources: [BTreeSet<u32>; 2],
     ) -> Option<Self> {
         if border_noises <= 0.0 {
             return None;
@@ -49,10 +49,15 @@ impl Window {
         Some(Self {
             face_from_world,
             border_m: border_noises * first.noise_m.max(second.noise_m),
-            depth: [
-                first.depth[0].max(second.depth[0]),
-                first.depth[1].min(second.depth[1]),
-            ],
+            depths: [&first, &second].map(|of| {
+                let reach = DEPTH_NOISES * of.noise_m;
+                [
+                    first.depth[0].max(second.depth[0]) - reach,
+                    first.depth[1].min(second.depth[1]) + reach,
+                ]
+            }),
+            noise_m: [first.noise_m, second.noise_m],
+            sources,
             rings: [&first.rings, &second.rings].map(|rings| RingIndex::new(rings)),
         })
     }
@@ -62,9 +67,20 @@ impl Window {
         &self.face_from_world
     }
 
-    /// Whether a point counts that lies here, in the window's axes about the stone's centroid.
-    pub(crate) fn holds(&self, at: &Point3<f64>, labelled: bool) -> bool {
-        let (flat, [low, high]) = (at.xy(), self.depth);
+    /// Noise of each epoch's points along the normal, about, metres.
+    pub(crate) fn noise_m(&self) -> [f64; 2] {
+        self.noise_m
+    }
+
+    /// The sources of each epoch's labelled points.
+    pub(crate) fn sources(&self) -> &[BTreeSet<u32>; 2] {
+        &self.sources
+    }
+
+    /// Whether a point of an epoch (0 or 1) counts that lies here, in the window's axes about the stone's
+    /// centroid.
+    pub(crate) fn holds(&self, epoch: usize, at: &Point3<f64>, labelled: bool) -> bool {
+        let (flat, [low, high]) = (at.xy(), self.depths[epoch]);
         let is_in_depth = at.z > low && at.z < high;
         let is_inside = || self.rings.iter().all(|ring| ring.contains(&flat));
         let is_at_border = || {
@@ -96,6 +112,7 @@ impl Window {
 struct Face {
     rings: Vec<Vec<Point2<f64>>>,
     noise_m: f64,
+    /// Lowest and highest place of all but the tails.
     depth: [f64; 2],
 }
 
@@ -119,33 +136,11 @@ impl Face {
         Some(Self {
             rings,
             noise_m,
-            depth: [
-                heights[tail] - DEPTH_NOISES * noise_m,
-                heights[heights.len() - 1 - tail] + DEPTH_NOISES * noise_m,
-            ],
+            depth: [heights[tail], heights[heights.len() - 1 - tail]],
         })
     }
 }
 
 fn place(face_from_world: &Matrix3<f64>, offset: &[f32; 3]) -> Point3<f64> {
     Point3::from(face_from_world * Vector3::from(offset.map(f64::from)))
-}
-
-/// Noise along z of points of a face of `size_m`: the median difference of neighbours that are nearest in x
-/// and y.
-///
-/// Relief within one point spacing counts as noise; on terrestrial scans that is about as much as the
-/// scanner's.
-fn noise_m(local: &[Point3<f64>], size_m: f64) -> f64 {
-    let flat: Vec<Point3<f64>> = local.iter().map(|p| Point3::new(p.x, p.y, 0.0)).collect();
-    let index = GridIndex::new(&flat, 2.0 * size_m / (flat.len() as f64).sqrt());
-    let mut differences: Vec<f64> = (0..flat.len())
-        .step_by((flat.len() / NOISE_SAMPLES).max(1))
-        .filter_map(|i| {
-            let near = index.nearest_k(&flat[i], 2, size_m);
-            let other = near.iter().find(|(j, _)| *j != i)?.0;
-            Some((local[i].z - local[other].z).abs())
-        })
-        .collect();
-    upper_median(&mut differences).map_or(0.0, |median| median / MEDIAN_DIFFERENCE)
 }

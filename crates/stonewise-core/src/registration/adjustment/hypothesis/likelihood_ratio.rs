@@ -120,6 +120,7 @@ mod tests {
                 NearPoint {
                     offset: Vector3::new(q.x + noise, q.y, q.z).cast::<f32>().into(),
                     labelled: y.abs().max(z.abs()) < HALF_M,
+                    source: 0,
                 }
             })
             .collect()
@@ -145,7 +146,11 @@ mod tests {
             nearby_second: cloud(chosen.nearby_second),
             window: chosen.window.map(Arc::new),
         };
-        LocalPair::new(&pair, &FaceFrame::from_normal(&normal).face_from_world())
+        LocalPair::new(
+            &pair,
+            &FaceFrame::from_normal(&normal).face_from_world(),
+            [1.0; 2],
+        )
     }
 
     fn placed(world: &Vector3<f64>) -> Placed {

@@ -61,11 +61,14 @@ impl Probe<'_> {
         best.1
     }
 
-    /// Deviance after a step that the prior of loose stones holds back.
+    /// Deviance after a step that the prior of loose stones holds back, and that goes no farther along the face
+    /// than half the way to another place: beyond, the equations there say more.
     fn expected_deviance(&self, e: &Equations) -> f64 {
         let held = e.information + Matrix9::identity() * self.inflation / self.move_m.powi(2);
         held.cholesky().map_or(f64::INFINITY, |c| {
-            e.deviance - e.gradient.dot(&c.solve(&e.gradient))
+            let step = c.solve(&e.gradient);
+            let share = (0.5 * self.move_m / step.xy().norm()).min(1.0);
+            e.deviance - share * (2.0 - share) * e.gradient.dot(&step)
         })
     }
 }
@@ -185,7 +188,7 @@ mod tests {
         let root = Matrix9::from_fn(|_, _| rng.random_range(-1.0..1.0));
         let mut equations = without_points();
         equations.information = root * root.transpose() * 1e4;
-        equations.gradient = Vector9::from_fn(|_, _| rng.random_range(-30.0..30.0));
+        equations.gradient = Vector9::from_fn(|_, _| rng.random_range(-3.0..3.0));
         equations.deviance = 17.0;
         let (pair, surface) = (scans([0.0; 2]), model());
         let mut probe = probe(&pair, &surface);

@@ -152,10 +152,12 @@ impl DiskPairs {
         progress.each("gather stones", 0..tiles.tile_count(), |tile| {
             let labels = epoch.labels(tile)?;
             if places.reach_into(&tiles.bounds(tile)) || labels.stone.iter().any(|s| places.has(*s)) {
-                let cloud = tiles.load(tile)?;
+                let (cloud, origins) = (tiles.load(tile)?, tiles.surveyed.origins(tile)?);
                 for (i, stone) in labels.stone.iter().enumerate() {
                     for (k, near) in places.near(cloud.world(i), *stone) {
                         let (batch, slot) = ((k / BATCH) as u32, (k % BATCH) as u16);
+                        let source = origins.source[i];
+                        let near = NearPoint { source, ..near };
                         spill.push(batch, &encode(slot, which, near))?;
                     }
                 }
@@ -199,12 +201,17 @@ const NEARBY: u32 = 2;
 
 const RECORD: usize = 16;
 
-/// Bit beside the epoch's number: the point has the label of the stone.
+/// Bit beside the epoch's number: the point has the label of the stone. The source stands above it.
 const LABELLED: u16 = 2;
+const SOURCE_SHIFT: u32 = 2;
+/// Sources beyond this share its number.
+const LAST_SOURCE: u32 = (u16::MAX >> SOURCE_SHIFT) as u32;
 
 fn encode(slot: u16, epoch: u16, point: NearPoint) -> [u8; RECORD] {
     let mut record = [0; RECORD];
-    let flags = epoch | if point.labelled { LABELLED } else { 0 };
+    let flags = epoch
+        | if point.labelled { LABELLED } else { 0 }
+        | (point.source.min(LAST_SOURCE) as u16) << SOURCE_SHIFT;
     record[..2].copy_from_slice(&slot.to_le_bytes());
     record[2..4].copy_from_slice(&flags.to_le_bytes());
     for axis in 0..3 {
@@ -220,6 +227,7 @@ fn decode(record: &[u8]) -> (usize, usize, NearPoint) {
     let point = NearPoint {
         offset: [real(4), real(8), real(12)],
         labelled: flags & LABELLED != 0,
+        source: u32::from(flags >> SOURCE_SHIFT),
     };
-    (usize::from(short(0)), usize::from(flags & !LABELLED), point)
+    (usize::from(short(0)), usize::from(flags & 1), point)
 }

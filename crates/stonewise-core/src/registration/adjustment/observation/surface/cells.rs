@@ -36,10 +36,12 @@ impl CellSums {
         self.add(epoch, p, 0.0, 1.0);
     }
 
+    /// Share of the cells of the larger face that hold points of both epochs.
     pub fn overlap(&self) -> f64 {
         let held = |test: fn(&[(f64, f64); 2]) -> bool| self.sums.iter().filter(|c| test(c)).count() as f64;
         let both = held(|c| c[0].1 > 0.0 && c[1].1 > 0.0);
-        both / held(|c| c[0].1 > 0.0).max(1.0)
+        let larger = held(|c| c[0].1 > 0.0).max(held(|c| c[1].1 > 0.0));
+        both / larger.max(1.0)
     }
 
     /// Per cell to which both give at least this weight: difference of the means, and its expected variance.

@@ -34,6 +34,21 @@ pub(crate) fn with_error_likelihood(equations: NormalEquations, error_m: f64) ->
     equations
 }
 
+/// The equations with an error of the translation, `error_m` per axis, that all points of the stone share:
+/// that of a sensor against the one that measured the stones around it. The optimum stays.
+pub(crate) fn with_shift_error(mut equations: NormalEquations, error_m: f64) -> NormalEquations {
+    let columns = equations.information.fixed_columns::<3>(0) * error_m;
+    let of_error = equations.vector.fixed_rows::<3>(0) * error_m;
+    let inner = Matrix3::identity() + columns.fixed_rows::<3>(0) * error_m;
+    let Some(inverse) = inner.try_inverse() else {
+        return equations;
+    };
+    equations.information -= columns * inverse * columns.transpose();
+    equations.vector -= columns * inverse * of_error;
+    equations.constant += 0.5 * of_error.dot(&(inverse * of_error));
+    equations
+}
+
 /// The discounted equations, and the log determinant of the covariance with the error over that without.
 fn with_log_det(mut equations: NormalEquations, factor: f64, error_m: f64) -> (NormalEquations, f64) {
     let a = Matrix3::from_fn(|r, c| equations.information[(INSIDE[r], INSIDE[c])]);
@@ -136,6 +151,21 @@ mod tests {
             }
         }
         assert!((d * after.vector - c * before.vector).norm() < 1e-6);
+    }
+
+    #[test]
+    fn an_error_of_the_sensor_adds_to_the_variances_of_the_translation() {
+        let (before, error_m) = (term(30), 2e-4);
+        let after = with_shift_error(before.clone(), error_m);
+        let [c, d] = [&before, &after].map(|t| t.information.try_inverse().unwrap());
+        for (k, (d, c)) in d.diagonal().iter().zip(c.diagonal().iter()).enumerate() {
+            let added = if k < 3 { error_m * error_m } else { 0.0 };
+            assert!((d - c - added).abs() < 1e-6 * d, "{k}");
+        }
+        let optimum = c * before.vector;
+        assert!((d * after.vector - optimum).norm() < 1e-6);
+        let peak = |t: &NormalEquations| t.constant + 0.5 * optimum.dot(&t.vector);
+        assert!((peak(&after) - peak(&before)).abs() < 1e-6 * peak(&before).abs());
     }
 
     #[test]

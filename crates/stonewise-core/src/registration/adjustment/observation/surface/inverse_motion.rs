@@ -19,6 +19,11 @@ impl InverseMotion {
         }
     }
 
+    /// By how much it moves a point of the second epoch at the stone's centroid along the face.
+    pub fn shift_in_face(&self) -> [f64; 2] {
+        [-self.translation.x, -self.translation.y]
+    }
+
     /// Where a point of the second epoch was in the first; bending is taken off its height.
     pub fn undo(&self, q: &[f64; 3]) -> [f64; 3] {
         let y = self

@@ -16,6 +16,8 @@ pub(crate) struct LocalPair {
     labelled: usize,
     /// Where points count, and from the stone's frame to the window's.
     window: Option<(Arc<Window>, Matrix3<f64>)>,
+    /// Noise of each epoch's points over that of most stones.
+    pub noise_factors: [f64; 2],
 }
 
 impl LocalPair {
@@ -27,10 +29,12 @@ impl LocalPair {
             labelled: second.len(),
             second,
             window: None,
+            noise_factors: [1.0; 2],
         }
     }
 
-    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>) -> Self {
+    /// `noise_factors`: noise of each epoch's points over that of most stones.
+    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>, noise_factors: [f64; 2]) -> Self {
         let local = |cloud: &Cloud| {
             let shift = cloud.origin() - pair.centroid;
             (0..cloud.len())
@@ -48,6 +52,7 @@ impl LocalPair {
                 .window
                 .as_ref()
                 .map(|w| (w.clone(), w.face_from_world() * face_from_world.transpose())),
+            noise_factors,
         }
     }
 
@@ -65,6 +70,7 @@ impl LocalPair {
             labelled: second.len(),
             second,
             window: None,
+            noise_factors: self.noise_factors,
         }
     }
 
@@ -77,7 +83,7 @@ impl LocalPair {
         self.second.iter().enumerate().filter_map(move |(i, q)| {
             let counts = self.window.as_ref().is_none_or(|(part, turn)| {
                 let at = turn * Vector3::from(window.undo(q));
-                part.holds(&Point3::from(at), i < self.labelled)
+                part.holds(1, &Point3::from(at), i < self.labelled)
             });
             counts.then(|| motion.undo(q))
         })
@@ -104,6 +110,7 @@ mod tests {
                 .map(|p| NearPoint {
                     offset: (p + moved).cast::<f32>().into(),
                     labelled: p.y.abs().max(p.z.abs()) < 0.101,
+                    source: 0,
                 })
                 .collect()
         };
@@ -121,7 +128,7 @@ mod tests {
             nearby_second: cloud(chosen.nearby_second),
             window: chosen.window.map(Arc::new),
         };
-        let local = LocalPair::new(&pair, &frame);
+        let local = LocalPair::new(&pair, &frame, [1.0; 2]);
         let moved = InverseMotion::new(&StoneVector::from_translation(frame * shift));
         let counted: Vec<[f64; 3]> = local.second_moved_back(&moved, &moved).collect();
         assert_eq!(counted.len(), local.first.len());

@@ -20,7 +20,7 @@ mod surface_noise;
 mod testing;
 
 pub(crate) use correlation::Correlation;
-pub(crate) use discount::with_error_likelihood;
+pub(crate) use discount::{with_error_likelihood, with_shift_error};
 pub(crate) use equations::{Equations, deviance};
 pub(crate) use layout::Layout;
 pub(crate) use linearisation::Linearisation;

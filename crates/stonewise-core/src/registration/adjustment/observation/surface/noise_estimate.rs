@@ -41,7 +41,7 @@ pub(crate) fn estimate_noise(
     start: &SurfaceNoise,
     layout: &Layout,
 ) -> SurfaceNoise {
-    let patches = sampled(sample, layout);
+    let patches = sampled(sample, start, layout);
     if patches.is_empty() {
         return *start;
     }
@@ -100,12 +100,12 @@ fn from_log(log: [f64; 3]) -> SurfaceNoise {
 }
 
 /// Evenly chosen patches of the sampled stones, at their present motion.
-fn sampled(sample: &[(&LocalPair, StoneVector)], layout: &Layout) -> Vec<PatchPoints> {
+fn sampled(sample: &[(&LocalPair, StoneVector)], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
     let all: Vec<PatchPoints> = sample
         .par_iter()
         .map(|(pair, x)| {
             let motion = InverseMotion::new(x);
-            pool_into_patches(pair, &motion, &motion, layout).list
+            pool_into_patches(pair, &motion, &motion, noise, layout).list
         })
         .collect::<Vec<_>>()
         .into_iter()

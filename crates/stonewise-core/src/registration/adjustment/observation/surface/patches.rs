@@ -5,6 +5,7 @@ use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
 use super::local_pair::LocalPair;
 use super::patch_grid::{PatchGrid, WeightedPoint};
+use super::surface_noise::SurfaceNoise;
 
 /// Points in each epoch that a patch needs: twice the unknowns of a plane, for a fit whose outliers can be
 /// told.
@@ -12,6 +13,10 @@ const PATCH_POINTS: usize = 12;
 /// Width by which a face is widened, in cells: points that noise moved beyond the first epoch's outline still
 /// count.
 const MARGIN_CELLS: f64 = 2.0;
+/// The grid of cells follows the second epoch's points where these weigh more by this factor. How well a surface
+/// of cells follows points depends on where the cells lie between them, and sharp points notice: a motion of
+/// these over the grid would seem likely or unlikely by itself.
+const HEAVIER: f64 = 2.0;
 /// Shortest side of a patch, in cells: a cubic spline's four coefficients.
 const LEAST_CELLS: usize = 4;
 
@@ -31,9 +36,17 @@ pub(crate) fn pool_into_patches(
     pair: &LocalPair,
     motion: &InverseMotion,
     window: &InverseMotion,
+    noise: &SurfaceNoise,
     layout: &Layout,
 ) -> Patches {
-    let Some(cuts) = Cuts::new(&pair.first, layout) else {
+    let second: Vec<[f64; 3]> = pair.second_moved_back(motion, window).collect();
+    let epochs = [&pair.first, &second];
+    let [first, moving] = [0, 1].map(|e| epochs[e].len() as f64 / noise.sigma_m[e].powi(2));
+    let anchor = match moving > HEAVIER * first {
+        true => motion.shift_in_face(),
+        false => [0.0; 2],
+    };
+    let Some(cuts) = Cuts::new(&pair.first, anchor, layout) else {
         return Patches {
             list: Vec::new(),
             overlap: 0.0,
@@ -46,12 +59,13 @@ pub(crate) fn pool_into_patches(
         })
         .collect();
     let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
-    let moved = pair.second_moved_back(motion, window).map(|p| (1, p));
-    for (epoch, p) in pair.first.iter().map(|p| (0, *p)).chain(moved) {
-        compare.count(epoch, &p);
-        if let Some(patch) = cuts.patch_at(&p) {
-            let PatchPoints { grid, epochs } = &mut list[patch];
-            epochs[epoch].push(grid.point(p));
+    for (epoch, points) in epochs.into_iter().enumerate() {
+        for p in points {
+            compare.count(epoch, p);
+            if let Some(patch) = cuts.patch_at(p) {
+                let PatchPoints { grid, epochs } = &mut list[patch];
+                epochs[epoch].push(grid.point(*p));
+            }
         }
     }
     list.retain(|patch| patch.epochs.iter().all(|o| o.len() >= PATCH_POINTS));
@@ -71,8 +85,8 @@ struct Cuts {
 }
 
 impl Cuts {
-    /// `None` without points.
-    fn new(face: &[[f64; 3]], layout: &Layout) -> Option<Self> {
+    /// `None` without points. `anchor`: by how much the grid of cells is moved, up to whole cells.
+    fn new(face: &[[f64; 3]], anchor: [f64; 2], layout: &Layout) -> Option<Self> {
         let margin = MARGIN_CELLS * layout.cell_m;
         let mut low = [f64::INFINITY; 2];
         let mut high = [f64::NEG_INFINITY; 2];
@@ -81,6 +95,11 @@ impl Cuts {
                 low[a] = low[a].min(p[a] - margin);
                 high[a] = high[a].max(p[a] + margin);
             }
+        }
+        for a in 0..2 {
+            let to_anchor = (anchor[a] / layout.cell_m).fract() * layout.cell_m;
+            low[a] += to_anchor;
+            high[a] += to_anchor;
         }
         let side = layout.patch_cells.max(LEAST_CELLS) as f64 * layout.cell_m;
         let count = [0, 1].map(|a| ((high[a] - low[a]) / side).ceil().max(1.0) as usize);

@@ -8,3 +8,13 @@ pub(crate) struct SurfaceNoise {
     /// Standard deviation of a second difference of the coefficients, metres.
     pub tau_m: f64,
 }
+
+impl SurfaceNoise {
+    /// With the points' noise times a factor for each epoch.
+    pub fn scaled(&self, factors: [f64; 2]) -> Self {
+        Self {
+            sigma_m: [0, 1].map(|e| factors[e] * self.sigma_m[e]),
+            ..*self
+        }
+    }
+}
