@@ -394,7 +394,7 @@ fn fine_needs_the_shape_too() {
     let none = Thresholds::default();
     let kept = judge(&bulged(false), &none);
     assert_eq!(kept.state, State::Fine, "{}", kept.sentence);
-    let words = "no change of the wall's shape is shown (detection limit 0.60 mm for a bulge of 1 m)";
+    let words = "no change of the shape of the wall is shown (detection limit 0.60 mm for a bulge of 1 m)";
     assert!(kept.sentence.contains(words), "{}", kept.sentence);
     let changed = judge(&bulged(true), &none);
     assert_eq!(codes(&changed), [ReasonCode::DeformationShown]);
