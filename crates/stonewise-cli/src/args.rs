@@ -1,6 +1,7 @@
 //! The command line, as typed.
 
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use std::path::PathBuf;
 use stonewise::experiment::{Dimension, Influence};
 
@@ -50,7 +51,7 @@ pub enum Command {
     /// Check a survey in seconds for problems with units, coordinate systems, overlap, photos, cameras and
     /// disk space.
     #[command(after_help = "Example:\n  stonewise check survey/stonewise.toml\n\n\
-        The table goes to stdout; a page with pictures is written beside the project file. Exit code 3 if anything is doubtful or wrong, 1 if an input cannot be read.")]
+        The table goes to stdout; a page with pictures is written into the temporary folder, or where --page says. Exit code 3 if anything is doubtful or wrong, 1 if an input cannot be read.")]
     Check(CheckArgs),
     /// Correct stones by hand: read edits back from QGIS or from an editor of COCO files, or check a file of
     /// edits.
@@ -124,6 +125,34 @@ pub enum Command {
     /// Describe the content of a cloud, a camera file, a mask file or a project.
     #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
+    /// Say what this machine offers and which parts of stonewise it can run.
+    #[command(after_help = "Example:\n  stonewise doctor")]
+    Doctor,
+    /// Print the completions of a shell.
+    #[command(
+        after_help = "Examples:\n  stonewise completions bash > ~/.local/share/bash-completion/completions/stonewise\n  \
+        stonewise completions zsh > ~/.zfunc/_stonewise\n  \
+        stonewise completions fish > ~/.config/fish/completions/stonewise.fish"
+    )]
+    Completions(CompletionsArgs),
+    /// Write the man pages, one for each command.
+    #[command(after_help = "Example:\n  stonewise man --out ~/.local/share/man/man1")]
+    Man(ManArgs),
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, ClapArgs)]
+pub struct CompletionsArgs {
+    /// The shell.
+    pub shell: Shell,
+}
+
+/// Arguments of `man`.
+#[derive(Debug, ClapArgs)]
+pub struct ManArgs {
+    /// Folder of the man pages; created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// A project and a folder for its results.
@@ -197,7 +226,7 @@ pub struct CheckArgs {
     /// Folder the results will go to; the free space on its disk is checked.
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
-    /// The page with pictures (default: PROJECT.check.html beside the project file).
+    /// The page with pictures (default: a file of its own in the temporary folder, named at the end).
     #[arg(long, value_name = "FILE")]
     pub page: Option<PathBuf>,
 }

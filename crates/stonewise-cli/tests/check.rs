@@ -4,6 +4,7 @@
 mod support;
 
 use nalgebra::Point3;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{LabelImage, Raster};
@@ -19,7 +20,9 @@ fn check(survey: &Path) -> (i32, String, String) {
         .arg("check")
         .arg(survey.join("stonewise.toml"))
         .arg("--out")
-        .arg(survey.join("out"));
+        .arg(survey.join("out"))
+        .arg("--page")
+        .arg(survey.join("stonewise.check.html"));
     let output = command.output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (table, log) = (text(&output.stdout), text(&output.stderr));
@@ -256,6 +259,34 @@ fn a_sound_survey_passes() {
     fs::write(survey.path().join("stonewise.check.html"), "mine").unwrap();
     let (code, _, log) = check(survey.path());
     assert!(code == 1 && log.contains("no page of this command"), "{log}");
+}
+
+#[test]
+fn a_page_that_is_not_asked_for_leaves_the_survey_as_it_is() {
+    let (survey, temporary) = (copy_of(tiny_survey()), tempfile::tempdir().unwrap());
+    let names = |folder: &Path| -> BTreeSet<_> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().file_name()).collect()
+    };
+    let before = names(survey.path());
+    let mut command = stonewise();
+    command.arg("check").arg(survey.path().join("stonewise.toml"));
+    command
+        .env("TMPDIR", temporary.path())
+        .env("TMP", temporary.path());
+    let output = command.output().unwrap();
+    assert_eq!(names(survey.path()), before);
+    let log = String::from_utf8_lossy(&output.stderr);
+    let page = log
+        .lines()
+        .find_map(|line| line.strip_prefix("pictures: "))
+        .unwrap();
+    assert!(Path::new(page).starts_with(temporary.path()), "{page}");
+    assert!(
+        fs::read_to_string(page)
+            .unwrap()
+            .contains("a look at the survey</title>")
+    );
 }
 
 #[test]

@@ -79,6 +79,11 @@ impl Browser {
         })
     }
 
+    /// The program.
+    pub fn program(&self) -> &Path {
+        &self.0
+    }
+
     /// Prints the page `html` (a file) to the file `pdf`; `folder` is empty and takes what the browser writes
     /// for itself.
     ///

@@ -12,5 +12,6 @@ mod testing;
 mod texts;
 pub mod verdict;
 
+pub use browser::Browser;
 pub use pdf::Pdf;
 pub use report_file::write_report;

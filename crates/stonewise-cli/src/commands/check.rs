@@ -32,10 +32,14 @@ pub fn check(args: &CheckArgs, force: bool, printer: &Printer) -> Result<Outcome
     })
 }
 
-/// Where the page goes; a file that is there must be an earlier page.
+/// Where the page goes: where it is told, else into a file of this call's own in the temporary folder, so that
+/// nothing is added to the survey. A file that is there must be an earlier page.
 fn page_path(args: &CheckArgs, force: bool) -> Result<PathBuf> {
-    let beside = args.project.with_extension("check.html");
-    let page = args.page.clone().unwrap_or(beside);
+    let temporary = || {
+        let survey = args.project.file_stem().unwrap_or_default().to_string_lossy();
+        std::env::temp_dir().join(format!("{survey}-{}.check.html", std::process::id()))
+    };
+    let page = args.page.clone().unwrap_or_else(temporary);
     if page.exists() && !force && !is_ours(&page) {
         bail!(
             "{} is there and is no page of this command: give another --page",

@@ -2,6 +2,8 @@
 
 mod check;
 mod compare;
+mod completions;
+mod doctor;
 mod edits;
 mod evaluate;
 mod experiment;
@@ -59,6 +61,9 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Init(args) => init::init(&args),
         Command::Schema => schema::schema(),
         Command::Info(args) => info::info(&args),
+        Command::Doctor => doctor::doctor(),
+        Command::Completions(args) => completions::completions(&args),
+        Command::Man(args) => completions::man(&args, force),
     }
 }
 

@@ -18,7 +18,7 @@ mod unreadable;
 pub use depth::Depth;
 pub use finding::{Finding, Report, Verdict};
 pub use resources::require_memory_of_clouds;
-pub use resources::{is_about_this_machine, require_memory_of_run};
+pub use resources::{free_disk, free_memory, is_about_this_machine, require_memory_of_run};
 
 use crate::{Epoch, PhotoFiles, Project};
 use std::path::Path;

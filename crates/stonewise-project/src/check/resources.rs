@@ -118,7 +118,7 @@ pub fn is_about_this_machine(finding: &Finding) -> bool {
 }
 
 /// Free bytes where a folder is, or will be, as `df` tells.
-fn free_disk(out: &Path) -> Option<u64> {
+pub fn free_disk(out: &Path) -> Option<u64> {
     let there = std::path::absolute(out).ok()?;
     let there = there.ancestors().find(|p| p.exists())?;
     let answer = Command::new("df").arg("-Pk").arg(there).output().ok()?;
@@ -140,7 +140,7 @@ fn parse_df(text: &str) -> Option<u64> {
 }
 
 /// Memory that this process can still get, where Linux tells: what is available, or less where it is limited.
-fn free_memory() -> Option<u64> {
+pub fn free_memory() -> Option<u64> {
     let meminfo = fs::read_to_string("/proc/meminfo").ok()?;
     let line = meminfo.lines().find(|l| l.starts_with("MemAvailable:"))?;
     let available = line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024;

@@ -1,0 +1,74 @@
+//! `doctor`.
+
+use crate::commands::Outcome;
+use anyhow::Result;
+use std::env;
+use std::io::Write;
+use std::num::NonZero;
+use std::process::Command;
+use stonewise::check::{free_disk, free_memory};
+use stonewise::report::Browser;
+
+/// Bytes of a gigabyte, as disks and memory are sold.
+const GB: f64 = 1e9;
+
+/// What this machine offers goes to stdout, one line each; nothing in it is an error.
+pub fn doctor() -> Result<Outcome> {
+    let unknown = || "not known here".to_owned();
+    let bytes = |bytes: Option<u64>| bytes.map_or_else(unknown, |b| format!("{:.1} GB free", b as f64 / GB));
+    let folder = env::current_dir().ok();
+    let lines = [
+        ("stonewise", env!("CARGO_PKG_VERSION").to_owned()),
+        ("system", format!("{} on {}", env::consts::OS, env::consts::ARCH)),
+        ("vector code", vector_code().to_owned()),
+        (
+            "threads",
+            std::thread::available_parallelism()
+                .map_or(1, NonZero::get)
+                .to_string(),
+        ),
+        ("memory", bytes(free_memory())),
+        ("disk, this folder", bytes(folder.as_deref().and_then(free_disk))),
+        ("locale", locale().unwrap_or_else(|| "none set".to_owned())),
+        (
+            "PDF of reports",
+            match Browser::find() {
+                Ok(browser) => format!("printed by {}", browser.program().display()),
+                Err(error) => error.to_string(),
+            },
+        ),
+        (
+            "Python",
+            python().unwrap_or_else(|| "no python3 on the path; only the Python module needs it".to_owned()),
+        ),
+    ];
+    let mut out = std::io::stdout();
+    for (what, found) in lines {
+        writeln!(out, "{what:<18} {found}")?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// The vector instructions that the processor has, of those for which there is code.
+fn vector_code() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        return "AVX2 and FMA";
+    }
+    #[cfg(target_arch = "aarch64")]
+    return "NEON";
+    #[cfg(not(target_arch = "aarch64"))]
+    "none beyond what every processor of this kind has; the detector is slower"
+}
+
+/// The locale, by the variables in the order in which they count.
+fn locale() -> Option<String> {
+    let set = |name| env::var(name).ok().filter(|value| !value.is_empty());
+    ["LC_ALL", "LC_CTYPE", "LANG"].into_iter().find_map(set)
+}
+
+fn python() -> Option<String> {
+    let answer = Command::new("python3").arg("--version").output().ok()?;
+    let text = String::from_utf8(answer.stdout).ok()?;
+    Some(text.trim().to_owned()).filter(|t| !t.is_empty())
+}
