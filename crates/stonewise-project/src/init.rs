@@ -116,7 +116,6 @@ pub fn init(dir: &Path) -> Result<Initialised> {
             message,
         });
     }
-    epoch::agree_on_sensor(&mut epochs);
     let why = order(&mut epochs);
     let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
     lines.push(format!("order of time: {} ({why})", names.join(", ")));
@@ -176,10 +175,6 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
     for epoch in epochs {
         let _ = writeln!(text, "\n[[epochs]]\nname = {}", quoted(&epoch.name));
         let _ = writeln!(text, "clouds = {}", quoted_list(&epoch.clouds));
-        if !epoch.other_clouds.is_empty() {
-            let others = quoted_list(&epoch.other_clouds);
-            let _ = writeln!(text, "# clouds = {others}   # of another sensor");
-        }
         let has_photos = epoch.images.is_some() && epoch.cameras.is_some();
         if !has_photos {
             text.push_str("# Without images and cameras, stones are looked for in views of the clouds.\n");
@@ -264,27 +259,18 @@ mod tests {
     }
 
     #[test]
-    fn one_sensor_is_chosen_for_all_epochs_and_the_other_is_offered() {
-        let (text, lines) = written(&[
-            "a/cloud_tls.laz",
-            "a/cloud_uav.laz",
-            "b/cloud_uav.laz",
-            "c/cloud_tls.laz",
-            "c/cloud_uav.laz",
-        ]);
+    fn clouds_of_all_sensors_are_taken_and_the_sensors_named() {
+        let (text, lines) = written(&["a/cloud_tls.laz", "a/cloud_uav.laz", "b/x_UAV.laz"]);
         assert!(
-            text.contains("\nclouds = [\"a/cloud_uav.laz\"]")
-                && text.contains("# clouds = [\"a/cloud_tls.laz\"]")
+            text.contains("\nclouds = [\"a/cloud_tls.laz\", \"a/cloud_uav.laz\"]")
+                && text.contains("\nclouds = [\"b/x_UAV.laz\"]"),
+            "{text}"
         );
         assert!(
-            lines.contains("left out: a/cloud_tls.laz (another sensor"),
+            lines.contains("a: clouds of 2 sensors by their names (terrestrial, drone)"),
             "{lines}"
         );
-        let (text, _) = written(&["a/cloud_tls.laz", "a/cloud_uav.laz", "b/x_TLS.laz", "b/x_uav.laz"]);
-        assert!(
-            text.contains("\nclouds = [\"a/cloud_tls.laz\"]")
-                && text.contains("\nclouds = [\"b/x_TLS.laz\"]")
-        );
+        assert!(!lines.contains("b: clouds of"), "{lines}");
     }
 
     #[test]
@@ -321,7 +307,10 @@ mod tests {
         );
         let (text, _) = written(&["2024_tls.laz", "2024_uav.laz", "2025_tls.laz", "2025_uav.laz"]);
         assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
-        assert!(text.contains("\nclouds = [\"2025_tls.laz\"]"), "{text}");
+        assert!(
+            text.contains("\nclouds = [\"2025_tls.laz\", \"2025_uav.laz\"]"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -16,7 +16,7 @@ const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
 const COLMAP_TEXTS: [&str; 3] = ["images.txt", "cameras.txt", "points3d.txt"];
 /// Extensions of scans that lie beside each other: no texts, which may be anything.
 const SCANS: [&str; 5] = ["laz", "las", "e57", "ply", "xyz"];
-/// Words in names of clouds, by sensor: the first of them wins where both are everywhere.
+/// Words in names of clouds, by sensor.
 const SENSORS: [(&str, &[&str]); 2] = [
     ("terrestrial", &["tls", "terrestrial", "scanner"]),
     ("drone", &["uav", "drone", "uls", "flight"]),
@@ -27,8 +27,6 @@ const SENSORS: [(&str, &[&str]); 2] = [
 pub(super) struct Found {
     pub name: String,
     pub clouds: Vec<PathBuf>,
-    /// Clouds of another sensor.
-    pub other_clouds: Vec<PathBuf>,
     pub images: Option<PathBuf>,
     pub cameras: Option<PathBuf>,
     pub masks: Option<PathBuf>,
@@ -60,17 +58,25 @@ impl Found {
             one(&self.cameras),
             one(&self.masks)
         )];
-        let others = self
-            .other_clouds
-            .iter()
-            .map(|p| (p, "another sensor; compare like with like"));
-        let left = self.left_out.iter().map(|(p, why)| (p, *why));
-        lines.extend(
-            others
-                .chain(left)
-                .map(|(p, why)| format!("left out: {} ({why})", p.display())),
-        );
+        let sensors = self.sensors();
+        if sensors.len() > 1 {
+            lines.push(format!(
+                "{}: clouds of {} sensors by their names ({}); the sharpest that shows a stone measures it",
+                self.name,
+                sensors.len(),
+                sensors.join(", ")
+            ));
+        }
+        let left = self.left_out.iter();
+        lines.extend(left.map(|(p, why)| format!("left out: {} ({why})", p.display())));
         lines
+    }
+
+    /// The sensors that the names of the clouds tell.
+    fn sensors(&self) -> Vec<&'static str> {
+        let has = |words: &[&str]| self.clouds.iter().any(|cloud| is_of(cloud, words));
+        let told = SENSORS.iter().filter(|(_, words)| has(words));
+        told.map(|(sensor, _)| *sensor).collect()
     }
 }
 
@@ -231,27 +237,6 @@ fn best(cameras: &[PathBuf], images: &[PathBuf]) -> (Option<PathBuf>, Option<Pat
 
 fn photos_of(cameras: &CameraFile, folder: &Path) -> usize {
     find_photos(folder, cameras).map_or(0, |photos| photos.paths.iter().flatten().count())
-}
-
-/// Keeps the clouds of one sensor in every epoch: the one that all epochs have, the terrestrial one where
-/// they have both.
-pub(super) fn agree_on_sensor(epochs: &mut [Found]) {
-    let has = |epoch: &Found, words: &[&str]| epoch.clouds.iter().any(|c| is_of(c, words));
-    let mixed = epochs
-        .iter()
-        .any(|e| SENSORS.iter().all(|(_, words)| has(e, words)));
-    let common = SENSORS
-        .iter()
-        .find(|(_, words)| epochs.iter().all(|e| has(e, words)));
-    let (true, Some((_, words))) = (mixed, common) else {
-        return;
-    };
-    for epoch in epochs {
-        let (kept, others) = std::mem::take(&mut epoch.clouds)
-            .into_iter()
-            .partition(|c| is_of(c, words));
-        (epoch.clouds, epoch.other_clouds) = (kept, others);
-    }
 }
 
 fn is_of(cloud: &Path, words: &[&str]) -> bool {
