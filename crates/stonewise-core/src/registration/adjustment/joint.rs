@@ -1,132 +1,87 @@
-//! The motions of all stones with their joint distribution.
+//! The joint distribution of the motions, from the last solution.
 
 use super::estimate::{Estimate, widening};
 use super::field::{information, stone_from_field};
+use super::joint_motions::{JointMotions, JointStone};
 use super::neighbour_covariances::without_negative;
 use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Vector9;
-use crate::id::StoneId;
-use crate::linalg::BlockMatrix;
 use crate::stone::{MotionFailure, PairResult};
-use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3};
 use rayon::prelude::*;
 
 /// Information that keeps a rotation or bending solvable which no point determines; far below any that
 /// counts.
 const RIDGE: f64 = 1e-9;
 
-/// The motions of all stones of a pair of epochs with their joint distribution, as the last solution has it.
-/// Errors of the registration of the epochs are not in it.
-///
-/// The displacement of stone i is G_i f_i + e_i + shared errors: f is the field, normal with the information
-/// matrix that is kept here; e_i is the stone's own part and independent of those of all others.
-#[derive(Clone, Debug)]
-pub struct JointMotions {
-    /// One per node of the field; `None`: not measured.
-    pub(crate) stones: Vec<Option<JointStone>>,
-    /// Neighbours in the field, the lower first.
-    pub(crate) edges: Vec<(usize, usize)>,
-    /// Information of the field: nine unknowns a stone.
-    pub(crate) information: BlockMatrix<9>,
-    /// Covariance of the errors of the photos' poses; of no unknowns where photos take no part.
-    pub(crate) poses: DMatrix<f64>,
-    /// Octaves of length between the distance of neighbours and the wall over which points share errors.
-    pub(crate) octaves: f64,
-    /// Distance of neighbours, metres.
-    pub(crate) step_m: f64,
-}
-
-/// A measured stone; world, metres.
-#[derive(Clone, Debug)]
-pub(crate) struct JointStone {
-    pub id: StoneId,
-    pub place: Point3<f64>,
-    /// Takes world components to (along, up, out) of the wall around the stone.
-    pub face_from_world: Matrix3<f64>,
-    pub body: u32,
-    pub is_loose: bool,
-    pub displacement: Vector3<f64>,
-    /// The displacement by the nine unknowns of the field.
-    pub by_field: SMatrix<f64, 3, 9>,
-    /// Covariance that it shares with no other stone.
-    pub own: Matrix3<f64>,
-    /// Root of the covariance of the errors that its points share over one octave of length.
-    pub octave: Matrix3<f64>,
-    /// The displacement by the unknowns of the photos' poses.
-    pub by_poses: Vec<(usize, Vector3<f64>)>,
-    /// What the stone's own observations say of its displacement: information and vector.
-    pub observed: (Matrix3<f64>, Vector3<f64>),
-}
-
-impl JointMotions {
-    pub(super) fn new(
-        adjustment: &Adjustment,
-        solution: &Solution,
-        results: &[PairResult],
-        estimates: &[Result<Estimate, MotionFailure>],
-    ) -> Self {
-        let [shared, bias] = octave_and_bias(adjustment);
-        let stone = |i: usize| {
-            let motion = results[i].motion.as_ref().ok()?;
-            let estimate = estimates[i].as_ref().ok()?;
-            let node = &adjustment.prior.graph.nodes[i];
-            let frame = node.face_from_world;
-            let world = frame.transpose();
-            let in_world = |m: &Matrix3<f64>| world * m * frame;
-            let by_field = estimate.by_field * stone_from_field(&frame);
-            let by_field = world * by_field.fixed_rows::<3>(0);
-            let mut translation = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-            // Whether a single stone slid in the face is asked of its motion, not of the shape of the wall.
-            let slide_m2 = adjustment.undetected_slide_m(i).powi(2);
-            let share = match estimate.missed > 0.0 {
-                true => widening(estimate.missed),
-                false => 1.0 - adjustment.p_loose(&adjustment.stones[i]),
-            };
-            (0..2).for_each(|k| translation[(k, k)] -= share * slide_m2);
-            let translation = in_world(&translation);
-            let field = by_field * solution.field.inverse.diagonal[i] * by_field.transpose();
-            let mut own = without_negative(&(translation - field));
-            let photos = adjustment.photo_part(i);
-            let octave = match &photos {
-                Some(photos) => photos.left_of(&shared) + photos.least_error(),
-                None => shared,
-            };
-            own += in_world(&(octave + bias));
-            let by_poses = photos.iter().flat_map(|p| p.by_poses());
-            let by_poses = by_poses.map(|(unknown, by)| (unknown, world * by)).collect();
-            let common = adjustment.prior.common_in(i);
-            let own_motion = Vector9::from(adjustment.prior.own_variances());
-            let noise = octave + Matrix3::from_diagonal(&own_motion.fixed_rows::<3>(0));
-            let observed = observed(&solution.equations[i].with_field, &noise);
-            let vector = observed.1 + observed.0 * common.translation();
-            Some(JointStone {
-                id: results[i].first,
-                place: node.centroid,
-                face_from_world: frame,
-                body: results[i].body,
-                is_loose: motion.loose,
-                displacement: motion.displacement,
-                by_field,
-                own,
-                octave: root(&in_world(&octave)),
-                by_poses,
-                observed: (in_world(&observed.0), world * vector),
-            })
+/// The joint distribution as the last solution has it.
+pub(super) fn joint_motions(
+    adjustment: &Adjustment,
+    solution: &Solution,
+    results: &[PairResult],
+    estimates: &[Result<Estimate, MotionFailure>],
+) -> JointMotions {
+    let [shared, bias] = octave_and_bias(adjustment);
+    let stone = |i: usize| {
+        let motion = results[i].motion.as_ref().ok()?;
+        let estimate = estimates[i].as_ref().ok()?;
+        let node = &adjustment.prior.graph.nodes[i];
+        let frame = node.face_from_world;
+        let world = frame.transpose();
+        let in_world = |m: &Matrix3<f64>| world * m * frame;
+        let by_field = estimate.by_field * stone_from_field(&frame);
+        let by_field = world * by_field.fixed_rows::<3>(0);
+        let mut translation = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
+        // Whether a single stone slid in the face is asked of its motion, not of the shape of the wall.
+        let slide_m2 = adjustment.undetected_slide_m(i).powi(2);
+        let share = match estimate.missed > 0.0 {
+            true => widening(estimate.missed),
+            false => 1.0 - adjustment.p_loose(&adjustment.stones[i]),
         };
-        let graph = &adjustment.prior.graph;
-        Self {
-            stones: (0..results.len()).into_par_iter().map(stone).collect(),
-            edges: graph.edges.iter().map(|e| (e.low, e.high)).collect(),
-            information: information(&adjustment.problem(solution.equations.iter().map(|e| &e.with_field))),
-            poses: adjustment
-                .photos
-                .as_ref()
-                .map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses().clone()),
-            octaves: adjustment.octaves(),
-            step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
-        }
+        (0..2).for_each(|k| translation[(k, k)] -= share * slide_m2);
+        let translation = in_world(&translation);
+        let field = by_field * solution.field.inverse.diagonal[i] * by_field.transpose();
+        let mut own = without_negative(&(translation - field));
+        let photos = adjustment.photo_part(i);
+        let octave = match &photos {
+            Some(photos) => photos.left_of(&shared) + photos.least_error(),
+            None => shared,
+        };
+        own += in_world(&(octave + bias));
+        let by_poses = photos.iter().flat_map(|p| p.by_poses());
+        let by_poses = by_poses.map(|(unknown, by)| (unknown, world * by)).collect();
+        let common = adjustment.prior.common_in(i);
+        let own_motion = Vector9::from(adjustment.prior.own_variances());
+        let noise = octave + Matrix3::from_diagonal(&own_motion.fixed_rows::<3>(0));
+        let observed = observed(&solution.equations[i].with_field, &noise);
+        let vector = observed.1 + observed.0 * common.translation();
+        Some(JointStone {
+            id: results[i].first,
+            place: node.centroid,
+            face_from_world: frame,
+            body: results[i].body,
+            is_loose: motion.loose,
+            displacement: motion.displacement,
+            by_field,
+            own,
+            octave: root(&in_world(&octave)),
+            by_poses,
+            observed: (in_world(&observed.0), world * vector),
+        })
+    };
+    let graph = &adjustment.prior.graph;
+    JointMotions {
+        stones: (0..results.len()).into_par_iter().map(stone).collect(),
+        edges: graph.edges.iter().map(|e| (e.low, e.high)).collect(),
+        information: information(&adjustment.problem(solution.equations.iter().map(|e| &e.with_field))),
+        poses: adjustment
+            .photos
+            .as_ref()
+            .map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses().clone()),
+        octaves: adjustment.octaves(),
+        step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
     }
 }
 

@@ -4,7 +4,8 @@ use super::bodies::{bodies, refuse_unconfirmed};
 use super::breaks::find_breaks;
 use super::candidate::Moving;
 use super::estimate::Estimate;
-use super::joint::JointMotions;
+use super::joint::joint_motions;
+use super::joint_motions::JointMotions;
 use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
@@ -84,7 +85,7 @@ impl Found {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
             neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &shared),
             common_covariance: common_covariance(adjustment, solution, &shared),
-            joint: Some(JointMotions::new(adjustment, solution, &results, &estimates)),
+            joint: Some(joint_motions(adjustment, solution, &results, &estimates)),
             results,
         }
     }

@@ -1,7 +1,7 @@
 //! Parameters and results of the adjustment.
 
 use super::field::VarianceComponents;
-use super::joint::JointMotions;
+use super::joint_motions::JointMotions;
 use super::observation::photo::PhotoReport;
 use crate::id::StoneId;
 use crate::params::{Params, Range, Ranged, with_ranges};

@@ -5,7 +5,7 @@ use crate::geometry::lever;
 use crate::id::StoneId;
 use crate::linalg::{BlockFactor, BlockPattern};
 use crate::registration::adjustment::JointMotions;
-use crate::registration::adjustment::joint::JointStone;
+use crate::registration::adjustment::joint_motions::JointStone;
 use crate::registration::observers::JointErrors;
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;

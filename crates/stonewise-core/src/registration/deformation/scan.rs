@@ -7,8 +7,8 @@
 //! alternative, so that nothing lies at a bound (compare Self & Liang 1987), and what its largest value is on a
 //! wall that moved as one body is simulated from the same model.
 
-use super::ZONE_EXTENTS_M;
 use super::body::{Body, BodyStone};
+use super::found::ZONE_EXTENTS_M;
 use super::random::Random;
 use crate::geometry::Bounds;
 use crate::statistics::upper_median;
@@ -44,7 +44,7 @@ pub(super) struct Scan {
     pub p: f64,
     /// Stones of the most likely bulge, all that move by more than a quarter of its amplitude.
     pub most_likely: Vec<usize>,
-    /// See [`super::Deformation::detection_limits_m`].
+    /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
 }
 

@@ -1,9 +1,9 @@
 //! Zones that deformed: connected stones whose deformation is not zero.
 
 use super::body::Body;
+use super::found::{DeformationZone, ZoneKind};
 use super::rigid_part::RigidPart;
 use super::scan::Scan;
-use super::{DeformationZone, ZoneKind};
 use crate::components::components;
 use crate::statistics::discoveries;
 use nalgebra::{Matrix3, Vector3};

@@ -1,0 +1,93 @@
+//! What was found of the deformation.
+
+use crate::id::StoneId;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Extents of zones for which detection limits are given, metres.
+pub const ZONE_EXTENTS_M: [f64; 3] = [1.0, 3.0, 10.0];
+/// Probability of a still wall to be called deformed.
+pub(super) const LEVEL: f64 = 0.05;
+
+/// How the wall deformed between two epochs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deformation {
+    /// Of each measured stone whose part of the wall has stones enough, ascending.
+    pub stones: Vec<StoneDeformation>,
+    /// Probability of so large a deformation by chance; `None` where no part of the wall has stones enough.
+    pub p: Option<f64>,
+    /// Smallest bulge out of the wall that is found in 95 of 100 cases, in the median over the wall, for each of
+    /// [`ZONE_EXTENTS_M`]; `None` where the wall is smaller. Metres.
+    pub detection_limits_m: [Option<f64>; 3],
+    /// Connected zones that deformed, the one of the largest motion first; none unless `p` is below 5 %.
+    pub zones: Vec<DeformationZone>,
+}
+
+impl Deformation {
+    /// Whether a deformation is shown.
+    pub fn is_shown(&self) -> bool {
+        self.p.is_some_and(|p| p <= LEVEL)
+    }
+}
+
+/// The deformation of a stone; world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StoneDeformation {
+    /// Stone of the first epoch.
+    pub stone: StoneId,
+    /// Its motion less that of the rigid part, metres.
+    pub deformation: Vector3<f64>,
+    /// Its covariance, m^2.
+    pub covariance: Matrix3<f64>,
+    /// Number of its zone, 0 for none.
+    pub zone: u32,
+}
+
+/// A zone that deformed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeformationZone {
+    /// From 1.
+    pub number: u32,
+    /// Its stones, ascending.
+    pub stones: Vec<StoneId>,
+    /// Length of the largest deformation, metres.
+    pub largest_m: f64,
+    /// Its 95 % interval, metres.
+    pub interval_m: [f64; 2],
+    /// Mean deformation along the wall, up and out, metres.
+    pub mean_m: Vector3<f64>,
+    /// What it resembles.
+    pub kind: ZoneKind,
+}
+
+/// What a zone of deformation resembles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ZoneKind {
+    /// It moved out of the wall, most in its middle.
+    Bulge,
+    /// It moved into the wall, most in its middle.
+    Dent,
+    /// It moved out of the wall or into it, more and more towards one side.
+    Tilt,
+    /// It sank.
+    Settlement,
+    /// It rose.
+    Heave,
+    /// It moved along the wall.
+    Slide,
+}
+
+impl ZoneKind {
+    /// The word in result files.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Bulge => "bulge",
+            Self::Dent => "dent",
+            Self::Tilt => "tilt",
+            Self::Settlement => "settlement",
+            Self::Heave => "heave",
+            Self::Slide => "slide",
+        }
+    }
+}
