@@ -26,7 +26,7 @@ pub use cell::{CellHasher, CellMap, CellSet, cell_of, cells_between, floor};
 pub use distortion::Distortion;
 pub use face_frame::FaceFrame;
 pub use moments::Moments;
-pub use outline::{OutlineParams, face_outline, outline, outlines};
+pub use outline::{OutlineParams, convex_hull, face_outline, outline, outlines};
 pub use plane::Plane;
 pub use rigid::Rigid3;
 pub use ring::{is_simple, ring_contains, signed_area};

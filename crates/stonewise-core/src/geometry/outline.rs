@@ -151,7 +151,7 @@ pub fn face_outline(
 }
 
 /// Corners of the smallest convex polygon around the points, counter-clockwise (Andrew 1979, monotone chain).
-fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
+pub fn convex_hull(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     let mut sorted: Vec<Point2<f64>> = points
         .iter()
         .copied()

@@ -2,6 +2,7 @@
 
 use super::joint_layer::joint_layer;
 use super::layer_style::{arrow_style, stone_style};
+use super::zone_layers::zone_layers;
 use crate::names::numbered;
 use crate::{
     ResultSet, RowMotion, Sorted, StoneOutline, StoneRow, column, component_limit_m, joints, nice_scale_m,
@@ -75,7 +76,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             styles: vec![arrow_style()],
         })
     };
-    Ok(vec![
+    let mut layers = vec![
         polygons(
             "stones",
             "Stones",
@@ -107,7 +108,7 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
         joint_layer(
             [&numbered("joints"), &titled("Joints")],
             Geometry::LineStringZ,
-            crs,
+            crs.clone(),
             &all_joints,
             results,
             |j| j.world.to_vec(),
@@ -120,7 +121,9 @@ pub(super) fn layers(results: &ResultSet) -> Result<Vec<Layer>, TableError> {
             results,
             |j| j.line.map(flat).to_vec(),
         )?,
-    ])
+    ];
+    layers.extend(zone_layers(results, &numbered, &titled, crs)?);
+    Ok(layers)
 }
 
 fn styles(measured: &[(&StoneRow, &RowMotion)]) -> Vec<LayerStyle> {

@@ -7,6 +7,7 @@ mod layer_style;
 mod layers;
 mod polygons;
 mod write_layers;
+mod zone_layers;
 
 pub use face_colours::FaceColours;
 pub use write_layers::write_layers;

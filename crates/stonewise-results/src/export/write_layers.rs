@@ -16,7 +16,8 @@ use stonewise_io::mesh_ply::write_coloured_mesh;
 ///
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
 /// displacements as exaggerated lines in both (`displacements`, `displacements_facade`), and the joints
-/// between them (`joints`, `joints_facade`), each with styles for QGIS. The VTK files hold the stones as
+/// between them (`joints`, `joints_facade`), each with styles for QGIS, and, where the wall deformed, the
+/// outlines of the zones (`zones`, `zones_facade`). The VTK files hold the stones as
 /// polygons and their centroids with the displacements as vectors, for ParaView. The PLY is a mesh of the
 /// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than
 /// two epochs, the GeoPackage has the layers of the third against the first as `stones_2` and so on; the
