@@ -1,14 +1,11 @@
-//! The sources of the sharpest sensor of each epoch, which know the datum best.
+//! The sources of the sharpest sensor of each epoch, which give the most precise datum.
 
 use super::epoch_pair::EpochPair;
 use super::sight::{SeenStone, Source};
 use super::stable::StablePoints;
 use crate::geometry::FaceFrame;
-use crate::registration::points::{NOISES_ALIKE, noise_of};
+use crate::registration::points::{noise_of, sharpest_sensor};
 use crate::statistics::upper_median;
-
-/// Share of the stones that an epoch shows which a sensor must show to give its datum.
-const LEAST_SHARE: f64 = 0.35;
 
 /// Stones on which a source's noise is measured.
 const STONES: usize = 40;
@@ -93,19 +90,9 @@ fn kept(pair: &EpochPair) -> Vec<bool> {
         if all.len() < 2 {
             continue;
         }
-        let mut noises: Vec<(usize, f64)> = all
-            .iter()
-            .filter_map(|s| Some((*s, noise_m(pair, *s)?)))
-            .collect();
-        noises.sort_by(|a, b| a.1.total_cmp(&b.1));
-        let shown = shows(&all);
-        while let Some(&(_, sharpest)) = noises.first() {
-            let same = noises.partition_point(|(_, noise)| *noise <= NOISES_ALIKE * sharpest);
-            let of_sensor: Vec<usize> = noises.drain(..same).map(|(source, _)| source).collect();
-            if shows(&of_sensor) >= LEAST_SHARE * shown {
-                all.iter().for_each(|s| kept[*s] = of_sensor.contains(s));
-                break;
-            }
+        let noises = all.iter().filter_map(|s| Some((*s, noise_m(pair, *s)?)));
+        if let Some(sensor) = sharpest_sensor(noises.collect(), shows(&all), shows) {
+            all.iter().for_each(|s| kept[*s] = sensor.contains(s));
         }
     }
     kept

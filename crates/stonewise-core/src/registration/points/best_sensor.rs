@@ -5,13 +5,11 @@
 //! harm. So the sharpest sensor that shows the stone measures it.
 
 use super::near_point::NearPoint;
-use super::noise::{NOISES_ALIKE, cells, noise_of_face};
+use super::noise::{cells, noise_of_face, sharpest_sensor};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::borrow::Cow;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-/// Share of what all sources show of a stone that a sensor must show to measure it alone.
-const LEAST_SHARE: f64 = 0.35;
 /// The points of the sharpest sensor that shows enough of the stone; all of them where there is only one, or
 /// none shows enough.
 pub(super) fn of_best_sensor<'a>(
@@ -27,19 +25,21 @@ pub(super) fn of_best_sensor<'a>(
         return Cow::Borrowed(near);
     }
     let noise = |(source, face): (&u32, &Vec<Point3<f64>>)| Some((*source, noise_of_face(face)?));
-    let mut noises: Vec<(u32, f64)> = faces.iter().filter_map(noise).collect();
-    noises.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let noises = faces.iter().filter_map(noise).collect();
     let shown = cells(faces.values().flatten()).len() as f64;
-    while let Some(&(_, sharpest)) = noises.first() {
-        let same = noises.partition_point(|(_, noise)| *noise <= NOISES_ALIKE * sharpest);
-        let of_sensor: BTreeSet<u32> = noises.drain(..same).map(|(source, _)| source).collect();
-        let own = faces.iter().filter(|(source, _)| of_sensor.contains(source));
-        if cells(own.flat_map(|(_, face)| face)).len() as f64 >= LEAST_SHARE * shown {
-            let kept = near.iter().filter(|p| of_sensor.contains(&p.source));
-            return Cow::Owned(kept.copied().collect());
-        }
+    let shows = |sources: &[u32]| {
+        let own = faces.iter().filter(|(source, _)| sources.contains(source));
+        cells(own.flat_map(|(_, face)| face)).len() as f64
+    };
+    match sharpest_sensor(noises, shown, shows) {
+        Some(sensor) => Cow::Owned(
+            near.iter()
+                .filter(|p| sensor.contains(&p.source))
+                .copied()
+                .collect(),
+        ),
+        None => Cow::Borrowed(near),
     }
-    Cow::Borrowed(near)
 }
 
 #[cfg(test)]
@@ -47,6 +47,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use std::collections::BTreeSet;
 
     /// Points of one source at random places in part of a face of 30 by 20 cm.
     fn scan(source: u32, noise_m: f64, points: usize, share: f64, seed: u64) -> Vec<NearPoint> {

@@ -16,7 +16,7 @@ pub use face_spacing::face_spacing;
 pub use local_shifts::local_shifts;
 pub use matched_pairs::{MatchedPair, PairPlaces, StoneExtents};
 pub use near_point::NearPoint;
-pub(crate) use noise::{NOISES_ALIKE, noise_of};
+pub(crate) use noise::{NOISES_ALIKE, noise_of, sharpest_sensor};
 pub use pairs::{MemoryPairs, PairPoints, PairSource};
 pub use stone_points::{StonePoints, stone_points};
 pub use window::Window;

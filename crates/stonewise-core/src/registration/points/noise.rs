@@ -8,6 +8,8 @@ use std::collections::BTreeSet;
 /// Noises that differ by a larger factor are of different sensors: incidence and range change the noise of a
 /// scanner by a factor of two.
 pub(crate) const NOISES_ALIKE: f64 = 3.0;
+/// Share of what all sources show that a sensor must show to be taken alone.
+const LEAST_SHARE: f64 = 0.35;
 /// Points that show their noise to a third.
 const NOISE_POINTS: usize = 25;
 /// Edge of the cells in which a face's extent is counted, metres: some dozens on a stone.
@@ -17,6 +19,26 @@ const CELL_M: f64 = 0.03;
 const NOISE_SAMPLES: usize = 300;
 /// The median of |a - b| in standard deviations of a, for two values of a normal variable.
 const MEDIAN_DIFFERENCE: f64 = 0.954;
+
+/// The sources of the sharpest sensor that shows at least 35 % of what all show; `None` where none does.
+///
+/// `noises`: sources with their noise; those of alike noises are of one sensor. `shown`: what all sources show;
+/// `shows`: what some of them show, in the same unit.
+pub(crate) fn sharpest_sensor<S>(
+    mut noises: Vec<(S, f64)>,
+    shown: f64,
+    shows: impl Fn(&[S]) -> f64,
+) -> Option<Vec<S>> {
+    noises.sort_by(|a, b| a.1.total_cmp(&b.1));
+    while let Some(&(_, sharpest)) = noises.first() {
+        let alike = noises.partition_point(|(_, noise)| *noise <= NOISES_ALIKE * sharpest);
+        let of_sensor: Vec<S> = noises.drain(..alike).map(|(source, _)| source).collect();
+        if shows(&of_sensor) >= LEAST_SHARE * shown {
+            return Some(of_sensor);
+        }
+    }
+    None
+}
 
 /// Noise of a stone's points along z of the face; `None` where there are too few.
 pub(crate) fn noise_of(cloud: &Cloud, face_from_world: &Matrix3<f64>) -> Option<f64> {
