@@ -12,7 +12,7 @@ const LAYERS: [&[&str]; 6] = [
         "statistics",
         "stone_row",
     ],
-    &["columns", "evidence", "outlines", "scale"],
+    &["columns", "evidence", "outlines", "scale", "zone_place"],
     &["neighbours", "stone_table"],
     &["result_set"],
     &["comparison", "joints"],

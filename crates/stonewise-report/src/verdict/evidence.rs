@@ -11,7 +11,7 @@ use stonewise_base::thresholds::Thresholds;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::registration::DeformationZone;
 use stonewise_results::records::{DatumState, DeformationVerdict, DeformedZone, EpochVerdict, State};
-use stonewise_results::{Joint, ResultSet, RowMotion, StoneRow, joints};
+use stonewise_results::{Joint, ResultSet, RowMotion, StoneRow, ZonePlace, joints};
 
 /// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
 /// `epochs`: their names.
@@ -82,25 +82,26 @@ fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
     let record = results.registration.as_ref()?.deformation.as_ref()?;
     let zone = |zone: &DeformationZone| {
         let stones = || results.stones.iter().filter(|s| s.zone_id == zone.number);
-        let area_m2: f64 = stones().map(|s| s.area_m2).sum();
-        let along_up = |of: fn(&StoneRow) -> f64| {
+        let place = ZonePlace::of(zone.number, &results.stones);
+        let extent = |of: fn(&StoneRow) -> f64| {
             let half = |s: &StoneRow| 0.5 * s.area_m2.sqrt();
             let low = stones().map(|s| of(s) - half(s)).fold(f64::INFINITY, f64::min);
             let high = stones()
                 .map(|s| of(s) + half(s))
                 .fold(f64::NEG_INFINITY, f64::max);
-            let middle = stones().map(|s| of(s) * s.area_m2).sum::<f64>() / area_m2;
-            (area_m2 > 0.0).then_some((middle, high - low))
+            high - low
         };
-        let ((along_m, width_m), (up_m, height_m)) = along_up(|s| s.along_m).zip(along_up(|s| s.up_m))?;
+        if place.area_m2 <= 0.0 {
+            return None;
+        }
         Some(DeformedZone {
             zone_id: zone.number,
             state: State::default(),
             kind: zone.kind,
-            along_m: millimetres(along_m) / 1e3,
-            up_m: millimetres(up_m) / 1e3,
-            extent_m: [width_m, height_m].map(|m| millimetres(m) / 1e3),
-            area_m2: (1e4 * area_m2).round() / 1e4,
+            along_m: millimetres(place.middle_m[0]) / 1e3,
+            up_m: millimetres(place.middle_m[1]) / 1e3,
+            extent_m: [extent(|s| s.along_m), extent(|s| s.up_m)].map(|m| millimetres(m) / 1e3),
+            area_m2: (1e4 * place.area_m2).round() / 1e4,
             largest_mm: millimetres(zone.largest_m),
             interval_mm: zone.interval_m.map(millimetres),
         })

@@ -1,6 +1,6 @@
 //! The zones of deformation as layers of polygons.
 
-use crate::{ResultSet, StoneOutline, StoneRow};
+use crate::{ResultSet, StoneOutline, StoneRow, ZonePlace};
 use nalgebra::{Point2, Point3, Vector3};
 use stonewise_core::geometry::convex_hull;
 use stonewise_core::registration::DeformationZone;
@@ -11,8 +11,7 @@ use stonewise_io::table::{Table, TableError};
 /// A zone and the convex hull of its stones' outlines.
 struct Outlined<'a> {
     zone: &'a DeformationZone,
-    stones: u32,
-    area_m2: f64,
+    place: ZonePlace,
     /// Corners in the unrolled facade, counter-clockwise.
     facade: Vec<Point2<f64>>,
     /// The same corners in the world.
@@ -70,10 +69,9 @@ pub(super) fn zone_layers(
 /// The hull of a zone's stones; `None` where no stone has an outline.
 fn outlined<'a>(results: &ResultSet, zone: &'a DeformationZone) -> Option<Outlined<'a>> {
     let is_in_zone = |s: &&StoneRow| s.zone_id == zone.number;
-    let stones: Vec<&StoneRow> = results.stones.iter().filter(is_in_zone).collect();
     let mut corners: Vec<(Point2<f64>, Point3<f64>)> = Vec::new();
     let mut normal = Vector3::zeros();
-    for stone in &stones {
+    for stone in results.stones.iter().filter(is_in_zone) {
         if let Some(outline) = results.outlines.get(&stone.stone_id) {
             corners.extend(
                 results
@@ -93,8 +91,7 @@ fn outlined<'a>(results: &ResultSet, zone: &'a DeformationZone) -> Option<Outlin
     };
     Some(Outlined {
         zone,
-        stones: stones.len() as u32,
-        area_m2: stones.iter().map(|s| s.area_m2).sum(),
+        place: ZonePlace::of(zone.number, &results.stones),
         world: hull.seen_from_above(),
         facade,
     })
@@ -112,12 +109,12 @@ fn attributes(zones: &[Outlined]) -> Result<Table, TableError> {
         numbers(|z| z.zone.number),
     )?;
     table.push("kind", "", "what the deformation resembles", kinds)?;
-    table.push("stones", "", "number of stones", numbers(|z| z.stones))?;
+    table.push("stones", "", "number of stones", numbers(|z| z.place.stones))?;
     table.push(
         "area_m2",
         "m2",
         "area of the faces of its stones",
-        reals(|z| z.area_m2),
+        reals(|z| z.place.area_m2),
     )?;
     table.push(
         "largest_m",

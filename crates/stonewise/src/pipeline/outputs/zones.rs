@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::steps::measure::MEASURE;
 use crate::pipeline::until::Until;
-use crate::results::StoneRow;
+use crate::results::ZonePlace;
 use crate::results::names::ZONES as FILE;
 use stonewise_io::table::{Table, write_parquet};
 
@@ -21,8 +21,7 @@ pub static ZONES: Step = Step {
 struct Row {
     epoch: String,
     zone_id: u32,
-    area_m2: f64,
-    place_m: [f64; 2],
+    place: ZonePlace,
     largest_m: f64,
     interval_m: [f64; 2],
     kind: &'static str,
@@ -34,20 +33,11 @@ fn write_zones(run: &Run) -> Result<()> {
     for later in context.project.epochs.later_ids() {
         let (registered, measured) = (run.registered(later)?, run.measured(later)?);
         for zone in registered.deformation.iter().flat_map(|d| &d.zones) {
-            let stones: Vec<&StoneRow> = measured
-                .rows
-                .iter()
-                .filter(|r| r.zone_id == zone.number)
-                .collect();
-            let area_m2: f64 = stones.iter().map(|s| s.area_m2).sum();
-            let middle = |place: fn(&StoneRow) -> f64| {
-                stones.iter().map(|s| place(s) * s.area_m2).sum::<f64>() / area_m2
-            };
+            let place = ZonePlace::of(zone.number, &measured.rows);
             rows.push(Row {
                 epoch: context.project.epochs[later].name.clone(),
                 zone_id: zone.number,
-                area_m2,
-                place_m: [middle(|s| s.along_m), middle(|s| s.up_m)],
+                place,
                 largest_m: zone.largest_m,
                 interval_m: zone.interval_m,
                 kind: zone.kind.word(),
@@ -69,19 +59,19 @@ fn write_zones(run: &Run) -> Result<()> {
         "area_m2",
         "m2",
         "area of the faces of its stones",
-        reals(|r| r.area_m2),
+        reals(|r| r.place.area_m2),
     )?;
     table.push(
         "along_m",
         "m",
         "middle along the unrolled wall",
-        reals(|r| r.place_m[0]),
+        reals(|r| r.place.middle_m[0]),
     )?;
     table.push(
         "up_m",
         "m",
         "middle up the unrolled wall",
-        reals(|r| r.place_m[1]),
+        reals(|r| r.place.middle_m[1]),
     )?;
     table.push(
         "largest_m",
