@@ -76,7 +76,7 @@ fn largest_of(
 }
 
 /// The state that a reason gives.
-fn state_of(reason: ReasonCode) -> State {
+pub(super) fn state_of(reason: ReasonCode) -> State {
     use ReasonCode as R;
     match reason {
         R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::DeformationAlarm => State::Alarm,

@@ -1,5 +1,6 @@
 //! The verdict in words.
 
+use super::area::state_of;
 use super::case::Case;
 use super::judged::{Judged, JudgedStone, Level, deformed};
 use super::limits::{Compared, Quantity, in_words};
@@ -67,22 +68,9 @@ pub(super) fn reasons(
 impl Speaker<'_> {
     /// The reasons that the sentence names: those that give the state; of several doubts the first.
     fn deciding(&self) -> Vec<ReasonCode> {
-        use ReasonCode as R;
-        let wanted = |r: &R| match self.wall.state {
-            State::Alarm => matches!(
-                r,
-                R::LengthAlarm | R::NeighboursAlarm | R::JointsAlarm | R::DeformationAlarm | R::StonesLost
-            ),
-            State::Attention => matches!(
-                r,
-                R::LengthAttention
-                    | R::NeighboursAttention
-                    | R::JointsAttention
-                    | R::DeformationAttention
-                    | R::StonesLost
-                    | R::MotionShown
-                    | R::DeformationShown
-            ),
+        let wanted = |reason: &ReasonCode| match self.wall.state {
+            State::Alarm => state_of(*reason) == State::Alarm || *reason == ReasonCode::StonesLost,
+            State::Attention => state_of(*reason) == State::Attention,
             State::CannotTell | State::Fine => true,
         };
         let most = if matches!(self.wall.state, State::CannotTell | State::Fine) {
