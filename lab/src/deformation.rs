@@ -13,7 +13,7 @@
 
 use crate::Outcome;
 use crate::figures::{Z95, rms};
-use crate::survey::{Points, SurveyPoint, pairs, places, seen_stone};
+use crate::survey::ScannedWall;
 use crate::table::Table;
 use crate::words::Words;
 use nalgebra::Vector3;
@@ -21,12 +21,10 @@ use rayon::prelude::*;
 use std::collections::BTreeSet;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, SeenStone, Source, epoch_errors};
-use stonewise_core::registration::{AdjustmentParams, MemoryPairs, adjust, deformation};
-use stonewise_simulate::{Scan, SceneParams, TlsParams, UavParams, WallMotion, WallParams, World};
+use stonewise_core::registration::deformation;
+use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, SeenStone, epoch_errors};
+use stonewise_simulate::{SceneParams, TlsParams, UavParams, WallMotion, WallParams};
 
-/// Points that a stone needs in each epoch.
-const LEAST_POINTS: usize = 60;
 /// Stations or strips of an epoch.
 const SOURCES: [u32; 2] = [2, 3];
 
@@ -146,58 +144,23 @@ impl Case {
     }
 
     fn measure(&self, seed: u64) -> Wall {
-        let world = World::new(&self.params(seed));
-        let count = SOURCES[usize::from(!self.is_tls)] as usize;
-        let epochs = [0, 1].map(|e| {
-            let scans = world.scan(&self.params(seed), e);
-            by_stone(&scans.tls.or(scans.uav).unwrap())
-        });
-        let is_seen = |id: &&u32| {
-            epochs
-                .iter()
-                .all(|e| e.get(id).is_some_and(|p| p.len() >= LEAST_POINTS))
-        };
-        let ids: Vec<u32> = epochs[0].keys().filter(is_seen).copied().collect();
-        let outward = Vector3::x();
-        let pairs = pairs(
-            &epochs.each_ref().map(|e| places(e, &ids)),
-            |_| Some(outward),
-            0.0,
-        );
-        let report = adjust(&MemoryPairs::new(pairs), &AdjustmentParams::default(), &Silent).unwrap();
-        let sources: Vec<Source> = (0..2 * count)
-            .map(|s| Source {
-                name: format!("{}/{}", s / count, s % count),
-                epoch: s / count,
-                has_times: true,
-                same_as: None,
-            })
-            .collect();
-        let measured = report.results.iter().filter(|r| r.motion.is_ok());
-        let seen: Vec<(StoneId, SeenStone)> = measured
-            .map(|r| {
-                (
-                    r.first,
-                    seen_stone(&epochs, r.first.0, &outward, |e, s| e * count + s).unwrap(),
-                )
-            })
-            .collect();
-        let (seen_ids, stones): (Vec<StoneId>, Vec<SeenStone>) = seen.into_iter().unzip();
+        let wall = ScannedWall::new(&self.params(seed), SOURCES[usize::from(!self.is_tls)]);
+        let sources = wall.sources();
+        let measured = wall.report.results.iter().filter(|r| r.motion.is_ok());
+        let seen = measured.map(|r| (r.first, wall.seen(r.first)));
+        let (seen_ids, stones): (Vec<StoneId>, Vec<SeenStone>) = seen.unzip();
         let pair = EpochPair {
             sources: &sources,
             stones: &stones,
             neighbours: &[],
             stable: &[],
             offered: &[],
-            sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
+            sigma_m: wall.sigma_m(),
         };
         let errors = epoch_errors(&pair, &EpochErrorParams::default());
         let errors = errors.joint.as_ref().map(|e| (e, seen_ids.as_slice()));
-        let found = deformation(report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
-        let truth = |id: StoneId, k: usize| {
-            let c = stones[k].centroid;
-            world.motions[id.0 as usize - 1].second_from_first * c - c
-        };
+        let found = deformation(wall.report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
+        let truth = |id: StoneId, k: usize| wall.truth(id, stones[k].centroid);
         let number = |id: StoneId| seen_ids.iter().position(|s| *s == id).unwrap();
         let stone = |s: &stonewise_core::registration::StoneDeformation| {
             let k = number(s.stone);
@@ -227,18 +190,6 @@ impl Case {
             limits_m: found.detection_limits_m,
         }
     }
-}
-
-fn by_stone(scan: &Scan) -> Points {
-    let mut stones = Points::new();
-    for (i, &id) in scan.stone.iter().enumerate().filter(|(_, id)| **id > 0) {
-        stones.entry(id).or_default().push(SurveyPoint {
-            place: scan.cloud.world(i),
-            source: scan.source[i] as usize - 1,
-            time_s: scan.time[i],
-        });
-    }
-    stones
 }
 
 fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {

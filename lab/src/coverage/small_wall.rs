@@ -2,6 +2,7 @@
 //! sources; the motions that the adjustment would measure are drawn from the same errors.
 
 use super::errors::{CHAIN_M, Kind, STRETCH, Sensor, SourceError, Target, draw, size_m, stretches};
+use crate::survey::sources;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -106,15 +107,6 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
         )
     };
     let errors: Vec<SourceError> = stretches.into_iter().flat_map(&mut of_epoch).collect();
-    let count = case.sources as usize;
-    let sources = (0..errors.len())
-        .map(|s| Source {
-            name: format!("{}/{}", s / count, s % count),
-            epoch: s / count,
-            has_times: true,
-            same_as: None,
-        })
-        .collect();
     let mut stones = Vec::new();
     let mut seeming = Vec::new();
     let (grid, width_m) = grid(case);
@@ -143,7 +135,7 @@ pub fn simulate(case: &Case, seed: u64) -> Survey {
             seeming.len()
         ],
         stable: stable(case.stable, &errors, &what, &mut rng),
-        sources,
+        sources: sources(case.sources as usize),
         stones,
         sigma_m: what.sigma_m,
         seeming,
