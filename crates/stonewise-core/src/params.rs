@@ -4,7 +4,7 @@ use schemars::Schema;
 use serde_json::{Value, json};
 use std::fmt;
 
-/// Parameters that know which values they may have.
+/// Parameters with the ranges of their values.
 pub trait Params {
     /// Every number of the struct with the range in which it must lie.
     fn ranges(&self) -> Vec<Ranged> {

@@ -6,7 +6,7 @@ use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value};
 use stonewise_base::settings::Settings;
 
-/// The JSON schema (draft 7, which editors of TOML know best) of the project file: every key with its meaning,
+/// The JSON schema (draft 7, which most editors of TOML support) of the project file: every key with its meaning,
 /// default and range, and its unit as `x-unit`. Nothing is referred to: each table holds its keys.
 pub fn project_schema() -> Value {
     let mut file = schema_of::<RawProject>();

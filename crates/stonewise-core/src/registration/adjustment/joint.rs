@@ -34,7 +34,7 @@ pub(super) fn joint_motions(
         let by_field = estimate.by_field * stone_from_field(&frame);
         let by_field = world * by_field.fixed_rows::<3>(0);
         let mut translation = estimate.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        // Whether a single stone slid in the face is asked of its motion, not of the shape of the wall.
+        // A slide of a single stone in the face belongs to its motion, not to the shape of the wall.
         let slide_m2 = adjustment.undetected_slide_m(i).powi(2);
         let share = match estimate.missed > 0.0 {
             true => widening(estimate.missed),
