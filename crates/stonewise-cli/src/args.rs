@@ -79,6 +79,12 @@ pub enum Command {
         Give the same command again to continue an interrupted training."
     )]
     Train(TrainArgs),
+    /// Train the detector of a project on the stones of its own survey that several photos and the cloud confirm.
+    ///
+    /// Parts of the wall are kept apart. Where the trained detector does not find their stones significantly better,
+    /// nothing changes.
+    #[command(after_help = "Example:\n  stonewise adapt survey/stonewise.toml --minutes 20")]
+    Adapt(AdaptArgs),
     /// Transfer the labels of the photos to the point clouds.
     #[command(after_help = "Example:\n  stonewise label survey/stonewise.toml --out results/")]
     Label(ProjectArgs),
@@ -391,6 +397,20 @@ pub struct TrainArgs {
     /// Parameters (TOML, every key optional).
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+}
+
+/// Arguments of `adapt`.
+#[derive(Debug, ClapArgs)]
+pub struct AdaptArgs {
+    /// The project file, or its folder.
+    pub project: PathBuf,
+    /// Length of the training, minutes; the same command continues an interrupted one.
+    #[arg(long, value_name = "M", default_value = "20", value_parser = parse_minutes)]
+    pub minutes: f64,
+    /// Folder of the trained detector (model.safetensors); created if missing [default: `adapted` beside the project
+    /// file].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 /// Arguments of `evaluate`.

@@ -1,5 +1,6 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
 
+mod adapt;
 pub mod experiment;
 mod kept;
 mod output;
@@ -19,6 +20,7 @@ use stonewise_figure as figure;
 use stonewise_project::sources;
 use stonewise_report::verdict;
 
+pub use adapt::{Adapted, adapt};
 pub use address_space::{require as require_memory, require_start};
 pub use error::{Error, Result};
 pub use output::{OutputFolder, Owner, PREVIOUS_DIR, UNFINISHED_FILE};

@@ -1,5 +1,6 @@
 //! One file per subcommand: parse, call the library, print.
 
+mod adapt;
 mod check;
 mod compare;
 mod completions;
@@ -43,6 +44,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Unit(args) => units::unit(&args, printer),
         Command::Segment(args) => segment::segment(args, force, printer),
         Command::Train(args) => train::train(&args, force, printer),
+        Command::Adapt(args) => adapt::adapt(&args, force, printer),
         Command::Label(args) => run::run(&args, Until::Labelled, force, printer),
         Command::Match(args) => run::run(&args, Until::Matched, force, printer),
         Command::Register(args) => run::run(&args, Until::Registered, force, printer),

@@ -30,6 +30,7 @@ mod overlap;
 mod panels;
 mod params;
 mod photo_frame;
+mod photo_stones;
 mod relief;
 mod run_labels;
 mod stones;
@@ -37,6 +38,7 @@ mod surface_cells;
 mod tracks;
 mod transfer_labels;
 mod visibility;
+mod visible;
 mod vote;
 
 pub use audit::AuditEvent;
@@ -51,6 +53,7 @@ pub use islands::Occupancy;
 pub use labels::{LabelStore, MemoryLabels, TileLabels};
 pub use panels::{StoneReliefs, panels};
 pub use params::TransferParams;
+pub use photo_stones::{PhotoStones, photo_stones};
 pub use relief::photo_relief;
 pub use stones::{StoneParams, build_stones};
 pub use transfer_labels::{

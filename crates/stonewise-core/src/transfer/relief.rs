@@ -1,12 +1,10 @@
 //! Relief of one photo from the cloud of its epoch.
 
-use super::depth::splat_all;
-use super::frustum::Cone;
+use super::visible::each_visible;
 use super::{TransferError, TransferParams};
-use crate::cloud::{Cloud, TileSource};
-use crate::geometry::{Bounds, View};
-use crate::params::Params;
-use crate::progress::{Progress, Silent};
+use crate::cloud::TileSource;
+use crate::geometry::View;
+use crate::progress::Progress;
 use crate::raster::{RangeImage, ReliefMap};
 
 /// The relief of what a photo shows, see [`ReliefMap`].
@@ -23,66 +21,23 @@ pub fn photo_relief<T: TileSource>(
     params: &TransferParams,
     progress: &dyn Progress,
 ) -> Result<ReliefMap, TransferError> {
-    params.check()?;
-    let cone = Cone::of(view);
-    let shown = (0..tiles.tile_count()).filter(|&tile| cone.touches(&tiles.bounds(tile)));
-    let shown = Shown {
-        tiles,
-        which: shown.collect(),
-    };
-    progress.check()?;
-    let (maps, surfaces) = splat_all(&shown, &[view], params, &Silent)?;
     let mut range = RangeImage::new(&view.camera);
-    let centre = view.centre();
-    for (tile, surface) in surfaces.iter().enumerate() {
-        progress.check()?;
-        let cloud = shown.load(tile).map_err(|e| TransferError::tile(tile, e))?;
-        for group in surface.groups(&cloud) {
-            for &i in &group.points {
-                let world = cloud.world(i as usize);
-                let Some(seen) = view.project(&world).filter(|seen| view.is_inside(seen.pixel)) else {
-                    continue;
-                };
-                let cosine = group.surface.cosine(&(world - centre).normalize());
-                let tolerance = group.surface.tolerance_m(cosine, params);
-                let nearest = maps.first().and_then(|map| map.at(seen.pixel));
-                if nearest.is_some_and(|nearest| seen.depth_m <= f64::from(nearest) + tolerance) {
-                    range.add(seen.pixel, seen.depth_m);
-                }
-            }
-        }
-    }
+    each_visible(tiles, view, params, progress, |_, visible| {
+        visible
+            .iter()
+            .for_each(|seen| range.add(seen.pixel, seen.depth_m));
+        Ok(())
+    })?;
     Ok(range.relief())
-}
-
-/// The tiles that a photo may show.
-struct Shown<'a, T> {
-    tiles: &'a T,
-    which: Vec<usize>,
-}
-
-impl<T: TileSource> TileSource for Shown<'_, T> {
-    type Error = T::Error;
-
-    fn tile_count(&self) -> usize {
-        self.which.len()
-    }
-
-    fn bounds(&self, tile: usize) -> Bounds {
-        self.tiles.bounds(self.which[tile])
-    }
-
-    fn load(&self, tile: usize) -> Result<Cloud, Self::Error> {
-        self.tiles.load(self.which[tile])
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::MemoryTiles;
+    use crate::cloud::{Cloud, MemoryTiles};
     use crate::geometry::{Camera, Rigid3};
     use crate::id::ImageId;
+    use crate::progress::Silent;
     use nalgebra::Point3;
 
     /// A wall at 10 m with a joint of 4 cm width and 3 cm depth every 40 cm, a second wall 5 m behind it, and

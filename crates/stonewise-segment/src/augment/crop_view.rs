@@ -6,6 +6,7 @@ use crate::Sample;
 use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use stonewise_core::raster::{RELIEF_CHANNELS, Raster, ReliefMap};
 
 /// A projective map from a square crop to a photo.
 #[derive(Clone, Debug)]
@@ -80,13 +81,38 @@ impl CropView {
         [p.x / p.z, p.y / p.z]
     }
 
-    /// The crop, image and labels alike.
+    /// The crop, image, labels and relief alike: heights, slope and confidence do not depend on the direction
+    /// from which they are seen.
     pub fn cut(&self, photo: &Photo) -> Sample {
-        Sample::from_pixels(self.size_px, self.size_px, |index| {
+        let relief = photo
+            .sample()
+            .relief()
+            .map(|relief| self.cut_relief(photo, relief));
+        let crop = Sample::from_pixels(self.size_px, self.size_px, |index| {
             let (x, y) = (index as u32 % self.size_px, index as u32 / self.size_px);
             let at = self.to_photo([f64::from(x) + 0.5, f64::from(y) + 0.5]);
             let (label, ignored) = photo.label(at);
             (photo.colour(at, self.scale), label, ignored)
-        })
+        });
+        crop.with_relief(relief)
+    }
+
+    /// The relief of the crop's pixels; outside the photo nothing is known of it.
+    fn cut_relief(&self, photo: &Photo, relief: &ReliefMap) -> ReliefMap {
+        let image = photo.sample().image();
+        let cells = [
+            f64::from(relief.width()) / f64::from(image.width()),
+            f64::from(relief.height()) / f64::from(image.height()),
+        ];
+        let mut cut = Raster::filled(self.size_px, self.size_px, [0.0; RELIEF_CHANNELS]);
+        for (index, value) in cut.data_mut().iter_mut().enumerate() {
+            let (x, y) = (index as u32 % self.size_px, index as u32 / self.size_px);
+            let at = self.to_photo([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+            *value = relief
+                .at([at[0] * cells[0], at[1] * cells[1]])
+                .copied()
+                .unwrap_or_default();
+        }
+        cut
     }
 }

@@ -56,6 +56,41 @@ fn images_and_labels_are_mapped_alike() {
     assert!(inner > 3_000, "{inner}");
 }
 
+/// Relief at half the resolution whose first value tells the columns apart.
+#[test]
+fn relief_is_mapped_like_the_image() {
+    let plain = photo();
+    let (width, height) = (150, 120);
+    let value = |i: u32| [(i % width) as f32, (i / width) as f32, 0.5, 1.0];
+    let relief = Raster::from_vec(width, height, (0..width * height).map(value).collect()).unwrap();
+    let photo = Photo::new(plain.sample().clone().with_relief(Some(relief)));
+    let params = AugmentParams {
+        rotation_deg: 40.0,
+        perspective: 0.2,
+        ..AugmentParams::default()
+    };
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let view = CropView::random(&photo, [160.0, 120.0], 64, &params, &mut rng);
+    let crop = view.cut(&photo);
+    let relief = crop.relief().unwrap();
+    assert_eq!((relief.width(), relief.height()), (64, 64));
+    for (x, y) in (0..64).flat_map(|y| (0..64).map(move |x| (x, y))) {
+        let at = view.to_photo([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+        let is_inside = (0.0..300.0).contains(&at[0]) && (0.0..240.0).contains(&at[1]);
+        let expected = match is_inside {
+            true => [
+                (at[0] / 2.0).floor() as f32,
+                (at[1] / 2.0).floor() as f32,
+                0.5,
+                1.0,
+            ],
+            false => [0.0; 4],
+        };
+        assert_eq!(relief.get(x, y), Some(&expected));
+    }
+    assert!(view.cut(&plain).relief().is_none());
+}
+
 #[test]
 fn nothing_is_known_outside_the_photo_and_where_the_photo_says_so() {
     let photo = photo();

@@ -1,9 +1,11 @@
 //! Photos of a folder and the masks of a COCO file.
 
-use crate::{Sample, SampleError};
+use super::error::DatasetError;
+use super::photo_set::PhotoSet;
+use crate::Sample;
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{LabelImage, Raster};
-use stonewise_io::image_io::{ImageIoError, image_size, photos_in, read_rgb};
+use stonewise_io::image_io::{image_size, photos_in, read_rgb};
 use stonewise_io::masks::{MaskError, MaskSource, ValidRegions};
 
 /// Masks of photos, and where they are complete.
@@ -19,31 +21,6 @@ pub struct LabelledPhotos {
     photos: Vec<PathBuf>,
     unlabelled: Vec<PathBuf>,
     reference: Reference,
-}
-
-/// Why labelled photos cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DatasetError {
-    /// A photo cannot be read.
-    #[error(transparent)]
-    Image(#[from] ImageIoError),
-    /// The masks cannot be read.
-    #[error(transparent)]
-    Masks(#[from] MaskError),
-    /// No photo of the folder has masks.
-    #[error("none of the photos ({photos}) in {} has masks in {}: the file names must be the same", folder.display(), masks.display())]
-    NoneLabelled {
-        /// Number of photos in the folder.
-        photos: usize,
-        /// The folder.
-        folder: PathBuf,
-        /// The masks.
-        masks: PathBuf,
-    },
-    /// Masks and photo do not fit.
-    #[error(transparent)]
-    Sample(#[from] SampleError),
 }
 
 impl Reference {
@@ -143,5 +120,15 @@ impl LabelledPhotos {
             )
         });
         Ok(Sample::new(image, labels, ignore)?)
+    }
+}
+
+impl PhotoSet for LabelledPhotos {
+    fn count(&self) -> usize {
+        self.photos.len()
+    }
+
+    fn sample(&self, index: usize) -> Result<Sample, DatasetError> {
+        self.read(&self.photos[index])
     }
 }

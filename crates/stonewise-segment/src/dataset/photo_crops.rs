@@ -1,6 +1,7 @@
 //! Training images from labelled photos.
 
-use super::labelled_photos::{DatasetError, LabelledPhotos};
+use super::error::DatasetError;
+use super::photo_set::PhotoSet;
 use super::split::Split;
 use crate::Sample;
 use crate::augment::{AugmentParams, CropView, Photo, recolour};
@@ -26,7 +27,7 @@ const TRIES: usize = 40;
 
 /// Crops of labelled photos, each seen from elsewhere in other light.
 pub struct PhotoCrops<'a> {
-    photos: &'a LabelledPhotos,
+    photos: &'a dyn PhotoSet,
     params: AugmentParams,
     size_px: u32,
     seed: u64,
@@ -35,7 +36,7 @@ pub struct PhotoCrops<'a> {
 
 impl<'a> PhotoCrops<'a> {
     /// Crops of `size_px` pixels.
-    pub fn new(photos: &'a LabelledPhotos, params: AugmentParams, size_px: u32, seed: u64) -> Self {
+    pub fn new(photos: &'a dyn PhotoSet, params: AugmentParams, size_px: u32, seed: u64) -> Self {
         Self {
             photos,
             params,
@@ -51,9 +52,8 @@ impl<'a> PhotoCrops<'a> {
     /// A photo or its masks cannot be read.
     pub fn validation(&self) -> Result<Vec<Sample>, DatasetError> {
         let mut crops: Vec<(u64, Sample)> = Vec::new();
-        for index in 0..self.photos.photos().len() {
-            let sample = self.photos.read(&self.photos.photos()[index])?;
-            let photo = Photo::new(sample);
+        for index in 0..self.photos.count() {
+            let photo = Photo::new(self.photos.sample(index)?);
             let split = self.split(&photo, index);
             let side = self.block_px(&photo);
             let measured = Photo::new(split.for_validation(photo.sample()));
@@ -76,7 +76,7 @@ impl<'a> PhotoCrops<'a> {
     /// # Errors
     /// The photo or its masks cannot be read.
     pub fn held_out(&self, index: usize) -> Result<Sample, DatasetError> {
-        let photo = Photo::new(self.photos.read(&self.photos.photos()[index])?);
+        let photo = Photo::new(self.photos.sample(index)?);
         Ok(self.split(&photo, index).for_validation(photo.sample()))
     }
 
@@ -88,8 +88,11 @@ impl<'a> PhotoCrops<'a> {
     }
 
     fn split(&self, photo: &Photo, index: usize) -> Split {
-        let seed = mix(self.seed, index as u64);
-        Split::new(photo.sample(), self.block_px(photo), VALIDATION_SHARE, seed)
+        let (sample, block_px) = (photo.sample(), self.block_px(photo));
+        match self.photos.kept_stones(index) {
+            Some(stones) => Split::of_stones(sample, block_px, &stones),
+            None => Split::new(sample, block_px, VALIDATION_SHARE, mix(self.seed, index as u64)),
+        }
     }
 
     /// Which photo a crop is taken from: a few at a time, so that each is read from disk once for many crops.
@@ -98,7 +101,7 @@ impl<'a> PhotoCrops<'a> {
             number / (PHOTOS_IN_MEMORY * CROPS_PER_VISIT),
             number % PHOTOS_IN_MEMORY,
         );
-        ((visit * PHOTOS_IN_MEMORY + slot) % self.photos.photos().len() as u64) as usize
+        ((visit * PHOTOS_IN_MEMORY + slot) % self.photos.count() as u64) as usize
     }
 
     fn photo(&self, index: usize) -> Result<Arc<Photo>, DatasetError> {
@@ -106,7 +109,7 @@ impl<'a> PhotoCrops<'a> {
         if let Some((_, photo)) = all.iter().find(|(i, _)| *i == index) {
             return Ok(Arc::clone(photo));
         }
-        let photo = Photo::new(self.photos.read(&self.photos.photos()[index])?);
+        let photo = Photo::new(self.photos.sample(index)?);
         let learnt = Photo::new(self.split(&photo, index).for_training(photo.sample()));
         let learnt = Arc::new(learnt);
         if all.len() as u64 >= PHOTOS_IN_MEMORY {
@@ -125,7 +128,9 @@ impl SampleSource for PhotoCrops<'_> {
         let crop = CropView::random(&photo, centre, self.size_px, &self.params, &mut rng).cut(&photo);
         let image = recolour(crop.image(), &self.params, &mut rng);
         let (labels, ignore) = (crop.labels().clone(), crop.ignore().clone());
-        Sample::new(image, labels, ignore).map_err(|e| e.to_string())
+        let relief = crop.relief().cloned();
+        let sample = Sample::new(image, labels, ignore).map_err(|e| e.to_string())?;
+        Ok(sample.with_relief(relief))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::Sample;
 use crate::seed::mix;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Square blocks of a photo, some of which are kept for measuring.
 ///
@@ -11,8 +11,7 @@ use std::collections::BTreeMap;
 /// it, so that no label is learnt and measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
-    block_px: u32,
-    columns: u32,
+    blocks: Blocks,
     kept: Vec<bool>,
     is_kept_stone: BTreeMap<u32, bool>,
 }
@@ -20,47 +19,69 @@ pub struct Split {
 impl Split {
     /// Keeps about this share of the blocks that show stones, one at least where there are two.
     pub fn new(sample: &Sample, block_px: u32, share: f64, seed: u64) -> Self {
-        let labels = sample.labels();
-        let columns = labels.width().div_ceil(block_px);
-        let blocks = (columns * labels.height().div_ceil(block_px)) as usize;
-        let block = |index: usize| block_of(index, labels.width(), block_px, columns);
-        let mut stone_pixels = vec![0u64; blocks];
-        for (index, _) in labels.data().iter().enumerate().filter(|(_, l)| **l != 0) {
-            stone_pixels[block(index)] += 1;
-        }
+        let blocks = Blocks::of(sample, block_px);
         // Blocks with some stones in them, in an order by chance.
         let enough = u64::from(block_px).pow(2) / 4;
-        let mut order: Vec<usize> = (0..blocks).filter(|&b| stone_pixels[b] >= enough).collect();
+        let pixels = blocks.pixels(sample, |label| label != 0);
+        let mut order: Vec<usize> = (0..blocks.count).filter(|&b| pixels[b] >= enough).collect();
         order.sort_by_key(|&b| mix(seed, b as u64));
         let count = match order.len() {
             0 | 1 => 0,
             all => ((all as f64 * share).round() as usize).max(1),
         };
-        let mut kept = vec![false; blocks];
+        let mut kept = vec![false; blocks.count];
         order.iter().take(count).for_each(|&b| kept[b] = true);
         let mut inside: BTreeMap<u32, [u64; 2]> = BTreeMap::new();
-        for (index, &label) in labels.data().iter().enumerate().filter(|(_, l)| **l != 0) {
-            inside.entry(label).or_default()[usize::from(kept[block(index)])] += 1;
+        for (index, &label) in sample
+            .labels()
+            .data()
+            .iter()
+            .enumerate()
+            .filter(|(_, l)| **l != 0)
+        {
+            inside.entry(label).or_default()[usize::from(kept[blocks.block(index)])] += 1;
         }
+        let is_kept = |(label, [out, within]): (u32, [u64; 2])| (label, within > out);
         Self {
-            block_px,
-            columns,
+            blocks,
             kept,
-            is_kept_stone: inside
-                .into_iter()
-                .map(|(l, [out, within])| (l, within > out))
+            is_kept_stone: inside.into_iter().map(is_kept).collect(),
+        }
+    }
+
+    /// Keeps these stones, and the blocks in which most pixels of stones are theirs.
+    pub fn of_stones(sample: &Sample, block_px: u32, stones: &BTreeSet<u32>) -> Self {
+        let blocks = Blocks::of(sample, block_px);
+        let pixels = blocks.pixels(sample, |label| label != 0);
+        let theirs = blocks.pixels(sample, |label| stones.contains(&label));
+        let labels: BTreeSet<u32> = sample
+            .labels()
+            .data()
+            .iter()
+            .copied()
+            .filter(|&l| l != 0)
+            .collect();
+        Self {
+            kept: pixels
+                .iter()
+                .zip(theirs)
+                .map(|(&all, theirs)| 2 * theirs > all)
                 .collect(),
+            blocks,
+            is_kept_stone: labels.into_iter().map(|l| (l, stones.contains(&l))).collect(),
         }
     }
 
     /// First pixel (x, y) of every block kept for measuring.
     pub fn kept_blocks(&self) -> impl Iterator<Item = [u32; 2]> {
-        let corner = |b: usize| [b as u32 % self.columns, b as u32 / self.columns].map(|i| i * self.block_px);
+        let columns = self.blocks.columns;
+        let corner = move |b: usize| [b as u32 % columns, b as u32 / columns];
+        let side = self.blocks.side_px;
         self.kept
             .iter()
             .enumerate()
             .filter(|(_, kept)| **kept)
-            .map(move |(b, _)| corner(b))
+            .map(move |(b, _)| corner(b).map(|i| i * side))
     }
 
     /// The photo with nothing known but what is to be learnt.
@@ -75,11 +96,11 @@ impl Split {
 
     fn restricted(&self, sample: &Sample, to_kept: bool) -> Sample {
         let (width, height) = (sample.labels().width(), sample.labels().height());
-        Sample::from_pixels(width, height, |index| {
+        let restricted = Sample::from_pixels(width, height, |index| {
             let label = sample.labels().data()[index];
             let is_kept = match self.is_kept_stone.get(&label) {
                 Some(&is_kept) => is_kept,
-                None => self.kept[block_of(index, width, self.block_px, self.columns)],
+                None => self.kept[self.blocks.block(index)],
             };
             let known = is_kept == to_kept;
             let label = if known { label } else { 0 };
@@ -88,11 +109,48 @@ impl Split {
                 label,
                 sample.ignore().data()[index] || !known,
             )
-        })
+        });
+        restricted.with_relief(sample.relief().cloned())
     }
 }
 
-fn block_of(index: usize, width: u32, block_px: u32, columns: u32) -> usize {
-    let (x, y) = (index as u32 % width, index as u32 / width);
-    (y / block_px * columns + x / block_px) as usize
+/// The blocks of a photo, row by row.
+#[derive(Clone, Debug, PartialEq)]
+struct Blocks {
+    side_px: u32,
+    width: u32,
+    columns: u32,
+    count: usize,
+}
+
+impl Blocks {
+    fn of(sample: &Sample, side_px: u32) -> Self {
+        let (width, height) = (sample.labels().width(), sample.labels().height());
+        let columns = width.div_ceil(side_px);
+        Self {
+            side_px,
+            width,
+            columns,
+            count: (columns * height.div_ceil(side_px)) as usize,
+        }
+    }
+
+    /// The block of a pixel, by its row-major index.
+    fn block(&self, index: usize) -> usize {
+        let (x, y) = (index as u32 % self.width, index as u32 / self.width);
+        (y / self.side_px * self.columns + x / self.side_px) as usize
+    }
+
+    /// Pixels of each block whose label is wanted.
+    fn pixels(&self, sample: &Sample, is_wanted: impl Fn(u32) -> bool) -> Vec<u64> {
+        let mut pixels = vec![0; self.count];
+        let wanted = sample
+            .labels()
+            .data()
+            .iter()
+            .enumerate()
+            .filter(|(_, l)| is_wanted(**l));
+        wanted.for_each(|(index, _)| pixels[self.block(index)] += 1);
+        pixels
+    }
 }

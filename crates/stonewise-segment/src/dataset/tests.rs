@@ -64,6 +64,20 @@ fn a_stone_is_learnt_from_or_measured_on_and_never_both() {
     assert_ne!(one, other);
 }
 
+#[test]
+fn chosen_stones_are_measured_on_and_all_others_learnt_from() {
+    let all = sample(30, 20);
+    let chosen: BTreeSet<u32> = stones(&all).into_iter().filter(|label| label % 30 <= 6).collect();
+    let split = Split::of_stones(&all, 40, &chosen);
+    assert_eq!(stones(&split.for_validation(&all)), chosen);
+    let learnt = stones(&split.for_training(&all));
+    assert!(learnt.is_disjoint(&chosen) && learnt.len() + chosen.len() == 600);
+    // Label 30 n + 1 is in the first column: the first six columns and the last are kept, 20 pixels each.
+    let corners: BTreeSet<[u32; 2]> = split.kept_blocks().collect();
+    let expected = (0..10).flat_map(|row| [0, 40, 80].map(|x| [x, 40 * row]));
+    assert_eq!(corners, expected.collect());
+}
+
 /// Two photos with masks, one without.
 fn folder() -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();

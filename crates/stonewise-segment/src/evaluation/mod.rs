@@ -9,4 +9,4 @@ mod mask_score;
 mod pairs;
 
 pub use mask_score::MaskScore;
-pub use pairs::{PhotoPairs, pair_masks};
+pub use pairs::{FoundStone, PhotoPairs, pair_masks};

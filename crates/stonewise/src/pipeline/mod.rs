@@ -23,5 +23,7 @@ pub(crate) use context::Context;
 pub(crate) use graph::Run;
 pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
+pub(crate) use steps::label::Labelled;
+pub(crate) use steps::segment::Segmented;
 pub use units::{Coordinator, Plan, PlanOptions, Unit, UnitDone, do_unit, plan};
 pub use until::Until;
