@@ -1,0 +1,70 @@
+"""Links of the Markdown pages lead somewhere, and their examples name commands and options that exist."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    *ROOT.glob("*.md"),
+    *(page for folder in ("docs", "lab", "testdata") for page in ROOT.glob(f"{folder}/**/*.md")),
+]
+
+
+def without_code(text: str) -> str:
+    return re.sub(r"^ *```.*?^ *```", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings, as GitHub makes them, and those that the page sets itself."""
+    text = without_code(page.read_text())
+    found = set(re.findall(r'<a id="([^"]+)"', text))
+    for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE):
+        words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower()
+        found.add(re.sub(r"[^\w\- ]", "", words).replace(" ", "-"))
+    return found
+
+
+def test_links_lead_somewhere() -> None:
+    broken, count = [], 0
+    for page in PAGES:
+        for link in re.findall(r"\]\(([^)\s]+)\)", without_code(page.read_text())):
+            path, _, anchor = link.partition("#")
+            target = page.parent / path if path else page
+            if re.match(r"[a-z]+:", link):
+                continue
+            count += 1
+            if not target.exists() or (anchor and target.suffix == ".md" and anchor not in anchors(target)):
+                broken.append(f"{page.relative_to(ROOT)}: {link}")
+    assert not broken
+    assert count > 200, "the search is broken"
+
+
+def examples() -> Iterator[tuple[Path, list[str]]]:
+    """Commands of stonewise in the pages' shell examples, as words."""
+    for page in PAGES:
+        for block in re.findall(r"^ *```sh\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.strip().startswith("stonewise "):
+                    yield page, line.split("#")[0].split()[1:]
+
+
+def test_examples_name_commands_and_options_that_exist(
+    command: Callable[..., subprocess.CompletedProcess[str]],
+) -> None:
+    helps: dict[tuple[str, ...], str] = {}
+    unknown, count = [], 0
+    for page, words in examples():
+        nested = words[0] in ("edits", "experiment")
+        name = tuple(words[: 2 if nested else 1])
+        if name not in helps:
+            helps[name] = command(*name, "--help", expect=None).stdout
+        count += 1
+        options = [word.split("=")[0] for word in words if word.startswith("--")]
+        if not helps[name] or any(option not in helps[name] for option in options):
+            unknown.append(f"{page.relative_to(ROOT)}: stonewise {' '.join(words)}")
+    assert not unknown
+    assert count > 30, "the search is broken"
