@@ -9,6 +9,7 @@ cameras:  poses in earth-centred coordinates (camera to world, 4 x 4 by rows), t
 
 import json
 import pathlib
+import sys
 import warnings
 
 import numpy as np
@@ -16,6 +17,7 @@ from pyproj import CRS, Transformer
 
 warnings.filterwarnings("ignore")  # WKT 1 cannot say everything, and need not here
 FOLDER = pathlib.Path(__file__).parent
+POINTS = int(sys.argv[1]) if len(sys.argv) > 1 else 12
 
 # Code and the corners of an area of use: south, west, north, east.
 SYSTEMS = {
@@ -30,6 +32,24 @@ SYSTEMS = {
     27700: (50, -6, 58, 1.5),
     2154: (42, -4, 51, 8),
     3006: (55, 11, 69, 24),
+    28992: (50.8, 3.4, 53.5, 7.2),  # oblique stereographic
+    31700: (43.7, 20.3, 48.2, 29.6),
+    2056: (45.8, 6.0, 47.8, 10.5),  # oblique cylinder
+    21781: (45.8, 6.0, 47.8, 10.5),
+    23700: (45.8, 16.1, 48.5, 22.8),
+    5514: (48.6, 12.2, 51, 22.5),  # Krovak
+    3035: (35, -10, 70, 30),  # Lambert azimuthal equal area
+    3571: (50, -180, 89, 180),
+    3031: (-89, -180, -65, 180),  # polar stereographic, by a parallel and by the scale at the pole
+    3413: (62, -180, 89, 180),
+    5041: (62, -180, 89, 180),
+    3395: (-75, -170, 75, 170),  # Mercator, by the scale and by a parallel
+    3388: (36.5, 46, 47, 54),
+    3005: (48, -138, 60, -114),  # Albers
+    27572: (45.5, -4, 48, 7.6),  # grads from Paris
+    31370: (49.5, 2.5, 51.5, 6.4),
+    3067: (59, 19, 70, 31),
+    2180: (49, 14, 55, 24),
 }
 
 
@@ -44,7 +64,7 @@ def systems(random):
         crs = CRS.from_epsg(code)
         to_map = Transformer.from_crs(geodetic_of(crs), crs, always_xy=True)
         points = []
-        for _ in range(12):
+        for _ in range(POINTS):
             latitude, longitude = random.uniform(south, north), random.uniform(west, east)
             x, y = to_map.transform(longitude, latitude)
             points.append([latitude, longitude, x, y])

@@ -170,7 +170,8 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
         "the clouds name no system: give theirs as crs under [project]"
     );
     assert!(refused(&map("EPSG:31467")).contains("another geodetic datum"));
-    assert!(refused(&map("EPSG:2056")).contains("EPSG:2056 is not among the systems known by their number"));
+    assert!(refused(&map("EPSG:2056")).contains("another geodetic datum"));
+    assert!(refused(&map("EPSG:5513")).contains("EPSG:5513 is not among the systems known by their number"));
     assert!(refused(&map("EPSG:4326")).contains("the clouds are in degrees (WGS 84)"));
     let swiss = "PROJCS[\"CH1903+ / LV95\",GEOGCS[\"CH1903+\",DATUM[\"CH1903+\",SPHEROID[\"Bessel 1841\",6377397.155,299.1528128]]],\
                  PROJECTION[\"Hotine_Oblique_Mercator_Azimuth_Center\"],UNIT[\"metre\",1]]";

@@ -70,6 +70,11 @@ impl Ellipsoid {
     }
 }
 
+/// The angle within half a turn of zero.
+pub(super) fn turn(angle: f64) -> f64 {
+    angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

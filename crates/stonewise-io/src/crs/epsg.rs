@@ -1,150 +1,153 @@
 //! Definitions of the systems that clouds often name by their number alone.
+//!
+//! Source: EPSG Geodetic Parameter Dataset 11.022 as in PROJ 9.5.1, packed by `testdata/crs/epsg.py`, which says
+//! what the lines hold.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::io::Read as _;
+use std::sync::LazyLock;
 
-/// An ellipsoid: name, semi-major axis in metres, inverse flattening.
-type Spheroid = (&'static str, &'static str, &'static str);
+use flate2::read::ZlibDecoder;
 
-const WGS_84_SPHEROID: Spheroid = ("WGS 84", "6378137", "298.257223563");
-const GRS_1980: Spheroid = ("GRS 1980", "6378137", "298.257222101");
-const BESSEL_1841: Spheroid = ("Bessel 1841", "6377397.155", "299.1528128");
-const AIRY_1830: Spheroid = ("Airy 1830", "6377563.396", "299.3249646");
+static PACKED: &[u8] = include_bytes!("epsg.tsv.zz");
 
-/// A geodetic system: its number in the EPSG register, names of the system and of its datum, ellipsoid.
-struct Base(u32, &'static str, &'static str, Spheroid);
-
-const WGS84: Base = Base(4326, "WGS 84", "WGS_1984", WGS_84_SPHEROID);
-const ETRS89: Base = Base(
-    4258,
-    "ETRS89",
-    "European_Terrestrial_Reference_System_1989",
-    GRS_1980,
-);
-const DHDN: Base = Base(4314, "DHDN", "Deutsches_Hauptdreiecksnetz", BESSEL_1841);
-const MGI: Base = Base(4312, "MGI", "Militar-Geographische_Institut", BESSEL_1841);
-const RGF93: Base = Base(4171, "RGF93", "Reseau_Geodesique_Francais_1993", GRS_1980);
-const OSGB36: Base = Base(4277, "OSGB 1936", "OSGB_1936", AIRY_1830);
-const SWEREF99: Base = Base(4619, "SWEREF99", "SWEREF99", GRS_1980);
-
-/// Parameters of a transverse Mercator grid: origin in degrees, scale, false easting and northing in metres.
-struct Grid {
-    latitude: f64,
-    meridian: f64,
-    scale: f64,
-    false_m: [f64; 2],
-}
-
-/// The definition of a system as WKT 1; `None` where this table does not have it.
-///
-/// Source: EPSG Geodetic Parameter Dataset; checked against PROJ (testdata/crs).
-pub fn definition(code: u32) -> Option<String> {
-    let utm = |zone: u32, false_north: f64| Grid {
-        latitude: 0.0,
-        meridian: f64::from(zone) * 6.0 - 183.0,
-        scale: 0.9996,
-        false_m: [500_000.0, false_north],
-    };
-    let gauss_krueger = |meridian: f64, false_m| Grid {
-        latitude: 0.0,
-        meridian,
-        scale: 1.0,
-        false_m,
-    };
-    let (name, base, grid) = match code {
-        4326 => return Some(geographic(&WGS84)),
-        4258 => return Some(geographic(&ETRS89)),
-        4314 => return Some(geographic(&DHDN)),
-        2154 => return Some(lambert_93()),
-        32_601..=32_660 => {
-            let zone = code - 32_600;
-            (format!("WGS 84 / UTM zone {zone}N"), &WGS84, utm(zone, 0.0))
-        }
-        32_701..=32_760 => {
-            let zone = code - 32_700;
-            (
-                format!("WGS 84 / UTM zone {zone}S"),
-                &WGS84,
-                utm(zone, 10_000_000.0),
-            )
-        }
-        25_828..=25_838 => {
-            let zone = code - 25_800;
-            (format!("ETRS89 / UTM zone {zone}N"), &ETRS89, utm(zone, 0.0))
-        }
-        31_466..=31_469 => {
-            let zone = code - 31_464;
-            let east = f64::from(zone) * 1e6 + 500_000.0;
-            let grid = gauss_krueger(f64::from(zone) * 3.0, [east, 0.0]);
-            (format!("DHDN / 3-degree Gauss-Kruger zone {zone}"), &DHDN, grid)
-        }
-        31_254..=31_256 => {
-            let number = code - 31_254;
-            let meridian = [10.0, 13.0, 16.0][number as usize] + 1.0 / 3.0;
-            let grid = gauss_krueger(meridian, [0.0, -5_000_000.0]);
-            let zone = ["West", "Central", "East"][number as usize];
-            (format!("MGI / Austria GK {zone}"), &MGI, grid)
-        }
-        27_700 => {
-            let grid = Grid {
-                latitude: 49.0,
-                meridian: -2.0,
-                scale: 0.999_601_271_7,
-                false_m: [400_000.0, -100_000.0],
-            };
-            ("OSGB 1936 / British National Grid".to_owned(), &OSGB36, grid)
-        }
-        3006 => ("SWEREF99 TM".to_owned(), &SWEREF99, utm(33, 0.0)),
-        _ => return None,
-    };
-    Some(transverse_mercator(code, &name, base, &grid))
-}
-
-fn geographic(base: &Base) -> String {
-    let Base(epsg, name, datum, (spheroid, semi_major, inverse)) = base;
-    format!(
-        "GEOGCS[\"{name}\",DATUM[\"{datum}\",SPHEROID[\"{spheroid}\",{semi_major},{inverse}]],PRIMEM[\"Greenwich\",0],\
-         UNIT[\"degree\",0.0174532925199433],AUTHORITY[\"EPSG\",\"{epsg}\"]]"
-    )
-}
-
-fn transverse_mercator(code: u32, name: &str, base: &Base, grid: &Grid) -> String {
-    let parameters = [
-        ("latitude_of_origin", grid.latitude),
-        ("central_meridian", grid.meridian),
-        ("scale_factor", grid.scale),
-        ("false_easting", grid.false_m[0]),
-        ("false_northing", grid.false_m[1]),
-    ];
-    projected(code, name, base, "Transverse_Mercator", &parameters)
-}
-
-fn lambert_93() -> String {
-    let parameters = [
-        ("latitude_of_origin", 46.5),
-        ("central_meridian", 3.0),
-        ("standard_parallel_1", 49.0),
-        ("standard_parallel_2", 44.0),
-        ("false_easting", 700_000.0),
-        ("false_northing", 6_600_000.0),
-    ];
-    projected(
-        2154,
-        "RGF93 / Lambert-93",
-        &RGF93,
-        "Lambert_Conformal_Conic_2SP",
-        &parameters,
-    )
-}
-
-fn projected(code: u32, name: &str, base: &Base, method: &str, parameters: &[(&str, f64)]) -> String {
-    let mut text = format!("PROJCS[\"{name}\",{},PROJECTION[\"{method}\"]", geographic(base));
-    for (name, value) in parameters {
-        let _ = write!(text, ",PARAMETER[\"{name}\",{value}]");
-    }
-    let _ = write!(
-        text,
-        ",UNIT[\"metre\",1],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH]"
-    );
-    let _ = write!(text, ",AUTHORITY[\"EPSG\",\"{code}\"]]");
+static TEXT: LazyLock<String> = LazyLock::new(|| {
+    let mut text = String::new();
+    // A test counts the systems: what is built in is whole.
+    let _ = ZlibDecoder::new(PACKED).read_to_string(&mut text);
     text
+});
+
+static REGISTER: LazyLock<Register> = LazyLock::new(|| Register::of(&TEXT));
+
+/// The definition of a system as WKT 1; `None` where the table does not have it.
+pub fn definition(code: u32) -> Option<String> {
+    REGISTER.definition(code)
+}
+
+/// The size of the unit of a projected system, metres.
+pub fn unit_m(code: u32) -> Option<f64> {
+    let projected = REGISTER.projected.get(&code)?;
+    let [_, _, _, unit, ..] = cells(projected)[..] else {
+        return None;
+    };
+    cells(REGISTER.at(&REGISTER.units, unit)?).last()?.parse().ok()
+}
+
+/// The lines of the table, without their kind and code.
+#[derive(Default)]
+struct Register {
+    spheroids: Vec<&'static str>,
+    units: Vec<&'static str>,
+    methods: Vec<&'static str>,
+    /// Code of each geographic system, in the order of the table.
+    bases: Vec<u32>,
+    geographic: BTreeMap<u32, &'static str>,
+    projected: BTreeMap<u32, &'static str>,
+}
+
+impl Register {
+    fn of(text: &'static str) -> Self {
+        let mut register = Self::default();
+        let (mut geographic, mut projected) = (0, 0);
+        for line in text.lines() {
+            let Some((kind, rest)) = line.split_once('\t') else {
+                continue;
+            };
+            let coded = |last: &mut u32| {
+                let (step, rest) = rest.split_once('\t')?;
+                *last += step.parse::<u32>().ok()?;
+                Some((*last, rest))
+            };
+            match kind {
+                "S" => register.spheroids.push(rest),
+                "U" => register.units.push(rest),
+                "M" => register.methods.push(rest),
+                "G" => register.geographic.extend(coded(&mut geographic)),
+                _ => register.projected.extend(coded(&mut projected)),
+            }
+        }
+        register.bases = register.geographic.keys().copied().collect();
+        register
+    }
+
+    fn at(&self, lines: &[&'static str], number: &str) -> Option<&'static str> {
+        lines.get(number.parse::<usize>().ok()?).copied()
+    }
+
+    fn definition(&self, code: u32) -> Option<String> {
+        match self.projected.get(&code) {
+            Some(line) => self.projected(code, line),
+            None => self.geographic(code),
+        }
+    }
+
+    fn geographic(&self, code: u32) -> Option<String> {
+        let line = self.geographic.get(&code)?;
+        let [name, datum, spheroid, meridian, degrees, unit, radians] = cells(line)[..] else {
+            return None;
+        };
+        let [spheroid, semi_major, inverse] = cells(self.at(&self.spheroids, spheroid)?)[..] else {
+            return None;
+        };
+        Some(format!(
+            "GEOGCS[\"{name}\",DATUM[\"{datum}\",SPHEROID[\"{spheroid}\",{semi_major},{inverse}]],\
+             PRIMEM[\"{meridian}\",{degrees}],UNIT[\"{unit}\",{radians}],AUTHORITY[\"EPSG\",\"{code}\"]]"
+        ))
+    }
+
+    fn projected(&self, code: u32, line: &str) -> Option<String> {
+        let line = cells(line);
+        let [name, base, method, unit, ref values @ ..] = line[..] else {
+            return None;
+        };
+        let base = *self.bases.get(base.parse::<usize>().ok()?)?;
+        let name = match name.strip_prefix('/') {
+            Some(rest) => format!("{} / {rest}", cells(self.geographic.get(&base)?).first()?),
+            None => name.to_owned(),
+        };
+        let method = cells(self.at(&self.methods, method)?);
+        let (method, parameters) = method.split_first()?;
+        let [unit, metres] = cells(self.at(&self.units, unit)?)[..] else {
+            return None;
+        };
+        let mut text = format!(
+            "PROJCS[\"{name}\",{},PROJECTION[\"{method}\"]",
+            self.geographic(base)?
+        );
+        for (parameter, value) in parameters.iter().zip(values) {
+            let _ = write!(text, ",PARAMETER[\"{parameter}\",{value}]");
+        }
+        let _ = write!(
+            text,
+            ",UNIT[\"{unit}\",{metres}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH],AUTHORITY[\"EPSG\",\"{code}\"]]"
+        );
+        Some(text)
+    }
+}
+
+fn cells(line: &str) -> Vec<&str> {
+    line.split('\t').collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::crs::MapSystem;
+
+    #[test]
+    fn the_table_is_whole_and_most_of_its_systems_can_be_projected_into() {
+        assert_eq!((REGISTER.geographic.len(), REGISTER.projected.len()), (662, 5520));
+        let mut usable = 0;
+        let mut other: BTreeMap<String, usize> = BTreeMap::new();
+        for &code in REGISTER.projected.keys().chain(REGISTER.geographic.keys()) {
+            match MapSystem::parse(&definition(code).unwrap()) {
+                Ok(system) => usable += usize::from(system.is_some()),
+                Err(reason) => *other.entry(reason).or_default() += 1,
+            }
+        }
+        // Of the others most are in feet.
+        assert_eq!(usable, 662 + 4464, "{other:?}");
+    }
 }

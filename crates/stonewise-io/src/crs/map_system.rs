@@ -4,6 +4,7 @@ use super::ellipsoid::Ellipsoid;
 use super::epsg;
 use super::projection::{MapOrigin, Projection};
 use super::wkt::Node;
+use std::f64::consts::FRAC_PI_2;
 
 /// A system that is tied to the earth.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,7 +176,13 @@ fn projection(node: &Node<'_>, base: &Node<'_>) -> Result<Projection, String> {
             .unwrap_or(0.0),
     };
     let scale = parameters
-        .plain(&["scalefactor", "scalefactoratnaturalorigin"])
+        .plain(&[
+            "scalefactor",
+            "scalefactoratnaturalorigin",
+            "scalefactoratprojectioncentre",
+            "scalefactoroninitialline",
+            "scalefactoronpseudostandardparallel",
+        ])
         .unwrap_or(1.0);
     let origin = parameters.origin();
     let possible = scale > 0.0 && origin.latitude.abs() < 1.6 && origin.longitude.abs() < 7.0;
@@ -191,11 +198,8 @@ fn projection(node: &Node<'_>, base: &Node<'_>) -> Result<Projection, String> {
         | "lambertconicconformal1sp"
         | "lambertconformalconic2sp"
         | "lambertconicconformal2sp" => {
-            let first = parameters.angle(&["standardparallel1", "latitudeof1ststandardparallel"]);
-            let first = first.unwrap_or(origin.latitude);
-            let second = parameters.angle(&["standardparallel2", "latitudeof2ndstandardparallel"]);
-            let parallels = [first, second.unwrap_or(first)];
-            if parallels.iter().any(|p| !(1e-6..1.57).contains(&p.abs())) || first * parallels[1] < 0.0 {
+            let parallels = parameters.parallels(origin.latitude)?;
+            if parallels.iter().any(|p| p.abs() < 1e-6) || parallels[0] * parallels[1] < 0.0 {
                 return Err("its cone has impossible parallels".to_owned());
             }
             Ok(Projection::LambertConic {
@@ -204,9 +208,70 @@ fn projection(node: &Node<'_>, base: &Node<'_>) -> Result<Projection, String> {
                 scale,
             })
         }
+        "mercator" | "mercator1sp" | "mercator2sp" | "mercatorvarianta" | "mercatorvariantb" => {
+            let parallel = parameters.angle(&FIRST_PARALLEL).unwrap_or(0.0);
+            if parallel.abs() > 1.5 || origin.latitude.abs() > 1e-9 {
+                return Err("its cylinder has an impossible parallel".to_owned());
+            }
+            Ok(Projection::Mercator {
+                origin,
+                parallel,
+                scale,
+            })
+        }
+        "polarstereographic" | "polarstereographicvarianta" | "polarstereographicvariantb" => {
+            let standard = parameters.angle(&["latitudeofstandardparallel"]);
+            let parallel = standard.unwrap_or(origin.latitude);
+            if !(0.5..1.571).contains(&parallel.abs()) {
+                return Err("it is not stereographic about a pole".to_owned());
+            }
+            Ok(Projection::PolarStereographic {
+                origin: MapOrigin {
+                    latitude: FRAC_PI_2.copysign(parallel),
+                    ..origin
+                },
+                parallel,
+                scale,
+            })
+        }
+        "obliquestereographic" | "doublestereographic" => {
+            Ok(Projection::ObliqueStereographic { origin, scale })
+        }
+        "swissobliquemercator" | "swissobliquecylindrical" => {
+            Ok(Projection::ObliqueCylinder { origin, scale })
+        }
+        "hotineobliquemercatorazimuthcenter" | "hotineobliquemercatorvariantb"
+            if parameters.is_level_cylinder() =>
+        {
+            Ok(Projection::ObliqueCylinder { origin, scale })
+        }
+        "krovak" | "krovaknorthorientated" => {
+            let from_pole = parameters.angle(&["azimuth", "colatitudeofconeaxis"]);
+            let parallel = parameters.angle(&["pseudostandardparallel1", "latitudeofpseudostandardparallel"]);
+            let (Some(from_pole), Some(parallel)) = (from_pole, parallel) else {
+                return Err("its cone has no axis or no parallel".to_owned());
+            };
+            if !(0.0..1.57).contains(&from_pole) || !(0.1..1.57).contains(&parallel) {
+                return Err("its cone has an impossible axis or parallel".to_owned());
+            }
+            Ok(Projection::Krovak {
+                origin,
+                from_pole,
+                parallel,
+                scale,
+            })
+        }
+        "lambertazimuthalequalarea" => Ok(Projection::AzimuthalEqualArea { origin }),
+        "albersconicequalarea" | "albersequalarea" => {
+            let parallels = parameters.parallels(origin.latitude)?;
+            Ok(Projection::AlbersConic { origin, parallels })
+        }
         _ => Err(format!("its projection, {method:?}, is not covered")),
     }
 }
+
+const FIRST_PARALLEL: [&str; 2] = ["standardparallel1", "latitudeof1ststandardparallel"];
+const SECOND_PARALLEL: [&str; 2] = ["standardparallel2", "latitudeof2ndstandardparallel"];
 
 /// The parameters of a projection.
 struct Parameters<'a> {
@@ -224,6 +289,7 @@ impl Parameters<'_> {
             "latitudeofnaturalorigin",
             "latitudeoffalseorigin",
             "latitudeofcenter",
+            "latitudeofprojectioncentre",
         ];
         let longitude = [
             "centralmeridian",
@@ -231,14 +297,42 @@ impl Parameters<'_> {
             "longitudeoffalseorigin",
             "longitudeoforigin",
             "longitudeofcenter",
+            "longitudeofprojectioncentre",
         ];
-        let east = self.plain(&["falseeasting", "eastingatfalseorigin"]);
-        let north = self.plain(&["falsenorthing", "northingatfalseorigin"]);
+        let east = self.plain(&[
+            "falseeasting",
+            "eastingatfalseorigin",
+            "eastingatprojectioncentre",
+        ]);
+        let north = self.plain(&[
+            "falsenorthing",
+            "northingatfalseorigin",
+            "northingatprojectioncentre",
+        ]);
         MapOrigin {
             latitude: self.angle(&latitude).unwrap_or(0.0),
             longitude: self.angle(&longitude).unwrap_or(0.0) + self.meridian.to_radians(),
             false_m: [east.unwrap_or(0.0), north.unwrap_or(0.0)],
         }
+    }
+
+    /// The parallels of a cone; `only`: the one of a cone without any of its own.
+    fn parallels(&self, only: f64) -> Result<[f64; 2], String> {
+        let first = self.angle(&FIRST_PARALLEL).unwrap_or(only);
+        let parallels = [first, self.angle(&SECOND_PARALLEL).unwrap_or(first)];
+        let is_flat = (parallels[0] + parallels[1]).abs() < 1e-6;
+        if is_flat || parallels.iter().any(|p| p.abs() > 1.57) {
+            return Err("its cone has impossible parallels".to_owned());
+        }
+        Ok(parallels)
+    }
+
+    /// Whether an oblique cylinder touches the earth along the great circle that crosses the meridian of the
+    /// centre at right angles, and north is up.
+    fn is_level_cylinder(&self) -> bool {
+        let is_right = |names: &[&str]| self.angle(names).is_some_and(|a| (a - FRAC_PI_2).abs() < 1e-9);
+        is_right(&["azimuth", "azimuthofinitialline", "azimuthatprojectioncentre"])
+            && is_right(&["rectifiedgridangle", "anglefromrectifiedtoskewgrid"])
     }
 
     fn node(&self, names: &[&str]) -> Option<&Node<'_>> {

@@ -1,7 +1,9 @@
 //! Coordinate reference systems: their names, and the map projections of those that cameras come in.
 
+mod conformal;
 mod ellipsoid;
 mod epsg;
+mod equal_area;
 mod feet;
 mod map_system;
 mod projection;

@@ -1,8 +1,10 @@
-//! Conformal map projections: the transverse Mercator family (UTM, Gauss-Krueger, most national grids) and
-//! Lambert's cone.
+//! Map projections: the transverse Mercator family (UTM, Gauss-Krueger, most national grids), Lambert's cone,
+//! Mercator and polar stereographic here, others in files of their own.
 
-use super::ellipsoid::{Ellipsoid, Geodetic};
-use std::f64::consts::FRAC_PI_4;
+use super::conformal::{GaussSphere, isometric};
+use super::ellipsoid::{Ellipsoid, Geodetic, turn};
+use super::equal_area::{albers, azimuthal, parallel_radius};
+use std::f64::consts::FRAC_PI_2;
 
 /// A projection with its parameters; angles in radians, lengths in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +25,61 @@ pub enum Projection {
         /// Scale on the parallels.
         scale: f64,
     },
+    /// Mercator.
+    Mercator {
+        /// Where it begins; its latitude is the equator.
+        origin: MapOrigin,
+        /// Parallel of true scale.
+        parallel: f64,
+        /// Scale on the parallel.
+        scale: f64,
+    },
+    /// Stereographic about a pole.
+    PolarStereographic {
+        /// Its latitude says which pole.
+        origin: MapOrigin,
+        /// Parallel of true scale; the pole where its scale is given.
+        parallel: f64,
+        /// Scale on the parallel.
+        scale: f64,
+    },
+    /// Stereographic by way of a sphere: RD New of the Netherlands.
+    ObliqueStereographic {
+        /// Where it begins.
+        origin: MapOrigin,
+        /// Scale at the origin.
+        scale: f64,
+    },
+    /// The oblique cylinder of Switzerland and Hungary, by way of a sphere.
+    ObliqueCylinder {
+        /// Where it begins.
+        origin: MapOrigin,
+        /// Scale along the great circle through the origin.
+        scale: f64,
+    },
+    /// Krovak's oblique cone, with coordinates to the east and north.
+    Krovak {
+        /// Where it begins.
+        origin: MapOrigin,
+        /// Angle between the axes of the cone and of the earth.
+        from_pole: f64,
+        /// Parallel of the cone.
+        parallel: f64,
+        /// Scale on the parallel.
+        scale: f64,
+    },
+    /// Lambert's azimuthal equal area.
+    AzimuthalEqualArea {
+        /// Where it begins.
+        origin: MapOrigin,
+    },
+    /// Albers's equal area cone.
+    AlbersConic {
+        /// Where it begins.
+        origin: MapOrigin,
+        /// Parallels of true scale.
+        parallels: [f64; 2],
+    },
 }
 
 /// The place from which a projection counts.
@@ -40,7 +97,8 @@ impl Projection {
     /// Easting and northing, metres.
     ///
     /// Source: Krueger 1912, as Karney 2011, "Transverse Mercator with an accuracy of a few nanometers",
-    /// equations 7 to 11 and 35; Snyder 1987, "Map projections", equations 15-1 to 15-10, for the cone.
+    /// equations 7 to 11 and 35; Snyder 1987, "Map projections", equations 15-1 to 15-10, for the cone, 7-6 and
+    /// 7-7 for Mercator, 21-33 and 21-34 for the poles.
     pub fn forward(&self, ellipsoid: &Ellipsoid, at: &Geodetic) -> [f64; 2] {
         match self {
             Self::TransverseMercator { origin, scale } => {
@@ -65,13 +123,72 @@ impl Projection {
                     origin.false_m[1] + r0 - r * angle.cos(),
                 ]
             }
+            Self::Mercator {
+                origin,
+                parallel,
+                scale,
+            } => {
+                let radius = ellipsoid.semi_major_m * parallel_radius(ellipsoid, *parallel);
+                let way = [
+                    turn(at.longitude - origin.longitude),
+                    isometric(ellipsoid, at.latitude),
+                ];
+                origin.add(*scale, way.map(|w| radius * w))
+            }
+            Self::PolarStereographic {
+                origin,
+                parallel,
+                scale,
+            } => {
+                let side = origin.latitude.signum();
+                let radius = polar_scale(ellipsoid, side * parallel)
+                    * (-isometric(ellipsoid, side * at.latitude)).exp();
+                let (sin, cos) = turn(at.longitude - origin.longitude).sin_cos();
+                origin.add(*scale, [radius * sin, -side * radius * cos])
+            }
+            Self::ObliqueStereographic { origin, scale } => {
+                let sphere = GaussSphere::new(ellipsoid, origin.latitude);
+                origin.add(*scale, sphere.stereographic(at, origin.longitude))
+            }
+            Self::ObliqueCylinder { origin, scale } => {
+                let sphere = GaussSphere::new(ellipsoid, origin.latitude);
+                origin.add(*scale, sphere.cylinder(at, origin.longitude))
+            }
+            Self::Krovak {
+                origin,
+                from_pole,
+                parallel,
+                scale,
+            } => {
+                let sphere = GaussSphere::new(ellipsoid, origin.latitude);
+                let way = sphere.oblique_cone(at, origin.longitude, *from_pole, *parallel);
+                origin.add(-scale, way)
+            }
+            Self::AzimuthalEqualArea { origin } => {
+                origin.add(1.0, azimuthal(ellipsoid, at, origin.latitude, origin.longitude))
+            }
+            Self::AlbersConic { origin, parallels } => {
+                let begin = [origin.latitude, origin.longitude];
+                origin.add(1.0, albers(ellipsoid, at, begin, *parallels))
+            }
         }
     }
 }
 
-/// The angle within half a turn of zero.
-fn turn(angle: f64) -> f64 {
-    angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round()
+impl MapOrigin {
+    /// The place that lies this far east and north on a map of scale 1.
+    fn add(&self, scale: f64, way: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| self.false_m[axis] + scale * way[axis])
+    }
+}
+
+/// Radius of a parallel of a polar stereographic map, over the exponential of its isometric colatitude, metres.
+fn polar_scale(ellipsoid: &Ellipsoid, parallel: f64) -> f64 {
+    if FRAC_PI_2 - parallel < 1e-9 {
+        let e = ellipsoid.eccentricity_squared().sqrt();
+        return 2.0 * ellipsoid.semi_major_m / ((1.0 + e).powf(1.0 + e) * (1.0 - e).powf(1.0 - e)).sqrt();
+    }
+    ellipsoid.semi_major_m * parallel_radius(ellipsoid, parallel) * isometric(ellipsoid, parallel).exp()
 }
 
 /// Easting and northing from the equator and the central meridian, scale 1.
@@ -153,9 +270,8 @@ struct Cone {
 
 impl Cone {
     fn new(ellipsoid: &Ellipsoid, parallels: [f64; 2]) -> Self {
-        let e2 = ellipsoid.eccentricity_squared();
-        let [m1, m2] = parallels.map(|p| p.cos() / (1.0 - e2 * p.sin().powi(2)).sqrt());
-        let [t1, t2] = parallels.map(|p| isometric(ellipsoid, p));
+        let [m1, m2] = parallels.map(|p| parallel_radius(ellipsoid, p));
+        let [t1, t2] = parallels.map(|p| (-isometric(ellipsoid, p)).exp());
         let n = if (parallels[0] - parallels[1]).abs() < 1e-10 {
             parallels[0].sin()
         } else {
@@ -168,13 +284,6 @@ impl Cone {
     }
 
     fn radius(&self, ellipsoid: &Ellipsoid, latitude: f64) -> f64 {
-        ellipsoid.semi_major_m * self.factor * isometric(ellipsoid, latitude).powf(self.n)
+        ellipsoid.semi_major_m * self.factor * (-self.n * isometric(ellipsoid, latitude)).exp()
     }
-}
-
-/// Snyder's t, equation 15-9.
-fn isometric(ellipsoid: &Ellipsoid, latitude: f64) -> f64 {
-    let e = ellipsoid.eccentricity_squared().sqrt();
-    let flattened = e * latitude.sin();
-    (FRAC_PI_4 - latitude / 2.0).tan() / ((1.0 - flattened) / (1.0 + flattened)).powf(e / 2.0)
 }
