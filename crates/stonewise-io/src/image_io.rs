@@ -7,17 +7,20 @@ use crate::folder::files_below;
 pub use crate::photo_name::is_photo;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader};
+use image::{ExtendedColorType, ImageDecoder, ImageEncoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::{BufWriter, Cursor};
 use std::path::{Path, PathBuf};
 use stonewise_core::raster::{Raster, RgbImage};
 
+/// Memory that a photo may take while it is read: 300 megapixels of three 16-bit values.
+const MOST_BYTES: u64 = 2 << 30;
+
 /// Why a picture could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageIoError {
-    /// The file cannot be read or is no intact JPEG or PNG.
+    /// The file cannot be read or is no intact JPEG, PNG or TIFF.
     #[error("cannot read the image: {source}: {}", path.display())]
     Read {
         /// File.
@@ -41,7 +44,8 @@ pub enum ImageIoError {
     },
 }
 
-/// Reads a JPEG or PNG as 8-bit RGB; the format is told from the content, not the name.
+/// Reads a JPEG, PNG or TIFF as 8-bit RGB, 16-bit values rounded; the format is told from the content, not the
+/// name. Of several pages of a TIFF the first is read.
 ///
 /// # Errors
 /// The file is missing, truncated or in another format.
@@ -53,7 +57,10 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ImageIoError> {
         });
     }
     let decode = || -> Result<image::RgbImage, ImageError> {
-        let reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+        let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format()?;
+        let mut limits = Limits::default();
+        limits.max_alloc = Some(MOST_BYTES);
+        reader.limits(limits);
         Ok(reader.decode()?.into_rgb8())
     };
     let decoded = decode().map_err(|source| read_error(path, source))?;
@@ -84,7 +91,7 @@ pub struct PictureHead {
     pub is_label: bool,
 }
 
-/// Reads the head of a JPEG or PNG alone.
+/// Reads the head of a JPEG, PNG or TIFF alone.
 ///
 /// # Errors
 /// The file is missing or in another format.

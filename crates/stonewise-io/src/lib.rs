@@ -4,6 +4,7 @@ pub mod atomic;
 pub mod cameras;
 pub mod cloud;
 pub mod crs;
+pub mod exif;
 mod folder;
 pub mod image_io;
 pub mod layers;

@@ -3,7 +3,7 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 3] = [
-    &["atomic", "crs", "folder", "photo_name", "wall"],
+    &["atomic", "crs", "exif", "folder", "photo_name", "wall"],
     &["cameras", "cloud", "image_io", "mesh_ply", "table"],
     &["layers", "masks"],
 ];
