@@ -2,7 +2,7 @@
 
 lens.json      pixels of points in the camera frame, by OpenCV's projectPoints and fisheye.projectPoints, and by the
                formulae of Metashape's user manual (appendix "Camera models") written out in numpy below.
-metashape.xml, colmap_bin/, colmap_txt/, opensfm.json
+metashape.xml, colmap_bin/, colmap_txt/, opensfm.json, pix4d/, transforms.json
                camera files with every model that is read, and expected.json with the pixels of world points in each.
 rejected/      COLMAP folders that must be refused.
 
@@ -306,8 +306,59 @@ def opensfm():
     return expected
 
 
+def pix4d():
+    """Local places, and the offset that brings them to the map."""
+    offset = np.array([350000.0, 5650000.0, 100.0])
+    lines = ["fileName imageWidth imageHeight", "camera matrix K [3x3]", "radial distortion [3x1]", "tangential distortion [2x1]",
+             "camera position t [3x1]", "camera rotation R [3x3]", "camera model m = K [R|-Rt] X", ""]
+    expected = {}
+    for name, dist in [("DJI 0001.JPG", K[:2] + P + K[2:]), ("DJI_0002.JPG", [0, 0, 0, 0, 0])]:
+        q, centre = random_quaternion(), rng.uniform(-20, 20, 3)
+        r = quaternion_to_matrix(q)
+        points = rays(W, H, FX, 20)
+        expected[name] = rounded(np.hstack([points @ r + centre + offset, opencv(points, FX, FY, CX, CY, dist)]))
+        k = [[FX, 0, CX], [0, FY, CY], [0, 0, 1]]
+        k1, k2, p1, p2, k3 = dist
+        rows = [*k, [k1, k2, k3], [p1, p2], centre, *r]
+        lines += [f"{name} {W} {H}", *[num(row) for row in rows]]
+    folder = HERE / "pix4d"
+    folder.mkdir(exist_ok=True)
+    (folder / "dam_calibrated_camera_parameters.txt").write_text("\n".join(lines) + "\n")
+    (folder / "dam_offset.xyz").write_text("350000.000 5650000.000 100.000\n")
+    return expected
+
+
+def nerfstudio():
+    """A shared camera and two of their own; the world was turned and shifted after the reconstruction."""
+    fish = [0.031, -0.0142, 0.0051, -0.0009]
+    turn, shift = quaternion_to_matrix(random_quaternion()), rng.uniform(-9, 9, 3)
+    shared = {"camera_model": "OPENCV", "w": W, "h": H, "fl_x": FX, "fl_y": FY, "cx": CX, "cy": CY, "k1": K[0], "k2": K[1],
+              "p1": P[0], "p2": P[1]}
+    own = {
+        "images/shared.jpg": ({}, lambda p: opencv(p, FX, FY, CX, CY, K[:2] + P)),
+        "images/fisheye.jpg": (
+            {"camera_model": "OPENCV_FISHEYE", "fl_x": 1400.0, "fl_y": 1403.0, **{f"k{i + 1}": v for i, v in enumerate(fish)}},
+            lambda p: opencv_fisheye(p, 1400.0, 1403.0, CX, CY, fish)),
+        "images/k3.jpg": ({"k3": K[2]}, lambda p: opencv(p, FX, FY, CX, CY, K[:2] + P + K[2:])),
+    }
+    frames, expected = [], {}
+    for name, (camera, project) in own.items():
+        q, centre = random_quaternion(), rng.uniform(-9, 9, 3)
+        r = quaternion_to_matrix(q)
+        points = wide_rays(20) if "fisheye" in name else rays(W, H, FX, 20)
+        expected[name] = rounded(np.hstack([points @ r + centre, project(points)]))
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = turn @ r.T @ np.diag([1, -1, -1]), turn @ centre + shift
+        frames.append({"file_path": "./" + name, "transform_matrix": pose.tolist(), **camera})
+    applied = np.hstack([turn, shift[:, None]]).tolist()
+    content = {**shared, "applied_transform": applied, "ply_file_path": "sparse_pc.ply", "frames": frames}
+    (HERE / "transforms.json").write_text(json.dumps(content, indent=1) + "\n")
+    return expected
+
+
 if __name__ == "__main__":
     compact = lambda value: json.dumps(value, separators=(",", ":")).replace('{"name"', '\n{"name"')
     (HERE / "lens.json").write_text(compact(list(lens_cases())) + "\n")
-    files = {"colmap": colmap(), "metashape": metashape_file(), "opensfm": opensfm()}
+    files = {"colmap": colmap(), "metashape": metashape_file(), "opensfm": opensfm(), "pix4d": pix4d(),
+             "nerfstudio": nerfstudio()}
     (HERE / "expected.json").write_text(json.dumps(files, separators=(",", ":")) + "\n")

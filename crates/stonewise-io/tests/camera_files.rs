@@ -89,6 +89,75 @@ fn opensfm_puts_points_where_opencv_does() {
     assert_eq!(file.warnings.len(), 1);
 }
 
+#[test]
+fn pix4d_and_nerfstudio_put_points_where_opencv_does() {
+    for (path, section) in [
+        ("pix4d/dam_calibrated_camera_parameters.txt", "pix4d"),
+        ("transforms.json", "nerfstudio"),
+    ] {
+        let file = read_cameras(&fixture(path)).unwrap();
+        assert_pixels(&file, &expected(section));
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+    }
+}
+
+#[test]
+fn pix4d_and_nerfstudio_files_that_cannot_be_read_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    for (source, from, to, part) in [
+        (
+            "pix4d/dam_calibrated_camera_parameters.txt",
+            "\n0 0 1\n",
+            "\n0 0\n",
+            "line 12: expected 3 numbers",
+        ),
+        (
+            "pix4d/dam_calibrated_camera_parameters.txt",
+            "2900.5 0",
+            "-2900.5 0",
+            "photo DJI 0001.JPG: its focal lengths must be positive",
+        ),
+        (
+            "transforms.json",
+            "\"OPENCV\"",
+            "\"EQUIRECTANGULAR\"",
+            "camera model EQUIRECTANGULAR of photo",
+        ),
+        (
+            "transforms.json",
+            "\"w\": 4000",
+            "\"w\": -1",
+            "a positive w is missing",
+        ),
+        (
+            "transforms.json",
+            "\"applied_transform\": [\n  [",
+            "\"applied_transform\": [[],\n  [",
+            "applied_transform: expected 3 or 4 rows of 4 numbers",
+        ),
+    ] {
+        let name = Path::new(source).file_name().unwrap();
+        let path = folder.path().join(name);
+        let good = std::fs::read_to_string(fixture(source)).unwrap();
+        assert!(good.contains(from), "{from}");
+        std::fs::write(&path, good.replacen(from, to, 1)).unwrap();
+        let error = message(&path);
+        let (place, problem) = part.split_once(": ").unwrap_or(("", part));
+        assert!(error.contains(place) && error.contains(problem), "{error}");
+    }
+    // Every cut at the end of a line but the last of a photo is an error.
+    let good = std::fs::read_to_string(fixture("pix4d/dam_calibrated_camera_parameters.txt")).unwrap();
+    let path = folder.path().join("cut_calibrated_camera_parameters.txt");
+    for (number, (end, _)) in good.match_indices('\n').enumerate() {
+        std::fs::write(&path, &good[..end]).unwrap();
+        assert_eq!(
+            read_cameras(&path).is_ok(),
+            [17, 27].contains(&number),
+            "{number}"
+        );
+    }
+}
+
 fn message(path: &Path) -> String {
     let error = read_cameras(path).unwrap_err();
     let text = error.to_string();

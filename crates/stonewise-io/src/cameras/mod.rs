@@ -1,4 +1,4 @@
-//! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM.
+//! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM, Pix4D, nerfstudio.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
@@ -9,8 +9,10 @@ mod colmap;
 mod error;
 mod map_frame;
 mod metashape;
+mod nerfstudio;
 mod opensfm;
 mod photos;
+mod pix4d;
 mod read;
 mod remark;
 mod xml;
@@ -21,7 +23,7 @@ pub use error::CameraError;
 pub use map_frame::MapFrame;
 pub use metashape::write_metashape;
 pub use photos::{Photos, find_photos};
-pub use read::{read_cameras, read_cameras_on_map};
+pub use read::{is_camera_file, read_cameras, read_cameras_on_map};
 pub use remark::Remark;
 
 use error::{malformed, read_text};

@@ -1,6 +1,8 @@
 //! Camera files of any of the known formats.
 
-use super::{CameraError, CameraFile, MapFrame, colmap, malformed, metashape, opensfm};
+use super::{
+    CameraError, CameraFile, MapFrame, colmap, malformed, metashape, nerfstudio, opensfm, pix4d, read_text,
+};
 use std::path::Path;
 use stonewise_core::geometry::View;
 
@@ -13,6 +15,8 @@ const MAX_PIXELS: u64 = 1 << 30;
 /// - COLMAP: a folder with cameras and images as .bin or .txt (.bin wins, as in COLMAP), or one of these
 ///   files, or a folder that holds them under `sparse/0`, `sparse` or `0`.
 /// - OpenSfM: reconstruction.json.
+/// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
+/// - nerfstudio and instant-ngp: transforms.json.
 ///
 /// ```
 /// use stonewise_io::cameras::read_cameras;
@@ -47,7 +51,9 @@ pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, Ca
     } else {
         match extension(path).as_str() {
             "xml" => metashape::read(path, map)?,
+            "json" if nerfstudio::is_transforms(&read_text(path)?) => nerfstudio::read(path)?,
             "json" => opensfm::read(path)?,
+            "txt" if pix4d::is_pix4d(path) => pix4d::read(path)?,
             "txt" | "bin" => colmap::read_folder(path.parent().unwrap_or(Path::new(".")))?,
             _ => {
                 return Err(CameraError::UnknownFormat {
@@ -65,6 +71,20 @@ pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, Ca
     check_sizes(&file, path)?;
     check_places(&file, path)?;
     Ok(file)
+}
+
+/// Whether a file bears the name of a camera file, by which it is told from masks and clouds.
+pub fn is_camera_file(path: &Path) -> bool {
+    let name = path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    match extension(path).as_str() {
+        "xml" => true,
+        "json" => name.contains("reconstruction") || name.contains("transforms"),
+        _ => pix4d::is_pix4d(path),
+    }
 }
 
 /// Refuses photos that no memory holds.
