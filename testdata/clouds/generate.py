@@ -4,7 +4,7 @@ Every file holds the same points, so that a test can compute them again:
     x = 350000 + i / 100, y = 5650000 - i / 50, z = 100 + (i * i % 97) / 1000, metres, for i = 0 .. 119
     red, green, blue = 500 i, 65535 - 500 i, 257 (i % 256); intensity = 7 i
 Formats with 8-bit colours hold the high byte. Run here: python generate.py
-Needs numpy, laspy[lazrs], lazrs, pye57, plyfile.
+Needs numpy, laspy[lazrs], lazrs, pye57, plyfile, pypcd4.
 """
 import io
 import struct
@@ -14,6 +14,7 @@ import lazrs
 import numpy as np
 import plyfile
 import pye57
+import pypcd4
 from laspy.vlrs.vlr import VLR
 
 N = 120
@@ -178,6 +179,44 @@ def text(name, separator, header, columns, decimal="."):
             out.write(separator.join(str(v).replace(".", decimal) for v in row) + "\n")
 
 
+def pcd(name, encoding):
+    """Fields of every kind before and between those that are read. In text, pypcd4 rounds packed floats to 0."""
+    packed = pypcd4.PointCloud.encode_rgb(rgb // 257)
+    packed = packed.view("u4") if encoding == pypcd4.Encoding.ASCII else packed
+    fields = {"label": i.astype("u1"), "x": x, "rgb": packed, "y": y, "z": z,
+              "intensity": intensity, "t": i.astype("i4")}
+    cloud = pypcd4.PointCloud.from_points(list(fields.values()), list(fields), [f.dtype for f in fields.values()])
+    cloud.metadata.viewpoint = (349990.0, 5650010.0, 101.5, 1.0, 0.0, 0.0, 0.0)
+    cloud.save(name, encoding)
+
+
+def ptx(name):
+    """Two scans; every tenth place of the grid has no echo. The second scanner is turned and tilted."""
+    turns = [np.eye(3), rotation(0.3, 0.02, -0.7)]
+    stations = np.array([[349990.0, 5650010.0, 101.5], [350020.0, 5649980.0, 99.25]])
+    with open(name, "w", newline="\r\n") as out:
+        for turn, station, part in zip(turns, stations, [i[:70], i[70:]]):
+            local = (np.stack([x, y, z], axis=1)[part] - station) @ turn
+            grid = len(part) + len(part) // 10
+            out.write(f"{grid // 11}\n11\n" + " ".join(f"{v:.6f}" for v in station) + "\n")
+            rows = np.hstack([turn.T, np.zeros((3, 1))])
+            for row in turn.T:
+                out.write(" ".join(f"{v:.15f}" for v in row) + "\n")
+            for row in [*rows, [*station, 1.0]]:
+                out.write(" ".join(f"{v:.15f}" for v in row) + "\n")
+            for k, (p, q) in enumerate(zip(local, part)):
+                out.write(" ".join(f"{v:.10f}" for v in p) + f" {7 * q / 1000:.6f} ")
+                out.write(" ".join(str(c // 257) for c in rgb[q]) + "\n")
+                if k % 10 == 9:
+                    out.write("0 0 0 0.500000 0 0 0\n")
+
+
+def rotation(z_turn, y_turn, x_turn):
+    (a, b, c), (d, e, f) = np.cos([z_turn, y_turn, x_turn]), np.sin([z_turn, y_turn, x_turn])
+    return (np.array([[a, -d, 0], [d, a, 0], [0, 0, 1]]) @ np.array([[b, 0, e], [0, 1, 0], [-e, 0, b]])
+            @ np.array([[1, 0, 0], [0, c, -f], [0, f, c]]))
+
+
 xyz = [[f"{v:.3f}" for v in axis] for axis in (x, y, z)]
 colors = list((rgb // 257).T)
 las10("las10_format1.las")
@@ -198,3 +237,7 @@ text("tabs.txt", "\t", "//X\tY\tZ\tIntensity\n", xyz + [intensity])
 text("header.csv", ",", '"id","Y [m]","X [m]","Z [m]",R,G,B\n', [i, xyz[1], xyz[0], xyz[2]] + colors)
 text("german.csv", ";", "x;y;z;intensity\n", xyz + [intensity], decimal=",")
 text("count.pts", " ", f"{N}\n", xyz + [intensity] + colors)
+pcd("text.pcd", pypcd4.Encoding.ASCII)
+pcd("binary.pcd", pypcd4.Encoding.BINARY)
+pcd("compressed.pcd", pypcd4.Encoding.BINARY_COMPRESSED)
+ptx("two_scans.ptx")

@@ -26,7 +26,7 @@ fn read(path: &Path) -> Result<(ReadSummary, Vec<Point3<f64>>), CloudError> {
     Ok((summary, all))
 }
 
-const BINARY: [&str; 8] = [
+const BINARY: [&str; 10] = [
     "las10_format1.las",
     "las12_format2.laz",
     "las12_format3.las",
@@ -35,7 +35,11 @@ const BINARY: [&str; 8] = [
     "two_scans.e57",
     "little.ply",
     "big.ply",
+    "binary.pcd",
+    "compressed.pcd",
 ];
+/// A cut in the middle of a number is no error in them; whole lines are missed.
+const TEXT: [&str; 3] = ["text.pcd", "two_scans.ptx", "count.pts"];
 
 #[test]
 fn a_file_that_is_cut_off_is_an_error() {
@@ -58,6 +62,47 @@ fn a_file_that_is_cut_off_is_an_error() {
             let _ = cloud_info(&path);
         }
         assert!(errors > whole.len() / 41 - 3, "{name}");
+    }
+}
+
+#[test]
+fn a_text_that_lacks_its_last_lines_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in TEXT {
+        let whole = fs::read_to_string(fixture(name)).unwrap();
+        let path = folder.path().join(name);
+        let starts = whole.match_indices('\n').map(|(at, _)| at + 1);
+        for length in starts.filter(|&at| at < whole.len()).step_by(7) {
+            fs::write(&path, &whole[..length]).unwrap();
+            let error = match read(&path) {
+                Err(error) => error.to_string(),
+                // What ends after a scan of PTX looks whole.
+                Ok((summary, _)) => {
+                    assert!(name.ends_with("ptx") && summary.records == 77, "{name}: {length}");
+                    continue;
+                }
+            };
+            assert!(error.contains(name), "{error}");
+            let _ = cloud_info(&path);
+        }
+    }
+}
+
+#[test]
+fn damaged_texts_do_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out.laz");
+    for name in TEXT {
+        let whole = fs::read(fixture(name)).unwrap();
+        let path = folder.path().join(name);
+        for place in (0..400).chain((400..whole.len()).step_by(71)) {
+            let mut bytes = whole.clone();
+            bytes[place] = b"09-.e \nx"[place % 8];
+            fs::write(&path, &bytes).unwrap();
+            let _ = read(&path);
+            let _ = cloud_info(&path);
+            let _ = write_labelled(&path, &out, LabelColumns::Stone, no_labels);
+        }
     }
 }
 
@@ -182,6 +227,106 @@ fn errors_name_the_file_the_line_and_the_reason() {
         failure(f, "a.ply", &short),
         "a.ply, line 8: the line ends before its property \"z\""
     );
+    let ptx = "1\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n5 6 7 1\n";
+    let pcd =
+        "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nDATA ascii\n";
+    for (name, content, expected) in [
+        (
+            "a.ptx",
+            format!("{ptx}1 2 3 0.5\n"),
+            "a.ptx is cut off: it holds 1 of 2 points of scan 1",
+        ),
+        (
+            "a.ptx",
+            format!("{ptx}1 2 3 0.5\n7\n"),
+            "a.ptx, line 12: a single number where a point is expected: the scan holds fewer points than its header \
+             claims; export it again",
+        ),
+        (
+            "a.ptx",
+            format!("{ptx}1 2 3 0.5\n1 2 3 0.5\n1 2 3 0.5\n"),
+            "a.ptx, line 13: not the number of columns that begins a scan of a PTX file: the scan before holds more \
+             points than its header claims, or this is no PTX file; export it again",
+        ),
+        (
+            "a.ptx",
+            format!("{ptx}1 2 3 0.5\n1 2 3 0.5 1 2 3\n"),
+            "a.ptx, line 12: 7 columns, but the points of this scan have 4",
+        ),
+        (
+            "a.ptx",
+            format!("{ptx}1 2 x 0.5\n1 2 3 0.5\n"),
+            "a.ptx, line 11: \"x\" in column 3 is not a number",
+        ),
+        (
+            "a.ptx",
+            ptx.replace("1 0 0 0\n", "1 0 0 5\n"),
+            "a.ptx, line 7: the fourth number of this row of the transformation must be 0: the translation stands in \
+             the fourth row, not in the fourth column",
+        ),
+        (
+            "a.ptx",
+            ptx.replace("0 0 1 0\n", "0 0 0 0\n"),
+            "a.ptx, line 10: the transformation of the scan has no inverse: export it again",
+        ),
+        (
+            "a.ptx",
+            ptx.replace("0 0 1 0\n", "0 nan 1 0\n"),
+            "a.ptx, line 9: expected 4 numbers: a row of the transformation",
+        ),
+        (
+            "a.pcd",
+            format!("{pcd}1 2 3\n"),
+            "a.pcd is cut off: it has room for 1 of the 2 points that its header claims",
+        ),
+        (
+            "a.pcd",
+            format!("{pcd}1 2.000000 3.000000\n"),
+            "a.pcd is cut off: it holds 1 of 2 points",
+        ),
+        (
+            "a.pcd",
+            format!("{pcd}1 2 3\n1 2\n1 2 3\n"),
+            "a.pcd, line 10: 2 values, but a point has 3",
+        ),
+        (
+            "a.pcd",
+            pcd.replace("FIELDS x y z", "FIELDS x y w") + "1 2 3\n",
+            "a.pcd: the points of the PCD header have no numbers x, y and z",
+        ),
+        (
+            "a.pcd",
+            pcd.replace("SIZE 4 4 4", "SIZE 4 4 3"),
+            "a.pcd: field \"z\" has the unknown TYPE F of SIZE 3",
+        ),
+        (
+            "a.pcd",
+            pcd.replace("COUNT 1 1 1", "COUNT 1 1 9000000000000000000"),
+            "a.pcd: the fields of a point take more than 1048576 bytes: no PCD file of points",
+        ),
+        (
+            "a.pcd",
+            pcd.replace("HEIGHT 1", "HEIGHT 1\nPOINTS 3"),
+            "a.pcd: POINTS is 3, but WIDTH times HEIGHT is 2",
+        ),
+        (
+            "a.pcd",
+            pcd.replace("DATA ascii", "DATA zip"),
+            "a.pcd, line 8: unknown DATA of a PCD file (known: ascii, binary, binary_compressed): \"DATA zip\"",
+        ),
+        (
+            "a.pts",
+            "3\n1 2 3 4\n5 6 7 8\n".to_owned(),
+            "a.pts is cut off: line 1 claims 3 points, and 2 follow: export the file again",
+        ),
+        (
+            "a.pts",
+            "1\n1 2 3 4\n5 6 7 8\n1\n1 2 3 4\n".to_owned(),
+            "a.pts, line 4: line 1 claims 1 points, and 2 follow: export the file again",
+        ),
+    ] {
+        assert_eq!(failure(f, name, &content), expected);
+    }
     assert!(failure(f, "a.doc", "1 2 3\n").starts_with("unknown point cloud format: a.doc"));
     assert!(
         read(&f.join("none.las"))

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use stonewise_core::id::StoneId;
 use stonewise_io::cloud::{
     CloudError, CloudFormat, LabelColumns, PointChunk, PointLabel, PointMotion, ReadSummary, cloud_info,
-    read_cloud, write_labelled,
+    cloud_scans, read_cloud, write_labelled,
 };
 
 const POINTS: u64 = 120;
@@ -132,6 +132,112 @@ fn every_encoding_of_ply() {
 }
 
 #[test]
+fn every_encoding_of_pcd() {
+    for name in ["text.pcd", "binary.pcd", "compressed.pcd"] {
+        let expected = Expected {
+            color_bits: 8,
+            intensity: true,
+            tolerance_m: 1e-9,
+        };
+        check(name, &expected);
+        let scans = cloud_scans(&fixture(name)).unwrap();
+        assert_eq!(scans.len(), 1, "{name}");
+        assert_eq!(scans[0].origin, Some(Point3::new(349_990.0, 5_650_010.0, 101.5)));
+    }
+}
+
+#[test]
+fn scans_of_ptx_are_put_in_the_world_and_have_their_scanners() {
+    let path = fixture("two_scans.ptx");
+    for step in [7, 50, 1000] {
+        let (all, summary) = read_all(&path, step);
+        assert_eq!((summary.records, summary.skipped), (POINTS + 12, 12));
+        // Every eleventh place of the grid has no echo.
+        let with_echo = (0..POINTS + 12).filter(|index| index % 11 != 10);
+        assert!(all.indices.iter().copied().eq(with_echo));
+        let (colors, intensities) = (all.colors.unwrap(), all.intensities.unwrap());
+        for (i, p) in (0..POINTS).zip(&all.positions) {
+            assert!((p - position(i)).amax() < 2e-9, "point {i}: {p}");
+            let k = i as usize;
+            assert_eq!(colors[k], color(i).map(|c| c / 257 * 257));
+            assert!((intensities[k] - 7.0 * i as f32 / 1000.0).abs() < 1e-6);
+        }
+    }
+    let info = cloud_info(&path).unwrap();
+    assert_eq!(info.format, CloudFormat::Ptx);
+    let scans: Vec<_> = info.scans.iter().map(|s| (s.name.as_str(), s.records)).collect();
+    assert_eq!(scans, [("scan 1", 77), ("scan 2", 55)]);
+    assert_eq!(
+        info.scans[1].origin,
+        Some(Point3::new(350_020.0, 5_649_980.0, 99.25))
+    );
+    let mut scans = Vec::new();
+    read_cloud(&path, 1000, |chunk| {
+        scans.extend((!chunk.is_empty()).then_some((chunk.scan, chunk.len())));
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    assert_eq!(scans, [(Some(0), 70), (Some(1), 50)]);
+}
+
+/// The head of a scan whose scanner stands at `place`, turned a quarter to the left, with one column.
+fn ptx_head(rows: usize, place: &str, shift: &str) -> String {
+    format!("1\n{rows}\n{place}\n1 0 0\n0 1 0\n0 0 1\n0 1 0 0\n-1 0 0 0\n0 0 1 0\n{shift} 1\n")
+}
+
+#[test]
+fn scanners_of_ptx_stand_where_a_line_or_the_transformation_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.ptx");
+    let mut text = String::new();
+    for (place, shift) in [
+        ("5 6 7", "5 6 7"),
+        ("0 0 0", "5 6 7"),
+        ("5 6 7", "0 0 0"),
+        ("0 0 0", "0 0 0"),
+    ] {
+        text += &(ptx_head(2, place, shift) + "0 0 0 0.5\n1 2 3 0.25\n");
+    }
+    std::fs::write(&path, text).unwrap();
+    let (all, summary) = read_all(&path, 10);
+    assert_eq!((summary.records, summary.skipped), (8, 4));
+    let expected = [
+        [3.0, 7.0, 10.0],
+        [3.0, 7.0, 10.0],
+        [-2.0, 1.0, 3.0],
+        [-2.0, 1.0, 3.0],
+    ];
+    assert_eq!(all.positions, expected.map(Point3::from));
+    assert_eq!(all.intensities, Some(vec![0.25; 4]));
+    let place = Some(Point3::new(5.0, 6.0, 7.0));
+    let origins: Vec<_> = cloud_scans(&path).unwrap().iter().map(|s| s.origin).collect();
+    assert_eq!(origins, [place, place, place, None]);
+}
+
+#[test]
+fn scans_of_pts_are_kept_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.pts");
+    std::fs::write(&path, "2\n1 2 3 -900\n4 5 6 40\n1\n7 8 9 2047\n").unwrap();
+    let (all, summary) = read_all(&path, 10);
+    assert_eq!((summary.records, summary.skipped), (3, 0));
+    assert_eq!(all.intensities, Some(vec![-900.0, 40.0, 2047.0]));
+    let mut scans = Vec::new();
+    read_cloud(&path, 10, |chunk| {
+        scans.push((chunk.scan, chunk.len()));
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    assert_eq!(scans, [(Some(0), 2), (Some(1), 1)]);
+    let records: Vec<u64> = cloud_scans(&path).unwrap().iter().map(|s| s.records).collect();
+    assert_eq!(records, [2, 1]);
+    // Intensities from below zero are shifted to fit LAS.
+    let out = folder.path().join("out.laz");
+    write_labelled(&path, &out, LabelColumns::Stone, no_labels).unwrap();
+    assert_eq!(read_all(&out, 10).0.intensities, Some(vec![0.0, 940.0, 2947.0]));
+}
+
+#[test]
 fn text_with_and_without_a_header() {
     for (name, color_bits, intensity) in [
         ("plain.xyz", 8, false),
@@ -209,7 +315,14 @@ fn the_callers_error_ends_the_pass() {
             Self::Cloud
         }
     }
-    for name in ["las12_format3.las", "little.ply", "plain.xyz", "two_scans.e57"] {
+    for name in [
+        "las12_format3.las",
+        "little.ply",
+        "binary.pcd",
+        "plain.xyz",
+        "two_scans.e57",
+        "two_scans.ptx",
+    ] {
         let mut seen = 0;
         let ended = read_cloud(&fixture(name), 10, |chunk| {
             seen += chunk.len();
@@ -275,7 +388,13 @@ fn a_labelled_copy_of_las_keeps_records_and_descriptions() {
 fn a_labelled_copy_of_other_formats_keeps_order_color_and_intensity() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out.laz");
-    for name in ["little.ply", "header.csv", "count.pts", "two_scans.e57"] {
+    for name in [
+        "little.ply",
+        "header.csv",
+        "count.pts",
+        "compressed.pcd",
+        "two_scans.e57",
+    ] {
         write_labelled(&fixture(name), &out, LabelColumns::StoneAndMotion, no_labels).unwrap();
         let (before, _) = read_all(&fixture(name), 1000);
         let (after, summary) = read_all(&out, 1000);

@@ -10,8 +10,8 @@ use stonewise_io::cloud::PointChunk;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SourceRule {
-    /// The file and the point source ID of LAS, or the scan of an E57; pieces of one strip in several files
-    /// are joined.
+    /// The file and the point source ID of LAS, or the scan of an E57, PTX or PTS; pieces of one strip in
+    /// several files are joined.
     #[default]
     Auto,
     /// Each file.

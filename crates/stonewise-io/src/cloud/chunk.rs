@@ -5,17 +5,18 @@ use nalgebra::Point3;
 /// A run of points of one file, in the order of the file.
 ///
 /// Records without a finite position are left out, so `indices` may have gaps; the other columns are parallel
-/// to it. A chunk never crosses from one scan of an E57 file into the next. Where a long part of a file holds
+/// to it. A chunk never crosses from one scan of a file into the next. Where a long part of a file holds
 /// no points, chunks without points pass by.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointChunk {
-    /// Index of each point's record in the file, from 0, ascending; counts across the scans of an E57 file.
+    /// Index of each point's record in the file, from 0, ascending; counts across the scans of a file.
     pub indices: Vec<u64>,
-    /// Positions in the world frame, metres; the pose of an E57 scan is applied.
+    /// Positions in the world frame, metres; the pose of a scan is applied.
     pub positions: Vec<Point3<f64>>,
     /// Red, green, blue, 16 bits each (8-bit colours are times 257), where the file has colours.
     pub colors: Option<Vec<[u16; 3]>>,
-    /// Intensities as the file has them (LAS: 0 to 65535; E57: scaled to 0 to 1), where it has any.
+    /// Intensities as the file has them (LAS: 0 to 65535; PTX: 0 to 1; PTS: often -2048 to 2047; E57: scaled to 0
+    /// to 1), where it has any.
     pub intensities: Option<Vec<f32>>,
     /// Index of the scan in [`CloudInfo::scans`](super::CloudInfo::scans), where the file keeps scans apart.
     pub scan: Option<usize>,
@@ -42,7 +43,7 @@ impl PointChunk {
 pub struct ReadSummary {
     /// Records in the file.
     pub records: u64,
-    /// Records left out because they have no finite position (marked invalid, NaN, infinite).
+    /// Records left out because they have no finite position (marked invalid, without echo, NaN, infinite).
     pub skipped: u64,
 }
 

@@ -24,7 +24,7 @@ pub enum CloudError {
         source: io::Error,
     },
     /// Neither content nor name identifies the format.
-    #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ply, and text as xyz, txt, csv, asc, pts)", .0.display())]
+    #[error("unknown point cloud format: {} (known: las, laz, copc, e57, ptx, ply, pcd, and text as xyz, txt, csv, asc, pts)", .0.display())]
     UnknownFormat(PathBuf),
     /// The file violates its format, or is damaged.
     #[error("{}: {reason}", .path.display())]

@@ -47,7 +47,8 @@ pub(super) fn export_labelled<E: From<CloudError>>(
 struct Survey {
     bounds: Bounds,
     has_color: bool,
-    max_intensity: f32,
+    /// Smallest, if below 0, and largest.
+    intensity: [f32; 2],
     /// WKT, or a code.
     crs: Option<String>,
 }
@@ -55,14 +56,14 @@ struct Survey {
 impl Survey {
     fn of(input: &Path) -> Result<Self, CloudError> {
         let mut bounds: Option<Bounds> = None;
-        let (mut has_color, mut max_intensity) = (false, 0f32);
+        let (mut has_color, mut intensity) = (false, [0f32; 2]);
         read_cloud(input, CHUNK_POINTS, |chunk| {
             if let Some(new) = Bounds::of(chunk.positions.iter().copied()) {
                 bounds = Some(bounds.map_or(new, |b| b.union(&new)));
             }
             has_color |= chunk.colors.is_some();
             let intensities = chunk.intensities.iter().flatten();
-            max_intensity = intensities.fold(max_intensity, |max, i| max.max(*i));
+            intensity = intensities.fold(intensity, |[low, high], i| [low.min(*i), high.max(*i)]);
             Ok::<(), CloudError>(())
         })?;
         let crs = match CloudFormat::of(input)? {
@@ -76,15 +77,17 @@ impl Survey {
                 max: origin,
             }),
             has_color,
-            max_intensity,
+            intensity,
             crs,
         })
     }
 
-    /// Intensities up to 1 are stretched to 16 bits; others are cut to them.
+    /// Intensities from 0 to 1 are stretched to 16 bits, those that begin below 0 are shifted to 0; what is
+    /// beyond 16 bits is cut.
     fn intensity(&self, value: f32) -> u16 {
-        let factor = if self.max_intensity <= 1.0 { 65535.0 } else { 1.0 };
-        (value * factor).round() as u16
+        let [low, high] = self.intensity;
+        let factor = if low == 0.0 && high <= 1.0 { 65535.0 } else { 1.0 };
+        ((value - low) * factor).round() as u16
     }
 
     fn records(

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::CloudError;
+use super::scalar::Scalar;
 
 /// Size of the description of one dimension.
 pub const DESCRIPTOR_BYTES: usize = 192;
@@ -117,6 +118,55 @@ impl ExistingDimension {
         let name = &self.descriptor[NAME];
         let end = name.iter().position(|&b| b == 0).unwrap_or(name.len());
         &name[..end]
+    }
+
+    /// How its number is stored; `None` for undocumented bytes, pairs and triples.
+    pub fn number(&self) -> Option<ExtraNumber> {
+        const KINDS: [Scalar; 10] = [
+            Scalar::U8,
+            Scalar::I8,
+            Scalar::U16,
+            Scalar::I16,
+            Scalar::U32,
+            Scalar::I32,
+            Scalar::U64,
+            Scalar::I64,
+            Scalar::F32,
+            Scalar::F64,
+        ];
+        let kind = usize::from(self.descriptor[2]).checked_sub(1)?;
+        let option = |bit: u8, start: usize, otherwise: f64| {
+            let bytes = self.descriptor[start..].first_chunk();
+            let value = bytes.map_or(otherwise, |bytes| f64::from_le_bytes(*bytes));
+            if self.descriptor[3] & bit == 0 {
+                otherwise
+            } else {
+                value
+            }
+        };
+        Some(ExtraNumber {
+            scalar: *KINDS.get(kind)?,
+            scale: option(8, 112, 1.0),
+            offset: option(16, 136, 0.0),
+        })
+    }
+}
+
+/// A number among the extra bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct ExtraNumber {
+    scalar: Scalar,
+    scale: f64,
+    offset: f64,
+}
+
+impl ExtraNumber {
+    /// Its value.
+    pub fn of(self, bytes: &[u8]) -> f64 {
+        let mut raw = [0; 8];
+        let size = self.scalar.size().min(bytes.len());
+        raw[..size].copy_from_slice(&bytes[..size]);
+        self.scalar.decode(raw) * self.scale + self.offset
     }
 }
 

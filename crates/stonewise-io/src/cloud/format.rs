@@ -1,5 +1,6 @@
 //! Telling formats apart.
 
+use std::fmt;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -13,13 +14,17 @@ pub enum CloudFormat {
     Las,
     /// ASTM E2807.
     E57,
+    /// Leica PTX: text, each scan with the place of its scanner.
+    Ptx,
     /// Stanford PLY, text or binary of either byte order.
     Ply,
-    /// Text, one point per line.
+    /// Point Cloud Library, text, binary or compressed.
+    Pcd,
+    /// Text, one point per line; PTS too.
     Text,
 }
 
-/// Extensions of text files; every other format says what it is in its first bytes.
+/// Extensions of text files; every other format but PTX says what it is in its first bytes.
 const TEXT_EXTENSIONS: [&str; 7] = ["xyz", "txt", "csv", "asc", "pts", "xyzrgb", "neu"];
 
 impl CloudFormat {
@@ -38,9 +43,24 @@ impl CloudFormat {
             s if s.starts_with(b"LASF") => Ok(Self::Las),
             s if s.starts_with(b"ASTM-E57") => Ok(Self::E57),
             [b'p', b'l', b'y', next, ..] if next.is_ascii_whitespace() => Ok(Self::Ply),
+            s if s.starts_with(b"# .PCD") || extension == "pcd" => Ok(Self::Pcd),
+            _ if extension == "ptx" => Ok(Self::Ptx),
             _ if TEXT_EXTENSIONS.contains(&extension.as_str()) => Ok(Self::Text),
             _ => Err(wrong_start(path, &extension, start.is_empty())),
         }
+    }
+}
+
+impl fmt::Display for CloudFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Las => "LAS",
+            Self::E57 => "E57",
+            Self::Ptx => "PTX",
+            Self::Ply => "PLY",
+            Self::Pcd => "PCD",
+            Self::Text => "text",
+        })
     }
 }
 

@@ -5,11 +5,9 @@ use std::path::Path;
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
+use super::gathered::CHUNK_POINTS;
 use super::scan::Scan;
-use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, ply, read_cloud};
-
-/// Points per chunk of a pass that only looks.
-const CHUNK_POINTS: usize = 100_000;
+use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, pcd, ply, ptx, read_cloud, text};
 
 /// Description of a cloud file.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +20,7 @@ pub struct CloudInfo {
     pub bounds: Option<Bounds>,
     /// Coordinate system, where the file names one: WKT, or a code such as `EPSG:25832`.
     pub crs: Option<String>,
-    /// Scans of an E57 file; empty for the others.
+    /// Scans, where the file keeps them apart.
     pub scans: Vec<Scan>,
 }
 
@@ -38,17 +36,29 @@ pub fn cloud_info(path: &Path) -> Result<CloudInfo, CloudError> {
         return las_info(path);
     }
     let (summary, bounds) = measure_cloud(path)?;
-    let (scans, crs) = match format {
-        CloudFormat::E57 => e57_file::scans(path)?,
-        _ => Default::default(),
-    };
     Ok(CloudInfo {
         format,
         records: summary.records,
         bounds,
-        crs,
-        scans,
+        crs: cloud_crs(path)?,
+        scans: cloud_scans(path)?,
     })
+}
+
+/// The scans that a file keeps apart, with the places of their scanners; LAS has none.
+///
+/// Cost: PTX and PTS are read from end to end, and nothing but the heads of the others.
+///
+/// # Errors
+/// The file cannot be read, or what says where its scans end is damaged.
+pub fn cloud_scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
+    match CloudFormat::of(path)? {
+        CloudFormat::E57 => Ok(e57_file::scans(path)?.0),
+        CloudFormat::Ptx => ptx::scans(path),
+        CloudFormat::Pcd => pcd::scans(path),
+        CloudFormat::Text => text::scans(path),
+        CloudFormat::Las | CloudFormat::Ply => Ok(Vec::new()),
+    }
 }
 
 /// Reads all points of a file, and gives the box around them.
@@ -74,11 +84,12 @@ pub fn cloud_crs(path: &Path) -> Result<Option<String>, CloudError> {
     match CloudFormat::of(path)? {
         CloudFormat::Las => Ok(las::Layout::open(path)?.crs()),
         CloudFormat::E57 => Ok(e57_file::scans(path)?.1),
-        CloudFormat::Ply | CloudFormat::Text => Ok(None),
+        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Pcd | CloudFormat::Text => Ok(None),
     }
 }
 
-/// How many records a file claims to have, from its head alone; `None` for text, which claims nothing.
+/// How many records a file claims to have, from its head alone; `None` for text and PTX, whose heads claim
+/// nothing or only the first scan.
 ///
 /// # Errors
 /// The file cannot be read, or its head is damaged.
@@ -87,7 +98,8 @@ pub fn claimed_records(path: &Path) -> Result<Option<u64>, CloudError> {
         CloudFormat::Las => Ok(Some(las::Layout::open(path)?.header.number_of_points())),
         CloudFormat::E57 => Ok(Some(e57_file::scans(path)?.0.iter().map(|s| s.records).sum())),
         CloudFormat::Ply => Ok(Some(ply::vertex_count(path)?)),
-        CloudFormat::Text => Ok(None),
+        CloudFormat::Pcd => Ok(Some(pcd::point_count(path)?)),
+        CloudFormat::Ptx | CloudFormat::Text => Ok(None),
     }
 }
 

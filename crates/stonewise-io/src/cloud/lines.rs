@@ -30,18 +30,40 @@ impl Lines {
 
     /// The next line without spaces at its ends; `None` at the end of the file.
     pub fn next(&mut self) -> Result<Option<&str>, CloudError> {
+        if self.advance()? {
+            self.text().map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    /// The next line that is not empty, without spaces at its ends; `None` at the end of the file.
+    pub fn next_filled(&mut self) -> Result<Option<&str>, CloudError> {
+        while self.advance()? {
+            if !self.line.trim_ascii().is_empty() {
+                return self.text().map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    fn advance(&mut self) -> Result<bool, CloudError> {
         self.line.clear();
         let mut limited = self.reader.by_ref().take(MAX_LINE_BYTES);
         let read = limited.read_until(b'\n', &mut self.line);
         if read.map_err(|e| CloudError::read(&self.path, e))? == 0 {
-            return Ok(None);
+            return Ok(false);
         }
         self.number += 1;
         if self.line.len() as u64 == MAX_LINE_BYTES {
             return Err(self.error("the line is too long for text with one point per line"));
         }
+        Ok(true)
+    }
+
+    fn text(&self) -> Result<&str, CloudError> {
         match str::from_utf8(&self.line) {
-            Ok(line) => Ok(Some(line.trim_start_matches('\u{feff}').trim())),
+            Ok(line) => Ok(line.trim_start_matches('\u{feff}').trim()),
             Err(_) => Err(self.error("the line is not text in UTF-8")),
         }
     }

@@ -6,6 +6,7 @@ use nalgebra::Point3;
 
 use super::chunk::{Chunker, PointRecord, Visit};
 use super::lines::Lines;
+use super::scan::Scan;
 use super::{CloudError, ReadSummary};
 
 /// Passes all points of a text file to `visit`, one point per line.
@@ -14,8 +15,9 @@ use super::{CloudError, ReadSummary};
 /// with semicolons a comma may stand for the decimal point. Lines that begin with `#`, `//` or `%` are
 /// comments. A header, also one in a comment, names the columns (x, y, z, r or red, g or green, b or blue,
 /// intensity or i). Without one they are x, y, z and, where the first point has three integers from 0 to 255
-/// there, colours; with seven columns an intensity comes before the colours. Colours are 8-bit. A line with
-/// nothing but a count is skipped before the first point, and anywhere in PTS files.
+/// there, colours; with seven columns, and with four in PTS files, an intensity comes before the colours.
+/// Colours are 8-bit. A line with nothing but a count is skipped before the first point. In PTS files a count
+/// begins a scan, wherever it stands, and must be right.
 pub fn read<E: From<CloudError>>(
     path: &Path,
     chunk_points: usize,
@@ -24,21 +26,97 @@ pub fn read<E: From<CloudError>>(
     let Some((columns, first)) = find_columns(path)? else {
         return Ok(ReadSummary::default());
     };
-    let is_pts = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pts"));
+    let mut parts = is_pts(path).then(Parts::default);
     let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
     let mut chunker = Chunker::new(chunk_points, has_color, has_intensity, visit);
     let mut lines = Lines::open(path)?;
     while let Some(line) = lines.next()? {
-        if line.is_empty() || comment(line).is_some() || (is_pts && is_count(line)) {
+        if line.is_empty() || comment(line).is_some() {
+            continue;
+        }
+        if let (Some(parts), Ok(claimed)) = (&mut parts, line.parse()) {
+            parts.begin(claimed, &lines)?;
+            chunker.begin_scan(parts.begun - 1, has_color, has_intensity)?;
             continue;
         }
         let record = columns.record(line);
         // What comes before the first point is the header.
         if lines.number() >= first {
             chunker.push(record.map_err(|reason| lines.error(reason))?)?;
+            if let Some(parts) = &mut parts {
+                parts.found += 1;
+            }
         }
     }
+    if let Some(parts) = parts {
+        parts.end(path)?;
+    }
     chunker.finish()
+}
+
+/// The scans of a PTS file, which is read from end to end; empty for other texts, and without counts.
+pub fn scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
+    let mut scans = Vec::new();
+    if !is_pts(path) {
+        return Ok(scans);
+    }
+    let mut lines = Lines::open(path)?;
+    while let Some(line) = lines.next()? {
+        if let Ok(records) = line.parse() {
+            scans.push(Scan {
+                name: format!("scan {}", scans.len() + 1),
+                records,
+                origin: None,
+            });
+        }
+    }
+    Ok(scans)
+}
+
+fn is_pts(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("pts"))
+}
+
+/// The scans of a PTS file, each after a line with the number of its points.
+#[derive(Default)]
+struct Parts {
+    begun: usize,
+    /// Line of the count.
+    line: u64,
+    claimed: u64,
+    /// Points since the count.
+    found: u64,
+}
+
+impl Parts {
+    fn begin(&mut self, claimed: u64, lines: &Lines) -> Result<(), CloudError> {
+        if self.begun > 0 && self.found != self.claimed {
+            return Err(lines.error(self.wrong()));
+        }
+        *self = Self {
+            begun: self.begun + 1,
+            line: lines.number(),
+            claimed,
+            found: 0,
+        };
+        Ok(())
+    }
+
+    fn end(&self, path: &Path) -> Result<(), CloudError> {
+        match self.begun {
+            0 => Ok(()),
+            _ if self.found == self.claimed => Ok(()),
+            _ if self.found < self.claimed => Err(CloudError::truncated(path, self.wrong())),
+            _ => Err(CloudError::malformed(path, self.wrong())),
+        }
+    }
+
+    fn wrong(&self) -> String {
+        format!(
+            "line {} claims {} points, and {} follow: export the file again",
+            self.line, self.claimed, self.found
+        )
+    }
 }
 
 /// Where the values stand in a line.
@@ -60,7 +138,7 @@ fn find_columns(path: &Path) -> Result<Option<(Columns, u64)>, CloudError> {
             named = named.or_else(|| Columns::named(text));
         } else if line.is_empty() || is_count(line) {
             continue;
-        } else if let Some(unnamed) = Columns::unnamed(line) {
+        } else if let Some(unnamed) = Columns::unnamed(line, is_pts(path)) {
             let separator = unnamed.separator;
             let columns = named.map_or(unnamed, |named| Columns { separator, ..named });
             return Ok(Some((columns, lines.number())));
@@ -100,11 +178,11 @@ impl Columns {
     }
 
     /// Columns by the values of the first point.
-    fn unnamed(line: &str) -> Option<Self> {
+    fn unnamed(line: &str, is_pts: bool) -> Option<Self> {
         let separator = separator(line);
         let values: Option<Vec<f64>> = cells(line, separator).map(|c| number(c, separator)).collect();
         let values = values.filter(|v| v.len() >= 3)?;
-        let intensity = (values.len() == 7).then_some(3);
+        let intensity = (values.len() == 7 || (is_pts && values.len() == 4)).then_some(3);
         let start = if values.len() == 7 { 4 } else { 3 };
         let color = values.get(start..start + 3).is_some_and(|v| {
             let is_byte = |c: &f64| (0.0..=255.0).contains(c) && c.fract() == 0.0;

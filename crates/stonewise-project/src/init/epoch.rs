@@ -3,19 +3,21 @@
 use super::listing::{files, folders, has_extension, is_made_by_stonewise, name};
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
-use stonewise_io::cameras::{CameraFile, find_photos, read_cameras};
+use stonewise_io::cameras::{CameraFile, find_photos, is_camera_file, read_cameras};
 
 /// Extensions of point clouds.
-pub(super) const CLOUDS: [&str; 8] = ["laz", "las", "e57", "ply", "xyz", "txt", "csv", "asc"];
+pub(super) const CLOUDS: [&str; 11] = [
+    "laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz", "txt", "csv", "asc",
+];
 /// Folder of the masks beside those of the epochs.
 pub(super) const MASKS: &str = "masks";
 /// Extensions of photos.
-const PHOTOS: [&str; 3] = ["jpg", "jpeg", "png"];
+const PHOTOS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
 /// Names of the files that make a folder a COLMAP model, and of all of its texts.
 const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
 const COLMAP_TEXTS: [&str; 3] = ["images.txt", "cameras.txt", "points3d.txt"];
 /// Extensions of scans that lie beside each other: no texts, which may be anything.
-const SCANS: [&str; 5] = ["laz", "las", "e57", "ply", "xyz"];
+const SCANS: [&str; 8] = ["laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz"];
 /// Words in names of clouds, by sensor.
 const SENSORS: [(&str, &[&str]); 2] = [
     ("terrestrial", &["tls", "terrestrial", "scanner"]),
@@ -174,7 +176,7 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
         list.push(dir.to_path_buf());
     }
     for file in &files {
-        if has_extension(file, &["xml"]) || name(file).contains("reconstruction") {
+        if is_camera_file(file) {
             found.cameras.push(file.clone());
         } else if has_extension(file, &["json"]) {
             found.masks.push(file.clone());

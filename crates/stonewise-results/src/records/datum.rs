@@ -68,7 +68,7 @@ pub struct Datum {
 pub struct SourceError {
     /// Name of its epoch.
     pub epoch: String,
-    /// Name of the source: file and point source id, or scan of an E57.
+    /// Name of the source: file and point source id, or scan of an E57, PTX or PTS.
     pub source: String,
     /// Estimated error in the middle of what it shows, metres.
     pub error_m: [f64; 3],

@@ -115,6 +115,13 @@ pub fn targets() -> Vec<Target> {
         Target::of_bytes("e57", testdata(&["clouds/two_scans.e57"]), las).repaired(repair::e57),
         Target::of_bytes("ply", testdata(&["clouds/little.ply", "clouds/big.ply"]), ply),
         Target::of_text("ply text", ply_texts(), ply),
+        Target::of_bytes(
+            "pcd",
+            testdata(&["clouds/binary.pcd", "clouds/compressed.pcd"]),
+            las,
+        ),
+        Target::of_text("pcd text", testdata(&["clouds/text.pcd"]), las),
+        Target::of_text("ptx", testdata(&["clouds/two_scans.ptx"]), las),
         Target::of_text(
             "xyz",
             testdata(&[
@@ -133,6 +140,12 @@ pub fn targets() -> Vec<Target> {
             cameras,
         )
         .beside(testdata(&["cameras/colmap_txt/cameras.txt"])),
+        Target::of_text("transforms", testdata(&["cameras/transforms.json"]), cameras),
+        Target::of_text(
+            "pix4d",
+            testdata(&["cameras/pix4d/dam_calibrated_camera_parameters.txt"]),
+            cameras,
+        ),
         Target::of_bytes(
             "colmap",
             testdata(&["cameras/colmap_bin/cameras.bin", "cameras/colmap_bin/images.bin"]),

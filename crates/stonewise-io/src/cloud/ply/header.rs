@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::cloud::CloudError;
 use crate::cloud::lines::Lines;
+use crate::cloud::scalar::Scalar;
 
 /// How values are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,45 +12,6 @@ pub enum Encoding {
     Text,
     LittleEndian,
     BigEndian,
-}
-
-/// Type of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-impl Scalar {
-    fn parse(word: &str) -> Option<Self> {
-        Some(match word {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    /// Bytes of a value.
-    pub fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
 }
 
 /// Kind of a property.
@@ -161,7 +123,7 @@ fn parse_encoding(name: &str, lines: &Lines) -> Result<Encoding, CloudError> {
 
 fn parse_property(words: &[&str], lines: &Lines) -> Result<Property, CloudError> {
     let scalar = |word: &str| {
-        Scalar::parse(word).ok_or_else(|| lines.error(format!("unknown type of property {word:?}")))
+        scalar_type(word).ok_or_else(|| lines.error(format!("unknown type of property {word:?}")))
     };
     let (kind, name) = match words {
         ["list", count, item, name] => {
@@ -176,4 +138,18 @@ fn parse_property(words: &[&str], lines: &Lines) -> Result<Property, CloudError>
     };
     let name = (*name).to_owned();
     Ok(Property { name, kind })
+}
+
+fn scalar_type(word: &str) -> Option<Scalar> {
+    Some(match word {
+        "char" | "int8" => Scalar::I8,
+        "uchar" | "uint8" => Scalar::U8,
+        "short" | "int16" => Scalar::I16,
+        "ushort" | "uint16" => Scalar::U16,
+        "int" | "int32" => Scalar::I32,
+        "uint" | "uint32" => Scalar::U32,
+        "float" | "float32" => Scalar::F32,
+        "double" | "float64" => Scalar::F64,
+        _ => return None,
+    })
 }

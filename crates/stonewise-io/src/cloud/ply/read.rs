@@ -6,9 +6,10 @@ use std::path::Path;
 
 use nalgebra::Point3;
 
-use super::header::{Element, Encoding, Header, Kind, Scalar};
+use super::header::{Element, Encoding, Header, Kind};
 use crate::cloud::chunk::{Chunker, PointRecord, Visit};
 use crate::cloud::lines::Lines;
+use crate::cloud::scalar::Scalar;
 use crate::cloud::{CloudError, ReadSummary};
 
 /// Passes all vertices to `visit`.
@@ -163,11 +164,9 @@ fn next_line(
     row: &mut Vec<f64>,
     item: &mut dyn FnMut(usize, f64),
 ) -> Result<bool, CloudError> {
-    let mut line = lines.next()?;
-    while line == Some("") {
-        line = lines.next()?;
-    }
-    let Some(line) = line else { return Ok(false) };
+    let Some(line) = lines.next_filled()? else {
+        return Ok(false);
+    };
     let parsed = parse_line(line, element, row, item);
     parsed.map(|()| true).map_err(|reason| lines.error(reason))
 }
@@ -227,15 +226,5 @@ fn next_scalar(bytes: &mut impl Read, big_endian: bool, scalar: Scalar) -> std::
     if big_endian {
         raw[..size].reverse();
     }
-    let [a, b, c, d, ..] = raw;
-    Ok(match scalar {
-        Scalar::I8 => f64::from(a.cast_signed()),
-        Scalar::U8 => f64::from(a),
-        Scalar::I16 => f64::from(i16::from_le_bytes([a, b])),
-        Scalar::U16 => f64::from(u16::from_le_bytes([a, b])),
-        Scalar::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-        Scalar::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-        Scalar::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
-        Scalar::F64 => f64::from_le_bytes(raw),
-    })
+    Ok(scalar.decode(raw))
 }

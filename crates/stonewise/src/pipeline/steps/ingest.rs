@@ -13,7 +13,7 @@ use nalgebra::Point3;
 use std::sync::Arc;
 use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::{EpochId, Pair};
-use stonewise_io::cloud::cloud_info;
+use stonewise_io::cloud::cloud_scans;
 
 /// Cuts the clouds of an epoch into tiles.
 pub static INGEST: Step = Step {
@@ -50,7 +50,7 @@ pub struct Ingested {
 pub fn scanners(epoch: &Epoch) -> Result<Vec<Point3<f64>>> {
     let mut positions = Vec::new();
     for cloud in &epoch.clouds {
-        let scans = cloud_info(cloud)?.scans.into_iter();
+        let scans = cloud_scans(cloud)?.into_iter();
         positions.extend(scans.filter_map(|scan| scan.origin));
     }
     Ok(positions)

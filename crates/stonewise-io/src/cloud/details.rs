@@ -1,0 +1,80 @@
+//! What a surveyor asks of a cloud file.
+
+use std::path::Path;
+
+use stonewise_core::geometry::Bounds;
+
+use super::gathered::{CHUNK_POINTS, Clock, FieldRange, Gathered, Head, Rounding, SourcePoints};
+use super::{
+    CloudError, CloudFormat, ReadSummary, Scan, cloud_crs, cloud_info, cloud_scans, las, read_cloud,
+};
+
+/// A cloud file, read from end to end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CloudDetails {
+    /// Family, version and kind of points.
+    pub format: String,
+    /// Program that wrote the file, where it says so.
+    pub software: Option<String>,
+    /// Records, and those without a position.
+    pub summary: ReadSummary,
+    /// Box around the points.
+    pub bounds: Option<Bounds>,
+    /// Box that the header claims, where it claims one.
+    pub claimed_bounds: Option<Bounds>,
+    /// Coordinate system, as [`CloudInfo::crs`](super::CloudInfo::crs).
+    pub crs: Option<String>,
+    /// Values of the points other than their positions.
+    pub fields: Vec<FieldRange>,
+    /// Scans that the file keeps apart.
+    pub scans: Vec<Scan>,
+    /// Stations or strips, by point source ID or scan.
+    pub sources: Vec<SourcePoints>,
+    /// Median distance from a point to the nearest other one, metres, of a sample.
+    pub spacing_m: Option<f64>,
+    /// What coordinates are rounded to, metres.
+    pub rounding: Rounding,
+    /// Date of the file, year, month and day.
+    pub created: Option<String>,
+    /// What times count from.
+    pub clock: Clock,
+}
+
+/// Reads a cloud from end to end.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
+    let format = CloudFormat::of(path)?;
+    let mut claimed_bounds = None;
+    let mut gathered = Gathered::default();
+    let (summary, head) = if format == CloudFormat::Las {
+        claimed_bounds = cloud_info(path)?.bounds;
+        las::details(path, &mut gathered)?
+    } else {
+        let summary = read_cloud(path, CHUNK_POINTS, |chunk| {
+            gathered.add(chunk);
+            Ok::<(), CloudError>(())
+        })?;
+        let head = Head {
+            format: format.to_string(),
+            ..Head::default()
+        };
+        (summary, head)
+    };
+    Ok(CloudDetails {
+        format: head.format,
+        software: head.software,
+        summary,
+        bounds: gathered.bounds,
+        claimed_bounds,
+        crs: cloud_crs(path)?,
+        fields: gathered.fields.list,
+        scans: cloud_scans(path)?,
+        sources: gathered.sources.into_values().collect(),
+        spacing_m: gathered.spacing.median_m(),
+        rounding: head.rounding.unwrap_or_else(|| gathered.steps.rounding()),
+        created: head.created,
+        clock: head.clock,
+    })
+}

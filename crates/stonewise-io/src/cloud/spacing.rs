@@ -1,0 +1,145 @@
+//! How far points lie from their nearest neighbours.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+use stonewise_core::geometry::cell_of;
+
+/// Sizes of the cells that are looked at, metres: each is kept with all of its points, or not at all.
+const CELLS_M: [f64; 3] = [0.05, 0.5, 8.0];
+/// Points that are kept of each size.
+const MOST_POINTS: usize = 100_000;
+/// Points whose neighbours are looked for.
+const SEARCHES: usize = 5000;
+
+/// A sample of whole cells, chosen by their place alone.
+pub(super) struct Spacing(Vec<Sample>);
+
+struct Sample {
+    cell_m: f64,
+    cells: HashMap<[i64; 3], Vec<Point3<f64>>>,
+    points: usize,
+    /// Cells whose number is not larger are kept.
+    limit: u64,
+}
+
+impl Spacing {
+    pub fn new() -> Self {
+        let sample = |cell_m| Sample {
+            cell_m,
+            cells: HashMap::new(),
+            points: 0,
+            limit: u64::MAX,
+        };
+        Self(CELLS_M.map(sample).into())
+    }
+
+    pub fn add(&mut self, points: &[Point3<f64>]) {
+        for sample in &mut self.0 {
+            points.iter().for_each(|p| sample.add(p));
+        }
+    }
+
+    /// Median distance from a point to the nearest other one, metres; points at the same place are one.
+    pub fn median_m(&self) -> Option<f64> {
+        let found: Vec<(f64, usize, usize)> = self.0.iter().filter_map(Sample::median_m).collect();
+        // In the smallest cells most neighbours are hidden by the border, unless the cloud is dense.
+        let trusted = found
+            .iter()
+            .find(|(_, found, searched)| found * 10 > searched * 9);
+        trusted.or(found.last()).map(|(median, _, _)| *median)
+    }
+}
+
+impl Sample {
+    fn add(&mut self, p: &Point3<f64>) {
+        let cell = cell_of(p, self.cell_m);
+        if number_of(&cell) > self.limit {
+            return;
+        }
+        self.cells.entry(cell).or_default().push(*p);
+        self.points += 1;
+        while self.points > MOST_POINTS {
+            self.limit /= 2;
+            let limit = self.limit;
+            self.cells.retain(|cell, _| number_of(cell) <= limit);
+            self.points = self.cells.values().map(Vec::len).sum();
+        }
+    }
+
+    /// The median, and of how many searches how many found a neighbour nearer than the border of the cell.
+    fn median_m(&self) -> Option<(f64, usize, usize)> {
+        let mut cells: Vec<(&[i64; 3], &Vec<Point3<f64>>)> = self.cells.iter().collect();
+        cells.sort_unstable_by_key(|(cell, _)| **cell);
+        let step = self.points.div_ceil(SEARCHES).max(1);
+        let (mut distances, mut searched, mut next) = (Vec::new(), 0, 0);
+        for (cell, points) in cells {
+            let mut sorted = points.clone();
+            sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+            while next < sorted.len() {
+                searched += 1;
+                let nearest = nearest_m(&sorted, next);
+                let p = sorted[next];
+                let to_border = |axis: usize| {
+                    let low = cell[axis] as f64 * self.cell_m;
+                    (p[axis] - low).min(low + self.cell_m - p[axis])
+                };
+                if nearest <= (0..3).map(to_border).fold(f64::INFINITY, f64::min) {
+                    distances.push(nearest);
+                }
+                next += step;
+            }
+            next -= sorted.len();
+        }
+        distances.sort_unstable_by(f64::total_cmp);
+        Some((*distances.get(distances.len() / 2)?, distances.len(), searched))
+    }
+}
+
+/// Distance of a point to the nearest other one, of points in order of x.
+fn nearest_m(sorted: &[Point3<f64>], of: usize) -> f64 {
+    let p = sorted[of];
+    let mut nearest = f64::INFINITY;
+    let mut look = |q: &Point3<f64>| {
+        let distance = (q - p).norm();
+        if distance > 0.0 && distance < nearest {
+            nearest = distance;
+        }
+        (q.x - p.x).abs() < nearest
+    };
+    let _ = sorted[of + 1..].iter().all(&mut look);
+    let _ = sorted[..of].iter().rev().all(&mut look);
+    nearest
+}
+
+/// A number of a cell that tells nothing of its place (Steele et al. 2014, SplitMix).
+fn number_of(cell: &[i64; 3]) -> u64 {
+    cell.iter().fold(0, |hash, &c| {
+        let mut z = (hash ^ c.cast_unsigned()).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spacing_of_grids_is_found() {
+        for step in [0.002, 0.013, 0.21, 1.7] {
+            let side = if step < 0.01 { 700 } else { 200 };
+            let mut spacing = Spacing::new();
+            for row in 0..side {
+                // Rows are farther apart than the points in them.
+                let at = |k| Point3::new(3e5 + f64::from(k) * step, f64::from(row) * 1.5 * step, 2.23);
+                let points: Vec<Point3<f64>> = (0..side).map(at).collect();
+                spacing.add(&points);
+            }
+            let found = spacing.median_m().unwrap();
+            assert!((found / step - 1.0).abs() < 1e-6, "{step}: {found}");
+        }
+        assert_eq!(Spacing::new().median_m(), None);
+    }
+}
