@@ -128,7 +128,7 @@ pub enum Command {
     /// Repeat the paper's experiment, or measure how the results depend on masks, noise, spacing and so on.
     #[command(subcommand)]
     Experiment(ExperimentCommand),
-    /// Describe the content of a cloud, a camera file, a mask file or a project.
+    /// Describe the content of a cloud, photos, a camera file, a mask file or a project.
     #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
     /// Say what this machine offers and which parts of stonewise it can run.
@@ -568,6 +568,9 @@ pub struct InfoArgs {
     /// Files or folders.
     #[arg(required = true)]
     pub paths: Vec<PathBuf>,
+    /// Print a JSON list instead, an object for each path
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Reads `WIDTHxHEIGHT`, metres.

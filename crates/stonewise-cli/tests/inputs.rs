@@ -39,7 +39,7 @@ fn info_goes_on_after_a_bad_file_and_names_what_is_wrong_with_it() {
     paths.push(testdata("clouds/little.ply"));
     let (code, out, log) = info(&paths);
     assert_eq!(code, 1);
-    assert!(out.contains("little.ply") && out.contains("Ply,"), "{out}");
+    assert!(out.contains("little.ply") && out.contains("PLY,"), "{out}");
     for name in bad {
         let about: Vec<&str> = log.lines().filter(|line| line.contains(name)).collect();
         assert_eq!(about.len(), 1, "{name}: {log}");
@@ -92,6 +92,60 @@ fn info_tells_what_pictures_and_masks_there_are() {
         log.contains("neither photos, label images nor a COLMAP model"),
         "{log}"
     );
+}
+
+#[test]
+fn info_tells_what_a_surveyor_asks() {
+    let (code, out, log) = info(&[
+        testdata("clouds/las14_format7_extra.laz"),
+        testdata("clouds/two_scans.ptx"),
+        testdata("photos/exif.jpg"),
+    ]);
+    assert_eq!((code, log.as_str()), (0, ""));
+    // Coordinates, fields and sources as testdata/clouds/generate.py writes them.
+    for expected in [
+        "  LAZ 1.4, point format 7, 120 points\n",
+        "  coordinates in steps of [0.001, 0.001, 0.001] m from [350000.0, 5650000.0, 0.0] m\n",
+        "intensity 0 to 833",
+        "gps_time 100000 to 100017",
+        "classification 0 to 19",
+        "reflectance -11.9 to 0",
+        "  source 900: 1 point",
+        "  and 100 more sources\n",
+        "  CRS PROJCS[\"ETRS89 / UTM zone 32N\"",
+        "  PTX, 132 points\n  12 of them have no position\n",
+        "  scan scan 2: 55 points, scanner at (350020.000, 5649980.000, 99.250)\n",
+        "  no CRS\n",
+        "  DJI FC6310, f 8.8 mm, 24 mm on 35 mm film\n  taken 2025-04-12 09:31:02\n",
+        "  GPS -51.0879833, 7.7360556, -12.3 m\n",
+    ] {
+        assert!(out.contains(expected), "{expected} is not in\n{out}");
+    }
+    let output = stonewise()
+        .args(["info", "--json"])
+        .arg(testdata("clouds/las12_format3.las"))
+        .arg(testdata("clouds/two_scans.ptx"))
+        .arg(testdata("cameras/transforms.json"))
+        .output()
+        .unwrap();
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(all[0]["epsg"], 25832);
+    assert_eq!(all[0]["records"], 120);
+    assert_eq!(
+        all[0]["rounding"]["scale_m"],
+        serde_json::json!([0.001, 0.001, 0.001])
+    );
+    assert_eq!(
+        all[1]["scans"][0]["scanner"],
+        serde_json::json!([349_990.0, 5_650_010.0, 101.5])
+    );
+    assert_eq!(
+        (&all[2]["kind"], &all[2]["photos"][1]["focal_px"][0]),
+        (&"cameras".into(), &1400.0.into())
+    );
+    let spacing = all[0]["spacing_m"].as_f64().unwrap();
+    // Neighbours lie 1 cm and 2 cm apart in x and y, and up to 97 mm in z.
+    assert!((0.0223..0.06).contains(&spacing), "{spacing}");
 }
 
 #[test]

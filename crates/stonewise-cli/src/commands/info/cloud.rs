@@ -1,0 +1,228 @@
+//! `info` of a cloud.
+
+use super::described::Described;
+use super::gps_time::date_of;
+use crate::counted::counted;
+use anyhow::Result;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+use stonewise_core::geometry::Bounds;
+use stonewise_io::cloud::{Clock, CloudDetails, Rounding, SourcePoints, cloud_details};
+use stonewise_io::crs::Crs;
+
+/// Difference of a header's box from that of the points from which on the header is wrong, metres: above all
+/// roundings.
+const WRONG_BOX_M: f64 = 0.02;
+/// Sources that are listed for people.
+const MOST_SOURCES: usize = 20;
+/// Seconds between the beginning of GPS time and that of adjusted GPS times.
+const ADJUSTED_S: f64 = 1e9;
+
+/// What a surveyor asks of a cloud.
+pub fn cloud(path: &Path) -> Result<Described> {
+    let details = cloud_details(path)?;
+    Ok(Described {
+        text: text(&details),
+        json: json(&details),
+    })
+}
+
+fn text(details: &CloudDetails) -> String {
+    let mut text = format!(
+        "  {}, {}\n",
+        details.format,
+        counted(details.summary.records, "point")
+    );
+    let mut line = |said: String| {
+        let _ = writeln!(text, "  {said}");
+    };
+    if details.summary.skipped > 0 {
+        line(format!("{} of them have no position", details.summary.skipped));
+    }
+    if let Some(bounds) = &details.bounds {
+        line(extent(bounds));
+    }
+    if let Some(claimed) = wrong_box(details) {
+        line(format!("its header is wrong: it says {}", extent(&claimed)));
+    }
+    if let Some(rounding) = rounding(&details.rounding) {
+        line(rounding);
+    }
+    if let Some(spacing) = details.spacing_m {
+        line(format!(
+            "{:.1} mm to the nearest point, in the median",
+            spacing * 1000.0
+        ));
+    }
+    let fields = details.fields.iter().map(|field| match field.range {
+        Some([low, high]) => format!("{} {} to {}", field.name, short(low), short(high)),
+        None => field.name.clone(),
+    });
+    let fields: Vec<String> = fields.collect();
+    if !fields.is_empty() {
+        line(format!("fields: {}", fields.join(", ")));
+    }
+    for scan in &details.scans {
+        let place = scan.origin.map_or(String::new(), |p| {
+            format!(", scanner at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)
+        });
+        line(format!(
+            "scan {}: {}{place}",
+            scan.name,
+            counted(scan.records, "point")
+        ));
+    }
+    if details.scans.is_empty() {
+        for source in details.sources.iter().take(MOST_SOURCES) {
+            let times = source.times.and_then(|t| period(details.clock, t));
+            let times = times.map_or(String::new(), |t| format!(", {t}"));
+            line(format!(
+                "source {}: {}{times}",
+                source.number,
+                counted(source.points, "point")
+            ));
+        }
+        if details.sources.len() > MOST_SOURCES {
+            line(format!(
+                "and {} more sources",
+                details.sources.len() - MOST_SOURCES
+            ));
+        }
+    }
+    match (&details.created, &details.software) {
+        (Some(date), Some(software)) => line(format!("written {date} by {software}")),
+        (Some(date), None) => line(format!("written {date}")),
+        (None, Some(software)) => line(format!("written by {software}")),
+        (None, None) => {}
+    }
+    line(match &details.crs {
+        Some(crs) => format!("CRS {}", system(crs)),
+        None => "no CRS".to_owned(),
+    });
+    text
+}
+
+fn json(details: &CloudDetails) -> serde_json::Value {
+    let corners = |b: &Bounds| json!({ "min": b.min.coords.as_slice(), "max": b.max.coords.as_slice() });
+    let named = details.crs.as_deref().and_then(Crs::parse);
+    let scans = details.scans.iter().map(|scan| {
+        let scanner = scan.origin.map(|p| [p.x, p.y, p.z]);
+        json!({ "name": scan.name, "records": scan.records, "scanner": scanner })
+    });
+    let sources = details.sources.iter().map(|source: &SourcePoints| {
+        let mut json = json!(source);
+        json["dates"] = json!(source.times.and_then(|t| dates(details.clock, t)));
+        json
+    });
+    json!({
+        "kind": "cloud",
+        "format": details.format,
+        "records": details.summary.records,
+        "without_position": details.summary.skipped,
+        "bounds_m": details.bounds.as_ref().map(corners),
+        "wrong_header_bounds_m": wrong_box(details).as_ref().map(corners),
+        "rounding": match details.rounding {
+            Rounding::Scaled { scale, offset } => json!({ "scale_m": scale, "offset_m": offset }),
+            Rounding::Decimals(n) => json!({ "decimals": n }),
+            Rounding::Single(step) => json!({ "single_precision_m": step }),
+            Rounding::Double => json!(null),
+        },
+        "spacing_m": details.spacing_m,
+        "fields": details.fields,
+        "scans": scans.collect::<Vec<_>>(),
+        "sources": sources.collect::<Vec<_>>(),
+        "clock": details.clock,
+        "written": details.created,
+        "software": details.software,
+        "crs": details.crs,
+        "epsg": named.map(|crs| crs.epsg),
+    })
+}
+
+fn wrong_box(details: &CloudDetails) -> Option<Bounds> {
+    let (claimed, found) = (details.claimed_bounds?, details.bounds?);
+    let error = (claimed.min - found.min)
+        .amax()
+        .max((claimed.max - found.max).amax());
+    (error > WRONG_BOX_M).then_some(claimed)
+}
+
+fn extent(bounds: &Bounds) -> String {
+    let [min, max] = [bounds.min, bounds.max];
+    format!(
+        "from {:.3?} to {:.3?} m",
+        min.coords.as_slice(),
+        max.coords.as_slice()
+    )
+}
+
+fn rounding(rounding: &Rounding) -> Option<String> {
+    match rounding {
+        Rounding::Scaled { scale, offset } => {
+            Some(format!("coordinates in steps of {scale:?} m from {offset:?} m"))
+        }
+        Rounding::Decimals(n) => Some(format!("coordinates have {} at most", counted(n, "decimal"))),
+        Rounding::Single(step) => Some(format!(
+            "coordinates have single precision: the largest are rounded to {} m",
+            short(*step)
+        )),
+        Rounding::Double => None,
+    }
+}
+
+/// First and last date, GPS time.
+fn dates(clock: Clock, times: [f64; 2]) -> Option<[String; 2]> {
+    match clock {
+        Clock::AdjustedGps => {
+            let [first, last] = times.map(|t| date_of(t + ADJUSTED_S));
+            Some([first?, last?])
+        }
+        Clock::GpsWeek | Clock::Unknown => None,
+    }
+}
+
+fn period(clock: Clock, times: [f64; 2]) -> Option<String> {
+    if times == [0.0; 2] {
+        return None;
+    }
+    let of_week = || format!("second {:.0} to {:.0} of the GPS week", times[0], times[1]);
+    match dates(clock, times) {
+        Some([first, last]) => Some(format!("{first} to {last} GPS time")),
+        None => (clock == Clock::GpsWeek).then(of_week),
+    }
+}
+
+/// Name and code of a system, or what the file says of another.
+fn system(text: &str) -> String {
+    match Crs::parse(text) {
+        Some(crs) if crs.wkt.is_empty() => text.to_owned(),
+        Some(crs) => format!("{} (EPSG:{})", crs.name, crs.epsg),
+        None => text.to_owned(),
+    }
+}
+
+/// A number with six significant digits at most.
+fn short(value: f64) -> String {
+    let digits = 5 - value.abs().max(1e-6).log10().floor() as i32;
+    let text = format!("{value:.*}", digits.clamp(0, 9) as usize);
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_keep_what_counts() {
+        let said = [0.0, 833.0, -2047.0, 65_535.0, 0.031_25, 1.5e-5, 413_591_802.75].map(short);
+        assert_eq!(
+            said,
+            ["0", "833", "-2047", "65535", "0.03125", "0.000015", "413591803"]
+        );
+    }
+}
