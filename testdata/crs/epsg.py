@@ -40,7 +40,7 @@ def wkt1(code):
 
 def codes(kind):
     found = database.query_crs_info("EPSG", [kind], allow_deprecated=True)
-    return sorted(int(info.code) for info in found)
+    return sorted({int(info.code) for info in found})
 
 
 def is_expressed(text, crs):

@@ -233,7 +233,7 @@ fn errors_name_the_file_the_line_and_the_reason() {
     for (name, content, expected) in [
         (
             "a.ptx",
-            format!("{ptx}1 2 3 0.5\n"),
+            format!("{ptx}1.000 2.000 3.000 0.5\n"),
             "a.ptx is cut off: it holds 1 of 2 points of scan 1",
         ),
         (

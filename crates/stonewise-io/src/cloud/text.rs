@@ -24,7 +24,13 @@ pub fn read<E: From<CloudError>>(
     visit: Visit<'_, E>,
 ) -> Result<ReadSummary, E> {
     let Some((columns, first)) = find_columns(path)? else {
-        return Ok(ReadSummary::default());
+        return match scans(path)?.iter().find(|scan| scan.records > 0) {
+            Some(scan) => {
+                let reason = format!("it claims {} points, and holds none", scan.records);
+                Err(CloudError::truncated(path, reason).into())
+            }
+            None => Ok(ReadSummary::default()),
+        };
     };
     let mut parts = is_pts(path).then(Parts::default);
     let (has_color, has_intensity) = (columns.color.is_some(), columns.intensity.is_some());
