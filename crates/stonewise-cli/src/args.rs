@@ -60,6 +60,12 @@ pub enum Command {
     /// Write a project file from the surveys found in a folder.
     #[command(after_help = "Example:\n  stonewise init survey/        # writes survey/stonewise.toml")]
     Init(InitArgs),
+    /// Open a page to work in: look at a survey, run it, correct its stones, read its report.
+    #[command(
+        after_help = "Examples:\n  stonewise studio survey/\n  stonewise studio results/ --view\n\n\
+        The address goes to stdout; only this machine can reach it. See docs/src/studio.md."
+    )]
+    Studio(StudioArgs),
     /// Print the JSON schema of the project file, with which editors complete and explain its keys.
     #[command(after_help = "Example:\n  stonewise schema > survey/stonewise.schema.json")]
     Schema,
@@ -151,6 +157,23 @@ pub enum Command {
 pub struct CompletionsArgs {
     /// The shell.
     pub shell: Shell,
+}
+
+/// Arguments of `studio`.
+#[derive(Debug, ClapArgs)]
+pub struct StudioArgs {
+    /// A folder of surveys, a project file, or a folder of results.
+    #[arg(default_value = ".", value_name = "FOLDER|PROJECT|RESULTS")]
+    pub place: PathBuf,
+    /// Port of the address (default: any that is free).
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub port: u16,
+    /// Do not start a browser.
+    #[arg(long)]
+    pub no_browser: bool,
+    /// Only for looking: nothing can be changed, nothing can be run.
+    #[arg(long)]
+    pub view: bool,
 }
 
 /// Arguments of `man`.

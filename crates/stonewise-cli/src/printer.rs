@@ -69,7 +69,7 @@ impl Printer {
     /// Listens for Ctrl-C and for the system's request to end from now on; a second one ends at once.
     ///
     /// Before work begins that looks whether it should stop, either ends the program as always.
-    fn listen(&self) {
+    pub fn listen(&self) {
         self.listening.call_once(|| {
             let flag = Arc::clone(&self.cancelled);
             let handler = move || {

@@ -12,6 +12,15 @@ use std::path::{Path, PathBuf};
 use stonewise_base::error::{Error, Result};
 use stonewise_base::files::write_text;
 
+/// A project file for the surveys of a folder, and why it is this one.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Proposal {
+    /// The text of the project file.
+    pub text: String,
+    /// What was chosen for each epoch, and what was left out with the reason, one line each.
+    pub lines: Vec<String>,
+}
+
 /// What [`init()`] wrote, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Initialised {
@@ -74,6 +83,16 @@ pub fn init(dir: &Path) -> Result<Initialised> {
             message: "there is a project file already; remove it to start anew".into(),
         });
     }
+    let Proposal { text, lines } = propose(dir)?;
+    write_text(&path, &text)?;
+    Ok(Initialised { path, lines })
+}
+
+/// The project file that [`init()`] would write; writes nothing.
+///
+/// # Errors
+/// No folder holds a cloud; a folder cannot be read.
+pub fn propose(dir: &Path) -> Result<Proposal> {
     let mut lines = Vec::new();
     let mut epochs = Vec::new();
     for folder in folders(dir)? {
@@ -123,8 +142,10 @@ pub fn init(dir: &Path) -> Result<Initialised> {
         lines.extend(epoch.lines());
     }
     lines.extend(unused_masks(dir, &epochs)?);
-    write_text(&path, &project_text(dir, &epochs))?;
-    Ok(Initialised { path, lines })
+    Ok(Proposal {
+        text: project_text(dir, &epochs),
+        lines,
+    })
 }
 
 /// Says which clouds in the folder and below are in formats that are not read.

@@ -11,7 +11,7 @@ mod schema;
 pub mod sources;
 mod split;
 
-pub use init::{Initialised, init};
+pub use init::{Initialised, Proposal, init, propose};
 pub use project_type::{Epoch, PhotoFiles, Project};
 pub use scans::{ScansProject, is_scan};
 pub use schema::project_schema;

@@ -172,11 +172,19 @@ impl Project {
 
     fn read_with(path: &Path, least_epochs: usize) -> Result<Self> {
         let path = &project_file(path);
-        Self::parse(path, &project_text(path)?, least_epochs)
+        Self::parse_with(path, &project_text(path)?, least_epochs)
     }
 
     /// The project that a file at `path` with this text would be.
-    pub(crate) fn parse(path: &Path, text: &str, least_epochs: usize) -> Result<Self> {
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        Self::parse_with(path, text, 2)
+    }
+
+    /// The same for a project of this number of epochs at least.
+    pub(crate) fn parse_with(path: &Path, text: &str, least_epochs: usize) -> Result<Self> {
         let source = Source { path, text };
         let raw: RawProject = toml::from_str(text).map_err(|e| source.not_toml(&e))?;
         if raw.epochs.len() < least_epochs {

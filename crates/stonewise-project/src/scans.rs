@@ -53,7 +53,7 @@ impl ScansProject {
         }
         let text = text_of(&scans);
         Ok(Self {
-            project: Project::parse(&path, &text, 2)?,
+            project: Project::parse(&path, &text)?,
             text,
         })
     }

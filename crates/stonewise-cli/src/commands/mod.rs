@@ -18,6 +18,7 @@ mod schema;
 mod segment;
 mod simulate;
 mod split;
+mod studio;
 mod train;
 mod tune;
 mod units;
@@ -61,6 +62,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Check(args) => check::check(&args, force, printer),
         Command::Edits(which) => edits::edits(&which, printer),
         Command::Init(args) => init::init(&args),
+        Command::Studio(args) => studio::studio(&args, printer),
         Command::Schema => schema::schema(),
         Command::Info(args) => info::info(&args),
         Command::Doctor => doctor::doctor(),

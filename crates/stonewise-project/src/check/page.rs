@@ -13,6 +13,11 @@ impl Report {
     /// # Errors
     /// The page cannot be written.
     pub fn write_page(&self, path: &Path, project: &Project) -> Result<()> {
+        write_text(path, &self.page(project))
+    }
+
+    /// The table with its pictures as one HTML page.
+    pub fn page(&self, project: &Project) -> String {
         let mut page = Page::new(&format!("{}: a look at the survey", project.name));
         page.note(match self.verdict() {
             Verdict::Fine => "Nothing speaks against running this project.",
@@ -46,6 +51,6 @@ impl Report {
         for picture in &self.pictures {
             page.figure(&picture.caption, &jpeg_element(&picture.jpeg, &picture.caption));
         }
-        write_text(path, &page.finish())
+        page.finish()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::lines::object_lines;
 use nalgebra::Point2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -33,7 +34,7 @@ pub struct EditsFile {
 }
 
 /// What an edit does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
     /// The stones at the places `at`, or inside `outline`, are one.
@@ -62,7 +63,7 @@ impl Action {
 }
 
 /// One correction by hand. Its shape is in metres on the unrolled wall (along, up), or in pixels of `photo`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Edit {
     /// What it does.
@@ -125,7 +126,7 @@ impl Edit {
     }
 
     /// What is wrong with it; `None` where it can be applied.
-    pub(super) fn mistake(&self) -> Option<String> {
+    pub fn mistake(&self) -> Option<String> {
         let word = self.action.word();
         let given = [
             ("at", self.at.len()),

@@ -1,0 +1,18 @@
+//! The page to work in: a server on the loopback address, its JSON API, and what it keeps.
+//!
+//! The library does the work; the page is TypeScript in `web/studio`. docs/src/studio.md says what the page does and
+//! what is promised about its security.
+
+mod api;
+mod assets;
+mod epochs;
+mod guard;
+mod http;
+mod journal;
+mod place;
+mod project_text;
+mod studio;
+mod work;
+
+pub use api::typescript;
+pub use studio::Studio;

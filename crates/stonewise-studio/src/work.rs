@@ -1,0 +1,328 @@
+//! The work in the background: a run, and the look at a survey. Pages are told when something changes.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use stonewise_core::progress::Progress;
+
+/// Most lines of a run's log that are kept.
+const LINES: usize = 200;
+
+/// What a run is at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Phase {
+    /// None was started here.
+    #[default]
+    Idle,
+    /// It works.
+    Running,
+    /// It was asked to stop, and will at the next moment at which nothing is lost.
+    Stopping,
+    /// It was stopped; the next run goes on from there.
+    Stopped,
+    /// It has finished.
+    Done,
+    /// It could not go on.
+    Failed,
+}
+
+impl Phase {
+    /// Whether a thread is at work.
+    pub fn is_at_work(self) -> bool {
+        matches!(self, Self::Running | Self::Stopping)
+    }
+}
+
+/// What became of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum StepState {
+    /// It comes later.
+    Waiting,
+    /// It is at work.
+    Working,
+    /// It has ended.
+    Done,
+    /// An earlier run did it.
+    Earlier,
+}
+
+/// A step of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct StepShown {
+    /// What it does, in words.
+    pub name: String,
+    /// What became of it.
+    pub state: StepState,
+    /// How long it has worked, seconds.
+    pub seconds: f64,
+}
+
+/// What the step at work is at.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct PartShown {
+    /// What it does, in words.
+    pub what: String,
+    /// Which unit, such as a photo.
+    pub detail: String,
+    /// Units that are done.
+    pub done: u64,
+    /// All units; 0 where that is not known.
+    pub total: u64,
+}
+
+/// A run, as pages show it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct RunShown {
+    /// What it is at.
+    pub phase: Phase,
+    /// Seconds since it began, until it ended.
+    pub seconds: f64,
+    /// Its steps in order.
+    pub steps: Vec<StepShown>,
+    /// What the step at work is at.
+    pub part: PartShown,
+    /// The last lines of its log.
+    pub lines: VecDeque<String>,
+    /// Why the results as a whole are in doubt, one sentence each.
+    pub doubts: Vec<String>,
+    /// The verdict in a sentence, once there is one.
+    pub sentence: Option<String>,
+    /// Why it failed.
+    pub error: Option<String>,
+}
+
+/// A run and who watches it.
+#[derive(Default)]
+pub struct Run {
+    inner: Mutex<Inner>,
+    changed: Condvar,
+    cancelled: AtomicBool,
+}
+
+#[derive(Default)]
+struct Inner {
+    shown: RunShown,
+    /// Counts changes, those of other things that pages show included.
+    version: u64,
+    began: Option<Instant>,
+    at: Option<(usize, Instant)>,
+}
+
+impl Run {
+    /// A run begins; `false` where one is at work.
+    pub fn begin(&self) -> bool {
+        let mut inner = self.inner();
+        if inner.shown.phase.is_at_work() {
+            return false;
+        }
+        self.cancelled.store(false, Ordering::Relaxed);
+        inner.shown = RunShown {
+            phase: Phase::Running,
+            ..RunShown::default()
+        };
+        (inner.began, inner.at) = (Some(Instant::now()), None);
+        self.tell(inner);
+        true
+    }
+
+    /// The run has ended like this; `outcome` sets what came out.
+    pub fn end(&self, phase: Phase, outcome: impl FnOnce(&mut RunShown)) {
+        let mut inner = self.inner();
+        inner.leave();
+        inner.shown.seconds = inner.began.take().map_or(0.0, |b| b.elapsed().as_secs_f64());
+        inner.shown.phase = phase;
+        inner.shown.part = PartShown::default();
+        outcome(&mut inner.shown);
+        self.tell(inner);
+    }
+
+    /// Asks the run to stop.
+    pub fn stop(&self) {
+        let mut inner = self.inner();
+        if inner.shown.phase == Phase::Running {
+            self.cancelled.store(true, Ordering::Relaxed);
+            inner.shown.phase = Phase::Stopping;
+            self.tell(inner);
+        }
+    }
+
+    /// Something else that pages show has changed.
+    pub fn touch(&self) {
+        let inner = self.inner();
+        self.tell(inner);
+    }
+
+    /// The run as it is, and the number of its version.
+    pub fn shown(&self) -> (RunShown, u64) {
+        let inner = self.inner();
+        let mut shown = inner.shown.clone();
+        if let Some(began) = inner.began {
+            shown.seconds = began.elapsed().as_secs_f64();
+        }
+        if let Some((step, since)) = inner.at
+            && let Some(step) = shown.steps.get_mut(step)
+        {
+            step.seconds += since.elapsed().as_secs_f64();
+        }
+        (shown, inner.version)
+    }
+
+    /// What the run is at.
+    pub fn phase(&self) -> Phase {
+        self.inner().shown.phase
+    }
+
+    /// Waits until there is a later version than this one, or so long.
+    pub fn wait(&self, version: u64, at_most: Duration) {
+        let inner = self.inner();
+        let waited = self
+            .changed
+            .wait_timeout_while(inner, at_most, |inner| inner.version == version);
+        drop(waited);
+    }
+
+    fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn tell(&self, mut inner: MutexGuard<'_, Inner>) {
+        inner.version += 1;
+        drop(inner);
+        self.changed.notify_all();
+    }
+}
+
+impl Inner {
+    /// The step at work has ended, or goes on later.
+    fn leave(&mut self) {
+        if let Some((step, since)) = self.at.take()
+            && let Some(step) = self.shown.steps.get_mut(step)
+        {
+            step.state = StepState::Done;
+            step.seconds += since.elapsed().as_secs_f64();
+        }
+    }
+}
+
+impl Progress for Run {
+    fn begin(&self, what: &str, total: u64) {
+        let mut inner = self.inner();
+        inner.shown.part = PartShown {
+            what: what.to_owned(),
+            total,
+            ..PartShown::default()
+        };
+        self.tell(inner);
+    }
+
+    fn advance(&self, units: u64) {
+        let mut inner = self.inner();
+        inner.shown.part.done += units;
+        self.tell(inner);
+    }
+
+    fn agenda(&self, steps: &[String]) {
+        let mut inner = self.inner();
+        inner.at = None;
+        let step = |name: &String| StepShown {
+            name: name.clone(),
+            state: StepState::Waiting,
+            seconds: 0.0,
+        };
+        inner.shown.steps = steps.iter().map(step).collect();
+        self.tell(inner);
+    }
+
+    fn enter(&self, step: usize) {
+        let mut inner = self.inner();
+        if inner.at.is_some_and(|(at, _)| at == step) {
+            return;
+        }
+        inner.leave();
+        inner.shown.part = PartShown::default();
+        if let Some(shown) = inner.shown.steps.get_mut(step) {
+            shown.state = StepState::Working;
+            inner.at = Some((step, Instant::now()));
+        }
+        self.tell(inner);
+    }
+
+    fn take_over(&self, step: usize) {
+        let mut inner = self.inner();
+        if let Some(shown) = inner.shown.steps.get_mut(step)
+            && shown.state == StepState::Waiting
+        {
+            shown.state = StepState::Earlier;
+        }
+        self.tell(inner);
+    }
+
+    fn detail(&self, unit: &str) {
+        let mut inner = self.inner();
+        unit.clone_into(&mut inner.shown.part.detail);
+        self.tell(inner);
+    }
+
+    fn note(&self, line: &str) {
+        let mut inner = self.inner();
+        inner.shown.lines.push_back(line.to_owned());
+        while inner.shown.lines.len() > LINES {
+            inner.shown.lines.pop_front();
+        }
+        self.tell(inner);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_follow_what_a_run_says_of_itself() {
+        let run = Run::default();
+        assert!(run.begin() && !run.begin());
+        run.agenda(&["clouds", "stones", "motions"].map(str::to_owned));
+        run.take_over(0);
+        run.enter(1);
+        Progress::begin(&run, "photos", 3);
+        run.advance(2);
+        run.enter(2);
+        let states = |run: &Run| run.shown().0.steps.iter().map(|s| s.state).collect::<Vec<_>>();
+        assert_eq!(
+            states(&run),
+            [StepState::Earlier, StepState::Done, StepState::Working]
+        );
+        assert_eq!(run.shown().0.part, PartShown::default());
+        run.stop();
+        assert!(run.is_cancelled());
+        run.end(Phase::Stopped, |_| {});
+        assert_eq!(run.phase(), Phase::Stopped);
+        // The next run starts afresh.
+        assert!(run.begin() && !run.is_cancelled());
+    }
+
+    #[test]
+    fn a_watcher_wakes_at_the_next_change() {
+        let run = Run::default();
+        let (_, version) = run.shown();
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(Duration::from_millis(20));
+                run.touch();
+            });
+            let began = Instant::now();
+            run.wait(version, Duration::from_secs(20));
+            assert!(began.elapsed() < Duration::from_secs(10));
+        });
+        assert_eq!(run.shown().1, version + 1);
+    }
+}

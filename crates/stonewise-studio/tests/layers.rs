@@ -1,0 +1,15 @@
+//! Keeps the modules of the studio in their order: a module uses only those below it, and no files use each
+//! other in a circle.
+
+/// Modules from the bottom up; those on one line do not use each other.
+const LAYERS: [&[&str]; 4] = [
+    &["http", "journal", "place", "project_text", "work"],
+    &["assets", "epochs", "guard"],
+    &["api"],
+    &["studio"],
+];
+
+#[test]
+fn modules_use_only_those_below_them_and_never_in_a_circle() {
+    stonewise_testing::assert_layers(env!("CARGO_MANIFEST_DIR"), &LAYERS);
+}

@@ -1,0 +1,218 @@
+// Made from the types of crates/stonewise-studio; a cargo test writes and compares it.
+
+/** `POST /edits/undo` and `POST /edits/redo`. */
+export interface Act {
+  /** A name that no other act has. */
+  readonly id: string;
+}
+
+/** What an edit does. */
+export type Action = "merge" | "split" | "delete" | "add" | "ignore";
+
+/** A change of the project file. */
+export interface Change {
+  /** The value; `null` removes it. */
+  readonly value: unknown;
+  /** The way to the value. */
+  readonly way: readonly (Step)[];
+}
+
+/** The look at the survey that goes on by itself. */
+export interface CheckShown {
+  /** Why it could not be done. */
+  readonly error?: string | null;
+  /** What it found. */
+  readonly findings: readonly (FindingShown)[];
+  /** Whether it has ended, so that there are findings and a page with pictures (`/check`). */
+  readonly is_done: boolean;
+  /** Whether it goes on. */
+  readonly is_running: boolean;
+}
+
+/** One correction by hand. Its shape is in metres on the unrolled wall (along, up), or in pixels of `photo`. */
+export interface Edit {
+  /** Places in stones. */
+  readonly at?: readonly (readonly [number, number])[];
+  /** What it does. */
+  readonly do: Action;
+  /** The epoch of that photo; absent: the first. */
+  readonly epoch?: string | null;
+  /** The epochs whose stones it changes; absent: all. */
+  readonly epochs?: readonly (string)[] | null;
+  /** A line from border to border of a stone. */
+  readonly line?: readonly (readonly [number, number])[];
+  /** A polygon; the first vertex is not repeated. */
+  readonly outline?: readonly (readonly [number, number])[];
+  /** The photo in whose pixels the shape is given; absent: the unrolled wall. */
+  readonly photo?: string | null;
+  /** When: a date, YYYY-MM-DD, with a time or without. */
+  readonly when: string;
+  /** Who decided it. */
+  readonly who: string;
+  /** Why. */
+  readonly why: string;
+}
+
+/** `GET /edits`, and the answer to every act: the corrections by hand. */
+export interface EditsShown {
+  /** Whether there is an undone act. */
+  readonly can_redo: boolean;
+  /** Whether there is an act to undo. */
+  readonly can_undo: boolean;
+  /** The edits, as the file of edits holds them. */
+  readonly edits: readonly (Edit)[];
+}
+
+/** An epoch. */
+export interface EpochShown {
+  /** Its clouds. */
+  readonly clouds: readonly (FileShown)[];
+  /** Its date, ISO 8601. */
+  readonly date?: string | null;
+  /** Whether a picture of it can be shown. */
+  readonly has_picture: boolean;
+  /** Where its masks are; absent: the detector finds the stones. */
+  readonly masks?: string | null;
+  /** Its name. */
+  readonly name: string;
+  /** Number of its photos. */
+  readonly photos: number;
+}
+
+/** A file of a survey. */
+export interface FileShown {
+  /** Its length, bytes. */
+  readonly bytes: number;
+  /** Its path, relative to the project file where it lies beside or below it. */
+  readonly name: string;
+}
+
+/** A finding of the look at the survey. */
+export interface FindingShown {
+  /** The epoch; empty where it is about all of them. */
+  readonly epoch: string;
+  /** What was looked at, in the project's language. */
+  readonly text: string;
+  /** What it means. */
+  readonly weight: Weight;
+}
+
+/** Why a request was refused; the body of every error. */
+export interface MistakeShown {
+  /** The line of the project file. */
+  readonly line?: number | null;
+  /** What is wrong, and the fix. */
+  readonly message: string;
+  /** The way to the value that is wrong. */
+  readonly way: readonly (Step)[];
+}
+
+/** `POST /edits`: edits that are one act and are undone together. */
+export interface NewEdits {
+  /** The edits; `when` may be empty: now. */
+  readonly edits: readonly (Edit)[];
+  /** A name that no other act has: an act that is sent again counts once. */
+  readonly id: string;
+}
+
+/** What the step at work is at. */
+export interface PartShown {
+  /** Which unit, such as a photo. */
+  readonly detail: string;
+  /** Units that are done. */
+  readonly done: number;
+  /** All units; 0 where that is not known. */
+  readonly total: number;
+  /** What it does, in words. */
+  readonly what: string;
+}
+
+/** What a run is at. */
+export type Phase = "idle" | "running" | "stopping" | "stopped" | "done" | "failed";
+
+/** `PATCH /project`: changes that hold together or not at all. */
+export interface ProjectChanges {
+  /** The changes, one after the other. */
+  readonly changes: readonly (Change)[];
+}
+
+/** `GET /project`: the project file. */
+export interface ProjectShown {
+  /** Its epochs; none where the file is not valid. */
+  readonly epochs: readonly (EpochShown)[];
+  /** What is wrong with the file. */
+  readonly mistake?: MistakeShown | null;
+  /** Where there is no file: the file that would be written, and why it is this one. */
+  readonly proposal?: ProposalShown | null;
+  /** Its values, as TOML holds them. */
+  readonly values: unknown;
+}
+
+/** A project file for what lies in the folder. */
+export interface ProposalShown {
+  /** What was chosen and what was left out, one line each. */
+  readonly lines: readonly (string)[];
+  /** Its text. */
+  readonly text: string;
+}
+
+/** A run, as pages show it. */
+export interface RunShown {
+  /** Why the results as a whole are in doubt, one sentence each. */
+  readonly doubts: readonly (string)[];
+  /** Why it failed. */
+  readonly error?: string | null;
+  /** The last lines of its log. */
+  readonly lines: readonly (string)[];
+  /** What the step at work is at. */
+  readonly part: PartShown;
+  /** What it is at. */
+  readonly phase: Phase;
+  /** Seconds since it began, until it ended. */
+  readonly seconds: number;
+  /** The verdict in a sentence, once there is one. */
+  readonly sentence?: string | null;
+  /** Its steps in order. */
+  readonly steps: readonly (StepShown)[];
+}
+
+/** `GET /state`, and every event of `GET /events`. */
+export interface State {
+  /** The look at the survey. */
+  readonly check: CheckShown;
+  /** Whether the project file is there. */
+  readonly has_project: boolean;
+  /** Whether edits or the project changed after the report was written. */
+  readonly is_outdated: boolean;
+  /** The project file, and the folder of the results. */
+  readonly project_file?: string | null;
+  /** The number of the project file's version: it changes with every change of the file. */
+  readonly project_version: string;
+  /** When the report was written, a number that changes with it; absent where there is none. */
+  readonly report?: string | null;
+  /** Where results go. */
+  readonly results_folder: string;
+  /** The run. */
+  readonly run: RunShown;
+  /** Whether nothing can be changed. */
+  readonly view: boolean;
+}
+
+/** A step on it. */
+export type Step = string | number;
+
+/** A step of a run. */
+export interface StepShown {
+  /** What it does, in words. */
+  readonly name: string;
+  /** How long it has worked, seconds. */
+  readonly seconds: number;
+  /** What became of it. */
+  readonly state: StepState;
+}
+
+/** What became of a step. */
+export type StepState = "waiting" | "working" | "done" | "earlier";
+
+/** What a finding means for a run. */
+export type Weight = "fine" | "note" | "doubt" | "wrong" | "unreadable";

@@ -1,0 +1,27 @@
+// The report as it is, in a frame that reaches nothing of the studio.
+
+import { el } from "../src/dom.ts";
+import type { Page } from "./main.ts";
+import { tx } from "./texts.ts";
+
+export const resultsPage: Page = (place, live, until) => {
+  const note = el("p", { class: "empty" });
+  const outdated = el("p", { class: "banner soft", hidden: true }, tx("outdated"));
+  const link = el("a", { href: "/report/index.html", target: "_blank", rel: "noopener", class: "own-tab" }, tx("ownTab"));
+  let frame: HTMLIFrameElement | null = null, version: string | null | undefined;
+  place.append(outdated, note, link);
+  live.watch((state) => {
+    outdated.hidden = !(state.is_outdated && state.report);
+    link.hidden = note.hidden = false;
+    link.hidden = !state.report;
+    note.hidden = Boolean(state.report);
+    note.textContent = tx("noResults");
+    if (state.report === version) return;
+    version = state.report;
+    frame?.remove();
+    frame = null;
+    if (!version) return;
+    frame = el("iframe", { src: "/report/index.html", title: tx("reportFrame"), class: "report" });
+    place.append(frame);
+  }, until);
+};

@@ -1,0 +1,398 @@
+// The stones: the face with outlines, a queue of those worth a look, corrections, and zones with thresholds.
+
+import type { Report } from "../src/data.ts";
+import { button, el } from "../src/dom.ts";
+import { fixed } from "../src/format.ts";
+import { Photos } from "../src/views/photos.ts";
+import type { Action, Change, Edit, EditsShown, ProjectShown, State } from "./api.ts";
+import { type Live, newId, server } from "./client.ts";
+import { type Area, Face, type Point } from "./face.ts";
+import type { Page } from "./main.ts";
+import { loadReport } from "./report.ts";
+import { type Word, tx } from "./texts.ts";
+
+/** A stone whose points get less than this share of the photos' votes is worth a look. */
+const AGREEMENT = 0.7;
+/** So much larger or smaller than the median stone is worth a look. */
+const UNLIKE = 5;
+/** Rows of the queue at most. */
+const ROWS = 200;
+
+export const stonesPage: Page = (place, live, until) => {
+  const note = el("p", { class: "empty" }, tx("loadingStones"));
+  place.append(note);
+  let version: string | null | undefined, ends = new AbortController();
+  until.addEventListener("abort", () => ends.abort());
+  live.watch((state) => {
+    if (state.report === version) return;
+    // Results lie aside while a run works: the stones stay as they were.
+    if (!state.report && version && state.run.phase === "running") return;
+    version = state.report;
+    ends.abort();
+    ends = new AbortController();
+    const mine = ends.signal, shown = version;
+    if (!shown) {
+      place.replaceChildren(note);
+      note.textContent = tx("noResults");
+      return;
+    }
+    void (async () => {
+      const [report, edits, project] = await Promise.all([loadReport(), server.edits(), server.project()]);
+      if (mine.aborted || !report) return;
+      const room = new Room(report, shown, edits, project, live, mine);
+      place.replaceChildren(el("h1", { class: "unseen" }, tx("stones")), room.element);
+    })();
+  }, until);
+};
+
+/** Everything of the page for one state of the results. */
+class Room {
+  readonly element: HTMLElement;
+  readonly #report: Report;
+  readonly #live: Live;
+  readonly #face: Face;
+  readonly #photos: Photos;
+  readonly #error = el("p", { class: "error", role: "alert", hidden: true });
+  readonly #status = el("p", { class: "note", role: "status" });
+  readonly #who = el("input", { type: "text", autocomplete: "name", value: localStorage.getItem("who") ?? "" });
+  readonly #why = el("input", { type: "text", value: localStorage.getItem("why") ?? tx("whySeen") });
+  readonly #list = el("ol", { class: "edits" });
+  readonly #queue: readonly { readonly stone: number; readonly why: string }[];
+  readonly #rows = new Map<number, HTMLButtonElement>();
+  readonly #zones = el("ul", { class: "zones" });
+  readonly #selection = el("div", { class: "selection" });
+  readonly #undo: HTMLButtonElement;
+  readonly #redo: HTMLButtonElement;
+  readonly #apply: HTMLButtonElement;
+  readonly #drawing: HTMLElement;
+  /** When the results were written, milliseconds: later edits are not in them. */
+  readonly #made: number;
+  #edits: EditsShown;
+  #project: ProjectShown;
+  /** Acts are sent one after the other, in the order in which they were done. */
+  #line: Promise<void> = Promise.resolve();
+
+  constructor(report: Report, version: string, edits: EditsShown, project: ProjectShown, live: Live, until: AbortSignal) {
+    this.#made = Number(version) / 1e6;
+    this.#report = report;
+    this.#edits = edits;
+    this.#project = project;
+    this.#live = live;
+    this.#photos = new Photos(report);
+    this.#face = new Face(report, this.#photos);
+    this.#queue = queue(report);
+    this.#undo = button(tx("undo"), tx("undoHint"), () => this.#step(server.undo));
+    this.#redo = button(tx("redo"), tx("redoHint"), () => this.#step(server.redo));
+    this.#apply = button(tx("apply"), tx("applyHint"), () => void this.#run());
+    this.#apply.classList.add("primary");
+    this.#drawing = el("div", { class: "drawing", hidden: true }, el("p", {}, tx("drawHelp")),
+      button(tx("finish"), "", () => this.#face.finish()), button(tx("cancel"), "", () => this.#face.cancel()));
+    this.element = el("div", { class: "room" }, this.#toolbar(), this.#status, this.#error,
+      el("div", { class: "work" },
+        el("div", { class: "wall" }, this.#face.element, this.#drawing, this.#views()),
+        this.#side()));
+    this.#face.onSelect = () => this.#showSelection();
+    this.#face.onDrawing = (isDrawing) => (this.#drawing.hidden = !isDrawing);
+    document.addEventListener("keydown", (e) => this.#press(e), { signal: until });
+    for (const [input, key] of [[this.#who, "who"], [this.#why, "why"]] as const) {
+      input.addEventListener("input", () => localStorage.setItem(key, input.value));
+    }
+    live.watch((state) => this.#told(state), until);
+    this.#show();
+    this.#showSelection();
+  }
+
+  #toolbar(): HTMLElement {
+    const tool = (word: Word, hint: Word, press: () => void) => {
+      const element = button(tx(word), tx(hint), press);
+      element.disabled = this.#live.state!.view;
+      return element;
+    };
+    return el("div", { class: "toolbar", role: "toolbar", "aria-label": tx("tools") },
+      el("span", { class: "group" },
+        tool("join", "joinHint", () => this.#join()),
+        tool("split", "splitHint", () => this.#split()),
+        tool("redraw", "redrawHint", () => this.#redraw()),
+        tool("add", "addHint", () => this.#outline("add")),
+        tool("delete", "deleteHint", () => this.#delete()),
+        tool("ignore", "ignoreHint", () => this.#outline("ignore")),
+        tool("zone", "zoneHint", () => this.#zone())),
+      el("span", { class: "group" }, this.#undo, this.#redo),
+      this.#apply);
+  }
+
+  /** What is shown behind the outlines, and how large. */
+  #views(): HTMLElement {
+    const names = this.#report.document.epochs;
+    const choice = el("select", { "aria-label": tx("behind") }, ...names.map((name, n) => el("option", { value: n }, name)));
+    choice.addEventListener("change", () => {
+      this.#face.epoch = choice.value === "1" ? 1 : 0;
+      this.#face.redraw();
+    });
+    return el("div", { class: "views-bar" }, choice,
+      button("+", "+", () => this.#face.zoom(1.5)), button("−", "−", () => this.#face.zoom(1 / 1.5)),
+      button("⤢", "Home", () => this.#face.whole()));
+  }
+
+  #side(): HTMLElement {
+    const rows = this.#queue.slice(0, ROWS).map(({ stone, why }) => {
+      const row = button(`${tx("stone", { id: this.#report.stones.id[stone]! })}: ${why}`, "", () => this.#face.choose(stone));
+      this.#rows.set(stone, row);
+      return el("li", {}, row);
+    });
+    return el("aside", {},
+      this.#selection,
+      el("section", {}, el("h2", {}, `${tx("queue")} (${this.#queue.length})`),
+        el("p", { class: "note" }, this.#queue.length > 0 ? tx("queueKeys") : tx("queueEmpty")),
+        el("p", { class: "group" }, button(`◂ ${tx("previousInQueue")}`, "P", () => this.#walk(-1)), button(`${tx("nextInQueue")} ▸`, "N", () => this.#walk(1))),
+        el("ol", { class: "queue", tabindex: 0, "aria-label": tx("queue") }, ...rows)),
+      el("section", {}, el("h2", {}, tx("edits")),
+        el("div", { class: "signed" }, el("label", {}, tx("who"), this.#who), el("label", {}, tx("why"), this.#why)),
+        this.#list),
+      el("section", {}, el("h2", {}, tx("zones")), this.#zones));
+  }
+
+  #told(state: State): void {
+    const isAtWork = state.run.phase === "running" || state.run.phase === "stopping";
+    this.#apply.hidden = state.view;
+    this.#apply.disabled = isAtWork || !state.is_outdated;
+    this.#status.hidden = !isAtWork;
+    this.#status.textContent = isAtWork ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : "";
+    if (state.run.error) this.#fail(state.run.error);
+  }
+
+  /** Shows the edits and zones as they are. */
+  #show(): void {
+    const { edits, can_undo, can_redo } = this.#edits;
+    const view = this.#live.state!.view;
+    this.#undo.disabled = view || !can_undo;
+    this.#redo.disabled = view || !can_redo;
+    const pending = edits.filter((edit) => Date.parse(edit.when) > this.#made);
+    this.#face.pending = pending;
+    this.#list.replaceChildren(...[...edits].reverse().map((edit) =>
+      el("li", {}, `${tx(`do_${edit.do}`)}, ${edit.who}, ${edit.why}`, pending.includes(edit) ? el("span", { class: "chip" }, tx("pending")) : null)));
+    if (edits.length === 0) this.#list.replaceChildren(el("li", { class: "note" }, tx("noEdits")));
+    const zones = zonesOf(this.#project);
+    this.#face.zones = zones;
+    this.#zones.replaceChildren(...zones.map((zone, n) => {
+      const remove = button(tx("remove"), tx("removeZone", { name: zone.name }), () =>
+        void this.#change([{ way: ["thresholds", "zones", n], value: null }]));
+      remove.hidden = view;
+      return el("li", {}, zone.name, remove);
+    }));
+    if (zones.length === 0) this.#zones.replaceChildren(el("li", { class: "note" }, tx("noZones")));
+    this.#face.redraw();
+  }
+
+  #showSelection(): void {
+    const chosen = [...this.#face.selected], { stones, document } = this.#report;
+    for (const [stone, row] of this.#rows) {
+      if (this.#face.selected.has(stone)) row.setAttribute("aria-current", "true");
+      else row.removeAttribute("aria-current");
+    }
+    const list = chosen.map((i) => stones.id[i]!).join(", ");
+    const head = el("h2", { "aria-live": "polite" }, chosen.length > 0 ? tx("selected", { list }) : tx("nothingSelected"));
+    const [only] = chosen;
+    if (chosen.length !== 1 || only === undefined) return this.#selection.replaceChildren(head);
+    const status = document.statuses[stones.state[only]!];
+    const facts = [`${fixed(stones.area[only]!, 3)} m²`, `${fixed(100 * stones.confidence[only]!, 0)} %`, status?.meaning ?? ""];
+    const photos = this.#photos.of(only);
+    this.#selection.replaceChildren(head, el("p", { class: "note" }, facts.join(", ")),
+      ...(photos ? [el("h3", { class: "unseen" }, tx("stone", { id: stones.id[only]! })), photos] : []));
+  }
+
+  /** Keys of the tools; not while somebody writes. */
+  #press(e: KeyboardEvent): void {
+    const target = e.target as HTMLElement;
+    if (/^(INPUT|TEXTAREA|SELECT)$/.test(target.tagName) || target.closest("dialog")) return;
+    if ((e.ctrlKey || e.metaKey) && !e.altKey) {
+      const key = e.key.toLowerCase();
+      if (key === "z") (e.shiftKey ? this.#redo : this.#undo).click();
+      else if (key === "y") this.#redo.click();
+      else return;
+      return e.preventDefault();
+    }
+    if (e.altKey || this.#live.state!.view) return;
+    if (this.#face.isDrawing) {
+      if (e.key === "Escape") this.#face.cancel();
+      return;
+    }
+    const acts: Record<string, () => void> = {
+      j: () => this.#join(), s: () => this.#split(), r: () => this.#redraw(), a: () => this.#outline("add"), i: () => this.#outline("ignore"),
+      z: () => this.#zone(), n: () => this.#walk(1), p: () => this.#walk(-1), Delete: () => this.#delete(),
+      Escape: () => {
+        this.#face.selected.clear();
+        this.#showSelection();
+        this.#face.redraw();
+      },
+    };
+    const act = acts[e.key.length === 1 ? e.key.toLowerCase() : e.key];
+    if (!act) return;
+    e.preventDefault();
+    act();
+  }
+
+  #walk(by: number): void {
+    if (this.#queue.length === 0) return;
+    const [only] = this.#face.selected;
+    const now = this.#queue.findIndex(({ stone }) => stone === only);
+    const next = now < 0 ? (by > 0 ? 0 : this.#queue.length - 1) : (now + by + this.#queue.length) % this.#queue.length;
+    const { stone } = this.#queue[next]!;
+    this.#face.choose(stone);
+    this.#rows.get(stone)?.scrollIntoView({ block: "nearest" });
+  }
+
+  #join(): void {
+    if (this.#face.selected.size < 2) return this.#fail(tx("needsTwo"));
+    this.#add([{ ...this.#signed("merge"), at: this.#places() }]);
+  }
+
+  #delete(): void {
+    if (this.#face.selected.size === 0) return this.#fail(tx("needsSelection"));
+    this.#add([{ ...this.#signed("delete"), at: this.#places() }]);
+  }
+
+  #split(): void {
+    this.#face.draw("line", (line) => this.#add([{ ...this.#signed("split"), line }]));
+  }
+
+  #outline(action: "add" | "ignore"): void {
+    this.#face.draw("polygon", (outline) => this.#add([{ ...this.#signed(action), outline }]));
+  }
+
+  /** Another border: the stone goes, and one with the new border comes. */
+  #redraw(): void {
+    if (this.#face.selected.size !== 1) return this.#fail(tx("needsSelection"));
+    const at = this.#places();
+    this.#face.draw("polygon", (outline) => this.#add([{ ...this.#signed("delete"), at }, { ...this.#signed("add"), outline }]));
+  }
+
+  #zone(): void {
+    this.#face.draw("polygon", (polygon) => this.#ask(polygon));
+  }
+
+  /** Asks for the name and the thresholds of a zone. */
+  #ask(polygon: Point[]): void {
+    const name = el("input", { type: "text", required: true });
+    const levels = [el("input", { type: "text", inputmode: "decimal" }), el("input", { type: "text", inputmode: "decimal" })] as const;
+    const dialog = el("dialog", { "aria-label": tx("zone") });
+    const close = () => dialog.remove();
+    const number = (input: HTMLInputElement) => {
+      const text = input.value.trim().replace(",", ".");
+      return text ? Number(text) : null;
+    };
+    const save = () => {
+      const [attention_mm, alarm_mm] = levels.map(number);
+      if (!name.value.trim() || Number.isNaN(attention_mm) || Number.isNaN(alarm_mm)) return;
+      const value = { name: name.value.trim(), polygon, attention_mm, alarm_mm };
+      void this.#change([{ way: ["thresholds", "zones", zonesOf(this.#project).length], value }]);
+      close();
+    };
+    const keep = button(tx("save"), "", save);
+    keep.className = "primary";
+    dialog.append(
+      el("label", {}, tx("zoneName"), name), el("label", {}, tx("attention"), levels[0]), el("label", {}, tx("alarm"), levels[1]),
+      el("p", { class: "group" }, keep, button(tx("cancel"), "", close)));
+    dialog.addEventListener("close", close);
+    dialog.addEventListener("keydown", (e) => {
+      if (e.key === "Enter") save();
+    });
+    this.element.append(dialog);
+    dialog.showModal();
+  }
+
+  /** Places in the selected stones. */
+  #places(): Point[] {
+    const { a, u } = this.#report.stones;
+    return [...this.#face.selected].map((i) => [a[i]!, u[i]!]);
+  }
+
+  #signed(action: Action): Edit {
+    return { do: action, who: this.#who.value.trim(), when: "", why: this.#why.value.trim() };
+  }
+
+  #add(edits: readonly Edit[]): void {
+    if (!this.#who.value.trim()) {
+      this.#fail(tx("whoMissing"));
+      return this.#who.focus();
+    }
+    const id = newId();
+    this.#send(() => server.edit({ id, edits }));
+    this.#face.selected.clear();
+    this.#showSelection();
+  }
+
+  #step(act: (id: string) => Promise<EditsShown>): void {
+    const id = newId();
+    this.#send(() => act(id));
+  }
+
+  #send(act: () => Promise<EditsShown>): void {
+    this.#line = this.#line.then(async () => {
+      this.#error.hidden = true;
+      try {
+        this.#edits = await act();
+        this.#show();
+      } catch (error) {
+        this.#fail((error as Error).message);
+      }
+    });
+  }
+
+  async #change(changes: readonly Change[]): Promise<void> {
+    try {
+      this.#project = await server.change({ changes });
+      this.#show();
+    } catch (error) {
+      this.#fail((error as Error).message);
+    }
+  }
+
+  async #run(): Promise<void> {
+    try {
+      this.#live.take(await server.start());
+    } catch (error) {
+      this.#fail((error as Error).message);
+    }
+  }
+
+  #fail(message: string): void {
+    this.#error.textContent = message;
+    this.#error.hidden = false;
+  }
+}
+
+/** Stones that a person should look at, those of the gravest reasons first. */
+function queue(report: Report): { stone: number; why: string }[] {
+  const { stones, document } = report;
+  const areas = Array.from(stones.area).filter((area) => area > 0).sort((p, q) => p - q);
+  const median = areas[areas.length >> 1] ?? 0;
+  const found: { stone: number; why: string; weight: number }[] = [];
+  for (let i = 0; i < stones.count; i++) {
+    const reasons: string[] = [];
+    let weight = 0;
+    const status = document.statuses[stones.state[i]!];
+    if (status && status.word !== "ok") {
+      reasons.push(status.meaning);
+      weight += 2;
+    }
+    if (stones.photos[i]! > 0 && stones.confidence[i]! < AGREEMENT) {
+      reasons.push(tx("lowAgreement", { percent: fixed(100 * stones.confidence[i]!, 0) }));
+      weight += 2 * (1 - stones.confidence[i]!);
+    }
+    const ratio = stones.area[i]! / median;
+    if (ratio > UNLIKE || ratio < 1 / UNLIKE) {
+      reasons.push(tx("unlike", { times: fixed(ratio, ratio < 1 ? 2 : 1) }));
+      weight += 1;
+    }
+    if (stones.photos[i] === 1 && reasons.length > 0) reasons.push(tx("fewPhotos"));
+    if (reasons.length > 0) found.push({ stone: i, why: reasons.join("; "), weight });
+  }
+  return found.sort((p, q) => q.weight - p.weight);
+}
+
+/** The zones of the project file. */
+function zonesOf(project: ProjectShown): Area[] {
+  const thresholds = (project.values as { thresholds?: { zones?: Area[] } } | null)?.thresholds;
+  return thresholds?.zones ?? [];
+}

@@ -1,0 +1,237 @@
+// The studio in a real browser: from a folder of scans to corrected stones.
+import assert from "node:assert/strict";
+import { execFileSync, spawn } from "node:child_process";
+import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { launch } from "./browser.mjs";
+
+const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
+const target = process.env["CARGO_TARGET_DIR"] ?? join(root, "target");
+/** The program, to test without cargo. */
+const program = process.env["STONEWISE"] ?? join(target, "debug/stonewise");
+/** Folder for screenshots, where a person looks at them. */
+const pictures = process.env["SCREENSHOTS"];
+
+/** A wall of a few dozen stones with true masks, so that a run takes seconds. */
+const SURVEY = `
+name = "Test wall"
+[scene]
+seed = 3
+[scene.wall]
+width_m = 1.6
+height_m = 1.0
+seed = 3
+[scene.tls]
+spacing_m = 0.008
+[photos]
+columns = 2
+rows = 1
+width = 800
+height = 600
+focal_px = 1100.0
+distance_m = 5.0
+`;
+
+let browser, folder;
+
+before(async () => {
+  browser = await launch();
+  if (!process.env["STONEWISE"]) execFileSync("cargo", ["build", "-q", "-p", "stonewise-cli"], { cwd: root, stdio: "inherit" });
+  folder = mkdtempSync(join(tmpdir(), "stonewise-studio-"));
+  writeFileSync(join(folder, "params.toml"), SURVEY);
+  execFileSync(program, ["simulate", "--quiet", "--params", join(folder, "params.toml"), "--out", join(folder, "made")]);
+});
+
+after(async () => {
+  await browser?.close();
+  rmSync(folder, { recursive: true, force: true });
+});
+
+/** Starts a studio; its address, and how to end it. */
+async function studio(place, ...options) {
+  const child = spawn(program, ["studio", place, "--no-browser", ...options], { stdio: ["ignore", "pipe", "inherit"] });
+  const address = await new Promise((found, failed) => {
+    child.stdout.once("data", (data) => found(String(data).trim()));
+    child.once("exit", () => failed(new Error("the studio ended")));
+  });
+  const end = () => new Promise((ended) => {
+    child.removeAllListeners("exit");
+    child.once("exit", ended);
+    child.kill("SIGINT");
+  });
+  return { address, end };
+}
+
+/** Opens a page and notes what goes wrong: errors on the console, and requests beyond the studio. */
+async function open(address, { width = 1440, height = 900, dark = false, locale = "en-GB" } = {}) {
+  const context = await browser.newContext({ viewport: { width, height }, colorScheme: dark ? "dark" : "light", reducedMotion: "reduce", locale });
+  const page = await context.newPage();
+  page.setDefaultTimeout(120_000);
+  const trouble = [];
+  page.on("console", (message) => {
+    // The browser reports a refused change on its console, too.
+    if (message.type() === "error" && !message.text().includes("status of 422")) trouble.push(message.text());
+  });
+  page.on("pageerror", (error) => trouble.push(String(error)));
+  const { origin } = new URL(address);
+  page.on("request", (request) => {
+    if (!request.url().startsWith(origin) && !/^(blob|data):/.test(request.url())) trouble.push(`request: ${request.url()}`);
+  });
+  await page.goto(address);
+  await page.waitForSelector(".bar nav a[aria-current]");
+  return { page, trouble, close: () => context.close() };
+}
+
+async function shot(page, name) {
+  if (!pictures) return;
+  mkdirSync(pictures, { recursive: true });
+  await page.screenshot({ path: join(pictures, `${name}.png`) });
+}
+
+/** What axe-core finds in the page as it is, the report in its frame left out. */
+async function findings(page) {
+  await page.evaluate(readFileSync(join(root, "web/node_modules/axe-core/axe.min.js"), "utf8")).catch(() => {});
+  const { violations } = await page.evaluate(() => axe.run({ exclude: [["iframe"]] }, { resultTypes: ["violations"], iframes: false }));
+  return violations.flatMap((v) => v.nodes.map((n) => `${v.id}: ${n.target.join(" ")}`));
+}
+
+/** Clicks a stone on the canvas after it was brought into view by the queue or by its place. */
+const canvas = (page) => page.locator(".face canvas");
+
+test("the whole story: folder, project, run, report, corrections, zone, apply", async () => {
+  const survey = join(folder, "survey");
+  cpSync(join(folder, "made"), survey, { recursive: true });
+  for (const made of ["stonewise.toml", "truth", "work", "simulation.toml"]) rmSync(join(survey, made), { recursive: true, force: true });
+  const { address, end } = await studio(survey);
+  const { page, trouble, close } = await open(address);
+
+  // The folder, and the project that fits it.
+  await page.waitForSelector("text=No project yet");
+  assert.match(await page.textContent("pre"), /\[\[epochs\]\]/);
+  await shot(page, "1-folder");
+  await page.click("text=Write this project file");
+  await page.waitForSelector(".epoch img");
+  await page.waitForFunction(() => document.querySelector(".findings a[href='/check']"));
+  assert.deepEqual(await findings(page), [], "survey");
+  await shot(page, "2-survey");
+
+  // A mistake is shown beside its field, a change is saved with the file's comments.
+  await page.click("summary:has(code:text-is('match'))");
+  const ratio = page.locator(".field:has(> label code:text-is('max_ratio'))");
+  await ratio.locator("input").fill("-1");
+  await page.click(".savebar >> text=Save");
+  await ratio.locator(".error").filter({ hasText: "above 0" }).waitFor();
+  await shot(page, "3-mistake");
+  await ratio.locator("input").fill("");
+  await page.locator(".field:has(> label code:text-is('date'))").nth(1).locator("input").fill("2026-04-01");
+  await page.click(".savebar >> text=Save");
+  await page.waitForSelector(".epoch:has-text('2026-04-01')");
+  const text = readFileSync(join(survey, "stonewise.toml"), "utf8");
+  assert.ok(text.includes("date = 2026-04-01") && text.startsWith("#:schema") && !text.includes("max_ratio"), text);
+
+  // The run: stopped, continued, watched.
+  await page.click("nav >> text=Run");
+  await page.click("text=Start the run");
+  await page.waitForSelector(".steps .working");
+  await shot(page, "4-run");
+  await page.click(".acts >> text=Stop");
+  await page.waitForSelector("text=/was stopped|has finished/");
+  await page.click(".acts button.primary");
+  await page.waitForSelector("text=The run has finished");
+  assert.deepEqual(await findings(page), [], "run");
+  await shot(page, "5-done");
+
+  // The report as it is.
+  await page.click("text=Open the report");
+  const report = page.frameLocator("iframe.report");
+  await report.locator("#explore[data-ready]").waitFor();
+  assert.deepEqual(await findings(page), [], "results");
+  await shot(page, "6-results");
+
+  // Corrections: join two, split one, draw one, take one back.
+  await page.click("nav >> text=Stones");
+  await page.waitForSelector(".face canvas[data-drawn]");
+  await page.waitForFunction(() => document.querySelector(".face canvas").dataset.backdrop === "true");
+  await shot(page, "7-stones");
+  await page.fill(".signed label:first-child input", "A. Keller");
+  const rows = () => readFileSync(join(survey, "results/stones.csv"), "utf8").trim().split("\n").length;
+  const before = rows();
+  const box = await canvas(page).boundingBox();
+  const click = (x, y, modifiers = []) => canvas(page).click({ position: { x: x * box.width, y: y * box.height }, modifiers });
+  await click(0.4, 0.5);
+  await page.waitForSelector(".selection canvas");
+  const first = await page.textContent(".selection h2");
+  assert.match(first, /Selected: \d+$/);
+  for (const x of [0.45, 0.5, 0.55, 0.6]) {
+    await click(x, 0.5, ["Shift"]);
+    if (/, \d+$/.test(await page.textContent(".selection h2"))) break;
+  }
+  await page.click(".toolbar >> text=Join");
+  await page.waitForSelector(".edits >> text=joined");
+  await page.click(".toolbar >> text=Add");
+  await shot(page, "8-drawing");
+  for (const [x, y] of [[0.1, 0.1], [0.2, 0.1], [0.2, 0.2]]) await click(x, y);
+  await page.keyboard.press("Enter");
+  await page.waitForSelector(".edits >> text=added");
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction(() => !document.querySelector(".edits").textContent.includes("added"));
+
+  // A zone with thresholds goes into the project file.
+  await page.keyboard.press("z");
+  for (const [x, y] of [[0.1, 0.1], [0.9, 0.1], [0.9, 0.5], [0.1, 0.5]]) await click(x, y);
+  await page.keyboard.press("Enter");
+  await page.fill("dialog label:nth-child(1) input", "crest");
+  await page.fill("dialog label:nth-child(3) input", "5");
+  await shot(page, "9-zone");
+  await page.click("dialog >> text=Save");
+  await page.waitForSelector(".zones >> text=crest");
+  assert.match(readFileSync(join(survey, "stonewise.toml"), "utf8"), /\[\[thresholds\.zones\]\]\nname = "crest"/);
+  assert.deepEqual(await findings(page), [], "stones");
+  await shot(page, "10-edited");
+
+  // Apply repeats what the edits touch; the stones shown are those of the new results.
+  await page.click(".toolbar >> text=Apply");
+  await page.waitForSelector("text=Edits are being applied");
+  await page.waitForFunction(() => document.querySelector(".toolbar .primary")?.disabled && !document.querySelector(".edits .chip"), null, { timeout: 120_000 });
+  const audit = readFileSync(join(survey, "results/audit_edits.csv"), "utf8");
+  assert.match(audit, /merge/);
+  assert.equal(rows(), before - 1, audit);
+  await shot(page, "11-applied");
+  assert.deepEqual(trouble, []);
+  await close();
+  await end();
+});
+
+test("existing results open within a second, also narrow, dark and in German", async () => {
+  const began = performance.now();
+  const { address, end } = await studio(join(folder, "survey/results"), "--view");
+  const { page, trouble, close } = await open(address, { width: 390, height: 844, dark: true, locale: "de-DE" });
+  const seconds = (performance.now() - began) / 1e3;
+  console.log(`start to page: ${seconds.toFixed(2)} s`);
+  assert.ok(seconds < 5, `${seconds} s`);
+  assert.equal(await page.evaluate(() => document.documentElement.lang), "en", "the project is English");
+  for (const name of ["Survey", "Run", "Stones", "Results"]) {
+    await page.click(`nav >> text=${name}`);
+    if (name === "Stones") {
+      await page.waitForSelector(".face canvas[data-drawn]");
+      assert.ok(await page.isDisabled(".toolbar >> text=Join"), "nothing can be changed");
+    }
+    if (name === "Survey") await page.waitForSelector(".epoch");
+    assert.deepEqual(await findings(page), [], name);
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `${name} is wider than the screen`);
+    await shot(page, `narrow-${name}`);
+  }
+  assert.deepEqual(trouble, []);
+  await close();
+  const tablet = await open(address, { width: 1024, height: 768 });
+  for (const name of ["Survey", "Stones", "Results"]) {
+    await tablet.page.click(`nav >> text=${name}`);
+    await tablet.page.waitForTimeout(600);
+    await shot(tablet.page, `tablet-${name}`);
+  }
+  await tablet.close();
+  await end();
+});
