@@ -42,6 +42,8 @@ pub fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
     };
     RunRecord {
         version: "0.0.0".to_owned(),
+        program: "0".repeat(64),
+        processor: "x86_64, AVX2 and FMA".to_owned(),
         finished_at: "2026-04-30T12:00:00.000Z".parse().unwrap(),
         project: ProjectRecord {
             name: project.to_owned(),

@@ -379,6 +379,8 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
     };
     let run = RunRecord {
         version: "0.0.0".to_owned(),
+        program: String::new(),
+        processor: stonewise::processor_class().to_owned(),
         finished_at: Timestamp::EPOCH,
         project: ProjectRecord {
             name: "Sample </title><script>alert(1)</script> wall".to_owned(),

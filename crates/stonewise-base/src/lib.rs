@@ -6,6 +6,7 @@ pub mod files;
 pub mod messages;
 mod parameters;
 pub mod part;
+pub mod processor;
 pub mod report_params;
 pub mod settings;
 pub mod stable;

@@ -3,7 +3,7 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 4] = [
-    &["report_params", "stable", "thresholds"],
+    &["processor", "report_params", "stable", "thresholds"],
     &["error", "messages", "settings"],
     &["address_space", "files", "part", "warnings"],
     &["parameters"],

@@ -120,6 +120,12 @@ pub enum Command {
         after_help = "Examples:\n  stonewise report results/\n  stonewise report results/ --pdf report.pdf --no-appendix"
     )]
     Report(ReportArgs),
+    /// Verify that results are those of their run: files against their digests, tables against each other, and,
+    /// with the project, inputs and all results against the same run again.
+    #[command(after_help = "Examples:\n  stonewise verify results/\n  \
+        stonewise verify results/ survey/stonewise.toml\n\n\
+        The findings go to stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be compared.")]
+    Verify(VerifyArgs),
     /// Simulate a survey with known truth.
     #[command(after_help = "Examples:\n  stonewise simulate --seed 7 --out survey/\n  \
         stonewise simulate dam --size 40x20 --out survey/")]
@@ -457,6 +463,18 @@ pub struct ReportArgs {
     /// Leave parameters, digests and decisions about masks out of the PDF.
     #[arg(long, requires = "pdf")]
     pub no_appendix: bool,
+}
+
+/// Arguments of `verify`.
+#[derive(Debug, ClapArgs)]
+pub struct VerifyArgs {
+    /// Folder of a finished run.
+    pub results: PathBuf,
+    /// The project file: it is run again into a temporary folder, and all results are compared.
+    pub project: Option<PathBuf>,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Which experiment.

@@ -21,7 +21,14 @@ const KILLS: usize = 20;
 
 /// Result files with their bytes; not those that hold times, and not what lies aside or is stonewise's own.
 fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let but = ["work", "previous", "UNFINISHED.txt", "run.json", "report"];
+    let but = [
+        "work",
+        "previous",
+        "UNFINISHED.txt",
+        "run.json",
+        "digests.b3",
+        "report",
+    ];
     let all = contents(out, &but).into_iter();
     all.filter(|(name, _)| !name.to_string_lossy().ends_with(".partial"))
         .collect()

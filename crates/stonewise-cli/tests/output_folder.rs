@@ -8,8 +8,9 @@ use std::fs::{self, File};
 use std::path::Path;
 use support::{contents, copy_of, outcome, run, stonewise, survey, tiny_survey};
 
-/// What a run writes that may differ between two runs: times, and what only resuming needs.
-const NOT_COMPARED: [&str; 2] = ["run.json", "work"];
+/// What a run writes that may differ between two runs: times, with the digests of the files that hold them, and what
+/// only resuming needs.
+const NOT_COMPARED: [&str; 3] = ["run.json", "digests.b3", "work"];
 
 /// Results of a run. The report and all else but `run.json` depend on the inputs alone, except for times in
 /// the report.

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 
 /// Result files with their bytes, but for those that hold times, and what is stonewise's own.
 fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    contents(out, &["work", "run.json", "report"])
+    contents(out, &["work", "run.json", "digests.b3", "report"])
         .into_iter()
         .collect()
 }
@@ -218,6 +218,18 @@ fn a_plan_holds_for_its_inputs_only_and_keeps_what_is_done() {
         .find(|u| u["id"] == "ingest-2")
         .unwrap();
     assert_eq!(redo["done"], false);
+
+    // A machine that adds in other lanes.
+    let file = out.path().join("work/plan.json");
+    let text = fs::read_to_string(&file).unwrap();
+    let processor = planned["processor"].as_str().unwrap();
+    fs::write(&file, text.replacen(processor, "vax", 1)).unwrap();
+    let (code, log) = unit(out.path(), "ingest-2");
+    assert!(
+        code == 2 && log.contains("\"vax\"") && log.contains("one class"),
+        "{log}"
+    );
+    fs::write(&file, text).unwrap();
 
     let project = survey.path().join("stonewise.toml");
     let text = fs::read_to_string(&project).unwrap();

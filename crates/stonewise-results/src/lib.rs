@@ -45,5 +45,5 @@ pub use scale::{component_limit_m, nice_scale_m};
 pub use squares::Squares;
 pub use statistics::Sorted;
 pub use stone_row::{Reference, RowMotion, Status, StoneRow, detection_limit_m};
-pub use stone_table::{read_stones, stone_table, write_stones};
+pub use stone_table::{read_stones, stone_table, write_stones, write_stones_csv};
 pub use zone_place::ZonePlace;

@@ -32,6 +32,8 @@ pub const DISPLACEMENTS_VTP: &str = "displacements.vtp";
 pub const FACES_PLY: &str = "stones.ply";
 /// The points of stones, coloured by their motion.
 pub const FACE_CLOUD: &str = "stones.laz";
+/// Digests of all result files, as `b3sum` writes them.
+pub const DIGESTS: &str = "digests.b3";
 /// Folder of the report.
 pub const REPORT_DIR: &str = "report";
 /// Folder of the excerpts that the report shows.

@@ -15,8 +15,16 @@ use stonewise_io::table::{Table, TableError, read_parquet, write_csv, write_parq
 pub fn write_stones(dir: &Path, pair: usize, rows: &[StoneRow]) -> Result<()> {
     let table = stone_table(rows)?;
     write_parquet(&dir.join(PairFile::StonesParquet.name(pair)), &table)?;
+    write_stones_csv(dir, pair, &table)
+}
+
+/// Writes a stone table as text alone.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_stones_csv(dir: &Path, pair: usize, table: &Table) -> Result<()> {
     let csv = dir.join(PairFile::StonesCsv.name(pair));
-    Ok(write_csv(&csv, &table, DESCRIPTION, Some("stone_id"))?)
+    Ok(write_csv(&csv, table, DESCRIPTION, Some("stone_id"))?)
 }
 
 /// What the stone table as a whole holds.

@@ -11,10 +11,11 @@ mod storage;
 #[path = "../../../testing/results.rs"]
 mod testing;
 mod truth;
+mod verify;
 
 use stonewise_base::{
-    address_space, error, files, messages as texts, part, report_params, settings, stable, thresholds,
-    warnings,
+    address_space, error, files, messages as texts, part, processor, report_params, settings, stable,
+    thresholds, warnings,
 };
 use stonewise_figure as figure;
 use stonewise_project::sources;
@@ -29,6 +30,7 @@ pub use pipeline::{
     Comparison, Coordinator, PairSummary, Plan, PlanOptions, Summary, Unit, UnitDone, Until, compare_clouds,
     do_unit, plan, run, tile_clouds,
 };
+pub use processor::processor_class;
 pub use report_params::{Language, ReportParams};
 pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 pub use stable::StableArea;
@@ -42,4 +44,5 @@ pub use stonewise_results::export;
 pub use storage::step::set_program;
 pub use thresholds::{Levels, Measures, Thresholds, Zone};
 pub use truth::evaluate_truth;
+pub use verify::{Answer, Finding, Maker, Verification, verify};
 pub use warnings::Warning;

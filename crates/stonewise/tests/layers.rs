@@ -8,7 +8,7 @@ const LAYERS: [&[&str]; 6] = [
     &["segmentation"],
     &["output"],
     &["pipeline"],
-    &["adapt", "experiment"],
+    &["adapt", "experiment", "verify"],
 ];
 
 #[test]

@@ -7,6 +7,7 @@ use std::io::Write;
 use std::num::NonZero;
 use std::process::Command;
 use stonewise::check::{free_disk, free_memory};
+use stonewise::processor_class;
 use stonewise::report::Browser;
 
 /// Bytes of a gigabyte, as disks and memory are sold.
@@ -19,8 +20,8 @@ pub fn doctor() -> Result<Outcome> {
     let folder = env::current_dir().ok();
     let lines = [
         ("stonewise", env!("CARGO_PKG_VERSION").to_owned()),
-        ("system", format!("{} on {}", env::consts::OS, env::consts::ARCH)),
-        ("vector code", vector_code().to_owned()),
+        ("system", env::consts::OS.to_owned()),
+        ("processor class", processor_class().to_owned()),
         (
             "threads",
             std::thread::available_parallelism()
@@ -47,18 +48,6 @@ pub fn doctor() -> Result<Outcome> {
         writeln!(out, "{what:<18} {found}")?;
     }
     Ok(Outcome::Done)
-}
-
-/// The vector instructions that the processor has, of those for which there is code.
-fn vector_code() -> &'static str {
-    #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-        return "AVX2 and FMA";
-    }
-    #[cfg(target_arch = "aarch64")]
-    return "NEON";
-    #[cfg(not(target_arch = "aarch64"))]
-    "none beyond what every processor of this kind has; the detector is slower"
 }
 
 /// The locale, by the variables in the order in which they count.

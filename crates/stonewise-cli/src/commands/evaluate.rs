@@ -11,8 +11,9 @@ use stonewise_core::evaluate::EvaluationParams;
 
 /// Scores a finished run; the evaluation goes to stdout as JSON.
 pub fn evaluate(args: &EvaluateArgs, printer: &Printer) -> Result<Outcome> {
-    let _folder = OutputFolder::of_results(&args.results)?;
+    let folder = OutputFolder::of_results(&args.results)?;
     let evaluation = evaluate_truth(&args.results, &args.truth, &EvaluationParams::default())?;
+    folder.note_made_anew()?;
     printer.finish();
     writeln!(
         std::io::stdout(),

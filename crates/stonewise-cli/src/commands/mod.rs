@@ -22,6 +22,7 @@ mod studio;
 mod train;
 mod tune;
 mod units;
+mod verify;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
@@ -54,6 +55,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::C2m(args) => compare::c2m(&args, force, printer),
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
         Command::Report(args) => report::report(&args, force, printer),
+        Command::Verify(args) => verify::verify(&args, printer),
         Command::Demo(args) => simulate::demo(&args, force, printer),
         Command::Simulate(args) => simulate::simulate(&args, force, printer),
         Command::Split(args) => split::split(&args, force, printer),

@@ -10,9 +10,10 @@ use stonewise::report::Pdf;
 /// Writes the report and the layers again, from result files alone; with `--pdf` as PDF, too.
 pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let pdf = args.pdf.as_deref().map(|pdf| Pdf::at(pdf, force)).transpose()?;
-    let _folder = OutputFolder::of_results(&args.results)?;
+    let folder = OutputFolder::of_results(&args.results)?;
     stonewise::report::write_report(&args.results)?;
     stonewise::export::write_layers(&args.results)?;
+    folder.note_made_anew()?;
     let results = args.results.display();
     printer.log(&format!(
         "wrote {results}/report/index.html, stones.gpkg, stones.geojson, stones.vtp and stones.ply"

@@ -14,6 +14,12 @@ use stonewise_core::evaluate::MotionField;
 pub struct RunRecord {
     /// Version of stonewise.
     pub version: String,
+    /// Digest of the program; empty in records of earlier versions.
+    #[serde(default)]
+    pub program: String,
+    /// Class of the processor, on which the last digits depend; empty in records of earlier versions.
+    #[serde(default)]
+    pub processor: String,
     /// When the run ended.
     pub finished_at: Timestamp,
     /// The project.

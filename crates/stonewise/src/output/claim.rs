@@ -1,11 +1,12 @@
 //! An output folder in the hands of one command.
 
+use super::digests::Digests;
 use super::inputs::{refuse_overwriting, resolved};
 use super::lock::FolderLock;
 use super::marker::{self, Found, Owner};
 use super::partials::sweep;
 use super::previous;
-use super::result_names::{is_result, result_folders};
+use super::result_names::{is_made_anew, is_result, result_folders};
 use crate::error::{Error, Result};
 use crate::project::Project;
 use std::fs;
@@ -115,9 +116,27 @@ impl OutputFolder {
         previous::bring_back(&self.path, file)
     }
 
-    /// Says that the results are finished; `all`: nothing of an earlier run is needed any more.
-    pub(crate) fn finish_results(&self, all: bool) -> Result<()> {
+    /// Notes the digests of all results and says that they are finished; `all`: nothing of an earlier run is
+    /// needed any more.
+    pub(crate) fn finish_results(&self, project: &Project, all: bool) -> Result<()> {
+        let results = previous::results_in(&self.path, project);
+        Digests::of(&self.path, results)?.write(&self.path)?;
         previous::finish(&self.path, all)
+    }
+
+    /// Notes the digests of results that a command has made anew from others: the report, the layers, scores
+    /// against a truth. Results whose digests were never noted stay so.
+    ///
+    /// # Errors
+    /// The digests cannot be read or written.
+    pub fn note_made_anew(&self) -> Result<()> {
+        let Some(mut digests) = Digests::read(&self.path)? else {
+            return Ok(());
+        };
+        let present = previous::named_results_in(&self.path);
+        let anew = present.into_iter().filter(|file| is_made_anew(file)).collect();
+        digests.replace(Digests::of(&self.path, anew)?);
+        digests.write(&self.path)
     }
 
     fn claim(path: &Path, owner: &Owner, force: bool) -> Result<Self> {

@@ -5,6 +5,7 @@
 //! the same project. A lock that the system releases with the process keeps a second run out.
 
 mod claim;
+mod digests;
 mod inputs;
 mod lock;
 mod marker;
@@ -13,7 +14,9 @@ mod previous;
 mod result_names;
 
 pub use claim::OutputFolder;
+pub(crate) use digests::Digests;
 pub use marker::Owner;
 pub use previous::UNFINISHED_FILE;
+pub(crate) use previous::named_results_in;
 pub use result_names::PREVIOUS_DIR;
 pub(crate) use result_names::cloud_names;

@@ -82,10 +82,18 @@ fn move_file(from: &Path, to: &Path) -> Result<()> {
 }
 
 /// Result files in a folder, relative to it. Files that others put there are none.
-fn results_in(folder: &Path, project: &Project) -> Vec<PathBuf> {
+pub(super) fn results_in(folder: &Path, project: &Project) -> Vec<PathBuf> {
     let clouds = project.epochs.iter().zip(1..);
     let clouds = clouds.flat_map(|(epoch, number)| cloud_names(number, &epoch.clouds));
     let mut results: Vec<PathBuf> = clouds.filter(|c| folder.join(c).is_file()).collect();
+    results.extend(named_results_in(folder));
+    results.sort();
+    results
+}
+
+/// The same without the labelled clouds, whose names only the project tells.
+pub(crate) fn named_results_in(folder: &Path) -> Vec<PathBuf> {
+    let mut results = Vec::new();
     for below in ["", EVIDENCE_DIR, REPORT_DIR] {
         let Ok(entries) = fs::read_dir(folder.join(below)) else {
             continue;

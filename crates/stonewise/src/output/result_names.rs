@@ -1,13 +1,16 @@
 //! The names of all files that a run publishes in its folder.
 
 use crate::project::Project;
-use crate::results::names::{EVIDENCE_DIR, REPORT_DIR, WORK_DIR};
+use crate::results::names::{
+    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, REPORT_DIR,
+    WORK_DIR,
+};
 use std::path::{Path, PathBuf};
 
 /// Where the results of the last finished run lie until the next one has finished.
 pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 19] = [
+const STEMS: [&str; 20] = [
     "stones",
     "matches",
     "registration",
@@ -27,10 +30,11 @@ const STEMS: [&str; 19] = [
     "facade",
     "c2c",
     "c2m",
+    "digests",
 ];
 /// Their extensions; `csv-metadata.json` is `json`.
-const EXTENSIONS: [&str; 11] = [
-    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png",
+const EXTENSIONS: [&str; 12] = [
+    "csv", "parquet", "json", "geojson", "gpkg", "laz", "vtp", "ply", "html", "jpg", "png", "b3",
 ];
 /// Excerpts of the survey, without the numbers of epochs and pictures.
 const EVIDENCE: [&str; 8] = [
@@ -75,6 +79,13 @@ pub(super) fn is_result(file: &Path) -> bool {
         Some(REPORT_DIR) => stem == "index",
         _ => false,
     }
+}
+
+/// Whether a command makes this result anew from others after the run: the report, the layers, and scores
+/// against a truth of the user's.
+pub(super) fn is_made_anew(file: &Path) -> bool {
+    let layers = [GEOPACKAGE, GEOJSON, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY];
+    file.starts_with(REPORT_DIR) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
 }
 
 /// The labelled clouds of one epoch in the folder `epoch{number}`: one LAZ per input, named after it; inputs

@@ -21,6 +21,7 @@ mod until;
 pub use clouds_only::{Comparison, compare_clouds, tile_clouds};
 pub(crate) use context::Context;
 pub(crate) use graph::Run;
+pub(crate) use outputs::verdict::verdict_of_tables;
 pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
 pub(crate) use steps::label::Labelled;

@@ -85,7 +85,7 @@ pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn P
     if until == Until::Reported {
         context.store.remove_unused()?;
     }
-    out.finish_results(until == Until::Reported)?;
+    out.finish_results(project, until == Until::Reported)?;
     Ok(summary)
 }
 

@@ -8,6 +8,7 @@
 use crate::error::{Error, Result};
 use crate::files::{write_json, write_text};
 use crate::kept::{Kept, file_digest, files_of};
+use crate::processor_class;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -19,12 +20,14 @@ use stonewise_io::atomic::partial_name;
 pub struct Key(String);
 
 impl Key {
-    /// The key of a step from its name, its parameters and the keys and digests of its inputs.
+    /// The key of a step from its name, its parameters, the program, the class of the processor, and the keys
+    /// and digests of its inputs.
     pub fn new(step: &str, parameters: &impl Serialize, inputs: &[&str]) -> Self {
         let mut hasher = blake3::Hasher::new();
         let parameters = serde_json::to_string(parameters).unwrap_or_default();
         let code = code_version();
-        for part in [step, code.as_str(), parameters.as_str()].iter().chain(inputs) {
+        let own = [step, code.as_str(), processor_class(), parameters.as_str()];
+        for part in own.iter().chain(inputs) {
             hasher.update(&(part.len() as u64).to_le_bytes());
             hasher.update(part.as_bytes());
         }

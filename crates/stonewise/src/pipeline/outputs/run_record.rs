@@ -7,8 +7,10 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::outputs::verdict::VERDICT;
 use crate::pipeline::until::Until;
+use crate::processor_class;
 use crate::results::names::RUN;
 use crate::results::records::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, Timestamp};
+use crate::storage::step::code_version;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::epoch::EpochId;
@@ -32,6 +34,8 @@ fn write_run_record(run: &Run) -> Result<()> {
     let project = context.project;
     let record = RunRecord {
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        program: code_version(),
+        processor: processor_class().to_owned(),
         finished_at: Timestamp::now(),
         project: ProjectRecord {
             name: project.name.clone(),

@@ -10,9 +10,13 @@ use crate::pipeline::until::Until;
 use crate::results::ResultSet;
 use crate::results::names::VERDICT as FILE;
 use crate::results::records::{EpochVerdict, Verdict};
+use crate::settings::Settings;
 use crate::verdict::{is_doubted, verdict_on};
+use crate::warnings::Warning;
+use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
+use stonewise_core::progress::Progress;
 
 /// Makes the verdict on every later epoch from the tables in the folder, and writes it.
 pub static VERDICT: Step = Step {
@@ -35,28 +39,40 @@ impl Run<'_> {
 
 fn write_verdict(context: &Context) -> Result<Verdict> {
     let project = context.project;
-    let (thresholds, language) = (&project.settings.thresholds, project.settings.report.language);
+    let names: Vec<&str> = project.epochs.iter().map(|e| e.name.as_str()).collect();
     let warnings = context.warnings.sorted();
-    let on_epoch = |later: EpochId| -> Result<EpochVerdict> {
-        context.progress.check()?;
-        let results = ResultSet::read_measured(&context.out, later.index())?;
-        let epochs = project.epochs.pair(later).map(|e| e.name.clone());
-        let others = project.epochs.iter().skip(1).map(|e| e.name.as_str());
-        let in_doubt = is_doubted(&warnings, &epochs.later, others);
-        Ok(verdict_on(
-            &results,
-            epochs.into_array(),
-            in_doubt,
-            thresholds,
-            language,
-        ))
-    };
-    let epochs = project
-        .epochs
-        .later_ids()
-        .map(on_epoch)
-        .collect::<Result<Vec<_>>>()?;
-    let verdict = Verdict::new(thresholds, epochs);
+    let verdict = verdict_of_tables(
+        &context.out,
+        &names,
+        &warnings,
+        &project.settings,
+        context.progress,
+    )?;
     write_readable_json(&context.out.join(FILE), &verdict)?;
     Ok(verdict)
+}
+
+/// The verdict that the tables in a folder give. `epochs`: the names of all, the reference first; `warnings`:
+/// those of the run.
+pub(crate) fn verdict_of_tables(
+    folder: &Path,
+    epochs: &[&str],
+    warnings: &[Warning],
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Verdict> {
+    let (thresholds, language) = (&settings.thresholds, settings.report.language);
+    let (reference, later) = match epochs {
+        [] => ("", &[] as &[&str]),
+        [first, later @ ..] => (*first, later),
+    };
+    let on_epoch = |(pair, epoch): (usize, &&str)| -> Result<EpochVerdict> {
+        progress.check()?;
+        let results = ResultSet::read_measured(folder, pair)?;
+        let in_doubt = is_doubted(warnings, epoch, later.iter().copied());
+        let names = [reference, *epoch].map(str::to_owned);
+        Ok(verdict_on(&results, names, in_doubt, thresholds, language))
+    };
+    let epochs = (1..).zip(later).map(on_epoch).collect::<Result<Vec<_>>>()?;
+    Ok(Verdict::new(thresholds, epochs))
 }

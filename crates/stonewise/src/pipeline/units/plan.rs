@@ -10,6 +10,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::Run;
 use crate::pipeline::steps::check::CHECK;
 use crate::pipeline::until::Until;
+use crate::processor_class;
 use crate::project::Project;
 use crate::results::names::{RUN, WORK_DIR};
 use crate::storage::step::{Key, code_version};
@@ -35,6 +36,8 @@ pub struct Plan {
     pub stonewise: String,
     /// Digest of the program; every unit has to be done by the same.
     pub program: String,
+    /// Class of the processor; every unit has to be done on one of the same.
+    pub processor: String,
     /// The project file.
     pub project: PathBuf,
     /// Parameters that replace those of the project file.
@@ -130,6 +133,7 @@ impl Plan {
             id: id.as_str().to_owned(),
             stonewise: env!("CARGO_PKG_VERSION").to_owned(),
             program,
+            processor: processor_class().to_owned(),
             project: project.path.clone(),
             parameters: parameters.clone(),
             batch_points: options.batch_points,

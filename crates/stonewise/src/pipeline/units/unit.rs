@@ -14,6 +14,7 @@ use crate::pipeline::list::tasks;
 use crate::pipeline::part::Part;
 use crate::pipeline::run::run_in;
 use crate::pipeline::until::Until;
+use crate::processor_class;
 use crate::project::Project;
 use crate::storage::step::code_version;
 use crate::storage::store::Scope;
@@ -56,6 +57,14 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
             "the plan was made by another build of stonewise: do its units with the same, or run `stonewise plan` again",
         ));
     }
+    if plan.processor != processor_class() {
+        return Err(stale(&format!(
+            "the plan was made on a processor of the class \"{}\", and this one is \"{}\", where the last digits of results may differ: \
+             plan and do units on machines of one class",
+            plan.processor,
+            processor_class()
+        )));
+    }
     let project = Project::read(&plan.project)?.with_parameters(&plan.parameters)?;
     let digests = unchanged(&plan.inputs, &file)?;
     if Receipt::read(out, &plan.id, id).is_some() {
@@ -88,7 +97,7 @@ pub fn do_unit(out: &Path, id: &str, progress: &dyn Progress) -> Result<UnitDone
     if summary.is_some() {
         // All other units are done, and what they left unfinished when they were killed is of no use.
         folder.sweep(&project);
-        folder.finish_results(true)?;
+        folder.finish_results(&project, true)?;
     }
     Receipt::write(out, &plan.id, id, &clock, folders)?;
     Ok(UnitDone {
