@@ -126,6 +126,12 @@ pub enum Command {
         stonewise verify results/ survey/stonewise.toml\n\n\
         The findings go to stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be compared.")]
     Verify(VerifyArgs),
+    /// Certify this program on this machine: data with published results, simulated walls, and, with a project,
+    /// motions put into its own scans.
+    #[command(after_help = "Examples:\n  stonewise certify --out certificate/\n  \
+        stonewise certify survey/stonewise.toml --seed 7 --out certificate/\n\n\
+        The figures go to stdout. Exit code 3 if one is outside what is allowed.")]
+    Certify(CertifyArgs),
     /// Simulate a survey with known truth.
     #[command(after_help = "Examples:\n  stonewise simulate --seed 7 --out survey/\n  \
         stonewise simulate dam --size 40x20 --out survey/")]
@@ -475,6 +481,22 @@ pub struct VerifyArgs {
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `certify`.
+#[derive(Debug, ClapArgs)]
+pub struct CertifyArgs {
+    /// A project, whose first epoch is split into halves (default: simulated walls only).
+    pub project: Option<PathBuf>,
+    /// Folder of certificate.json, certificate.html and the runs; created if missing.
+    #[arg(long, value_name = "DIR", default_value = "certificate")]
+    pub out: PathBuf,
+    /// Seed of the simulated walls and of the halves.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Number of simulated walls; every second one stands still.
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    pub walls: u64,
 }
 
 /// Which experiment.

@@ -19,7 +19,7 @@ pub mod epoch;
 pub mod evaluate;
 pub mod geometry;
 pub mod id;
-mod linalg;
+pub mod linalg;
 pub mod matching;
 pub mod parallel;
 pub mod params;

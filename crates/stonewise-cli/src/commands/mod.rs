@@ -1,6 +1,7 @@
 //! One file per subcommand: parse, call the library, print.
 
 mod adapt;
+mod certify;
 mod check;
 mod compare;
 mod completions;
@@ -56,6 +57,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
         Command::Report(args) => report::report(&args, force, printer),
         Command::Verify(args) => verify::verify(&args, printer),
+        Command::Certify(args) => certify::certify(&args, force, printer),
         Command::Demo(args) => simulate::demo(&args, force, printer),
         Command::Simulate(args) => simulate::simulate(&args, force, printer),
         Command::Split(args) => split::split(&args, force, printer),

@@ -3,8 +3,10 @@
 
 mod band;
 mod block;
+mod least_squares;
 mod selected_inverse;
 
 pub(crate) use band::{Band, BandFactor, BandInverse};
 pub(crate) use block::{BlockFactor, BlockMatrix, BlockPattern};
+pub use least_squares::least_squares;
 pub(crate) use selected_inverse::SelectedInverse;

@@ -3,6 +3,7 @@
 //! Every variant is an ordinary run of a project. All runs of an experiment share a store of steps, so that
 //! what variants have in common is done once, and an interrupted experiment goes on where it stopped.
 
+mod certify;
 mod halves;
 mod known_motion;
 mod paper;
@@ -11,6 +12,7 @@ mod sensitivity;
 mod settings_with;
 mod tune;
 
+pub use certify::{Certificate, CertifyOptions, Figure, certify};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
 pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};

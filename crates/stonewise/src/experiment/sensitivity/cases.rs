@@ -154,7 +154,7 @@ pub(super) fn variants(influence: Influence) -> Vec<Variant> {
 /// The survey from which everything differs: a wall without anything before it, both scanners, eight photos
 /// at the paper's ground sampling distance, the paper's translation. Errors of registration and datum are
 /// left out: they would add the same to everything.
-pub(super) fn base([width_m, height_m]: [f64; 2], seed: u64) -> SurveyParams {
+pub(in crate::experiment) fn base([width_m, height_m]: [f64; 2], seed: u64) -> SurveyParams {
     let dam = SurveyParams::dam([width_m, height_m]);
     let side = |size_m: f64| ((size_m + 1.2) / 5.4e-3) as u32;
     let params = SurveyParams {

@@ -7,6 +7,7 @@ mod page;
 mod point;
 
 pub use cases::Influence;
+pub(super) use cases::base;
 pub use point::{SensitivityOptions, SensitivityPoint};
 
 use crate::error::{Error, Result};
@@ -16,7 +17,7 @@ use crate::project::Project;
 use crate::settings::Estimator;
 use crate::storage::store::{Keeps, StepStore};
 use crate::truth::evaluate_truth;
-use cases::{Variant, base, variants};
+use cases::{Variant, variants};
 use inputs::inputs;
 use std::path::Path;
 use std::sync::Arc;

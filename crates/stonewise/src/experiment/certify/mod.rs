@@ -1,0 +1,51 @@
+//! A certificate: what the program reaches on data whose truth is published, simulated or put in, on this
+//! machine, with tolerances stated beforehand.
+
+mod certificate;
+mod nist_data;
+mod own;
+mod page;
+mod solver;
+mod walls;
+
+use crate::error::Result;
+use crate::files::write_readable_json;
+use crate::processor_class;
+use crate::results::records::Timestamp;
+use crate::storage::step::code_version;
+use crate::storage::store::{Keeps, StepStore};
+pub use certificate::{Certificate, CertifyOptions, Figure};
+use std::path::Path;
+use std::sync::Arc;
+use stonewise_core::progress::Progress;
+
+/// The certificate as JSON.
+const JSON: &str = "certificate.json";
+/// The same as a page.
+const PAGE: &str = "certificate.html";
+
+/// Makes a certificate and writes it into `out` as JSON and HTML. An interrupted one goes on where it stopped.
+///
+/// # Errors
+/// What stops a simulation or a run. A figure that is not within what is allowed is none.
+pub fn certify(options: &CertifyOptions, out: &Path, progress: &dyn Progress) -> Result<Certificate> {
+    let store = Arc::new(StepStore::new(&out.join("work"), Keeps::Every)?);
+    let mut figures = solver::figures();
+    figures.extend(walls::figures(options, out, &store, progress)?);
+    if let Some(project) = &options.project {
+        figures.extend(own::figures(project, options.seed, out, &store, progress)?);
+    }
+    let certificate = Certificate {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        program: code_version(),
+        processor: processor_class().to_owned(),
+        made_at: Timestamp::now(),
+        seed: options.seed,
+        project: options.project.as_ref().map(|p| p.path.clone()),
+        holds: figures.iter().all(|f| f.holds),
+        figures,
+    };
+    write_readable_json(&out.join(JSON), &certificate)?;
+    page::write(&certificate, &out.join(PAGE))?;
+    Ok(certificate)
+}
