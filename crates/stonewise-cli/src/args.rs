@@ -126,6 +126,13 @@ pub enum Command {
         stonewise verify results/ survey/stonewise.toml\n\n\
         The findings go to stdout. Exit codes: 0 all holds, 1 something differs, 3 something could not be compared.")]
     Verify(VerifyArgs),
+    /// Predict what the next survey will see, from the first one alone: standard deviations of every stone, the
+    /// smallest bulge that is found, what one more station gains.
+    #[command(
+        after_help = "Example:\n  stonewise design survey/stonewise.toml --out design/\n\n\
+        A project of one epoch is enough. The figures go to stdout as JSON."
+    )]
+    Design(DesignArgs),
     /// Certify this program on this machine: data with published results, simulated walls, and, with a project,
     /// motions put into its own scans.
     #[command(after_help = "Examples:\n  stonewise certify --out certificate/\n  \
@@ -481,6 +488,19 @@ pub struct VerifyArgs {
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `design`.
+#[derive(Debug, ClapArgs)]
+pub struct DesignArgs {
+    /// The project file; its first epoch counts.
+    pub project: PathBuf,
+    /// Folder of design.json, design.csv, design.parquet, design.html and the run; created if missing.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Seed of the errors of the repetition's stations.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
 }
 
 /// Arguments of `certify`.

@@ -20,7 +20,8 @@ fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
             .unwrap();
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         let certificate = fs::read(dir.path().join("certificate/certificate.json")).unwrap_or_default();
-        let certificate: Value = serde_json::from_slice(&certificate).unwrap_or_else(|_| panic!("{text}"));
+        assert!(!certificate.is_empty(), "{text}");
+        let certificate: Value = serde_json::from_slice(&certificate).unwrap();
         (output.status.code().unwrap(), certificate)
     };
     let (code, certificate) = certify();
@@ -31,7 +32,8 @@ fn a_certificate_has_all_parts_and_goes_on_where_it_stopped() {
         let of = figures
             .iter()
             .find(|f| f["name"].as_str().unwrap().contains(words));
-        of.unwrap_or_else(|| panic!("no figure {words}"))
+        assert!(of.is_some(), "no figure {words}");
+        of.unwrap()
     };
     for words in [
         "Longley, as given",

@@ -15,8 +15,8 @@ fn verify(results: &Path, project: Option<&Path>) -> (i32, String, Vec<String>) 
     command.arg("verify").arg(results).arg("--json");
     let output = command.args(project).output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let said: Value = serde_json::from_str(&text)
-        .unwrap_or_else(|_| panic!("{text}{}", String::from_utf8_lossy(&output.stderr)));
+    assert!(!text.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said: Value = serde_json::from_str(&text).unwrap();
     let word = |value: &Value| value.as_str().unwrap().to_owned();
     let findings = said["findings"].as_array().unwrap().iter();
     let failed = findings

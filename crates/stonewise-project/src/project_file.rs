@@ -191,7 +191,11 @@ impl Project {
             let at = text.find("[[epochs]]").unwrap_or(0);
             return Err(source.error(
                 at..at,
-                format!("{least_epochs} [[epochs]] at least are needed, in time order"),
+                match raw.epochs.len() {
+                    1 => "2 [[epochs]] at least are needed, in time order; of one, `stonewise design` says what the next will show"
+                        .to_owned(),
+                    _ => format!("{least_epochs} [[epochs]] at least are needed, in time order"),
+                },
             ));
         }
         let settings = Settings {

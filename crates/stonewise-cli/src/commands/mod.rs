@@ -5,6 +5,7 @@ mod certify;
 mod check;
 mod compare;
 mod completions;
+mod design;
 mod doctor;
 mod edits;
 mod evaluate;
@@ -57,6 +58,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Evaluate(args) => evaluate::evaluate(&args, printer),
         Command::Report(args) => report::report(&args, force, printer),
         Command::Verify(args) => verify::verify(&args, printer),
+        Command::Design(args) => design::design(&args, force, printer),
         Command::Certify(args) => certify::certify(&args, force, printer),
         Command::Demo(args) => simulate::demo(&args, force, printer),
         Command::Simulate(args) => simulate::simulate(&args, force, printer),

@@ -4,6 +4,7 @@
 //! what variants have in common is done once, and an interrupted experiment goes on where it stopped.
 
 mod certify;
+mod design;
 mod halves;
 mod known_motion;
 mod paper;
@@ -13,6 +14,7 @@ mod settings_with;
 mod tune;
 
 pub use certify::{Certificate, CertifyOptions, Figure, certify};
+pub use design::{Design, design};
 pub use paper::{Detail, PaperOptions, PaperSurvey, PaperTables, Segmented, paper};
 pub use sensitivity::{Influence, SensitivityOptions, SensitivityPoint, sensitivity};
 pub use tune::{Dimension, DimensionError, TuneOptions, Tuned, TunedPoint, default_grid, tune};
