@@ -5,6 +5,7 @@ use super::field::{information, stone_from_field};
 use super::joint_motions::{JointMotions, JointStone};
 use super::neighbour_covariances::without_negative;
 use super::observation::NormalEquations;
+use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Vector9;
@@ -22,8 +23,9 @@ pub(super) fn joint_motions(
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
+    octaves: &Octaves,
 ) -> JointMotions {
-    let [shared, bias] = octave_and_bias(adjustment);
+    let one = octaves.one();
     let stone = |i: usize| {
         let motion = results[i].motion.as_ref().ok()?;
         let estimate = estimates[i].as_ref().ok()?;
@@ -46,10 +48,10 @@ pub(super) fn joint_motions(
         let mut own = without_negative(&(translation - field));
         let photos = adjustment.photo_part(i);
         let octave = match &photos {
-            Some(photos) => photos.left_of(&shared) + photos.least_error(),
-            None => shared,
+            Some(photos) => photos.left_of(&one) + octaves.shown(&photos.least_error()),
+            None => one,
         };
-        own += in_world(&(octave + bias));
+        own += in_world(&(octave + octaves.of_stone()));
         let by_poses = photos.iter().flat_map(|p| p.by_poses());
         let by_poses = by_poses.map(|(unknown, by)| (unknown, world * by)).collect();
         let common = adjustment.prior.common_in(i);
@@ -83,15 +85,6 @@ pub(super) fn joint_motions(
         octaves: adjustment.octaves(),
         step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
     }
-}
-
-/// Covariances, in the frame of any stone, of errors that all points of a stone share: over one octave of length, and
-/// of the stone alone.
-fn octave_and_bias(adjustment: &Adjustment) -> [Matrix3<f64>; 2] {
-    let [one, two] = [1.0, 2.0].map(|octaves| adjustment.shared_variances(octaves));
-    let octave = Vector3::from_fn(|k, _| (two[k] - one[k]).max(0.0));
-    let bias = Vector3::from_fn(|k, _| (one[k] - octave[k]).max(0.0));
-    [octave, bias].map(|v| Matrix3::from_diagonal(&v))
 }
 
 /// What a stone's observations say of its displacement about the common one, in its frame, with rotation and

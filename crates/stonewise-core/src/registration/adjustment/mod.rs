@@ -20,6 +20,7 @@ mod joint;
 pub(crate) mod joint_motions;
 mod neighbour_covariances;
 pub(crate) mod observation;
+mod octaves;
 mod outcome;
 mod params;
 mod phases;

@@ -2,13 +2,14 @@
 
 use super::estimate::{Estimate, widening};
 use super::field::{Edge, stone_from_field};
+use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use super::tracking::PhotoPart;
 use crate::statistics::{UPPER_95, student_95};
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -28,17 +29,15 @@ use statrs::distribution::{ContinuousCDF, Normal};
 /// the covariance of f is that of a normal distribution with the weights that result from them. The
 /// covariance is therefore scaled so that 1.96 standard deviations contain 95 % of the distribution of the
 /// ties.
-///
-/// `shared`: variances of the shortest octave of the errors that a stone's points share.
 pub(crate) fn neighbour_covariances(
     adjustment: &Adjustment,
     solution: &Solution,
     results: &[PairResult],
     estimates: &[Result<Estimate, MotionFailure>],
-    shared: &[f64; 9],
+    octaves: &Octaves,
 ) -> Vec<NeighbourCovariance> {
     let tails = tail_factor(adjustment.params.tie_freedom);
-    let octave = Matrix3::from_diagonal(&Vector3::new(shared[0], shared[1], shared[2]));
+    let octave = octaves.one() + octaves.of_stone();
     let measured: Vec<Option<Measured>> = estimates
         .par_iter()
         .enumerate()

@@ -9,6 +9,7 @@ use super::joint_motions::JointMotions;
 use super::neighbour_covariances::neighbour_covariances;
 use super::observation::NormalEquations;
 use super::observation::surface::Equations;
+use super::octaves::Octaves;
 use super::params::{AdjustmentReport, Break};
 use super::significance::{Tested, test_stones};
 use super::solution::Solution;
@@ -79,13 +80,19 @@ impl Found {
         let tested = test_stones(adjustment, solution);
         let shared = adjustment.shared_variances(1.0);
         let estimates = estimates(adjustment, solution, &shared);
-        let mut results = results(adjustment, solution, &tested, &estimates);
+        let octaves = Octaves::of(adjustment, |i| {
+            let estimate = estimates[i].as_ref().ok().filter(|_| !tested[i].is_loose)?;
+            Some((estimate.mean + adjustment.prior.common_in(i)).translation())
+        });
+        let mut results = results(adjustment, solution, &tested, &estimates, &octaves);
         refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
-            neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &shared),
+            neighbours: neighbour_covariances(adjustment, solution, &results, &estimates, &octaves),
             common_covariance: common_covariance(adjustment, solution, &shared),
-            joint: Some(joint_motions(adjustment, solution, &results, &estimates)),
+            joint: Some(joint_motions(
+                adjustment, solution, &results, &estimates, &octaves,
+            )),
             results,
         }
     }
@@ -127,8 +134,9 @@ fn results(
     solution: &Solution,
     tested: &[Tested],
     estimates: &[Result<Estimate, MotionFailure>],
+    octaves: &Octaves,
 ) -> Vec<PairResult> {
-    let [of_stone, shared] = [1.0, adjustment.octaves()].map(|octaves| adjustment.shared_variances(octaves));
+    let shared = adjustment.shared_variances(1.0);
     let bodies = bodies(adjustment);
     let stones = adjustment.stones.iter().zip(estimates).enumerate();
     stones
@@ -139,7 +147,7 @@ fn results(
             motion: match estimate {
                 Err(failure) => Err(failure.clone()),
                 Ok(estimate) => observable(
-                    motion(adjustment, i, solution, tested[i], estimate, [&of_stone, &shared]),
+                    motion(adjustment, i, solution, tested[i], estimate, (&shared, octaves)),
                     adjustment.params.max_sd_m,
                 ),
             },
@@ -196,15 +204,14 @@ fn shows_two_surfaces(equations: &Equations, inflation: f64, share: f64) -> bool
     bad >= BAD_CELLS && bad as f64 / cells.max(1.0) > share
 }
 
-/// `of_stone`, `shared`: variances of errors that all points of a stone share, over the shortest octave of length
-/// and against the other epoch.
+/// `shared`: variances of errors that all points of a stone share; those of the translation come from the octaves.
 fn motion(
     adjustment: &Adjustment,
     i: usize,
     solution: &Solution,
     tested: Tested,
     estimate: &Estimate,
-    [of_stone, shared]: [&[f64; 9]; 2],
+    (shared, octaves): (&[f64; 9], &Octaves),
 ) -> StoneMotion {
     let node = &adjustment.prior.graph.nodes[i];
     let world = node.face_from_world.transpose();
@@ -217,19 +224,11 @@ fn motion(
     for (k, variance) in shared.iter().enumerate().skip(3) {
         local[(k, k)] += variance;
     }
-    let translations = |v: &[f64; 9]| Matrix3::from_diagonal(&Vector3::new(v[0], v[1], v[2]));
-    let of_points = translations(shared);
+    let photos = adjustment.photo_part(i);
     let mut translation = local.fixed_view_mut::<3, 3>(0, 0);
-    match adjustment.photo_part(i) {
-        Some(photos) => {
-            // Light shifts neighbours alike: the least bias of appearance is shared over all lengths, too.
-            let of_light = photos.least_error() * adjustment.octaves();
-            // What is wrong over the length of a stone, a mask or a stain, photos see like the points.
-            let of_stone = translations(of_stone);
-            translation += of_stone + photos.left_of(&(of_points - of_stone));
-            translation += photos.pose_covariance(&photos) + of_light;
-        }
-        None => translation += of_points,
+    translation += octaves.over_all(photos.as_ref()) + octaves.of_stone();
+    if let Some(photos) = photos {
+        translation += photos.pose_covariance(&photos);
     }
     let covariance = in_world(&local, &world);
     let prediction = &solution.field.from_others[i];

@@ -1,0 +1,201 @@
+//! Errors that the points of a stone share with those of its neighbours, over octaves of length, as the motions
+//! show them.
+
+use super::state::Adjustment;
+use super::tracking::PhotoPart;
+use crate::statistics::{UPPER_95, component_median, quantile};
+use nalgebra::{Matrix3, Vector3};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Share of the stones by which the scatter of their motions is measured.
+const HELD: f64 = 0.95;
+/// Stones that stand for errors as large as expected before those of the survey count: as many as a rigid motion
+/// has unknowns.
+const PRIOR_STONES: f64 = 6.0;
+
+/// Errors that points share beyond what the cells of a stone show, in the frame of any stone.
+///
+/// How large an octave is follows from heights, and so from errors out of the face. Errors of a cloud that was computed from photos lie along its rays, so that those in the face are much smaller, and
+/// what photos measure takes little part in them. How much smaller, the motions themselves show: whatever stones
+/// do, their motions scatter at least as much as their errors. The variances on each axis are therefore no
+/// larger than the motions allow.
+pub(super) struct Octaves {
+    /// Variance of one octave on any axis as heights show it, m^2.
+    expected_m2: f64,
+    /// Number of octaves from the distance of neighbours to the wall.
+    count: f64,
+    /// Variance out of the face of what the points of a stone share with no other, m^2.
+    of_stone_m2: f64,
+    /// Factor on the variance along, up and out that the motions show, at most one.
+    shown: Vector3<f64>,
+}
+
+/// A motion by which the errors are measured.
+pub(super) struct Shown {
+    /// World, metres.
+    pub displacement: Vector3<f64>,
+    pub face_from_world: Matrix3<f64>,
+    /// Expected variances of the errors along, up and out, m^2.
+    pub expected_m2: Vector3<f64>,
+}
+
+impl Octaves {
+    /// As heights alone show them: alike on all axes.
+    fn expected(adjustment: &Adjustment) -> Self {
+        let one = adjustment.shared_variances(1.0);
+        Self {
+            expected_m2: one[0],
+            count: adjustment.octaves(),
+            of_stone_m2: one[2] - one[0],
+            shown: Vector3::repeat(1.0),
+        }
+    }
+
+    /// As large as the motions of stones that are not loose allow. `displacement`: of a stone in its frame.
+    pub fn of(adjustment: &Adjustment, displacement: impl Fn(usize) -> Option<Vector3<f64>>) -> Self {
+        let expected = Self::expected(adjustment);
+        let motion = |i: usize| {
+            let face_from_world = adjustment.prior.graph.nodes[i].face_from_world;
+            Some(Shown {
+                displacement: face_from_world.transpose() * displacement(i)?,
+                face_from_world,
+                expected_m2: expected.over_all(adjustment.photo_part(i).as_ref()).diagonal(),
+            })
+        };
+        let motions: Vec<Shown> = (0..adjustment.stones.len()).filter_map(motion).collect();
+        Self {
+            shown: shown(&motions),
+            ..expected
+        }
+    }
+
+    /// Covariance of one octave.
+    pub fn one(&self) -> Matrix3<f64> {
+        self.shown(&(Matrix3::identity() * self.expected_m2))
+    }
+
+    /// Covariance of what the points of a stone share with no other.
+    pub fn of_stone(&self) -> Matrix3<f64> {
+        Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, self.of_stone_m2))
+    }
+
+    /// Covariance over all octaves, against the other epoch; `photos`: their part in the motion.
+    ///
+    /// Photos do not share the errors of the points, but over one octave: what is wrong over the length of a
+    /// stone, a mask or a stain, they see like the points. Light shifts neighbours alike, so that the least bias
+    /// of appearance is shared over all octaves, too.
+    pub fn over_all(&self, photos: Option<&PhotoPart>) -> Matrix3<f64> {
+        let octaves = |count: f64| Matrix3::identity() * (count * self.expected_m2);
+        self.shown(&match photos {
+            Some(photos) => {
+                octaves(1.0) + photos.left_of(&octaves(self.count - 1.0)) + photos.least_error() * self.count
+            }
+            None => octaves(self.count),
+        })
+    }
+
+    /// What the motions show of a covariance of such errors.
+    pub fn shown(&self, expected: &Matrix3<f64>) -> Matrix3<f64> {
+        let root = Matrix3::from_diagonal(&self.shown.map(f64::sqrt));
+        root * expected * root
+    }
+}
+
+/// Factors on the expected variances of errors, per axis of the face, with which normal errors hold 95 % of the
+/// motions about the common one; at most one.
+///
+/// A median and a quantile: stones that moved on their own do not matter as long as they are few, and if they are
+/// many the factor is too large, but never more than one.
+fn shown(motions: &[Shown]) -> Vector3<f64> {
+    let displacements: Vec<Vector3<f64>> = motions.iter().map(|m| m.displacement).collect();
+    let common = component_median(&displacements);
+    let limit = Normal::standard().inverse_cdf(UPPER_95);
+    Vector3::from_fn(|axis, _| {
+        let apart = |m: &Shown| {
+            let apart = m
+                .face_from_world
+                .row(axis)
+                .transpose()
+                .dot(&(m.displacement - common));
+            let sd = m.expected_m2[axis].sqrt();
+            (sd > 0.0).then(|| apart.abs() / sd)
+        };
+        let mut apart: Vec<f64> = motions.iter().filter_map(apart).collect();
+        if apart.is_empty() {
+            return 1.0;
+        }
+        apart.sort_by(f64::total_cmp);
+        let count = apart.len() as f64;
+        let ratio = (quantile(&apart, HELD) / limit).powi(2);
+        ((PRIOR_STONES + count * ratio) / (PRIOR_STONES + count)).min(1.0)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use stonewise_testing::normal;
+
+    /// Stones whose frames turn about the vertical, as on a curved wall, with errors of these standard deviations
+    /// along, up and out, where one millimetre is expected, beside a motion of each.
+    fn motions(count: usize, sd_m: [f64; 3], moved: impl Fn(usize) -> Vector3<f64>) -> Vec<Shown> {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let stone = |i: usize| {
+            let face_from_world = Rotation3::from_euler_angles(0.0, 0.0, 0.01 * i as f64).into_inner();
+            let error = Vector3::from(sd_m).map(|sd| sd * normal(&mut rng));
+            Shown {
+                displacement: face_from_world.transpose() * error + moved(i),
+                face_from_world,
+                expected_m2: Vector3::repeat(1e-6),
+            }
+        };
+        (0..count).map(stone).collect()
+    }
+
+    #[test]
+    fn the_scatter_of_a_wall_that_moved_as_one_gives_its_errors_on_each_axis() {
+        let sd_m = [2e-4, 1e-4, 7e-4];
+        for moved in [Vector3::zeros(), Vector3::new(0.03, -0.02, 0.05)] {
+            let found = shown(&motions(2000, sd_m, |_| moved)).map(f64::sqrt);
+            for k in 0..3 {
+                let by_prior = (6.0 + 2000.0 * (1e3 * sd_m[k]).powi(2)) / 2006.0;
+                assert!((found[k] / by_prior.sqrt() - 1.0).abs() < 0.06, "{found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_few_stones_that_moved_change_little_and_many_leave_what_is_expected() {
+        let step =
+            |share: usize| move |i: usize| Vector3::new(0.0, 0.0, 0.01) * f64::from(u8::from(i % share == 0));
+        let [still, few, many] = [usize::MAX, 50, 4].map(|share| {
+            // Stone 0 is in every share.
+            shown(&motions(1000, [3e-4; 3], step(share)))
+        });
+        assert!((few.z / still.z).sqrt() < 1.25, "{still} {few}");
+        assert!(many.z > 0.999 && many.x < 0.2, "{many}");
+    }
+
+    #[test]
+    fn a_bulge_and_larger_errors_than_expected_leave_what_is_expected() {
+        let bulge = |i: usize| Vector3::new(0.0, 0.0, 0.02 * (i as f64 / 60.0).sin());
+        assert!(shown(&motions(300, [1e-4; 3], bulge)).z > 0.999);
+        assert_eq!(
+            shown(&motions(300, [3e-3; 3], |_| Vector3::zeros())),
+            Vector3::repeat(1.0)
+        );
+    }
+
+    #[test]
+    fn few_stones_and_no_errors_at_all_leave_what_is_expected() {
+        let few = shown(&motions(3, [0.0; 3], |_| Vector3::zeros()));
+        assert!((few - Vector3::repeat(6.0 / 9.0)).norm() < 1e-12);
+        assert_eq!(shown(&[]), Vector3::repeat(1.0));
+        let mut exact = motions(20, [1e-4; 3], |_| Vector3::zeros());
+        exact.iter_mut().for_each(|m| m.expected_m2 = Vector3::zeros());
+        assert_eq!(shown(&exact), Vector3::repeat(1.0));
+    }
+}
