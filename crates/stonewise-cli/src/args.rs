@@ -496,7 +496,7 @@ pub struct DesignArgs {
     /// The project file; its first epoch counts.
     pub project: PathBuf,
     /// Folder of design.json, design.csv, design.parquet, design.html and the run; created if missing.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = "design")]
     pub out: PathBuf,
     /// Seed of the errors of the repetition's stations.
     #[arg(long, default_value_t = 1)]
