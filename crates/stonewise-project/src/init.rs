@@ -42,7 +42,7 @@ const NO_EPOCHS: [&str; 7] = [
 ];
 
 /// Extensions of clouds in formats that only the programs of scanners read.
-const UNREAD: [&str; 7] = ["ptx", "rcp", "rcs", "fls", "zfs", "rdbx", "lgs"];
+const UNREAD: [&str; 6] = ["rcp", "rcs", "fls", "zfs", "rdbx", "lgs"];
 /// What is said of them.
 const NOT_READ: &str = "a format that is not read";
 
@@ -314,7 +314,7 @@ mod tests {
 
     #[test]
     fn scans_in_one_folder_are_an_epoch_each() {
-        let (text, lines) = written(&["dam_2025.laz", "dam_2024.laz", "README.txt", "dam_2024.ptx"]);
+        let (text, lines) = written(&["dam_2025.laz", "dam_2024.laz", "README.txt", "dam_2024.rcp"]);
         let place = |what: &str| text.find(what).unwrap();
         assert!(place("clouds = [\"dam_2024.laz\"]") < place("clouds = [\"dam_2025.laz\"]"));
         assert!(
@@ -323,7 +323,7 @@ mod tests {
         );
         assert_eq!(text.matches("[[epochs]]").count(), 2, "{text}");
         assert!(
-            lines.contains("left out: dam_2024.ptx (a format that is not read"),
+            lines.contains("left out: dam_2024.rcp (a format that is not read"),
             "{lines}"
         );
         let (text, _) = written(&["2024_tls.laz", "2024_uav.laz", "2025_tls.laz", "2025_uav.laz"]);
@@ -332,6 +332,28 @@ mod tests {
             text.contains("\nclouds = [\"2025_tls.laz\", \"2025_uav.laz\"]"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn scans_of_all_formats_are_taken_and_cameras_are_no_clouds() {
+        let (text, lines) = written(&[
+            "2024/a.ptx",
+            "2024/b.PTS",
+            "2025/c.pcd",
+            "2025/dam_calibrated_camera_parameters.txt",
+            "2025/photos/1.tif",
+        ]);
+        assert!(
+            text.contains("clouds = [\"2024/a.ptx\", \"2024/b.PTS\"]"),
+            "{text}"
+        );
+        assert!(text.contains("clouds = [\"2025/c.pcd\"]"), "{text}");
+        assert!(
+            text.contains("cameras = \"2025/dam_calibrated_camera_parameters.txt\"")
+                && text.contains("images = \"2025/photos\""),
+            "{text}"
+        );
+        assert!(!lines.contains("left out"), "{lines}");
     }
 
     #[test]
