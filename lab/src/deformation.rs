@@ -20,9 +20,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use stonewise_core::id::StoneId;
-use stonewise_core::progress::Silent;
-use stonewise_core::registration::deformation;
-use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, SeenStone, epoch_errors};
+use stonewise_core::registration::observers::SeenStone;
 use stonewise_simulate::{SceneParams, TlsParams, UavParams, WallMotion, WallParams};
 
 /// Stations or strips of an epoch.
@@ -145,21 +143,8 @@ impl Case {
 
     fn measure(&self, seed: u64) -> Wall {
         let wall = ScannedWall::new(&self.params(seed), SOURCES[usize::from(!self.is_tls)]);
-        let sources = wall.sources();
-        let measured = wall.report.results.iter().filter(|r| r.motion.is_ok());
-        let seen = measured.map(|r| (r.first, wall.seen(r.first)));
-        let (seen_ids, stones): (Vec<StoneId>, Vec<SeenStone>) = seen.unzip();
-        let pair = EpochPair {
-            sources: &sources,
-            stones: &stones,
-            neighbours: &[],
-            stable: &[],
-            offered: &[],
-            sigma_m: wall.sigma_m(),
-        };
-        let errors = epoch_errors(&pair, &EpochErrorParams::default());
-        let errors = errors.joint.as_ref().map(|e| (e, seen_ids.as_slice()));
-        let found = deformation(wall.report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
+        let (found, seen) = wall.deformation();
+        let (seen_ids, stones): (Vec<StoneId>, Vec<SeenStone>) = seen.into_iter().unzip();
         let truth = |id: StoneId, k: usize| wall.truth(id, stones[k].centroid);
         let number = |id: StoneId| seen_ids.iter().position(|s| *s == id).unwrap();
         let stone = |s: &stonewise_core::registration::StoneDeformation| {

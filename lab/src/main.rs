@@ -8,6 +8,7 @@ mod epoch_errors;
 mod figures;
 mod photo_curves;
 mod sample_report;
+mod series;
 mod speed;
 mod survey;
 mod table;
@@ -21,10 +22,11 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 15] = [
+const PROGRAMS: [Program; 16] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("deformation", deformation::run),
+    ("series", series::run),
     ("epoch-errors", epoch_errors::run),
     ("photo-curves", photo_curves::run),
     ("kept-walls", detector::kept_walls::run),

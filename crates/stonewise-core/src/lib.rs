@@ -9,7 +9,7 @@
 //!
 //! ```text
 //! id < epoch < statistics < linalg < components < progress < parallel < params < geometry < raster < cloud
-//!    < stone < surface < {transfer | matching | registration | change | views} < evaluate
+//!    < stone < surface < {transfer | matching | registration | change | views | series} < evaluate
 //! ```
 
 pub mod change;
@@ -26,6 +26,7 @@ pub mod params;
 pub mod progress;
 pub mod raster;
 pub mod registration;
+pub mod series;
 pub mod statistics;
 pub mod stone;
 pub mod surface;

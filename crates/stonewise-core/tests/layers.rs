@@ -18,7 +18,14 @@ const LAYERS: [&[&str]; 8] = [
     &["cloud"],
     &["stone"],
     &["surface"],
-    &["transfer", "matching", "registration", "change", "views"],
+    &[
+        "transfer",
+        "matching",
+        "registration",
+        "change",
+        "views",
+        "series",
+    ],
     &["evaluate"],
 ];
 

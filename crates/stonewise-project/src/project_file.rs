@@ -1,6 +1,7 @@
 //! How a project file is read and checked.
 
 use super::{Epoch, PhotoFiles, Project};
+use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
 use crate::sources::SourceRule;
 use schemars::JsonSchema;
@@ -65,6 +66,25 @@ pub(super) struct RawProject {
     report: ReportParams,
     /// Corrections of stones by hand.
     edits: Option<RawEdits>,
+    /// Levels, temperatures and other readings over time.
+    conditions: Option<RawConditions>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct RawConditions {
+    /// A CSV file with a column `date` and any others, whose values are interpolated to the dates of the epochs. What an
+    /// epoch's own `conditions` say wins.
+    #[schemars(with = "PathBuf")]
+    file: Spanned<PathBuf>,
+    /// Longest time between two readings that is interpolated, days. Nothing is extrapolated.
+    #[serde(default = "longest_gap_days")]
+    #[schemars(with = "f64", range(min = 0.0))]
+    longest_gap_days: Spanned<f64>,
+}
+
+fn longest_gap_days() -> Spanned<f64> {
+    Spanned::new(0..0, 7.0)
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -223,6 +243,10 @@ impl Project {
             epochs.push(source.epoch(epoch, &map, &epochs)?);
         }
         let mut notes = Vec::new();
+        let conditions = raw.conditions.map(|c| source.conditions(c)).transpose()?;
+        if let Some(file) = &conditions {
+            notes.extend(add_conditions(file, &mut epochs));
+        }
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
@@ -234,6 +258,7 @@ impl Project {
             settings,
             notes,
             edits,
+            conditions: conditions.map(|file| file.path),
             part: None,
         })
     }
@@ -440,6 +465,16 @@ impl Source<'_> {
         Ok(edits)
     }
 
+    /// The readings, whose file is read at once: a mistake in it is one of the project.
+    fn conditions(&self, raw: RawConditions) -> Result<ConditionsFile> {
+        let days = *raw.longest_gap_days.get_ref();
+        if !(days.is_finite() && days >= 0.0) {
+            let message = "conditions.longest_gap_days must be a number of days, 0 or more";
+            return Err(self.error(raw.longest_gap_days.span(), message));
+        }
+        ConditionsFile::read(&self.existing(raw.file)?, days)
+    }
+
     /// The logo, like all paths, is relative to the project file.
     fn report(&self, mut params: ReportParams) -> Result<ReportParams> {
         if let Some(logo) = params.logo {
@@ -531,9 +566,81 @@ impl Source<'_> {
     }
 }
 
+/// Adds to dated epochs the readings of their day that they do not state themselves; returns what is not known.
+fn add_conditions(file: &ConditionsFile, epochs: &mut [Epoch]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for epoch in epochs {
+        let Some(date) = &epoch.date else {
+            notes.push(format!(
+                "epoch {:?} has no date, so that nothing in {} belongs to it: give it one",
+                epoch.name,
+                file.path.display()
+            ));
+            continue;
+        };
+        let found = file.at(date);
+        for (name, value) in found.values {
+            epoch.conditions.entry(name).or_insert(value);
+        }
+        let own = |gap: &&String| {
+            !epoch
+                .conditions
+                .keys()
+                .any(|name| gap.contains(&format!(" no {name} on")))
+        };
+        notes.extend(found.gaps.iter().filter(own).cloned());
+    }
+    notes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn conditions_come_from_the_file_and_the_epochs_own_win() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["a.laz", "b.laz"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        fs::write(
+            dir.path().join("levels.csv"),
+            "date,level_m,air_c\n2025-04-01,10,5\n2025-04-03,12,\n",
+        )
+        .unwrap();
+        let file = dir.path().join("stonewise.toml");
+        let read = |table: &str| {
+            let text = format!(
+                "[project]\nname = \"wall\"\n[[epochs]]\nname = \"a\"\ndate = 2025-04-02\nclouds = [\"a.laz\"]\n\
+                 [[epochs]]\nname = \"b\"\ndate = 2025-04-03\nconditions = {{ level_m = 99.0 }}\nclouds = [\"b.laz\"]\n{table}"
+            );
+            fs::write(&file, text).unwrap();
+            Project::read(&file)
+        };
+        let project = read("[conditions]\nfile = \"levels.csv\"\n").unwrap();
+        let level = |epoch: usize| project.epochs[EpochId::at(epoch)].conditions["level_m"];
+        assert_eq!((level(0), level(1)), (11.0, 99.0));
+        let gaps: Vec<bool> = project
+            .notes
+            .iter()
+            .map(|n| n.contains("no air_c on 2025-04-0"))
+            .collect();
+        assert_eq!(gaps, [true, true]);
+        assert!(project.inputs().iter().any(|path| path.ends_with("levels.csv")));
+        for (table, message) in [
+            (
+                "[conditions]\nfile = \"none.csv\"\n",
+                "stonewise.toml:13: no such file or folder",
+            ),
+            (
+                "[conditions]\nfile = \"levels.csv\"\nlongest_gap_days = -1\n",
+                "stonewise.toml:14: conditions.longest",
+            ),
+        ] {
+            let found = read(table).unwrap_err().to_string();
+            assert!(found.contains(message), "{found}");
+        }
+    }
 
     fn with_reference(reference: &str, same: [Option<&str>; 3]) -> Result<Project> {
         let dir = tempfile::tempdir().unwrap();

@@ -30,6 +30,8 @@ pub struct Project {
     pub notes: Vec<String>,
     /// Corrections by hand; absent where the project names none.
     pub edits: Option<EditsFile>,
+    /// The file of readings; absent where the project names none.
+    pub conditions: Option<PathBuf>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -107,6 +109,7 @@ impl Project {
         }
         inputs.extend(self.settings.report.logo.clone());
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
+        inputs.extend(self.conditions.clone());
         inputs
     }
 
@@ -134,6 +137,7 @@ impl Project {
             },
             notes: Vec::new(),
             edits: None,
+            conditions: None,
             part: None,
         }
     }

@@ -2,8 +2,9 @@
 //! other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 4] = [
-    &["edits", "init", "sources"],
+const LAYERS: [&[&str]; 5] = [
+    &["day"],
+    &["conditions", "edits", "init", "sources"],
     &["project_type"],
     &["check", "project_file", "project_parameters", "split"],
     &["scans", "schema"],

@@ -1,10 +1,12 @@
 //! The texts of the verdict and of the report, in each language.
 
 mod report;
+mod series;
 
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
+pub(crate) use series::SeriesTexts;
 pub(crate) use stonewise_base::messages::fill;
 use stonewise_base::report_params::Language;
 use stonewise_figure::{Axis, count, mm, number, percent};
@@ -31,6 +33,7 @@ pub(crate) struct Texts {
     pub scores: ScoreTexts,
     pub method: MethodTexts,
     pub audit: AuditTexts,
+    pub series: &'static SeriesTexts,
     /// What became of stones, in the order of [`Status::ALL`].
     pub statuses: [&'static str; 10],
 }
@@ -351,6 +354,7 @@ static ENGLISH: Texts = Texts {
     scores: ScoreTexts::ENGLISH,
     method: MethodTexts::ENGLISH,
     audit: AuditTexts::ENGLISH,
+    series: &series::ENGLISH,
     statuses: [
         "measured",
         "the later epoch has no points, or no photo of them, at this place",
@@ -562,6 +566,7 @@ static GERMAN: Texts = Texts {
     scores: ScoreTexts::GERMAN,
     method: MethodTexts::GERMAN,
     audit: AuditTexts::GERMAN,
+    series: &series::GERMAN,
     statuses: [
         "gemessen",
         "die sp\u{e4}tere Epoche hat an dieser Stelle keine Punkte oder kein Foto von ihnen",

@@ -21,6 +21,7 @@ mod stone_table;
 #[cfg(test)]
 #[path = "../../../testing/results.rs"]
 mod testing;
+mod velocities;
 mod zone_place;
 
 // What `testing` calls it.
@@ -46,4 +47,5 @@ pub use squares::Squares;
 pub use statistics::Sorted;
 pub use stone_row::{Reference, RowMotion, Status, StoneRow, detection_limit_m};
 pub use stone_table::{read_stones, stone_table, write_stones, write_stones_csv};
+pub use velocities::read_velocities;
 pub use zone_place::ZonePlace;

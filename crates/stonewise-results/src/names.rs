@@ -16,6 +16,10 @@ pub const EDITS_AUDIT: &str = "audit_edits.csv";
 pub const CARRY_AUDIT: &str = "audit_carried.csv";
 /// Rows of all later epochs, where there are more than one.
 pub const SERIES: &str = "series.parquet";
+/// The model in time of every stone, where there are more than two epochs.
+pub const TRENDS_TABLE: &str = "trends.parquet";
+/// What the path over all epochs means.
+pub const TRENDS: &str = "trends.json";
 /// Zones of deformation of all later epochs.
 pub const ZONES: &str = "zones.parquet";
 /// Scores against a table of true stones.

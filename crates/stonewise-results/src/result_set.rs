@@ -1,11 +1,11 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, PairFile, RUN, VERDICT, audit};
+use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, PairFile, RUN, TRENDS, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
-use super::records::{Datum, RegistrationRecord, RunRecord, Verdict};
+use super::records::{Datum, RegistrationRecord, RunRecord, TrendsRecord, Verdict};
 use super::stone_table::read_stones;
-use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours};
+use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -45,6 +45,10 @@ pub struct ResultSet {
     pub neighbours: Vec<NeighbourCovariance>,
     /// `verdict.json`, where there is one.
     pub verdict: Option<Verdict>,
+    /// `trends.json`, where there are more than two epochs.
+    pub trends: Option<TrendsRecord>,
+    /// Velocities by stone, along the wall, up and out, from `trends.parquet`; metres a year.
+    pub velocities: BTreeMap<u32, Vector3<f64>>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
     /// stones, share, points.
     pub decisions: Vec<Vec<Vec<String>>>,
@@ -76,6 +80,8 @@ impl ResultSet {
     pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, Error> {
         Ok(Self {
             verdict: read_json(&dir.join(VERDICT))?,
+            trends: read_json(&dir.join(TRENDS))?,
+            velocities: read_velocities(dir)?,
             decisions: read_decisions(dir)?,
             edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
             carried: read_rows(&dir.join(CARRY_AUDIT))?.unwrap_or_default(),
@@ -84,7 +90,7 @@ impl ResultSet {
         })
     }
 
-    /// The same without the verdict, the decisions about masks and the excerpts of the survey.
+    /// The same without the verdict, the series, the decisions about masks and the excerpts of the survey.
     ///
     /// # Errors
     /// As [`Self::read_pair`].
@@ -114,6 +120,8 @@ impl ResultSet {
             registration: read_json(&dir.join(PairFile::Registration.name(pair)))?,
             neighbours: read_neighbours(dir, pair)?,
             verdict: None,
+            trends: None,
+            velocities: BTreeMap::new(),
             decisions: Vec::new(),
             edits: Vec::new(),
             carried: Vec::new(),

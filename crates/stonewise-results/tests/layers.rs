@@ -13,7 +13,7 @@ const LAYERS: [&[&str]; 6] = [
         "stone_row",
     ],
     &["columns", "evidence", "outlines", "scale", "zone_place"],
-    &["neighbours", "stone_table"],
+    &["neighbours", "stone_table", "velocities"],
     &["result_set"],
     &["comparison", "joints"],
     &["export"],

@@ -2,10 +2,13 @@
 
 use super::points::{Points, SurveyPoint, pairs, places, seen_stone};
 use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::observers::{SeenStone, Source};
-use stonewise_core::registration::{AdjustmentParams, AdjustmentReport, MemoryPairs, adjust};
+use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, SeenStone, Source, epoch_errors};
+use stonewise_core::registration::{
+    AdjustmentParams, AdjustmentReport, Deformation, MemoryPairs, adjust, deformation,
+};
 use stonewise_simulate::{Scan, SceneParams, World};
 
 /// Points that a stone needs in each epoch.
@@ -23,8 +26,13 @@ pub struct ScannedWall {
 impl ScannedWall {
     /// `count`: stations or strips of each epoch.
     pub fn new(params: &SceneParams, count: u32) -> Self {
+        Self::later(params, count, 1)
+    }
+
+    /// The same, the later epoch the one of this number, with the errors of that epoch: 1 for the second.
+    pub fn later(params: &SceneParams, count: u32, epoch: usize) -> Self {
         let world = World::new(params);
-        let epochs = [0, 1].map(|e| {
+        let epochs = [0, epoch].map(|e| {
             let scans = world.scan(params, e);
             by_stone(&scans.tls.or(scans.uav).unwrap())
         });
@@ -61,6 +69,27 @@ impl ScannedWall {
     pub fn seen(&self, stone: StoneId) -> SeenStone {
         let number = |epoch, source| epoch * self.count + source;
         seen_stone(&self.epochs, stone.0, &Vector3::x(), number).unwrap()
+    }
+
+    /// How the wall deformed, with the errors of stations or strips; and the stones that both epochs show.
+    pub fn deformation(&self) -> (Deformation, BTreeMap<StoneId, SeenStone>) {
+        let sources = self.sources();
+        let measured = self.report.results.iter().filter(|r| r.motion.is_ok());
+        let seen: BTreeMap<StoneId, SeenStone> = measured.map(|r| (r.first, self.seen(r.first))).collect();
+        let stones: Vec<SeenStone> = seen.values().cloned().collect();
+        let pair = EpochPair {
+            sources: &sources,
+            stones: &stones,
+            neighbours: &[],
+            stable: &[],
+            offered: &[],
+            sigma_m: self.sigma_m(),
+        };
+        let errors = epoch_errors(&pair, &EpochErrorParams::default());
+        let ids: Vec<StoneId> = seen.keys().copied().collect();
+        let errors = errors.joint.as_ref().map(|e| (e, ids.as_slice()));
+        let found = deformation(self.report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
+        (found, seen)
     }
 
     /// True displacement of a stone at a place.

@@ -49,6 +49,10 @@ pub fn run(args: &ProjectArgs, until: Until, force: bool, printer: &Printer) -> 
 /// The verdict's sentence, which is the last thing that a person reads.
 pub fn say_verdict(summary: &Summary, printer: &Printer) {
     if let Some(verdict) = &summary.verdict {
+        verdict
+            .series
+            .iter()
+            .for_each(|series| printer.log(&series.sentence));
         printer.log(&verdict.sentence);
     }
 }

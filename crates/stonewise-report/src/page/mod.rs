@@ -14,6 +14,7 @@ mod maps;
 mod method;
 mod overview;
 mod pair;
+mod series;
 mod survey;
 mod tracked;
 
@@ -34,10 +35,11 @@ pub(super) use explorer::{SCRIPT, STYLE};
 const PAGE_STYLE: &str = include_str!("style.css");
 
 /// Sections in the order of the page.
-fn sections(texts: &Texts) -> [(&'static str, &'static str); 8] {
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 9] {
     let names = &texts.sections;
     [
         ("summary", texts.page.summary),
+        ("series", texts.series.heading),
         ("maps", names.maps),
         ("tables", names.tables),
         ("distributions", names.distributions),
@@ -122,6 +124,7 @@ fn content(
 ) -> String {
     let mut body = String::new();
     body.push_str(&overview::summary(results, facts));
+    body.push_str(&series::series(results, facts));
     if !results.stones.is_empty() {
         body.push_str(&maps::maps(results, facts, joints));
         body.push_str(&overview::tables(results, facts));

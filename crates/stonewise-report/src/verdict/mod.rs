@@ -13,12 +13,15 @@ mod judged;
 mod limits;
 mod lost;
 mod sentence;
+mod series;
 #[cfg(test)]
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 
 pub use evidence::verdict_on;
+pub(crate) use series::name as term_name;
+pub use series::{inseparable_in_words, series_verdict};
 
 use stonewise_base::warnings::Warning;
 

@@ -4,6 +4,7 @@ mod datum;
 mod registration;
 mod run;
 mod timestamp;
+mod trends;
 mod verdict;
 
 pub use datum::{Datum, DatumState, SourceError};
@@ -13,9 +14,11 @@ pub use registration::{
 };
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
+pub use trends::{InseparableRecord, TRENDS_VERSION, TrendsRecord};
 pub use verdict::{
-    Area, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline, Headlines, JointVerdict,
-    Largest, Reason, ReasonCode, State, StoneVerdict, VERDICT_VERSION, Verdict, ZoneVerdict,
+    AnswerVerdict, Area, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline, Headlines,
+    JointVerdict, Largest, Reason, ReasonCode, SeriesVerdict, State, StoneVerdict, VERDICT_VERSION, Verdict,
+    ZoneVerdict,
 };
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 use stonewise_base::thresholds::Thresholds;
 use stonewise_core::registration::ZoneKind;
+use stonewise_core::series::Answer;
 
 /// Version of the file's layout.
 pub const VERDICT_VERSION: u32 = 1;
@@ -63,6 +64,34 @@ pub struct Verdict {
     pub thresholds: Thresholds,
     /// Every later epoch against the first, in time order.
     pub epochs: Vec<EpochVerdict>,
+    /// What the path over all epochs means; absent with two epochs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub series: Option<SeriesVerdict>,
+}
+
+/// The four answers of a series.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SeriesVerdict {
+    /// All in one sentence.
+    pub sentence: String,
+    /// Whether the newest epoch is as the others predict it under its conditions.
+    pub as_predicted: AnswerVerdict,
+    /// Whether the newest epoch continues the mean course of the earlier ones.
+    pub as_in_the_past: AnswerVerdict,
+    /// Whether stones move in proportion to time.
+    pub trend: AnswerVerdict,
+    /// Whether stones moved abruptly.
+    pub anomaly: AnswerVerdict,
+}
+
+/// An answer in words and numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct AnswerVerdict {
+    /// For people, in the language of the report.
+    pub text: String,
+    /// For programs.
+    #[serde(flatten)]
+    pub answer: Answer,
 }
 
 /// The verdict in a word and a sentence, as `run.json` holds it.
@@ -345,7 +374,14 @@ impl Verdict {
             sentence: worst.map_or(String::new(), |e| e.sentence.clone()),
             thresholds: thresholds.clone(),
             epochs,
+            series: None,
         }
+    }
+
+    /// The verdict with the answers of a series.
+    #[must_use]
+    pub fn with_series(self, series: Option<SeriesVerdict>) -> Self {
+        Self { series, ..self }
     }
 
     /// State and sentence of the run and of every later epoch.
@@ -438,7 +474,7 @@ mod tests {
             }),
             ..EpochVerdict::default()
         };
-        Verdict::new(&Thresholds::default(), vec![epoch])
+        Verdict::new(&Thresholds::default(), vec![epoch]).with_series(Some(SeriesVerdict::default()))
     }
 
     #[test]
@@ -456,8 +492,9 @@ mod tests {
         let verdict = serde_json::to_value(sample()).unwrap();
         let epoch = &verdict["epochs"][0];
         let checks = [
-            (schema.clone(), &verdict),
             (of("epoch"), epoch),
+            (of("series"), &verdict["series"]),
+            (of("answer"), &verdict["series"]["trend"]),
             (of("area"), &epoch["wall"]),
             (of("stone"), &epoch["stones"][0]),
             (of("joint"), &epoch["joints"][0]),
@@ -465,6 +502,11 @@ mod tests {
             (of("deformation"), &epoch["deformation"]),
             (of("deformed_zone"), &epoch["deformation"]["zones"][0]),
         ];
+        // Only a series has its answers.
+        let mut required = words(&schema["required"]);
+        required.insert("series".to_owned());
+        assert_eq!(required, keys(&verdict));
+        assert_eq!(keys(&schema["properties"]), keys(&verdict));
         for (schema, value) in checks {
             assert_eq!(keys(&schema["properties"]), keys(value));
             assert_eq!(words(&schema["required"]), keys(value));

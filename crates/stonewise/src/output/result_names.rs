@@ -22,6 +22,7 @@ const STEMS: [&str; 20] = [
     "displacements",
     "run",
     "series",
+    "trends",
     "zones",
     "verdict",
     "audit_epoch",

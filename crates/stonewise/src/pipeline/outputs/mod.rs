@@ -15,5 +15,7 @@ pub mod run_record;
 pub mod series;
 pub mod stone_rows;
 pub mod tables;
+mod time_order;
+pub mod trends;
 pub mod verdict;
 pub mod zones;

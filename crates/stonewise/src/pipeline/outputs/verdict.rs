@@ -1,17 +1,18 @@
 //! `verdict.json`: the state of the wall, its zones and its stones.
 
 use crate::error::Result;
-use crate::files::write_readable_json;
+use crate::files::{read_json, write_readable_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::outputs::tables::TABLES;
+use crate::pipeline::outputs::trends::TRENDS;
 use crate::pipeline::steps::change::CHANGE;
 use crate::pipeline::until::Until;
 use crate::results::ResultSet;
-use crate::results::names::VERDICT as FILE;
-use crate::results::records::{EpochVerdict, Verdict};
+use crate::results::names::{TRENDS as TRENDS_FILE, VERDICT as FILE};
+use crate::results::records::{EpochVerdict, TrendsRecord, Verdict};
 use crate::settings::Settings;
-use crate::verdict::{is_doubted, verdict_on};
+use crate::verdict::{is_doubted, series_verdict, verdict_on};
 use crate::warnings::Warning;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +22,7 @@ use stonewise_core::progress::Progress;
 /// Makes the verdict on every later epoch from the tables in the folder, and writes it.
 pub static VERDICT: Step = Step {
     name: "verdict",
-    needs: &[Need::all(&TABLES), Need::all(&CHANGE)],
+    needs: &[Need::all(&TABLES), Need::all(&CHANGE), Need::same(&TRENDS)],
     wanted: |until| until >= Until::Registered,
     make: |run, _| run.verdict().map(drop),
     ..Step::PLAIN
@@ -74,5 +75,10 @@ pub(crate) fn verdict_of_tables(
         Ok(verdict_on(&results, names, in_doubt, thresholds, language))
     };
     let epochs = (1..).zip(later).map(on_epoch).collect::<Result<Vec<_>>>()?;
-    Ok(Verdict::new(thresholds, epochs))
+    let trends: Option<TrendsRecord> = match later.len() > 1 {
+        true => Some(read_json(&folder.join(TRENDS_FILE))?),
+        false => None,
+    };
+    let series = trends.map(|found| series_verdict(&found, language));
+    Ok(Verdict::new(thresholds, epochs).with_series(series))
 }

@@ -1,0 +1,141 @@
+//! A series of four epochs: its tables, its answers and its section in the report.
+#![allow(clippy::unwrap_used)] // a test that cannot go on must stop
+
+mod support;
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use stonewise_io::table::{Table, read_parquet};
+use support::{outcome, run, simulated, stonewise};
+
+/// The wall and its noise; `seed`: of the noise.
+fn params(seed: u64) -> String {
+    format!(
+        "name = \"Series wall\"\n[scene]\nseed = {seed}\n[scene.wall]\nwidth_m = 1.6\nheight_m = 1.0\nseed = 3\n\
+         [scene.tls]\nspacing_m = 0.008\n[photos]\ncolumns = 2\nrows = 1\nwidth = 800\nheight = 600\nfocal_px = 1100.0\n\
+         distance_m = 5.0\n"
+    )
+}
+
+/// Four surveys of one wall that stands still, as one project; the reference is the second.
+fn project(dir: &Path) {
+    let mut text =
+        "[project]\nname = \"Series wall\"\nreference = \"2020-04\"\n[conditions]\nfile = \"levels.csv\"\n\
+                    [registration.photos]\nenabled = false\n"
+            .to_owned();
+    let dates = ["2019-10-01", "2020-04-01", "2020-10-01", "2021-04-01"];
+    for (survey, seed) in [3, 4].into_iter().enumerate() {
+        let (_kept, made) = simulated(&params(seed));
+        support::copy_tree(&made, &dir.join(format!("s{survey}")));
+    }
+    for (i, date) in dates.iter().enumerate() {
+        let (survey, epoch) = (i / 2, 1 + i % 2);
+        let at = format!("s{survey}/epoch{epoch}");
+        text += &format!(
+            "[[epochs]]\nname = \"{}\"\ndate = {date}\nclouds = [\"{at}/cloud_tls.laz\"]\nimages = \"{at}/images\"\n\
+             cameras = \"{at}/cameras_metashape.xml\"\nmasks = \"s{survey}/masks/epoch{epoch}.json\"\n",
+            &date[..7]
+        );
+    }
+    fs::write(dir.join("stonewise.toml"), text).unwrap();
+    let levels = "date,level_m\n2019-09-30,10\n2019-10-02,12\n2020-04-01,8\n2020-10-01,14\n2021-04-01,9\n";
+    fs::write(dir.join("levels.csv"), levels).unwrap();
+}
+
+fn reals(table: &Table, name: &str) -> Vec<Option<f64>> {
+    table.optional::<f64>(name).unwrap()
+}
+
+#[test]
+fn a_series_has_its_tables_its_answers_and_its_section() {
+    let (dir, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    project(dir.path());
+    let (code, log) = run(dir.path(), out.path(), &[]);
+    assert!([0, 3].contains(&code), "{log}");
+
+    let series = read_parquet(&out.path().join("series.parquet")).unwrap();
+    let epochs = series.required::<String>("epoch").unwrap();
+    assert_eq!(epochs[0], "2019-10");
+    assert!(
+        series
+            .required::<String>("since")
+            .unwrap()
+            .iter()
+            .all(|s| s == "2020-04")
+    );
+    let [own, before] = ["cov_xx", "cov_prev_xx"].map(|name| reals(&series, name));
+    let of = |epoch: &str| -> Vec<usize> { (0..epochs.len()).filter(|&i| epochs[i] == epoch).collect() };
+    // There is nothing before the first epoch; before the third lies the reference; the fourth is free of it.
+    assert!(of("2019-10").iter().all(|&i| before[i].is_none()));
+    assert!(of("2020-10").iter().all(|&i| before[i] == own[i]));
+    let known: Vec<usize> = of("2021-04")
+        .into_iter()
+        .filter(|&i| before[i].is_some())
+        .collect();
+    assert!(known.len() > 5);
+
+    let trends = read_parquet(&out.path().join("trends.parquet")).unwrap();
+    let velocities = reals(&trends, "v_out");
+    assert_eq!(velocities.len(), of("2021-04").len());
+    let known: Vec<f64> = velocities.into_iter().flatten().collect();
+    assert!(
+        known.len() > 5 && known.iter().all(|v| v.abs() < 2e-3),
+        "{known:?}"
+    );
+    assert!(reals(&trends, "season_cos_out").iter().all(Option::is_none));
+
+    let json = |name: &str| -> Value {
+        serde_json::from_str(&fs::read_to_string(out.path().join(name)).unwrap()).unwrap()
+    };
+    let (found, verdict, record) = (json("trends.json"), json("verdict.json"), json("run.json"));
+    assert_eq!(
+        found["epochs"],
+        serde_json::json!(["2019-10", "2020-04", "2020-10", "2021-04"])
+    );
+    assert_eq!(found["terms"], serde_json::json!(["trend"]));
+    let text = "4 epochs are too few for level: it takes 5";
+    assert!(
+        found["not_separable"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|t| t["text"] == text),
+        "{found}"
+    );
+    for answer in ["as_predicted", "as_in_the_past"] {
+        assert_eq!(verdict["series"][answer]["answer"], "yes", "{verdict}");
+    }
+    for answer in ["trend", "anomaly"] {
+        assert_eq!(verdict["series"][answer]["answer"], "no", "{verdict}");
+    }
+    let levels: Vec<&Value> = { record["epochs"].as_array().unwrap().iter() }
+        .map(|e| &e["conditions"]["level_m"])
+        .collect();
+    assert_eq!(levels, [8.0, 11.0, 14.0, 9.0]);
+    let sentence = verdict["series"]["sentence"].as_str().unwrap();
+    assert!(log.contains(sentence), "{log}");
+    let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
+    let page = page.replace('\u{a0}', " ");
+    assert!(page.contains("<section id=\"series\">") && page.contains(sentence) && page.contains(text));
+}
+
+#[test]
+fn mistakes_in_the_file_of_conditions_are_named_by_check() {
+    let dir = tempfile::tempdir().unwrap();
+    let cloud = "x y z\n0 0 0\n";
+    fs::write(dir.path().join("a.xyz"), cloud).unwrap();
+    fs::write(
+        dir.path().join("levels.csv"),
+        "date,level_m\n2019-10-01,1\n2019-10-02,1.5m\n",
+    )
+    .unwrap();
+    let text = "[project]\nname = \"Wall\"\n[conditions]\nfile = \"levels.csv\"\n[[epochs]]\nname = \"a\"\nclouds = [\"a.xyz\"]\n\
+                [[epochs]]\nname = \"b\"\nclouds = [\"a.xyz\"]\n";
+    fs::write(dir.path().join("stonewise.toml"), text).unwrap();
+    let (code, said) = outcome(stonewise().arg("check").arg(dir.path().join("stonewise.toml")));
+    assert_eq!(code, 2, "{said}");
+    let message =
+        "levels.csv:3: level_m: \"1.5m\" is no number: leave the cell empty where there is no reading";
+    assert!(said.contains(message), "{said}");
+}

@@ -1,0 +1,314 @@
+//! From the looks of all epochs to the model of every stone and the four answers.
+
+use super::answers::{Answer, LEVEL, SeriesAnswers, Unanswered, Word};
+use super::fit::Fit;
+use super::look::StoneSeries;
+use super::moderated::VarianceFactor;
+use super::stone_model::{Coefficient, Seen, Step, coefficient, likeliest_step, of_term, with_step};
+use super::terms::{Inseparable, Model, SeriesEpoch, Term, WhyInseparable, models};
+use crate::id::StoneId;
+use crate::statistics::q_values;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::cmp::Ordering;
+
+/// Epochs without which no answer is given.
+const LEAST_EPOCHS: usize = 4;
+/// Epochs of a straight line with something left over.
+const LEAST_OF_A_LINE: usize = 3;
+/// Rounds of steps and variance factors, each of which the other changes.
+const ROUNDS: usize = 3;
+/// Factor on variances beyond which a stone loses weight in the choice of terms.
+const OUTLYING_FACTOR: f64 = 9.0;
+
+/// A coefficient of a stone's model: along the wall, up and out, with standard deviations of which 1.96 hold 95 %.
+pub type Trend = Coefficient;
+
+/// What was found of a series.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SeriesFindings {
+    /// Terms of the model, the trend first; none where there is no model.
+    pub terms: Vec<Term>,
+    /// Terms that the epochs cannot carry.
+    pub inseparable: Vec<Inseparable>,
+    /// Epochs without a date, which take no part.
+    pub undated: Vec<String>,
+    /// How much larger errors are than claimed: along the wall, up and out.
+    pub factors: Option<[VarianceFactor; 3]>,
+    /// Stones that were measured in epochs enough, in the order given.
+    pub stones: Vec<StoneTrend>,
+    /// The four answers.
+    pub answers: SeriesAnswers,
+}
+
+/// The model of a stone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoneTrend {
+    /// Stone of the reference.
+    pub stone: StoneId,
+    /// Epochs in which it was measured, the reference among them.
+    pub epochs: usize,
+    /// Metres a year.
+    pub velocity: Trend,
+    /// The smallest false discovery rate at which it counts as moving in proportion to time.
+    pub velocity_q: f64,
+    /// Metres for each metre of level.
+    pub level: Option<Trend>,
+    /// Metres for each degree.
+    pub temperature: Option<Trend>,
+    /// Metres: cosine and sine of the year.
+    pub season: Option<[Trend; 2]>,
+    /// An abrupt motion, where one is shown.
+    pub step: Option<Step>,
+}
+
+/// A stone while the model is fitted.
+struct Fitted {
+    stone: StoneId,
+    seen: Seen,
+    fits: [Fit; 3],
+    /// Which is in the fits.
+    step: Option<Step>,
+}
+
+/// Fits the model in time. `epochs`: all of them; `stones`: with a look for each.
+///
+/// Epochs without a date take no part. Terms beside the trend enter by Akaike's criterion with the correction for few
+/// observations (Hurvich & Tsai 1989), over all stones that all epochs show. Cost: linear in the stones.
+pub fn analyse(epochs: &[SeriesEpoch], stones: &[StoneSeries]) -> SeriesFindings {
+    let mut dated: Vec<usize> = (0..epochs.len()).filter(|&e| epochs[e].years.is_some()).collect();
+    dated.sort_by(|a, b| {
+        epochs[*a]
+            .years
+            .partial_cmp(&epochs[*b].years)
+            .unwrap_or(Ordering::Equal)
+    });
+    let undated = epochs.iter().filter(|e| e.years.is_none());
+    let mut found = SeriesFindings {
+        undated: undated.map(|e| e.name.clone()).collect(),
+        ..SeriesFindings::default()
+    };
+    let epochs: Vec<&SeriesEpoch> = dated.iter().map(|&e| &epochs[e]).collect();
+    let few = Unanswered::FewEpochs {
+        have: epochs.len(),
+        need: LEAST_EPOCHS,
+    };
+    found.answers = unanswered(&few);
+    if epochs.len() < LEAST_OF_A_LINE {
+        return found;
+    }
+    let (models, inseparable) = models(&epochs);
+    found.inseparable = inseparable;
+    let only_dated = |s: &StoneSeries| StoneSeries {
+        stone: s.stone,
+        looks: dated.iter().map(|&e| s.looks[e]).collect(),
+    };
+    let stones: Vec<StoneSeries> = stones.iter().map(only_dated).collect();
+    let Some(model) = choose(&models, &stones) else {
+        return found;
+    };
+    let (fitted, factors) = settle(model, &stones);
+    found.terms.clone_from(&model.terms);
+    found.factors = Some(factors);
+    found.stones = described(&fitted, model, &factors, &dated);
+    if epochs.len() < LEAST_EPOCHS {
+        return found;
+    }
+    let plain = &models[0];
+    found.answers = SeriesAnswers {
+        as_predicted: continued(&fitted, model),
+        as_in_the_past: continued(&fitted, plain),
+        trend: trend(&found),
+        anomaly: anomaly(&fitted, model, &factors, &epochs),
+    };
+    found
+}
+
+fn unanswered(reason: &Unanswered) -> SeriesAnswers {
+    let none = || Answer::none(reason.clone());
+    SeriesAnswers {
+        as_predicted: none(),
+        as_in_the_past: none(),
+        trend: none(),
+        anomaly: none(),
+    }
+}
+
+/// The model of the smallest criterion; the plain one where no stone was seen in all epochs.
+fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> {
+    let plain = models.first()?;
+    let largest = models.iter().max_by_key(|m| m.unknowns())?;
+    let complete: Vec<Seen> = stones
+        .iter()
+        .filter(|s| s.looks.iter().all(Option::is_some))
+        .map(Seen::of)
+        .collect();
+    let epochs = plain.design.nrows() as f64;
+    // Stones that no model fits count less, the same in all models.
+    let weight = |seen: &Seen| {
+        let fits = seen.fit(&largest.design)?;
+        Some(fits.map(|f| {
+            let factor = f.residuals / (f.freedom.max(1)) as f64;
+            (OUTLYING_FACTOR / factor).min(1.0)
+        }))
+    };
+    let weights: Vec<Option<[f64; 3]>> = complete.par_iter().map(weight).collect();
+    if complete.is_empty() {
+        return Some(plain);
+    }
+    let criterion = |model: &Model| {
+        let residuals = |(seen, weights): (&Seen, &Option<[f64; 3]>)| {
+            let (fits, weights) = (seen.fit(&model.design)?, weights.as_ref()?);
+            Some(
+                fits.iter()
+                    .zip(weights)
+                    .map(|(f, w)| w * f.residuals)
+                    .sum::<f64>(),
+            )
+        };
+        let sum: f64 = complete.iter().zip(&weights).filter_map(residuals).sum();
+        let share = model.unknowns() as f64 / epochs;
+        let mean = sum / (3.0 * complete.len() as f64 * epochs);
+        mean.max(f64::MIN_POSITIVE).ln() + 2.0 * share / (1.0 - share)
+    };
+    let by_criterion = models.iter().map(|m| (m, criterion(m)));
+    by_criterion.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(m, _)| m)
+}
+
+/// Fits, steps and variance factors that agree with each other.
+fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFactor; 3]) {
+    let start = |stone: &StoneSeries| {
+        let seen = Seen::of(stone);
+        let fits = seen.fit(&model.design).filter(|f| f[0].freedom > 0)?;
+        Some(Fitted {
+            stone: stone.stone,
+            seen,
+            fits,
+            step: None,
+        })
+    };
+    let mut fitted: Vec<Fitted> = stones.par_iter().filter_map(start).collect();
+    let mut factors = factors_of(fitted.iter().map(|f| &f.fits));
+    for _ in 0..ROUNDS {
+        let likeliest = |f: &Fitted| likeliest_step(&f.seen, model, &factors);
+        let steps: Vec<Option<(Step, f64)>> = fitted.par_iter().map(likeliest).collect();
+        let p: Vec<f64> = steps.iter().map(|s| s.as_ref().map_or(1.0, |s| s.1)).collect();
+        let shown = q_values(&p);
+        for ((stone, step), q) in fitted.iter_mut().zip(&steps).zip(shown) {
+            stone.step = step.filter(|_| q <= LEVEL).map(|s| s.0);
+            let design = match &stone.step {
+                Some(step) => with_step(&model.design, step.epoch),
+                None => model.design.clone(),
+            };
+            if let Some(fits) = stone.seen.fit(&design) {
+                stone.fits = fits;
+            }
+        }
+        factors = factors_of(fitted.iter().map(|f| &f.fits));
+    }
+    (fitted, factors)
+}
+
+fn factors_of<'a>(fits: impl Iterator<Item = &'a [Fit; 3]> + Clone) -> [VarianceFactor; 3] {
+    [0, 1, 2].map(|axis| {
+        let all: Vec<(f64, usize)> = fits
+            .clone()
+            .map(|f| (f[axis].residuals, f[axis].freedom))
+            .collect();
+        VarianceFactor::of(&all)
+    })
+}
+
+/// `places`: of the epochs that take part among all.
+fn described(
+    fitted: &[Fitted],
+    model: &Model,
+    factors: &[VarianceFactor; 3],
+    places: &[usize],
+) -> Vec<StoneTrend> {
+    let describe = |f: &Fitted| {
+        let term = |term: Term| of_term(&f.fits, factors, model, term);
+        let season = model.place(Term::Season);
+        Some(StoneTrend {
+            stone: f.stone,
+            epochs: f.seen.epochs.len(),
+            velocity: term(Term::Trend)?,
+            velocity_q: 1.0,
+            level: term(Term::Level),
+            temperature: term(Term::Temperature),
+            season: season.map(|c| [c, c + 1].map(|c| coefficient(&f.fits, factors, c))),
+            step: f.step.map(|step| Step {
+                epoch: places[step.epoch],
+                ..step
+            }),
+        })
+    };
+    let mut all: Vec<StoneTrend> = fitted.iter().filter_map(describe).collect();
+    let p: Vec<f64> = all.iter().map(|s| s.velocity.p).collect();
+    all.iter_mut()
+        .zip(q_values(&p))
+        .for_each(|(s, q)| s.velocity_q = q);
+    all
+}
+
+/// Whether the newest epoch is where the others say by a model: its look gets an unknown of its own, which is the
+/// departure from the prediction.
+fn continued(fitted: &[Fitted], model: &Model) -> Answer {
+    let newest = model.design.nrows() - 1;
+    let depart = |f: &Fitted| {
+        if f.seen.epochs.last() != Some(&newest) {
+            return None;
+        }
+        let earlier = f.step.filter(|s| s.epoch != newest);
+        let base: DMatrix<f64> = match earlier {
+            Some(step) => with_step(&model.design, step.epoch),
+            None => model.design.clone(),
+        };
+        let column = base.ncols();
+        let fits = f
+            .seen
+            .fit(&with_step(&base, newest))
+            .filter(|f| f[0].freedom > 0)?;
+        Some((f.stone, fits, column))
+    };
+    let departures: Vec<(StoneId, [Fit; 3], usize)> = fitted.par_iter().filter_map(depart).collect();
+    let factors = factors_of(departures.iter().map(|d| &d.1));
+    let found: Vec<_> = departures
+        .iter()
+        .map(|(stone, fits, column)| (*stone, coefficient(fits, &factors, *column), None))
+        .collect();
+    Answer::of(&found, Word::No)
+}
+
+fn trend(found: &SeriesFindings) -> Answer {
+    let velocities: Vec<_> = found.stones.iter().map(|s| (s.stone, s.velocity, None)).collect();
+    let mut answer = Answer::of(&velocities, Word::Yes);
+    let cause = found
+        .inseparable
+        .iter()
+        .find(|i| i.why == WhyInseparable::GoesWith { other: Term::Trend });
+    if let (Some(cause), Word::Yes) = (cause, answer.answer) {
+        answer.answer = Word::CannotTell;
+        answer.reason = Some(Unanswered::GoesWith { term: cause.term });
+    }
+    answer
+}
+
+fn anomaly(
+    fitted: &[Fitted],
+    model: &Model,
+    factors: &[VarianceFactor; 3],
+    epochs: &[&SeriesEpoch],
+) -> Answer {
+    let step = |f: &Fitted| {
+        let (step, p) = likeliest_step(&f.seen, model, factors)?;
+        let found = Coefficient {
+            value: step.value,
+            sd: step.sd,
+            p,
+        };
+        Some((f.stone, found, Some(epochs[step.epoch].name.clone())))
+    };
+    let found: Vec<_> = fitted.par_iter().filter_map(step).collect();
+    Answer::of(&found, Word::Yes)
+}

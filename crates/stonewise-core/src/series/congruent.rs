@@ -1,0 +1,115 @@
+//! One frame for all epochs: the part of the wall that kept its shape over the whole series.
+
+use crate::geometry::lever;
+use crate::statistics::median;
+use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
+use std::collections::BTreeSet;
+
+/// Median of chi-square with three degrees of freedom.
+const MEDIAN_CHI_SQUARE: f64 = 2.366;
+/// Squared standardised deformation at which a stone of a wall that kept its shape no longer counts (Tukey's biweight).
+const CUT: f64 = 21.0;
+/// Rounds of weights.
+const ROUNDS: usize = 8;
+/// Fewest stones that make a frame.
+const LEAST_STONES: usize = 12;
+
+/// Deformations of a stone in all epochs; world, metres.
+#[derive(Clone, Debug)]
+pub struct SeriesPlace {
+    /// Its middle.
+    pub place: Point3<f64>,
+    /// The part of the wall that ties join.
+    pub body: u32,
+    /// The deformation with its covariance in each epoch; `None`: not measured.
+    pub deformations: Vec<Option<(Vector3<f64>, Matrix3<f64>)>>,
+}
+
+/// Brings the deformations of all epochs to one frame.
+///
+/// Each pair of epochs has its own idea of which part of the wall kept its shape. Here every stone has one weight in all
+/// epochs (Tukey's biweight of its mean squared standardised deformation), and of each epoch the rigid motion is taken
+/// off that is the closest to its deformations with these weights. What moves in proportion to time or level then does
+/// so after it too.
+pub fn keep_congruent(stones: &mut [SeriesPlace]) {
+    let bodies: BTreeSet<u32> = stones.iter().map(|s| s.body).collect();
+    for body in bodies {
+        let members: Vec<usize> = (0..stones.len()).filter(|&i| stones[i].body == body).collect();
+        if members.len() >= LEAST_STONES {
+            of_body(stones, &members);
+        }
+    }
+}
+
+fn of_body(stones: &mut [SeriesPlace], members: &[usize]) {
+    let count = members.len() as f64;
+    let middle = Point3::from(
+        members
+            .iter()
+            .map(|&i| stones[i].place.coords)
+            .sum::<Vector3<f64>>()
+            / count,
+    );
+    let epochs = members
+        .iter()
+        .map(|&i| stones[i].deformations.len())
+        .max()
+        .unwrap_or(0);
+    for _ in 0..ROUNDS {
+        let mut squares: Vec<f64> = members.iter().map(|&i| mean_square(&stones[i])).collect();
+        let typical = median(&mut squares.clone()).unwrap_or(0.0) / MEDIAN_CHI_SQUARE;
+        let cut = CUT * typical.max(1.0);
+        squares
+            .iter_mut()
+            .for_each(|q| *q = (1.0 - *q / cut).max(0.0).powi(2));
+        for epoch in 0..epochs {
+            let Some(rigid) = rigid(stones, members, &squares, &middle, epoch) else {
+                continue;
+            };
+            for &i in members {
+                let by: SMatrix<f64, 3, 6> = lever(&(stones[i].place - middle));
+                if let Some((deformation, _)) = &mut stones[i].deformations[epoch] {
+                    *deformation -= by * rigid;
+                }
+            }
+        }
+    }
+}
+
+/// The mean over the epochs of the squared standardised deformation; infinite where none is known.
+fn mean_square(stone: &SeriesPlace) -> f64 {
+    let square = |(d, c): &(Vector3<f64>, Matrix3<f64>)| Some(d.dot(&c.cholesky()?.solve(d)));
+    let all: Vec<f64> = stone.deformations.iter().flatten().filter_map(square).collect();
+    match all.is_empty() {
+        true => f64::INFINITY,
+        false => all.iter().sum::<f64>() / all.len() as f64,
+    }
+}
+
+/// The rigid motion about `middle` that is closest to the deformations of an epoch.
+fn rigid(
+    stones: &[SeriesPlace],
+    members: &[usize],
+    weights: &[f64],
+    middle: &Point3<f64>,
+    epoch: usize,
+) -> Option<Vector6<f64>> {
+    let (mut normal, mut right, mut used) = (Matrix6::zeros(), Vector6::zeros(), 0);
+    for (&i, weight) in members.iter().zip(weights) {
+        let Some((deformation, covariance)) = stones[i].deformations[epoch].filter(|_| *weight > 0.0) else {
+            continue;
+        };
+        let Some(information) = covariance.try_inverse() else {
+            continue;
+        };
+        let by: SMatrix<f64, 3, 6> = lever(&(stones[i].place - middle));
+        let weighted = by.transpose() * information * *weight;
+        normal += weighted * by;
+        right += weighted * deformation;
+        used += 1;
+    }
+    (used >= LEAST_STONES)
+        .then(|| normal.cholesky())
+        .flatten()
+        .map(|n| n.solve(&right))
+}

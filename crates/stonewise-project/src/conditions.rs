@@ -1,0 +1,220 @@
+//! The file of conditions: dates with levels, temperatures and what else was read.
+
+use crate::day::day_of;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use stonewise_base::error::{Error, Result};
+
+/// Readings by the name of their column.
+#[derive(Clone, Debug)]
+pub struct ConditionsFile {
+    /// Where it lies.
+    pub path: PathBuf,
+    /// Of each column: day and value, ascending by day.
+    columns: BTreeMap<String, Vec<(f64, f64)>>,
+    /// Longest time between two readings that is interpolated, days.
+    longest_gap_days: f64,
+}
+
+/// What the file says of a day.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ConditionsAt {
+    /// Values by column.
+    pub values: BTreeMap<String, f64>,
+    /// What it does not say, one sentence for each column.
+    pub gaps: Vec<String>,
+}
+
+impl ConditionsFile {
+    /// Reads a CSV file whose first line names the columns, `date` first among equals, and whose cells are numbers or
+    /// empty.
+    ///
+    /// # Errors
+    /// With the line: no dates, a cell that is no number, dates that go back.
+    pub fn read(path: &Path, longest_gap_days: f64) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(Error::io("reading the file of conditions", path))?;
+        let error = |line: usize, message: String| Error::Project {
+            path: path.to_path_buf(),
+            line,
+            message,
+        };
+        let text = String::from_utf8(bytes).map_err(|_| {
+            error(
+                1,
+                "a character that is not in UTF-8: save the file as UTF-8".to_owned(),
+            )
+        })?;
+        let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
+        let head: Vec<String> = lines.next().map_or_else(Vec::new, |(_, head)| {
+            head.split(',')
+                .map(|c| c.trim().trim_matches('"').to_owned())
+                .collect()
+        });
+        let Some(of_date) = head.iter().position(|c| c == "date") else {
+            let message = "the first line must name the columns, separated by commas, one of them `date`";
+            return Err(error(1, message.to_owned()));
+        };
+        if let Some(twin) = (1..head.len()).find(|&i| head[..i].contains(&head[i])) {
+            return Err(error(
+                1,
+                format!("two columns are named {:?}: rename one", head[twin]),
+            ));
+        }
+        let mut columns: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
+        let mut before = f64::NEG_INFINITY;
+        for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
+            let cells: Vec<&str> = line.split(',').map(|c| c.trim().trim_matches('"')).collect();
+            if cells.len() != head.len() {
+                let message = format!(
+                    "{} cells, but the first line names {} columns: write decimals with a point, and leave a cell empty where \
+                     there is no reading",
+                    cells.len(),
+                    head.len()
+                );
+                return Err(error(number, message));
+            }
+            let date = cells[of_date];
+            let Some(day) = day_of(date) else {
+                return Err(error(
+                    number,
+                    format!("{date:?} is no date: write it as 2026-04-10"),
+                ));
+            };
+            if day < before {
+                return Err(error(
+                    number,
+                    format!("{date} stands after a later date: sort the lines by date"),
+                ));
+            }
+            before = day;
+            for (name, cell) in head
+                .iter()
+                .zip(&cells)
+                .filter(|(name, cell)| *name != "date" && !cell.is_empty())
+            {
+                let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
+                let Some(value) = value else {
+                    let message = format!(
+                        "{name}: {cell:?} is no number: leave the cell empty where there is no reading"
+                    );
+                    return Err(error(number, message));
+                };
+                columns.entry(name.clone()).or_default().push((day, value));
+            }
+        }
+        if columns.is_empty() {
+            return Err(error(
+                1,
+                "no readings: add a column, such as reservoir_level_m".to_owned(),
+            ));
+        }
+        Ok(Self {
+            path: path.to_path_buf(),
+            columns,
+            longest_gap_days,
+        })
+    }
+
+    /// The conditions of a day, interpolated linearly between the readings before and after it; of several readings of
+    /// one moment the last counts. Nothing is said beyond the first and last reading, or where two readings lie too far
+    /// apart.
+    pub fn at(&self, date: &str) -> ConditionsAt {
+        let mut found = ConditionsAt::default();
+        let Some(day) = day_of(date) else {
+            return found;
+        };
+        let file = self.path.file_name().unwrap_or_default().to_string_lossy();
+        for (name, readings) in &self.columns {
+            let after = readings.partition_point(|r| r.0 <= day);
+            let before = after.checked_sub(1).map(|i| readings[i]);
+            let value = match (before, readings.get(after)) {
+                (Some((at, value)), _) if at == day => Ok(value),
+                (Some((from, low)), Some((to, high))) if to - from <= self.longest_gap_days => {
+                    Ok(low + (high - low) * (day - from) / (to - from))
+                }
+                (Some((from, _)), Some((to, _))) => Err(format!(
+                    "{file}: no {name} on {date}: its readings before and after lie {:.0} days apart, more than \
+                     conditions.longest_gap_days = {}",
+                    to - from,
+                    self.longest_gap_days
+                )),
+                _ => Err(format!(
+                    "{file}: no {name} on {date}, which lies {} its readings; nothing is extrapolated",
+                    if before.is_none() { "before" } else { "after" }
+                )),
+            };
+            match value {
+                Ok(value) => {
+                    found.values.insert(name.clone(), value);
+                }
+                Err(gap) => found.gaps.push(gap),
+            }
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<ConditionsFile> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("levels.csv");
+        std::fs::write(&path, text).unwrap();
+        ConditionsFile::read(&path, 7.0)
+    }
+
+    const LEVELS: &str = "date,reservoir_level_m,temperature_c\n2025-04-01,312.0,\n2025-04-05,314.0,8\n\n2025-05-20,300,20\n\
+                          2025-05-21,301,\n";
+
+    #[test]
+    fn readings_are_interpolated_between_near_days_and_nowhere_else() {
+        let file = read(LEVELS).unwrap();
+        let at = |date: &str| file.at(date);
+        assert_eq!(at("2025-04-02").values["reservoir_level_m"], 312.5);
+        assert_eq!(at("2025-04-05").values["temperature_c"], 8.0);
+        assert_eq!(at("2025-05-20T12:00:00").values["reservoir_level_m"], 300.5);
+        let gap = at("2025-05-01");
+        assert!(gap.values.is_empty());
+        assert!(
+            gap.gaps[0].contains("levels.csv: no reservoir_level_m on 2025-05-01")
+                && gap.gaps[0].contains("45 days")
+        );
+        assert!(at("2025-03-31").gaps[0].contains("before its readings"));
+        assert!(at("2025-05-22").gaps[0].contains("after its readings"));
+        // A reading of the day itself needs no other.
+        assert_eq!(at("2025-05-21").values["reservoir_level_m"], 301.0);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_line_and_fix() {
+        for (text, message) in [
+            (
+                "day,level\n",
+                "levels.csv:1: the first line must name the columns",
+            ),
+            ("date\n2025-01-01\n", "levels.csv:1: no readings"),
+            ("date,a,a\n", "levels.csv:1: two columns are named \"a\""),
+            (
+                "date,a\n2025-01-01,1\n2025-01-02,x\n",
+                "levels.csv:3: a: \"x\" is no number",
+            ),
+            (
+                "date,a\n01.02.2025,1\n",
+                "levels.csv:2: \"01.02.2025\" is no date",
+            ),
+            (
+                "date,a\n2025-01-01,1,5\n",
+                "levels.csv:2: 3 cells, but the first line names 2 columns",
+            ),
+            (
+                "date,a\n2025-01-02,1\n2025-01-01,1\n",
+                "levels.csv:3: 2025-01-01 stands after a later date",
+            ),
+        ] {
+            let found = read(text).unwrap_err().to_string();
+            assert!(found.contains(message), "{found}");
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! What the path over all epochs means.
+
+use super::html::{figure, section, table, with_units};
+use crate::draw::{MapLayout, MapPicture, stone_map};
+use crate::summary::Summary;
+use crate::texts::{SeriesTexts, Texts, fill};
+use crate::verdict::term_name;
+use std::fmt::Write;
+use stonewise_core::series::Word;
+use stonewise_figure::{Scale, escape};
+use stonewise_results::records::{AnswerVerdict, TrendsRecord};
+use stonewise_results::{ResultSet, StoneRow, nice_scale_m};
+
+/// The four answers, the model and the map of velocity; empty where there are only two epochs.
+pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
+    let texts = facts.texts();
+    let names = texts.series;
+    let found = results.verdict.as_ref().and_then(|v| v.series.as_ref());
+    let (Some(answers), Some(trends)) = (found, &results.trends) else {
+        return String::new();
+    };
+    let all = [
+        &answers.as_predicted,
+        &answers.as_in_the_past,
+        &answers.trend,
+        &answers.anomaly,
+    ];
+    let row = |(question, answer): (&&str, &AnswerVerdict)| {
+        vec![
+            (*question).to_owned(),
+            format!("<b>{}</b>", word(answer.answer.answer, names)),
+            with_units(&escape(&answer.text)),
+        ]
+    };
+    let rows: Vec<Vec<String>> = names.questions.iter().zip(all).map(row).collect();
+    let mut body = format!("<p>{}</p>", with_units(&escape(&answers.sentence)));
+    body.push_str(&table(&[names.question, names.answer, ""], &rows, 3));
+    body.push_str(&model(trends, texts));
+    body.push_str(&map(results, facts));
+    section("series", names.heading, &body)
+}
+
+fn word(answer: Word, names: &SeriesTexts) -> &'static str {
+    names.words[match answer {
+        Word::Yes => 0,
+        Word::No => 1,
+        Word::CannotTell => 2,
+    }]
+}
+
+/// The terms of the model, and what the epochs cannot carry.
+fn model(trends: &TrendsRecord, texts: &Texts) -> String {
+    let names = texts.series;
+    let mut out = String::new();
+    if !trends.terms.is_empty() {
+        let terms: Vec<&str> = trends.terms.iter().map(|t| term_name(*t, texts)).collect();
+        let _ = write!(
+            out,
+            "<p>{}</p>",
+            fill(names.model, &[("terms", &*terms.join(", "))])
+        );
+    }
+    let mut rest: Vec<String> = trends.not_separable.iter().map(|i| escape(&i.text)).collect();
+    if !trends.undated.is_empty() {
+        rest.push(escape(&fill(
+            names.undated,
+            &[("epochs", &*trends.undated.join(", "))],
+        )));
+    }
+    if !rest.is_empty() {
+        let _ = write!(out, "<ul><li>{}</li></ul>", rest.join("</li><li>"));
+    }
+    out
+}
+
+/// How fast every stone moves.
+fn map(results: &ResultSet, facts: &Summary) -> String {
+    if results.velocities.is_empty() {
+        return String::new();
+    }
+    let names = facts.texts().series;
+    let layout = MapLayout::new(results, facts.texts());
+    let speed = |s: &StoneRow| results.velocities.get(&s.stone_id).map(|v| v.norm());
+    let picture = MapPicture {
+        title: names.map,
+        value: &speed,
+        unit: names.map_unit,
+        scale: Scale::Sequential(nice_scale_m(results.velocities.values().map(|v| v.norm()))),
+        strong: None,
+        arrows: false,
+        loose: false,
+    };
+    let wide = if layout.is_wide() { " wide" } else { "" };
+    let picture = figure(names.map, &stone_map(&layout, &picture), names.map_note);
+    format!("<div class=\"maps{wide}\">{picture}</div>")
+}

@@ -1,0 +1,141 @@
+//! Texts of the answers that a series gives.
+
+/// A text for one and a text for several.
+type Number = [&'static str; 2];
+
+/// What the four answers are made of.
+#[derive(Debug)]
+pub(crate) struct SeriesTexts {
+    pub heading: &'static str,
+    pub question: &'static str,
+    pub answer: &'static str,
+    pub words: [&'static str; 3],
+    /// As predicted, as in the past, trend, anomaly.
+    pub questions: [&'static str; 4],
+    pub intro: &'static str,
+    pub cannot_tell: &'static str,
+    pub trend: Number,
+    pub no_trend: &'static str,
+    pub predicted: &'static str,
+    pub not_predicted: Number,
+    pub past: &'static str,
+    pub not_past: Number,
+    pub anomaly: Number,
+    pub no_anomaly: &'static str,
+    pub few_epochs: &'static str,
+    pub nothing_measured: &'static str,
+    pub may_be: &'static str,
+    /// Trend, level, temperature, season.
+    pub terms: [&'static str; 4],
+    pub model: &'static str,
+    pub not_given: &'static str,
+    pub too_few: &'static str,
+    pub same: &'static str,
+    pub same_season: &'static str,
+    pub two_seasons: &'static str,
+    pub goes_with: &'static str,
+    pub undated: &'static str,
+    pub map: &'static str,
+    pub map_unit: &'static str,
+    pub map_note: &'static str,
+}
+
+pub(super) static ENGLISH: SeriesTexts = SeriesTexts {
+    heading: "The series",
+    question: "Question",
+    answer: "Answer",
+    words: ["yes", "no", "cannot tell"],
+    questions: [
+        "Is the newest epoch as predicted?",
+        "Is it as in the past?",
+        "Is there a trend?",
+        "Is there an anomaly?",
+    ],
+    intro: "Series of {n} epochs: {answers}.",
+    cannot_tell: "cannot tell: {reason}",
+    trend: [
+        "trend: {n} of {m} stones moves in proportion to time, by {length} mm a year (95 % interval {low} to {high} mm), stone {id}",
+        "trend: {n} of {m} stones move in proportion to time, the fastest by {length} mm a year (95 % interval {low} to {high} mm), stone {id}",
+    ],
+    no_trend: "no trend is shown (half of the velocities are known to {half} mm a year or better)",
+    predicted: "the newest epoch is as predicted",
+    not_predicted: [
+        "the newest epoch is not as predicted: {n} of {m} stones departs, by {length} mm (95 % interval {low} to {high} mm), stone {id}",
+        "the newest epoch is not as predicted: {n} of {m} stones depart, by up to {length} mm (95 % interval {low} to {high} mm), stone {id}",
+    ],
+    past: "it continues the past",
+    not_past: [
+        "it does not continue the past: {n} of {m} stones departs, by {length} mm (95 % interval {low} to {high} mm), stone {id}",
+        "it does not continue the past: {n} of {m} stones depart, by up to {length} mm (95 % interval {low} to {high} mm), stone {id}",
+    ],
+    anomaly: [
+        "{n} of {m} stones moved abruptly, by {length} mm (95 % interval {low} to {high} mm) before {epoch}, stone {id}",
+        "{n} of {m} stones moved abruptly, the farthest by {length} mm (95 % interval {low} to {high} mm) before {epoch}, stone {id}",
+    ],
+    no_anomaly: "no stone moved abruptly",
+    few_epochs: "it takes {need} epochs with a date, and there are {have}",
+    nothing_measured: "no stone was measured in enough epochs",
+    may_be: "what looks like a trend of {n} stones, of {length} mm a year at stone {id}, may come from the {term}, which changed with time over these epochs",
+    terms: ["trend", "level", "temperature", "season"],
+    model: "Model of every stone: a constant and {terms}.",
+    not_given: "{term}: not given for {epochs}",
+    too_few: "{have} epochs are too few for {term}: it takes {need}",
+    same: "{n} epochs, always at the same {term}: what it does cannot be told",
+    same_season: "{n} epochs, always in the same season: what the season does cannot be told",
+    two_seasons: "{n} epochs in two seasons: a yearly wave cannot be told",
+    goes_with: "{n} epochs, in which {term} and {other} change together: they cannot be told apart",
+    undated: "Without a date, and left out: {epochs}",
+    map: "Velocity",
+    map_unit: "mm/a",
+    map_note: "Metres along and up the wall. Length of the velocity against the part of the wall that kept its shape; the map alone shows no trend. The numbers with their standard deviations are in trends.parquet.",
+};
+
+pub(super) static GERMAN: SeriesTexts = SeriesTexts {
+    heading: "Die Zeitreihe",
+    question: "Frage",
+    answer: "Antwort",
+    words: ["ja", "nein", "keine Aussage"],
+    questions: [
+        "Ist die neueste Epoche wie vorhergesagt?",
+        "Ist sie wie fr\u{fc}her?",
+        "Gibt es einen Trend?",
+        "Gibt es eine Auff\u{e4}lligkeit?",
+    ],
+    intro: "Zeitreihe aus {n} Epochen: {answers}.",
+    cannot_tell: "keine Aussage: {reason}",
+    trend: [
+        "Trend: {n} von {m} Steinen bewegt sich proportional zur Zeit, um {length} mm im Jahr (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        "Trend: {n} von {m} Steinen bewegen sich proportional zur Zeit, der schnellste um {length} mm im Jahr (95-%-Intervall {low} bis {high} mm), Stein {id}",
+    ],
+    no_trend: "kein Trend ist nachweisbar (die H\u{e4}lfte der Geschwindigkeiten ist auf {half} mm im Jahr oder besser bekannt)",
+    predicted: "die neueste Epoche ist wie vorhergesagt",
+    not_predicted: [
+        "die neueste Epoche ist nicht wie vorhergesagt: {n} von {m} Steinen weicht ab, um {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        "die neueste Epoche ist nicht wie vorhergesagt: {n} von {m} Steinen weichen ab, um bis zu {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+    ],
+    past: "sie setzt den bisherigen Gang fort",
+    not_past: [
+        "sie setzt den bisherigen Gang nicht fort: {n} von {m} Steinen weicht ab, um {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+        "sie setzt den bisherigen Gang nicht fort: {n} von {m} Steinen weichen ab, um bis zu {length} mm (95-%-Intervall {low} bis {high} mm), Stein {id}",
+    ],
+    anomaly: [
+        "{n} von {m} Steinen hat sich pl\u{f6}tzlich bewegt, um {length} mm (95-%-Intervall {low} bis {high} mm) vor {epoch}, Stein {id}",
+        "{n} von {m} Steinen haben sich pl\u{f6}tzlich bewegt, der weiteste um {length} mm (95-%-Intervall {low} bis {high} mm) vor {epoch}, Stein {id}",
+    ],
+    no_anomaly: "kein Stein hat sich pl\u{f6}tzlich bewegt",
+    few_epochs: "{need} Epochen mit Datum sind n\u{f6}tig, vorhanden sind {have}",
+    nothing_measured: "kein Stein wurde in gen\u{fc}gend Epochen gemessen",
+    may_be: "was bei {n} Steinen wie ein Trend aussieht, {length} mm im Jahr bei Stein {id}, kann eine Wirkung von {term} sein, das sich in diesen Epochen mit der Zeit \u{e4}nderte",
+    terms: ["Trend", "Stauspiegel", "Temperatur", "Jahreszeit"],
+    model: "Modell jedes Steins: eine Konstante und {terms}.",
+    not_given: "{term}: nicht angegeben f\u{fc}r {epochs}",
+    too_few: "{have} Epochen sind zu wenige f\u{fc}r {term}: {need} sind n\u{f6}tig",
+    same: "{n} Epochen, immer bei gleichem Wert ({term}): die Wirkung ist nicht bestimmbar",
+    same_season: "{n} Epochen, immer in derselben Jahreszeit: ihre Wirkung ist nicht bestimmbar",
+    two_seasons: "{n} Epochen in zwei Jahreszeiten: ein Jahresgang ist nicht bestimmbar",
+    goes_with: "{n} Epochen, in denen sich {term} und {other} gemeinsam \u{e4}ndern: sie sind nicht zu trennen",
+    undated: "Ohne Datum und nicht verwendet: {epochs}",
+    map: "Geschwindigkeit",
+    map_unit: "mm/a",
+    map_note: "Meter l\u{e4}ngs und auf der Mauer. Betrag der Geschwindigkeit gegen den Teil der Mauer, der seine Form behielt; die Karte allein zeigt keinen Trend. Die Zahlen mit ihren Standardabweichungen stehen in trends.parquet.",
+};
