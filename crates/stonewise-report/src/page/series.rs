@@ -3,7 +3,7 @@
 use super::html::{figure, section, table, with_units};
 use crate::draw::{MapLayout, MapPicture, stone_map};
 use crate::summary::Summary;
-use crate::texts::{SeriesTexts, Texts, fill};
+use crate::texts::{SeriesTexts, Texts, counted, fill};
 use crate::verdict::term_name;
 use std::fmt::Write;
 use stonewise_core::series::Word;
@@ -67,6 +67,20 @@ fn model(trends: &TrendsRecord, texts: &Texts) -> String {
             &[("epochs", &*trends.undated.join(", "))],
         )));
     }
+    rest.extend(trends.zones.iter().map(|zone| {
+        let [along, up, out] = zone.velocity.map(|v| texts.mm(v));
+        let half = texts.mm(1.96 * zone.sd.iter().copied().fold(0.0, f64::max));
+        let id = zone.zone_id.to_string();
+        let values = [
+            ("id", &*id),
+            ("epoch", &*zone.epoch),
+            ("along", &*along),
+            ("up", &*up),
+            ("out", &*out),
+            ("half", &*half),
+        ];
+        with_units(&escape(&counted(names.zone, zone.stones, &values)))
+    }));
     if !rest.is_empty() {
         let _ = write!(out, "<ul><li>{}</li></ul>", rest.join("</li><li>"));
     }

@@ -137,6 +137,7 @@ mod tests {
             terms: vec![Term::Trend],
             not_separable: Vec::new(),
             variance_factors: None,
+            zones: Vec::new(),
             answers,
         }
     }

@@ -21,8 +21,25 @@ pub struct TrendsRecord {
     pub not_separable: Vec<InseparableRecord>,
     /// How much larger the variances of errors are than claimed: along the wall, up and out.
     pub variance_factors: Option<[VarianceFactor; 3]>,
+    /// Velocities of the newest epoch's zones of deformation.
+    pub zones: Vec<ZoneTrend>,
     /// The four answers.
     pub answers: SeriesAnswers,
+}
+
+/// How fast a zone of deformation moves: the mean of its stones.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ZoneTrend {
+    /// Epoch of the zone.
+    pub epoch: String,
+    /// As in the stone table of the epoch.
+    pub zone_id: u32,
+    /// Its stones that have a velocity.
+    pub stones: usize,
+    /// Along the wall, up and out, metres a year.
+    pub velocity: [f64; 3],
+    /// Standard deviations, for errors that all of its stones share: the mean of theirs.
+    pub sd: [f64; 3],
 }
 
 /// A term that the epochs cannot carry.

@@ -9,7 +9,7 @@ use crate::pipeline::until::Until;
 use crate::project::{DAYS_A_YEAR, Epoch};
 use crate::results::StoneRow;
 use crate::results::names::{TRENDS as FILE, TRENDS_TABLE};
-use crate::results::records::{InseparableRecord, TRENDS_VERSION, TrendsRecord};
+use crate::results::records::{InseparableRecord, TRENDS_VERSION, TrendsRecord, ZoneTrend};
 use crate::verdict::inseparable_in_words;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
@@ -57,6 +57,7 @@ fn write_trends(run: &Run) -> Result<()> {
         });
     let record = TrendsRecord {
         version: TRENDS_VERSION,
+        zones: zones(run, &order, &found.stones)?,
         not_separable: not_separable.collect(),
         epochs: dated,
         undated: found.undated,
@@ -65,6 +66,38 @@ fn write_trends(run: &Run) -> Result<()> {
         answers: found.answers,
     };
     write_readable_json(&context.out.join(FILE), &record)
+}
+
+/// Velocities of the zones of the newest epoch that is not the reference.
+fn zones(run: &Run, order: &[EpochId], stones: &[StoneTrend]) -> Result<Vec<ZoneTrend>> {
+    let Some(&newest) = order.iter().rev().find(|id| **id != EpochId::REFERENCE) else {
+        return Ok(Vec::new());
+    };
+    let measured = run.measured(newest)?;
+    let zone_of: BTreeMap<u32, u32> = measured.rows.iter().map(|r| (r.stone_id, r.zone_id)).collect();
+    let mut members: BTreeMap<u32, Vec<&Trend>> = BTreeMap::new();
+    for stone in stones {
+        let zone = zone_of.get(&stone.stone.0).copied().unwrap_or(0);
+        members.entry(zone).or_default().push(&stone.velocity);
+    }
+    let one = |(zone_id, members): (u32, Vec<&Trend>)| {
+        let mean = |of: fn(&Trend) -> Vector3<f64>| -> [f64; 3] {
+            let sum: Vector3<f64> = members.iter().map(|t| of(t)).sum();
+            (sum / members.len() as f64).into()
+        };
+        ZoneTrend {
+            epoch: run.context.project.epochs[newest].name.clone(),
+            zone_id,
+            stones: members.len(),
+            velocity: mean(|t| t.value),
+            sd: mean(|t| t.sd),
+        }
+    };
+    Ok(members
+        .into_iter()
+        .filter(|(zone, _)| *zone > 0)
+        .map(one)
+        .collect())
 }
 
 /// The epoch with the conditions that the model knows: the first whose name has "level" or "temp" in it.
