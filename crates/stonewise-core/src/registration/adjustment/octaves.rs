@@ -169,8 +169,9 @@ mod tests {
 
     #[test]
     fn a_few_stones_that_moved_change_little_and_many_leave_what_is_expected() {
-        let step =
-            |share: usize| move |i: usize| Vector3::new(0.0, 0.0, 0.01) * f64::from(u8::from(i % share == 0));
+        let step = |share: usize| {
+            move |i: usize| Vector3::new(0.0, 0.0, 0.01) * f64::from(u8::from(i.is_multiple_of(share)))
+        };
         let [still, few, many] = [usize::MAX, 50, 4].map(|share| {
             // Stone 0 is in every share.
             shown(&motions(1000, [3e-4; 3], step(share)))
