@@ -18,7 +18,7 @@ pub(super) struct Fit {
 /// unknowns.
 pub(super) fn fit(design: &DMatrix<f64>, values: &[f64], variances: &[f64]) -> Option<Fit> {
     let (rows, unknowns) = design.shape();
-    if rows < unknowns || variances.iter().any(|v| !(*v > 0.0)) {
+    if rows < unknowns || variances.iter().any(|v| v.is_nan() || *v <= 0.0) {
         return None;
     }
     let mut a = design.clone();
