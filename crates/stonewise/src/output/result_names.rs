@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Where the results of the last finished run lie until the next one has finished.
 pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 20] = [
+const STEMS: [&str; 21] = [
     "stones",
     "matches",
     "registration",
