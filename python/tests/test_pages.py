@@ -68,3 +68,14 @@ def test_examples_name_commands_and_options_that_exist(
             unknown.append(f"{page.relative_to(ROOT)}: stonewise {' '.join(words)}")
     assert not unknown
     assert count > 30, "the search is broken"
+
+
+def test_every_command_is_on_the_page_of_commands(
+    command: Callable[..., subprocess.CompletedProcess[str]],
+) -> None:
+    listed = command("--help").stdout.split("Commands:")[1].split("Options:")[0]
+    names = set(re.findall(r"^  ([a-z0-9]+) ", listed, re.MULTILINE)) - {"help"}
+    page = (ROOT / "docs" / "src" / "commands.md").read_text()
+    named = {words.split()[0] for words in re.findall(r"`([a-z][^`]*)`", page)}
+    assert len(names) > 20, "the search is broken"
+    assert names <= named, f"docs/src/commands.md lacks {sorted(names - named)}"
