@@ -71,10 +71,10 @@ struct Keys {
     /// From this deformation of a zone on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     deformation_alarm_mm: Option<f64>,
-    /// The same for the motion of a stone against its neighbours.
+    /// Thresholds of the motion of a stone against its neighbours.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     neighbours: Levels,
-    /// The same for the opening of a joint between two stones.
+    /// Thresholds of the opening of a joint between two stones.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     joints: Levels,
     /// Parts of the wall with thresholds of their own.
@@ -97,10 +97,10 @@ struct ZoneKeys {
     /// From this length of a stone's motion on an alarm is raised, millimetres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     alarm_mm: Option<f64>,
-    /// The same for the motion of a stone against its neighbours.
+    /// Thresholds of the motion of a stone against its neighbours.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     neighbours: Levels,
-    /// The same for the opening of a joint between two stones.
+    /// Thresholds of the opening of a joint between two stones.
     #[serde(default, skip_serializing_if = "Levels::is_empty")]
     joints: Levels,
 }

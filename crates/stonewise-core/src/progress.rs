@@ -5,7 +5,7 @@
 #[error("interrupted")]
 pub struct Interrupted;
 
-/// Receiver of progress, and carrier of the wish to stop.
+/// Receives progress, and says whether the work should stop.
 pub trait Progress: Sync {
     /// A piece of work of `total` units starts under this name.
     fn begin(&self, what: &str, total: u64);

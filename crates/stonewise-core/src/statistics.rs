@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::f64::consts::TAU;
 
-/// From so many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
+/// From this many degrees of freedom on, Student's quantile follows from the normal one by an expansion to 5e-5
 /// of its size; below, it is sought numerically, which takes longer.
 const EXPANDED_FROM: f64 = 12.0;
 /// Cumulative probability at the upper end of a 95 % interval.

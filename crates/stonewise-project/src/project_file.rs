@@ -182,7 +182,7 @@ impl Project {
         Self::read_with(path, 2)
     }
 
-    /// The same for a project that may have a single epoch, which is to be split.
+    /// Reads a project that may have a single epoch, which is to be split.
     ///
     /// # Errors
     /// As [`Self::read`].

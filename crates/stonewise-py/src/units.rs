@@ -50,7 +50,7 @@ pub fn plan(
     })
 }
 
-/// Does one unit of the plan in a folder with so many threads.
+/// Does one unit of the plan in a folder with this number of threads.
 #[pyfunction]
 pub fn unit(py: Python<'_>, out: PathBuf, unit: &str, threads: usize) -> PyResult<()> {
     let pool = ThreadPoolBuilder::new()

@@ -88,7 +88,7 @@ fn print_page(browser: &Browser, page: &str, to: &Path, progress: &dyn Progress)
     let html = folder.0.join("report.html");
     fs::write(&html, page).map_err(Error::io("writing", &html))?;
     progress.begin("print the report", 0);
-    // The browser gets a name with its ending, and is elsewhere at home than this process.
+    // The browser may have another working folder, so paths are absolute, and it gets a name that ends in .pdf.
     let printed = folder.0.join("report.pdf");
     let [html, pdf] = [&html, &printed].map(|p| std::path::absolute(p).unwrap_or_else(|_| p.clone()));
     let profile = std::path::absolute(&folder.0).unwrap_or_else(|_| folder.0.clone());

@@ -124,7 +124,7 @@ fn shared_scale_m(results: &ResultSet, measured: &[(&StoneRow, &RowMotion)]) -> 
     }
 }
 
-/// A tenth of the stones that moved must be at least so many to have a place of their own.
+/// A tenth of the stones that moved must be at least this many to have a place of their own.
 const LEAST_STRONGEST: usize = 5;
 
 fn strongest(results: &ResultSet, moved: &[(&StoneRow, &RowMotion)]) -> Option<(f64, [Point2<f64>; 2])> {

@@ -651,7 +651,7 @@ impl Texts {
         self.statuses[status as usize]
     }
 
-    /// A number with so many decimals.
+    /// A number with this many decimals.
     pub(crate) fn number(&self, value: f64, decimals: usize) -> String {
         number(value, decimals).replace('.', self.decimal)
     }
@@ -661,7 +661,7 @@ impl Texts {
         mm(metres).replace('.', self.decimal)
     }
 
-    /// The same of a value that may be missing.
+    /// Metres as millimetres, or a dash where the value is missing.
     pub(crate) fn mm_or_dash(&self, metres: Option<f64>) -> String {
         self.mm(metres.unwrap_or(f64::NAN))
     }
@@ -686,7 +686,7 @@ impl Texts {
     }
 }
 
-/// The text for so many, with `{n}` filled in.
+/// The text for this number of things, with `{n}` filled in.
 pub(crate) fn counted(texts: Number, n: usize, values: &[(&str, &str)]) -> String {
     let text = fill(texts[usize::from(n != 1)], &[("n", &count(n))]);
     fill(&text, values)

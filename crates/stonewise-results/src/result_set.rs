@@ -90,7 +90,7 @@ impl ResultSet {
         })
     }
 
-    /// The same without the verdict, the series, the decisions about masks and the excerpts of the survey.
+    /// Reads a pair without the verdict, the series, the decisions about masks and the excerpts of the survey.
     ///
     /// # Errors
     /// As [`Self::read_pair`].

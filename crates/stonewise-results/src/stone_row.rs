@@ -52,7 +52,7 @@ pub struct StoneRow {
 pub struct RowMotion {
     /// Displacement of the centroid, world.
     pub displacement: Vector3<f64>,
-    /// The same as (along-dam, up, out-of-plane) of the stone's own face frame.
+    /// The displacement as (along-dam, up, out-of-plane) of the stone's own face frame.
     pub face: Vector3<f64>,
     /// Rotation vector, world.
     pub rotation: Vector3<f64>,
@@ -98,7 +98,7 @@ pub struct Reference {
     /// Covariance that the reference adds to the stone's own, m^2: error of the registration, or of the
     /// common motion.
     pub covariance: Matrix3<f64>,
-    /// The same for the rotation, rad^2.
+    /// Covariance that the reference adds to the rotation of the stone, rad^2.
     pub rotation_covariance: Matrix3<f64>,
 }
 

@@ -4,7 +4,7 @@ use crate::model::{MaskRcnn, WeightsError, config_from_bytes, model_from_bytes};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Weights trained on rendered photos, see docs/src/method/segmentation.md. A static, because a constant
+/// Weights trained on rendered photos, see docs/src/method/built-in-weights.md. A static, because a constant
 /// would lie in the program once for each use.
 static BUILT_IN: &[u8] = include_bytes!("../weights/built-in.safetensors");
 /// What the built-in detector is called where a file could be given.

@@ -36,7 +36,7 @@ impl Kept {
         })
     }
 
-    /// The same without a look at the content.
+    /// What is wrong with the file by its length alone; its content is not read.
     pub fn differs_in_length(&self, path: &Path) -> Option<String> {
         let name = path.display();
         match fs::metadata(path) {

@@ -34,7 +34,7 @@ struct Entry {
 }
 
 impl Blocks {
-    /// Whether a grid of so many cells is not too large.
+    /// Whether a grid of this many cells is small enough.
     pub(super) fn can_hold(cells: [f64; 3]) -> bool {
         cells.iter().map(|c| (c / EDGE as f64).ceil()).product::<f64>() <= MAX_BLOCKS
     }

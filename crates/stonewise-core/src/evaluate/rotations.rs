@@ -17,7 +17,7 @@ pub struct RotationScore {
     pub estimated: usize,
     /// Errors about the axes of the true face.
     pub errors: RotationAxes,
-    /// The same after the rotations of the common rigid motions of estimates and of truths are subtracted.
+    /// Errors after the rotations of the common rigid motions of estimates and of truths are subtracted.
     pub errors_without_datum: RotationAxes,
     /// Whether the stated covariances are correct; `None` where the datum is unknown. `coverage_95.along` is
     /// the coverage of the rotation about the axis along the dam, and so on.

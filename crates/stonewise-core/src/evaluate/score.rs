@@ -16,7 +16,7 @@ pub struct MotionScore {
     pub estimated: usize,
     /// Errors per direction.
     pub errors: Directions,
-    /// The same with the common rigid motions of estimates and of truths taken off.
+    /// Errors per direction, with the common rigid motions of estimates and of truths taken off.
     #[serde(default)]
     pub errors_without_datum: Directions,
     /// Share of estimates whose 3D error is beyond the outlier limit.
@@ -24,7 +24,8 @@ pub struct MotionScore {
     /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have
     /// no claim.
     pub calibration: Option<Calibration>,
-    /// The same against the common rigid motion, registration error left out; `None` where nothing is claimed
+    /// Whether claims against the common rigid motion are right, registration error left out; `None` where none is
+    /// made
     /// about it.
     #[serde(default)]
     pub calibration_without_datum: Option<Calibration>,

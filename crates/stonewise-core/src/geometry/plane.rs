@@ -17,7 +17,7 @@ pub struct Plane {
 /// Points less wide than this part of their length lie on a line: what rounding feigns where products are
 /// summed about the mean.
 const LEAST_WIDTH: f64 = 1e-12;
-/// The same where they are summed about another point: the root of the rounding error.
+/// The least width where products are summed about another point: the root of the rounding error.
 const LEAST_WIDTH_OF_MOMENTS: f64 = 1e-7;
 
 impl Plane {

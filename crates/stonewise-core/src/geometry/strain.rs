@@ -157,7 +157,7 @@ fn parts_of(places: &[Vector2<f64>]) -> Vec<usize> {
     parts
 }
 
-/// Start and end of each part of a row of so many.
+/// Start and end of each part of a row of this length.
 fn thirds(count: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..PARTS).map(move |part| (part * count / PARTS, (part + 1) * count / PARTS))
 }

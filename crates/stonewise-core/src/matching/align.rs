@@ -29,7 +29,7 @@ const MIN_STONES: usize = 8;
 /// By how much the best motion must bring together a larger share of the stones than any other. On a wall of equal
 /// stones a motion by one stone brings nearly all together.
 const MIN_LEAD: f64 = 0.25;
-/// The same in standard deviations of the difference of both shares.
+/// Least lead of the best motion in standard deviations of the difference of both shares.
 const MIN_LEAD_SD: f64 = 4.0;
 
 /// How the second epoch lies in the frame of the first.

@@ -15,7 +15,7 @@ const NEIGHBOUR_SIZES: f64 = 8.0;
 /// A stone is the same as another if their centroids differ by less than this share of its size: a fifth is more than
 /// masks of different photos differ by, and chance brings one stone of ten that near.
 const SAME_SIZES: f64 = 0.2;
-/// The same while a motion is known from two stones only, whose normals are good to some degrees.
+/// The share while a motion is known from two stones only, whose normals are good to some degrees.
 const ROUGHLY_SAME_SIZES: f64 = 0.4;
 /// Least ratio of the faces of one stone in two epochs.
 const MIN_AREA_RATIO: f64 = 0.6;

@@ -30,7 +30,7 @@ pub struct SurfaceCell {
 }
 
 impl SurfaceCell {
-    /// The same seen from the other side.
+    /// The cell seen from the other side.
     pub fn flipped(self) -> Self {
         Self {
             normal: -self.normal,

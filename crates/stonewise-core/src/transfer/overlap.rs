@@ -21,7 +21,7 @@ pub(super) struct Overlaps {
     pub instances: Vec<Instance>,
     /// Instance of each small label of a photo; [`NONE`] for background.
     small: Vec<Vec<u32>>,
-    /// The same for labels of [`SMALL_LABELS`] and above.
+    /// Instance of each photo and label of [`SMALL_LABELS`] and above.
     large: CellMap<(u32, u32), u32>,
     /// Area common to two instances (ascending indices) of different photos.
     pub common: BTreeMap<(u32, u32), u32>,

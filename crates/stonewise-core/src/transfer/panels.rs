@@ -231,7 +231,7 @@ impl Shape {
         best
     }
 
-    /// Correlation where the other is shifted by so many cells.
+    /// Correlation where the other is shifted by this many cells.
     fn correlation(&self, other: &Self, [dx, dy]: [i32; 2], least: f64) -> Option<f64> {
         let side = 2 * HALF;
         let mut sums = Vector3::<f64>::zeros();

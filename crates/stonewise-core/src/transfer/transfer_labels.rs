@@ -169,7 +169,7 @@ impl<'a> PreparedTransfer<'a> {
         })
     }
 
-    /// The same for some tiles from what was kept; only photos that may show them are read.
+    /// Restores the transfer for some tiles from what was kept; only photos that may show them are read.
     ///
     /// # Errors
     /// A mask that fails; what was kept cannot be read, or is damaged.

@@ -59,7 +59,7 @@ impl<'a> Observer<'a> {
         Ok(Self::of(views, labels, depths, (surfaces, 0), params))
     }
 
-    /// The same from depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles,
+    /// From depth maps and surfaces that were made before; `surfaces`: those of consecutive tiles,
     /// and the number of the first. What no tile of these needs may be empty.
     pub(super) fn of(
         views: Vec<&'a View>,

@@ -15,7 +15,7 @@ pub enum Remark {
     NotPlaced(String),
     /// The photo belongs to another reconstruction than the largest.
     SmallerReconstruction,
-    /// The file holds so many reconstructions, of which only the largest was read.
+    /// The file holds this many reconstructions, of which only the largest was read.
     SeveralReconstructions(usize),
     /// This chunk is disabled and was not read.
     ChunkDisabled(String),

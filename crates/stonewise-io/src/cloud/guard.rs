@@ -12,7 +12,7 @@ pub(super) fn guarded<T>(path: &Path, step: impl FnOnce() -> Result<T, CloudErro
     behind_wall(step).unwrap_or_else(|| Err(CloudError::malformed(path, "the file is damaged")))
 }
 
-/// The same for the LAZ encoder, which can stumble over nonsense in records that are copied.
+/// Guards the LAZ encoder, which can panic on nonsense in records that are copied.
 pub(super) fn guarded_write<T>(
     path: &Path,
     step: impl FnOnce() -> Result<T, CloudError>,

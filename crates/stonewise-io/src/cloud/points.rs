@@ -149,7 +149,7 @@ impl PointSink<'_> {
         self.append_records(positions, None, columns)
     }
 
-    /// The same with the source and the time of every point.
+    /// Appends points with the source and the time of each.
     ///
     /// # Errors
     /// As [`Self::append`], and sources or times of another length.

@@ -22,7 +22,7 @@ pub struct PolygonFeature {
 /// out.
 ///
 /// # Errors
-/// The file is no GeoPackage or lacks the layer, or a geometry is damaged or no polygon.
+/// The file is no GeoPackage or lacks the layer, or a geometry is damaged or not a polygon.
 pub fn read_polygons(path: &Path, layer: &str) -> Result<Vec<PolygonFeature>, LayerError> {
     let content = |message: String| LayerError::Content {
         path: path.to_owned(),

@@ -83,7 +83,7 @@ fn percent(share: f64) -> String {
 
 /// How many points lie in each of some cells: the same cells for every epoch.
 struct Cells {
-    /// One in so many cells is counted.
+    /// One cell in this many is counted.
     thinning: u64,
     counts: HashMap<[i64; 3], u32>,
 }

@@ -188,7 +188,7 @@ fn finite(interval_m: [f64; 2]) -> Option<[f64; 2]> {
         .then(|| interval_m.map(millimetres))
 }
 
-/// A number with so many digits.
+/// A number with this many digits.
 fn significant_digits(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1))
         .parse()

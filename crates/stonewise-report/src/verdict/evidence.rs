@@ -123,7 +123,7 @@ enum Tested<'a> {
     Absolute,
     /// The common motion of the wall, from registration.json.
     Recorded(&'a ResultSet),
-    /// The same from the stones, where the record of an earlier version does not have it.
+    /// The common motion fitted to the stones, where the record of an earlier version does not have it.
     Fitted(Box<SmallMotion>),
 }
 

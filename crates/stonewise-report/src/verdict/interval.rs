@@ -59,7 +59,8 @@ impl Estimate {
         }
     }
 
-    /// The same of a single number with its standard deviation: both tails of the normal distribution.
+    /// Probability that a single number of this standard deviation is as far from zero by chance: both tails of
+    /// the normal distribution.
     pub(super) fn p_value_of(value: f64, sd: f64) -> f64 {
         let p = erfc((value / sd).abs() / SQRT_2);
         if sd > 0.0 && p.is_finite() { p } else { 1.0 }

@@ -21,7 +21,7 @@ pub(super) struct Atlas<'a> {
     pub per_row: u32,
 }
 
-/// Small pictures of this edge in a row of a large one, for so many of them.
+/// How many small pictures of this edge lie in a row of a large one, for `count` of them.
 pub(super) fn per_row(side_px: u32, count: usize) -> u32 {
     (ATLAS_PX / side_px).clamp(1, (count as f64).sqrt().ceil().max(1.0) as u32)
 }
@@ -37,7 +37,7 @@ impl Atlas<'_> {
         Ok(())
     }
 
-    /// The JPEG files that hold so many small pictures.
+    /// The JPEG files that hold this many small pictures.
     pub fn read(&self, count: usize) -> Result<Vec<Vec<u8>>, Error> {
         (0..count.div_ceil((self.per_row * self.per_row) as usize))
             .map(|number| {

@@ -44,7 +44,7 @@ pub struct StoredTracks {
     pub pictures: Vec<Vec<u8>>,
 }
 
-/// Edge of the pictures of so many tracked stones, pixels.
+/// Edge of the pictures of this many tracked stones, pixels.
 pub fn track_side_px(stones: usize) -> u32 {
     let fits = |side: &&u32| pixels(**side) * stones <= BUDGET_PX;
     *SIDES_PX.iter().find(fits).unwrap_or(&SIDES_PX[2])

@@ -56,7 +56,7 @@ pub struct Datum {
     pub common_motion: Option<[f64; 6]>,
     /// Errors of single stations and strips, where they were estimated.
     pub sources: Vec<SourceError>,
-    /// The same in one sentence.
+    /// What is known about the datum, in one sentence.
     pub note: String,
     /// The sentence in German; in a record, only where its report is in German.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -112,7 +112,7 @@ impl Datum {
         }
     }
 
-    /// The same with the common rigid motion that motions are tested against; only where nothing else is
+    /// Adds the common rigid motion that motions are tested against; only where nothing else is
     /// known.
     pub fn against(mut self, common: Option<&SmallMotion>) -> Self {
         if self.state == DatumState::Unknown {

@@ -99,7 +99,7 @@ pub struct AnswerVerdict {
 pub struct Headline {
     /// The state of the wall.
     pub state: State,
-    /// The same with the most important numbers.
+    /// The verdict in a sentence, with the most important numbers.
     pub sentence: String,
 }
 
@@ -124,7 +124,7 @@ pub struct EpochVerdict {
     pub datum: Option<DatumState>,
     /// State of the wall.
     pub state: State,
-    /// The same in one sentence.
+    /// The verdict in one sentence.
     pub sentence: String,
     /// Why the wall has this state, the most important first.
     pub reasons: Vec<Reason>,

@@ -33,7 +33,7 @@ impl Tensor {
         }
     }
 
-    /// The same as a leaf of a tape.
+    /// The tensor as a leaf of a tape.
     pub fn on(&self, tape: &Tape) -> Self {
         Self {
             node: Some(tape.leaf()),

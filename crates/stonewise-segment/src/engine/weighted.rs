@@ -27,7 +27,7 @@ impl Tensor {
         })
     }
 
-    /// The same for 3 x 3 weights and stride 1 with weights in both forms, which is faster; not recorded.
+    /// Convolution with 3 x 3 weights and stride 1, given in both forms, which is faster; not recorded.
     pub fn filtered(&self, weight: &Self, filters: &Filters, bias: Option<&Self>) -> Self {
         let geometry = geometry(self, weight, 1);
         let y = winograd::forward(self.values(), filters, bias.map(Self::values), &geometry);
@@ -84,7 +84,7 @@ impl Tensor {
     }
 }
 
-/// The matrix of so many rows.
+/// The matrix of this number of rows.
 fn matrix(values: &[f32], rows: usize) -> MatRef<'_, f32> {
     MatRef::from_row_major_slice(values, rows, values.len() / rows.max(1))
 }

@@ -307,7 +307,7 @@ impl ConvBlock {
         }
     }
 
-    /// The same in a list of torchvision's, which numbers both.
+    /// The parameters under torchvision's names for a list, which numbers both layers.
     pub fn numbered_parameters<'a>(&'a mut self, name: &str, found: &mut Parameters<'a>) {
         self.parameters([&part(name, 0), &part(name, 1)], found);
     }

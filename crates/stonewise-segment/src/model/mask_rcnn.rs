@@ -243,7 +243,7 @@ impl MaskRcnn {
             .collect()
     }
 
-    /// How regions are cut into so many cells along a side.
+    /// How regions are cut into this number of cells along a side.
     pub(super) fn align(&self, cells: usize) -> RoiAlign {
         RoiAlign {
             cells,

@@ -32,7 +32,7 @@ pub struct Scaling {
     pub index: usize,
     /// Width and height of the photo, pixels.
     pub photo: [u32; 2],
-    /// The same at the scale.
+    /// Width and height of the photo at the scale, pixels.
     pub scaled: [u32; 2],
 }
 

@@ -61,7 +61,7 @@ impl AdamW {
         Self::from_state(params, BTreeMap::new(), 0)
     }
 
-    /// An optimiser that goes on from a saved state after so many steps.
+    /// An optimiser that goes on from a saved state after this number of steps.
     pub(super) fn from_state(params: AdamWParams, moments: BTreeMap<String, Moments>, steps: i32) -> Self {
         Self {
             params,

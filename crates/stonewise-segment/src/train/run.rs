@@ -38,7 +38,7 @@ pub struct Run<'a> {
     pub validation: &'a [Sample],
     /// Folder of the checkpoint, the model and the curves; it exists.
     pub out: &'a Path,
-    /// Ends this run after so many minutes.
+    /// Ends this run after this many minutes.
     pub minutes: Option<f64>,
     /// Threads that make images while the detector learns.
     pub threads: usize,

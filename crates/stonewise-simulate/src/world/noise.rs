@@ -131,7 +131,7 @@ fn floor(v: f64) -> i64 {
 pub struct Row {
     /// The first place along x.
     pub x: f64,
-    /// The same for all places.
+    /// The y of all places.
     pub y: f64,
     /// Distance of the places, positive.
     pub step: f64,

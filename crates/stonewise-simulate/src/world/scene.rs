@@ -226,7 +226,7 @@ impl<'a> Scene<'a> {
         Some(self.wall_hit(point, down))
     }
 
-    /// The same without the normal: the place, and what is there.
+    /// The place straight below or above a place on the face, and what is there.
     pub(super) fn target_on_face(&self, a: f64, u: f64) -> Option<(Point3<f64>, Target)> {
         let (point, _) = self.come_down_at(a, u)?;
         let found = self.clearance(&point, &self.wall.face.face_of(&point));

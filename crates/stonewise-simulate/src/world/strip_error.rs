@@ -43,7 +43,7 @@ pub struct FlightErrorParams {
 
 /// Errors of all strips of a flight.
 pub struct StripErrors {
-    /// The same for all strips, metres.
+    /// Error that all strips share, metres.
     datum: Vector3<f64>,
     strips: Vec<StripError>,
     /// What the adjustment of the strips takes off each, metres.

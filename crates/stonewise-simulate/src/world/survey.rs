@@ -99,7 +99,7 @@ impl World {
         self.scene_of(whole, epoch)
     }
 
-    /// The same of a part of the section whose surface was sampled with [`World::surface`].
+    /// The scene of a part of the section whose surface was sampled with [`World::surface`].
     pub fn scene_of<'a>(&'a self, surface: &'a Surface, epoch: usize) -> Scene<'a> {
         let motions = if epoch == 0 { &self.still } else { &self.motions };
         Scene::new(&self.wall, surface, motions, &self.props)

@@ -24,7 +24,7 @@ pub struct Owner {
     kind: String,
     /// What tells it from others of its kind: paths, or a digest of parameters.
     identity: String,
-    /// The same for people.
+    /// The owner in words.
     what: String,
 }
 
@@ -179,7 +179,7 @@ fn recorded_for(folder: &Path, owner: &Owner) -> bool {
     let Some(file) = run["project"]["file"].as_str().map(Path::new) else {
         return false;
     };
-    // A path that was relative to a working folder of then may lead nowhere now.
+    // A relative path may lead nowhere now, because the working folder was another one.
     let project = Path::new(&owner.identity);
     resolved(file) == project
         || (!file.exists()

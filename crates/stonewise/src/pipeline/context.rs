@@ -64,7 +64,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// The same for a process that does one unit of a plan.
+    /// The context of a process that does one unit of a plan.
     pub fn of_unit(
         project: &'a Project,
         output: &'a OutputFolder,
@@ -80,7 +80,7 @@ impl<'a> Context<'a> {
         })
     }
 
-    /// The same with the steps in a store that other runs may share.
+    /// The context of a run whose steps lie in a store that other runs may share.
     pub fn with_store(
         project: &'a Project,
         out: &Path,
@@ -117,7 +117,7 @@ impl<'a> Context<'a> {
         self.step_publishing(name, key, &[], make)
     }
 
-    /// The same for a step that makes files outside its folder too.
+    /// As [`Self::step`], for a step that makes files outside its folder too.
     pub fn step_publishing<'n>(
         &self,
         name: impl Into<Name<'n>>,

@@ -7,9 +7,9 @@ pub enum Part {
     Prepare,
     /// One photo, counted from 0.
     Photo(usize),
-    /// One batch of tiles, counted from 0, of so many.
+    /// One batch of tiles, counted from 0, and how many there are.
     Tiles(usize, usize),
-    /// The step itself, from so many parts.
+    /// The step itself, from this number of parts.
     Whole(usize),
 }
 

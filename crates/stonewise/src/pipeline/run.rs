@@ -89,7 +89,7 @@ pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn P
     Ok(summary)
 }
 
-/// The same in a context of the caller's.
+/// Runs in a context of the caller's.
 pub(crate) fn run_in(context: &Context, until: Until) -> Result<Summary> {
     let run = Run::new(context, until);
     for Task { step, epoch } in tasks(context.project, until) {

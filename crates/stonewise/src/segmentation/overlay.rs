@@ -2,7 +2,7 @@
 
 use stonewise_core::raster::{LabelImage, RgbImage};
 
-/// Outlines get wider by a pixel for every so many pixels of the photo's shorter side.
+/// Outlines get wider by a pixel each time the photo's shorter side grows by this many pixels.
 const WIDTH_STEP_PX: u32 = 1000;
 /// Colours that differ from masonry and from each other.
 const COLOURS: [[u8; 3]; 8] = [

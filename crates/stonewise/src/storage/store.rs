@@ -133,7 +133,7 @@ impl StepStore {
         self.do_at(place, published, make)
     }
 
-    /// The same for a part of a step: a step of its own, which lies beside the whole until that is done.
+    /// Makes a part of a step: a step of its own, which lies beside the whole until that is done.
     pub fn part(
         &self,
         (whole, key): (&str, &Key),

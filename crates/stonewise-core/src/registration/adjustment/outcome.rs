@@ -25,7 +25,7 @@ use rayon::prelude::*;
 const BAD_CELL: f64 = 9.0;
 /// A face of which this share shows two surfaces is not the same stone twice.
 const BAD_SHARE: f64 = 0.25;
-/// At least so many cells: one alone may be that of a neighbour which did not move along.
+/// At least this many cells: one alone may be that of a neighbour which did not move along.
 const BAD_CELLS: usize = 2;
 /// The same share where the stone is probably loose: at its own optimum, remaining disagreement means a wrong
 /// mask.

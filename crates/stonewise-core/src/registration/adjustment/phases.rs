@@ -142,7 +142,7 @@ impl<'a, S: PairSource> Settled<'a, S> {
         self.converged && self.run.part_along_crack(MAX_CRACKS)
     }
 
-    /// The same as [`Tracked::weigh`], now that the wall is parted.
+    /// As [`Tracked::weigh`], now that the wall is parted.
     pub fn weigh(self) -> Phase<Weighed<'a, S>, S> {
         Tracked(self.run).weigh()
     }

@@ -60,7 +60,7 @@ fn p_values(adjustment: &Adjustment, solution: &Solution) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// The same for one stone with these variances of its own motion.
+/// P-value of one stone with these variances of its own motion.
 ///
 /// Bending is free: a bent face is not a loose stone.
 fn p_value(equations: &NormalEquations, prediction: &Prediction, own: &[f64; 9]) -> Option<f64> {

@@ -7,12 +7,12 @@ use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::StoneVector;
 
-/// One stone in so many may still swing between two optima of its own when the adjustment has settled.
+/// One stone in this many may still swing between two optima of its own when the adjustment has settled.
 const RESTLESS: usize = 50;
 /// A stone's own optimum is followed once its points make it so many times more probably loose than it was
 /// without them.
 const SUSPECT: f64 = 1.5;
-/// A stone whose last step exceeds so many standard deviations of its motion swings between two optima:
+/// A stone whose last step exceeds this many standard deviations of its motion swings between two optima:
 /// neither is its motion.
 const SWINGING: f64 = 1.0;
 /// A step within this share of its standard deviation no longer matters.

@@ -251,7 +251,7 @@ impl Adjustment {
         self.cloud_motion_about(i, &self.stones[i].with_field, place)
     }
 
-    /// The same about one of the stone's motions.
+    /// The displacement about one of the stone's motions.
     fn cloud_motion_about(
         &self,
         i: usize,

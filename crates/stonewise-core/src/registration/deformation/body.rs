@@ -41,7 +41,7 @@ pub(super) struct BodyStone<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// All parts of at least so many stones that are not loose.
+    /// All parts of at least this many stones that are not loose.
     pub fn all(
         motions: &'a JointMotions,
         errors: Option<(&JointErrors, &[StoneId])>,

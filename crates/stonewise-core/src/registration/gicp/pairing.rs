@@ -24,8 +24,8 @@ impl Partner {
     /// Index of the nearest point of `block` within `max_m` of `at` (in the block's frame), and the way to
     /// it.
     ///
-    /// The same as a fresh search: while a point has moved by less than half the difference between its two
-    /// smallest distances, the nearest stays the nearest.
+    /// The answer is that of a fresh search: while a point has moved by less than half the difference between its
+    /// two smallest distances, the nearest stays the nearest.
     pub(super) fn find(
         &mut self,
         block: &GicpBlock,

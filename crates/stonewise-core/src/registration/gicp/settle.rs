@@ -37,7 +37,7 @@ pub(super) struct Alignment<'a> {
 
 /// A subset of the points, and the step at which its iteration stops.
 struct Share {
-    /// One point in so many takes part.
+    /// One point in this many takes part.
     stride: usize,
     /// Steps below this many times the tolerances end the iteration.
     tolerances: f64,

@@ -16,7 +16,7 @@ pub(super) struct Model {
     pub components: ObserverComponents,
     /// Of the later epoch against the reference as a whole, per axis, metres.
     pub whole_m: f64,
-    /// The same where areas are to speak for themselves.
+    /// Error of the later epoch where it is left open, so that areas alone determine it, metres.
     pub open_m: f64,
     /// Of a source on a plane of a stable area, metres.
     pub plane_m: f64,

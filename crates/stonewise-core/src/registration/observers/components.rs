@@ -153,7 +153,7 @@ impl ObserverComponents {
         }
     }
 
-    /// The same with all errors of the sources times `factor`.
+    /// The components with all errors of the sources times `factor`.
     pub(super) fn scaled(self, factor: f64) -> Self {
         Self {
             translation_m: self.translation_m * factor,

@@ -298,7 +298,7 @@ fn common_noise(
     estimate_noise(&sample, start, layout)
 }
 
-/// Every so many points, so that no more than `most` remain.
+/// Evenly spaced points, so that no more than `most` remain.
 fn thinned(cloud: &Cloud, most: usize) -> Cloud {
     let step = cloud.len().div_ceil(most.max(1)).max(1);
     Cloud::new(

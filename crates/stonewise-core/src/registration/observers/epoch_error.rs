@@ -128,7 +128,7 @@ pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors 
     }
 }
 
-/// The same of sources that are all used.
+/// Errors of the epochs from sources that are all used.
 fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     let class = SensorClass::of_noise(pair.sigma_m);
     let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());

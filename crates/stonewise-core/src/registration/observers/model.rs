@@ -134,7 +134,7 @@ impl Unknowns {
         }
     }
 
-    /// The same with the errors of the sources on the planes of these observations.
+    /// Adds the errors of the sources on the planes of these observations.
     pub fn with_planes(mut self, observations: &[Observation]) -> Self {
         for sight in observations.iter().flat_map(|o| &o.sights) {
             let next = self.count();

@@ -80,7 +80,7 @@ impl PhotoParams {
         self.margin_around_m(self.max_search_m)
     }
 
-    /// The same for a search that goes this far, metres.
+    /// The margin for a search that goes this far, metres.
     pub(super) fn margin_around_m(&self, search_m: f64) -> f64 {
         search_m + WINDOW_SDS * OTHER_WINDOW * self.normalise_m
     }

@@ -43,7 +43,7 @@ pub(super) struct Shown<'a> {
     pub photo: usize,
     /// Grey values on the stone's face.
     pub grey: &'a [Option<f32>],
-    /// The same with normalised contrast.
+    /// The patch of these values with normalised contrast.
     pub patch: &'a Patch,
     pub found: &'a Match,
 }

@@ -103,7 +103,7 @@ impl Placed<'_> {
     }
 }
 
-/// Nodes along a side of so many cells.
+/// Nodes along a side of this many cells.
 fn nodes_across(cells: usize) -> usize {
     cells.div_ceil(NODE_CELLS) + 1
 }

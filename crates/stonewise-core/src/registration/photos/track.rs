@@ -94,7 +94,7 @@ pub(crate) struct Tracker<'a> {
 struct Second {
     /// Their grey values on the moved face.
     grey: Vec<Vec<Option<f32>>>,
-    /// The same with normalised contrast.
+    /// Patches of these values with normalised contrast.
     patches: Vec<Patch>,
     /// How they lie on the template.
     matches: Vec<Option<Match>>,

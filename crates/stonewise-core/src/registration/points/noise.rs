@@ -46,7 +46,7 @@ pub(crate) fn noise_of(cloud: &Cloud, face_from_world: &Matrix3<f64>) -> Option<
     noise_of_face(&(0..cloud.len()).map(at).collect::<Vec<_>>())
 }
 
-/// The same of points in the frame of the face.
+/// Noise along z of points in the frame of the face; `None` where there are too few.
 pub(super) fn noise_of_face(local: &[Point3<f64>]) -> Option<f64> {
     let size_m = CELL_M * (cells(local.iter()).len() as f64).sqrt();
     (local.len() >= NOISE_POINTS).then(|| noise_m(local, size_m))

@@ -11,7 +11,7 @@ pub struct EditedWall<'a> {
     pub place: &'a (dyn Fn(&Point3<f64>) -> Point3<f64> + Sync),
     /// Stones that belong to the side of the wall on which edits are drawn.
     pub stones: &'a BTreeSet<StoneId>,
-    /// Parts of stones, and added stones, have at least so many points.
+    /// Parts of stones, and added stones, have at least this many points.
     pub min_points: u32,
     /// Number of the first new stone; above that of every stone.
     pub first_new: u32,

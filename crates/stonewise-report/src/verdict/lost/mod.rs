@@ -141,7 +141,7 @@ mod tests {
         is_lost_with(stones, |along, up| distance_m(along, up).map(|d| (d, 100)))
     }
 
-    /// The same with the number of later points, of 100 of the first epoch.
+    /// [`is_lost`] with the number of later points, of 100 of the first epoch.
     fn is_lost_with(stones: &[StoneRow], seen: impl Fn(f64, f64) -> Option<(f64, u32)>) -> bool {
         match lost_with(stones, seen)[..] {
             [] => false,

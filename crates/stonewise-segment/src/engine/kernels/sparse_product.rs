@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// Rows that one thread takes at a time.
 const ROWS_AT_ONCE: usize = 64;
 
-/// The product of a sparse matrix and a dense one of so many columns, row by row.
+/// The product of a sparse matrix and a dense one of `columns` columns, row by row.
 pub fn forward(matrix: &SparseMatrix, dense: &[f32], columns: usize) -> Vec<f32> {
     let mut product = vec![0.0f32; matrix.rows() * columns];
     let rows = product

@@ -29,7 +29,7 @@ pub struct Material {
     pub colours: Vec<[f32; 3]>,
     /// Standard deviation of the logarithm of a stone's brightness, 0 to 0.35.
     pub tone_spread: f32,
-    /// The same per colour channel, 0 to 0.1.
+    /// Standard deviation of the logarithm of a stone's brightness per colour channel, 0 to 0.1.
     pub hue_spread: f32,
     /// Brightness of blotches within a stone, 0 to 0.25.
     pub mottle: f32,

@@ -15,7 +15,7 @@ pub struct Viewpoint {
     pub roll: f32,
     /// Angle of the wall's normal to the left or right of the camera's axis, radians, within 1.1.
     pub yaw: f32,
-    /// The same up or down, radians, within 0.7.
+    /// Angle of the wall's normal up or down from the camera's axis, radians, within 0.7.
     pub pitch: f32,
     /// Focal length in parts of the photo's longer side, 0.8 to 4.
     pub focal: f32,

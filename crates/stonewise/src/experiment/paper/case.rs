@@ -53,7 +53,7 @@ pub(super) struct Case {
     pub stones: MotionScore,
     /// M3C2 at its core points.
     pub m3c2: MotionScore,
-    /// The same for the place that moves alone, where only a part does.
+    /// Scores of stones and of M3C2 in the place that moves, where only a part does.
     pub inside: Option<[MotionScore; 2]>,
 }
 

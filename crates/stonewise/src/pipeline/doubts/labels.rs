@@ -72,7 +72,7 @@ fn off_place(doubt: &Message, offset: &LabelOffset, first: &str) -> Option<Said>
 pub(super) struct Votes {
     /// Share of a typical stone.
     share: f64,
-    /// The same of stones that the most photos show.
+    /// Share of those stones that the most photos show.
     best: f64,
 }
 

@@ -52,7 +52,7 @@ const DEPTH_M: f64 = 0.3;
 pub struct LabelOffsets {
     /// Labels of the first epoch against the relief of its own cloud.
     pub first: Option<LabelOffset>,
-    /// The same of the later epoch.
+    /// Labels of the later epoch against the relief of its own cloud.
     pub second: Option<LabelOffset>,
     /// The later epoch's cloud under its labels, against the first epoch's.
     pub between: Option<LabelOffset>,

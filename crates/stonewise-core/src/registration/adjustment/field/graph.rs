@@ -70,7 +70,7 @@ const CANDIDATES: usize = 64;
 /// Shortest length of a tie, metres: nearer centroids come from split masks, and a tie's stiffness grows with
 /// the third power of the inverse.
 const SHORTEST_M: f64 = 0.02;
-/// A frame prevails over a stone's own if so many times more of its surroundings (by weight) agree with it.
+/// A frame prevails over a stone's own if this many times more of its surroundings (by weight) agree with it.
 const MAJORITY: f64 = 1.5;
 
 impl Graph {

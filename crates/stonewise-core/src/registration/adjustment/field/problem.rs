@@ -63,7 +63,7 @@ pub(crate) struct FieldStone<'a> {
 }
 
 impl<'a> FieldProblem<'a> {
-    /// The same with other equations of the stones.
+    /// The problem with other equations of the stones.
     pub fn with_equations<'b>(&'b self, equations: &'b [NormalEquations]) -> FieldProblem<'b>
     where
         'a: 'b,

@@ -35,7 +35,7 @@ const RATE: f64 = 2.0 * 4.6;
 /// Own motion or error of stones that one survey in a hundred exceeds, metres: locked masonry moves with its
 /// surroundings.
 const RARE_M: f64 = 5e-4;
-/// The same for rotations, radians: half a millimetre at the edge of a stone of 20 cm.
+/// Rotation that one survey in a hundred exceeds, radians: half a millimetre at the edge of a stone of 20 cm.
 const RARE_RAD: f64 = 5e-3;
 
 /// Number of components; the last one counts where photos take part.

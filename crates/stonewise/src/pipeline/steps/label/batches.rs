@@ -24,7 +24,7 @@ const ELECTION: &str = "election";
 /// Where the stones of a batch are, in its folder.
 const OCCUPANCY: &str = "occupancy";
 
-/// The step `label` of an epoch in so many batches.
+/// The step `label` of an epoch in this number of batches.
 pub struct LabelBatches<'a> {
     context: &'a Context<'a>,
     ingested: &'a Ingested,

@@ -189,7 +189,7 @@ fn transferred(
     })
 }
 
-/// The same from batches of tiles that other processes labelled.
+/// Joins the labels of batches of tiles that other processes labelled.
 fn gather_labels(
     context: &Context,
     epoch: EpochId,

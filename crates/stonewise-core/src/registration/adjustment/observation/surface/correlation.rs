@@ -9,7 +9,7 @@ use crate::statistics::upper_median;
 
 /// Cells that a stone needs to be judged: twice the unknowns that its own points determine at most.
 const CELLS: usize = 10;
-/// The same for slopes, where cells have different weights and the mean alone is taken off.
+/// Cells needed for slopes, where cells have different weights and the mean alone is taken off.
 const SLOPE_CELLS: f64 = 4.0;
 /// Stones that a survey needs to be judged: the median of fewer moves by a third with one stone.
 const STONES: usize = 10;
@@ -28,7 +28,7 @@ pub(crate) struct Correlation {
     pub small: f64,
     /// In larger cells: also what is shared over decimetres.
     pub large: f64,
-    /// The same of what the small cells' slopes say of motions in the face: points err more at steep rims.
+    /// In what the small cells' slopes say of motions in the face: points err more at steep rims.
     pub slopes: f64,
 }
 

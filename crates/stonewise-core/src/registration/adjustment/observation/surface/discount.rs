@@ -26,8 +26,8 @@ pub(crate) fn discounted(equations: NormalEquations, factor: f64, error_m: f64) 
     with_log_det(equations, factor, error_m).0
 }
 
-/// The same for an error alone, as a log likelihood in the error too: the constant holds the log determinant
-/// by which the density of the optimum spreads.
+/// Equations discounted for an error alone, as a log likelihood in the error too: the constant holds the log
+/// determinant by which the density of the optimum spreads.
 pub(crate) fn with_error_likelihood(equations: NormalEquations, error_m: f64) -> NormalEquations {
     let (mut equations, log_det) = with_log_det(equations, 1.0, error_m);
     equations.constant -= 0.5 * log_det;

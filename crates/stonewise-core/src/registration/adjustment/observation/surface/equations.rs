@@ -28,7 +28,7 @@ pub(crate) struct Equations {
     pub overlap: f64,
     /// Per small cell seen by both: squared difference of the mean residuals over its expected variance.
     pub differences: Vec<f64>,
-    /// The same for quarters of the patches.
+    /// Squared differences as in `differences`, for quarters of the patches.
     pub coarse_differences: Vec<f64>,
     /// Expected variances behind `coarse_differences`, m^2.
     pub coarse_variances: Vec<f64>,
