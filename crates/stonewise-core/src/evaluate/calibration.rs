@@ -1,4 +1,4 @@
-//! Whether claimed uncertainties are honest.
+//! Whether claimed uncertainties are right.
 
 use crate::statistics::quantile;
 use nalgebra::Vector3;

@@ -21,7 +21,7 @@ pub struct MotionScore {
     pub errors_without_datum: Directions,
     /// Share of estimates whose 3D error is beyond the outlier limit.
     pub outlier_rate: Option<f64>,
-    /// Honesty of the claimed uncertainties; `None` where the datum is unknown, so that absolute motions have
+    /// Whether the claimed uncertainties are right; `None` where the datum is unknown, so that absolute motions have
     /// no claim.
     pub calibration: Option<Calibration>,
     /// Whether claims against the common rigid motion are right, registration error left out; `None` where none is

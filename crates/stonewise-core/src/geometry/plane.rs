@@ -14,7 +14,7 @@ pub struct Plane {
     pub spread_m: [f64; 3],
 }
 
-/// Points less wide than this part of their length lie on a line: what rounding feigns where products are
+/// Points less wide than this part of their length lie on a line: what rounding leaves where products are
 /// summed about the mean.
 const LEAST_WIDTH: f64 = 1e-12;
 /// The least width where products are summed about another point: the root of the rounding error.

@@ -1,4 +1,4 @@
-//! Lines of text files, without trust in their length.
+//! Lines of text files, read with a limit on their length.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};

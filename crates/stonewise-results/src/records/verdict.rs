@@ -366,7 +366,7 @@ pub struct JointVerdict {
 impl Verdict {
     /// The verdict on these epochs.
     pub fn new(thresholds: &Thresholds, epochs: Vec<EpochVerdict>) -> Self {
-        // Of equal states the newest epoch speaks.
+        // Of equal states, the sentence is that of the newest epoch.
         let worst = epochs.iter().max_by_key(|e| e.state);
         Self {
             version: VERDICT_VERSION,

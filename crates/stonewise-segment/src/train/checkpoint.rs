@@ -24,7 +24,7 @@ const PARAMETER: &str = "parameter/";
 const MEAN: &str = "mean/";
 const SQUARE: &str = "square/";
 
-/// A training at rest.
+/// A training as it is saved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint<C> {
     /// How far it has come.

@@ -13,7 +13,7 @@ use stonewise_io::cloud::{Dimension, ExtraColumn, ExtraType, Observed, PointSink
 
 impl Survey<'_> {
     /// The clouds of both scanners, written unless they are there; gives back what they saw. `truths`: of all
-    /// stones, filled in by whoever needs them first.
+    /// stones, filled in when they are first needed.
     pub fn scanned(&self, truths: &mut Option<Vec<StoneTruth>>) -> Result<SeenByScans, SimulateError> {
         let part = format!("epoch{}_clouds.json", self.number());
         if let Some(seen) = self.unfinished.read(&part) {

@@ -439,7 +439,7 @@ impl Placed {
     }
 }
 
-/// Things that can stand between the sampled part of the wall and whoever looks at it from the front; the
+/// Things that can stand between the sampled part of the wall and a viewer in front of it; the
 /// others would only cost time.
 fn props_near<'a>(wall: &Wall, surface: &Surface, props: &'a [Prop]) -> Vec<&'a Prop> {
     /// More than anything stands out from the wall, metres.

@@ -34,7 +34,7 @@ pub struct GicpStone {
 /// The blocks must hold all points within the buffer, and in the second epoch within
 /// [`GicpParams::max_distance_m`] of where those go. The displacement of the centroid c is (R - I) c + t (Eq.
 /// 3 of the paper). The covariance comes from the information of the final pairs and the scatter of their
-/// residuals, with the slope that noise feigns taken off. The observability is the square root of the
+/// residuals, with the apparent slope of the noise taken off. The observability is the square root of the
 /// smallest over the largest eigenvalue of that information for the displacement of the centroid, rotations
 /// free: for a face seen from the front about the root mean square slope of its relief in the direction where
 /// it has least. `relative` and `loose` are left empty, see [`super::relate_to_neighbours`].

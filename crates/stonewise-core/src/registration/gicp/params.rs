@@ -52,7 +52,7 @@ pub struct GicpParams {
     /// Share of the window's points that must find a partner. 0.3: below it the epochs show different things.
     pub min_overlap: f64,
     /// Smallest observability (`sep_obs` of the stone table) at which a motion is reported. 0.01: relief with a slope
-    /// of 1 % of the whole window, after the slope that noise feigns is taken off.
+    /// of 1 % of the whole window, after the apparent slope of the noise is taken off.
     pub min_observability: f64,
     /// Cell within which residuals may be correlated, metres. 0.05: twice the usual support of a plane.
     pub correlation_cell_m: f64,

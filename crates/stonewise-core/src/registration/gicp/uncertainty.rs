@@ -2,7 +2,7 @@
 //!
 //! At the solution the weighted residuals balance. How fast that balance changes with the motion is the
 //! information G of the pairs; how much it scatters by chance is B. The covariance is then G^-1 B G^-1. Two
-//! things make that honest:
+//! things correct that:
 //! - Normals of noisy points lean, and lean like relief. Partners' normals differ by twice the variance of
 //!   that lean, which tells its size; G is formed without it, and without the weight along the planes, which
 //!   pulls a point to its neighbour however the surface moves.

@@ -4,7 +4,7 @@ use super::components::{ObserverComponents, SensorClass};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
 
-/// Factor on the error of the whole epoch where areas are to speak for themselves. With it left open,
+/// Factor on the error of the whole epoch where areas alone are to determine it. With it left open,
 /// directions that no area sees would seem to show anything.
 pub(super) const WIDE: f64 = 5.0;
 /// An error of the whole epoch this many times as large as assumed shows that the assumption does not hold.
@@ -31,7 +31,7 @@ impl Model {
         (prior, components)
     }
 
-    /// With an error of the whole epoch that lets areas speak for themselves.
+    /// With an error of the whole epoch so wide that areas alone determine it.
     pub fn opened(&self) -> (Prior, ObserverComponents) {
         self.with_whole(self.open_m)
     }

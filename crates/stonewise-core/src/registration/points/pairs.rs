@@ -54,8 +54,7 @@ pub struct MemoryPairs {
     pairs: Vec<PairPoints>,
 }
 
-/// Pairs in a batch of [`MemoryPairs`]: enough to occupy all threads, few enough to need no memory to speak
-/// of.
+/// Pairs in a batch of [`MemoryPairs`]: enough to occupy all threads, few enough to need little memory.
 const BATCH: usize = 64;
 
 impl MemoryPairs {

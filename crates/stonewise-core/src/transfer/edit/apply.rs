@@ -114,7 +114,7 @@ fn split(
                 effect.after.extend([stone, new]);
                 effect.points += count;
             }
-            // A line along the border of a stone is no reason to speak of it.
+            // A line along the border of a stone is not worth a warning.
             Err(NoEffect::SmallPart { points: 0, .. }) => {}
             Err(why) => reason = why,
         }

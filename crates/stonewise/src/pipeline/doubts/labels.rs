@@ -97,7 +97,7 @@ impl Votes {
         self.share < AGREED
     }
 
-    /// Whether that speaks for photos that do not fit the cloud.
+    /// Whether the votes suggest photos that do not fit the cloud.
     pub fn are_torn(self, fit: Fit) -> bool {
         let is_misfit = match fit.holds() {
             Some(holds) => !holds,

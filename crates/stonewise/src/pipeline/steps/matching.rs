@@ -20,7 +20,7 @@ const COVERAGE_CELL_M: f64 = 0.1;
 
 impl Run<'_> {
     /// Finds the stones of the reference in a later epoch, in a step of this name. The same labels are compared
-    /// once, whoever asks.
+    /// once, for all callers.
     pub fn matches(&self, name: &str, labelled: Pair<&Labelled>, later: EpochId) -> Result<Arc<MatchReport>> {
         let params = &self.context.project.settings.r#match;
         let key = Key::new("match", params, &labelled.map(|l| l.key.as_str()).into_array());
