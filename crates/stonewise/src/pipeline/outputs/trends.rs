@@ -11,7 +11,7 @@ use crate::results::StoneRow;
 use crate::results::names::{TRENDS as FILE, TRENDS_TABLE};
 use crate::results::records::{InseparableRecord, TRENDS_VERSION, TrendsRecord, ZoneTrend};
 use crate::verdict::inseparable_in_words;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::FaceFrame;
@@ -148,15 +148,16 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone]) -> Result<Vec<StoneSer
     let reference = order.iter().position(|id| *id == EpochId::REFERENCE).unwrap_or(0);
     let one = |((stone, place), shares): ((&Stone, &SeriesPlace), &Vec<f64>)| {
         let face = FaceFrame::from_normal(&stone.normal).face_from_world();
-        let pair = |(found, share): (&Option<(Vector3<f64>, Matrix3<f64>)>, &f64)| {
+        let deformations = place.deformations.iter().zip(shares);
+        let pairs = deformations.map(|(found, share)| {
             let (deformation, covariance) = (*found)?;
             Some(PairLook {
                 value: face * deformation,
                 variance: (face * covariance * face.transpose()).diagonal(),
                 reference_share: *share,
             })
-        };
-        let pairs: Vec<Option<PairLook>> = place.deformations.iter().zip(shares).map(pair).collect();
+        });
+        let pairs: Vec<Option<PairLook>> = pairs.collect();
         StoneSeries::of_pairs(stone.id, reference, &pairs)
     };
     Ok(stones.iter().zip(&places).zip(&shares).map(one).collect())
