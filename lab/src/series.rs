@@ -148,8 +148,8 @@ impl Case {
                 );
             }
         }
-        let (ids, (mut stones, normals)): (Vec<StoneId>, (Vec<SeriesPlace>, Vec<Vector3<f64>>)) =
-            places.into_iter().unzip();
+        let (ids, shown): (Vec<StoneId>, Vec<(SeriesPlace, Vector3<f64>)>) = places.into_iter().unzip();
+        let (mut stones, normals): (Vec<SeriesPlace>, Vec<Vector3<f64>>) = shown.into_iter().unzip();
         keep_congruent(&mut stones);
         let faces: Vec<_> = normals
             .iter()
