@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use e57::{E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
+use e57::{DateTime, E57Writer, Quaternion, Record, RecordValue, Transform, Translation};
 use las::Reader;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use stonewise_core::geometry::Bounds;
@@ -208,6 +208,12 @@ fn spherical_coordinates_become_points_in_the_world() {
             z: translation.z,
         },
     }));
+    scan.set_sensor_vendor(Some("Leica Geosystems".to_owned()));
+    scan.set_sensor_model(Some("RTC360".to_owned()));
+    scan.set_acquisition_start(Some(DateTime {
+        gps_time: 1.4e9,
+        atomic_reference: false,
+    }));
     scan.add_point(vec![
         RecordValue::Double(range),
         RecordValue::Double(azimuth),
@@ -228,8 +234,8 @@ fn spherical_coordinates_become_points_in_the_world() {
         Ok::<(), CloudError>(())
     })
     .unwrap();
-    assert_eq!(
-        cloud_info(&path).unwrap().scans[0].origin,
-        Some(translation.into())
-    );
+    let scan = &cloud_info(&path).unwrap().scans[0];
+    assert_eq!(scan.origin, Some(translation.into()));
+    assert_eq!(scan.sensor.as_deref(), Some("Leica Geosystems RTC360"));
+    assert_eq!(scan.begun_s, Some(1.4e9));
 }

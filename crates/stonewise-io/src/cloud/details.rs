@@ -4,9 +4,9 @@ use std::path::Path;
 
 use stonewise_core::geometry::Bounds;
 
-use super::gathered::{CHUNK_POINTS, Clock, FieldRange, Gathered, Head, Rounding, SourcePoints};
+use super::gathered::{CHUNK_POINTS, Clock, Created, FieldRange, Gathered, Head, Rounding, SourcePoints};
 use super::{
-    CloudError, CloudFormat, ReadSummary, Scan, cloud_crs, cloud_info, cloud_scans, las, read_cloud,
+    CloudError, CloudFormat, ReadSummary, Scan, cloud_crs, cloud_info, cloud_scans, e57_file, las, read_cloud,
 };
 
 /// A cloud file, read from end to end.
@@ -34,8 +34,8 @@ pub struct CloudDetails {
     pub spacing_m: Option<f64>,
     /// What coordinates are rounded to, metres.
     pub rounding: Rounding,
-    /// Date of the file, year, month and day.
-    pub created: Option<String>,
+    /// When the file was written.
+    pub created: Option<Created>,
     /// What times count from.
     pub clock: Clock,
 }
@@ -56,8 +56,13 @@ pub fn cloud_details(path: &Path) -> Result<CloudDetails, CloudError> {
             gathered.add(chunk);
             Ok::<(), CloudError>(())
         })?;
+        let created = match format {
+            CloudFormat::E57 => e57_file::created_s(path)?.map(Created::Gps),
+            _ => None,
+        };
         let head = Head {
             format: format.to_string(),
+            created,
             ..Head::default()
         };
         (summary, head)

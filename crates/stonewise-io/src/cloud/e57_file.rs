@@ -47,10 +47,21 @@ pub fn scans(path: &Path) -> Result<(Vec<Scan>, Option<String>), CloudError> {
             let t = &pose.translation;
             Point3::new(t.x, t.y, t.z)
         }),
+        sensor: {
+            let parts = [&scan.sensor_vendor, &scan.sensor_model, &scan.sensor_serial];
+            let parts: Vec<&str> = parts.into_iter().flatten().map(|p| p.trim()).collect();
+            Some(parts.join(" ").trim().to_owned()).filter(|s| !s.is_empty())
+        },
+        begun_s: scan.acquisition_start.as_ref().map(|t| t.gps_time),
     };
     let crs = reader.coordinate_metadata().map(str::trim);
     let crs = crs.filter(|text| !text.is_empty()).map(str::to_owned);
     Ok((scans.iter().enumerate().map(describe).collect(), crs))
+}
+
+/// When a file was written, seconds of GPS time.
+pub fn created_s(path: &Path) -> Result<Option<f64>, CloudError> {
+    Ok(open(path)?.creation().map(|t| t.gps_time))
 }
 
 fn open(path: &Path) -> Result<Reader, CloudError> {

@@ -67,12 +67,21 @@ pub enum Clock {
     Unknown,
 }
 
+/// When a file was written.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Created {
+    /// Year, month and day.
+    Day(String),
+    /// Seconds of GPS time since 6 January 1980.
+    Gps(f64),
+}
+
 /// What the head of a file says.
 #[derive(Default)]
 pub(super) struct Head {
     pub format: String,
     pub software: Option<String>,
-    pub created: Option<String>,
+    pub created: Option<Created>,
     pub clock: Clock,
     pub rounding: Option<Rounding>,
 }

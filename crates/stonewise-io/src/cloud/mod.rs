@@ -32,7 +32,7 @@ pub use details::{CloudDetails, cloud_details};
 pub use error::CloudError;
 pub use extra_bytes::{Dimension, ExtraType};
 pub use format::CloudFormat;
-pub use gathered::{Clock, FieldRange, Rounding, SourcePoints};
+pub use gathered::{Clock, Created, FieldRange, Rounding, SourcePoints};
 pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_info, cloud_scans, measure_cloud};
 pub use label::{LabelColumns, PointLabel, PointMotion};
 pub use labelled::{select_points, write_labelled};

@@ -48,6 +48,7 @@ pub fn scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
             name: format!("scan {}", scans.len() + 1),
             records: head.records(),
             origin: head.scanner,
+            ..Scan::default()
         });
     }
     Ok(scans)

@@ -72,7 +72,7 @@ pub fn scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
             scans.push(Scan {
                 name: format!("scan {}", scans.len() + 1),
                 records,
-                origin: None,
+                ..Scan::default()
             });
         }
     }

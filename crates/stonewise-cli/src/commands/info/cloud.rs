@@ -8,7 +8,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 use stonewise_core::geometry::Bounds;
-use stonewise_io::cloud::{Clock, CloudDetails, Rounding, SourcePoints, cloud_details};
+use stonewise_io::cloud::{Clock, CloudDetails, Created, Rounding, SourcePoints, cloud_details};
 use stonewise_io::crs::Crs;
 
 /// Difference of a header's box from that of the points from which on the header is wrong, metres: above all
@@ -67,11 +67,11 @@ fn text(details: &CloudDetails) -> String {
         let place = scan.origin.map_or(String::new(), |p| {
             format!(", scanner at ({:.3}, {:.3}, {:.3})", p.x, p.y, p.z)
         });
-        line(format!(
-            "scan {}: {}{place}",
-            scan.name,
-            counted(scan.records, "point")
-        ));
+        let sensor = scan.sensor.as_ref().map_or(String::new(), |s| format!(", {s}"));
+        let begun = scan.begun_s.and_then(date_of);
+        let begun = begun.map_or(String::new(), |date| format!(", begun {date} GPS time"));
+        let points = counted(scan.records, "point");
+        line(format!("scan {}: {points}{place}{sensor}{begun}", scan.name));
     }
     if details.scans.is_empty() {
         for source in details.sources.iter().take(MOST_SOURCES) {
@@ -90,7 +90,7 @@ fn text(details: &CloudDetails) -> String {
             ));
         }
     }
-    match (&details.created, &details.software) {
+    match (written(details), &details.software) {
         (Some(date), Some(software)) => line(format!("written {date} by {software}")),
         (Some(date), None) => line(format!("written {date}")),
         (None, Some(software)) => line(format!("written by {software}")),
@@ -108,7 +108,10 @@ fn json(details: &CloudDetails) -> serde_json::Value {
     let named = details.crs.as_deref().and_then(Crs::parse);
     let scans = details.scans.iter().map(|scan| {
         let scanner = scan.origin.map(|p| [p.x, p.y, p.z]);
-        json!({ "name": scan.name, "records": scan.records, "scanner": scanner })
+        let begun = scan.begun_s.and_then(date_of);
+        json!({
+            "name": scan.name, "records": scan.records, "scanner": scanner, "sensor": scan.sensor, "begun": begun,
+        })
     });
     let sources = details.sources.iter().map(|source: &SourcePoints| {
         let mut json = json!(source);
@@ -133,11 +136,19 @@ fn json(details: &CloudDetails) -> serde_json::Value {
         "scans": scans.collect::<Vec<_>>(),
         "sources": sources.collect::<Vec<_>>(),
         "clock": details.clock,
-        "written": details.created,
+        "written": written(details),
         "software": details.software,
         "crs": details.crs,
         "epsg": named.map(|crs| crs.epsg),
     })
+}
+
+/// When the file was written.
+fn written(details: &CloudDetails) -> Option<String> {
+    match details.created.as_ref()? {
+        Created::Day(day) => Some(day.clone()),
+        Created::Gps(seconds) => date_of(*seconds).map(|date| format!("{date} GPS time")),
+    }
 }
 
 fn wrong_box(details: &CloudDetails) -> Option<Bounds> {

@@ -6,7 +6,7 @@ use las::GpsTimeType;
 
 use super::read::{LasSource, fill_chunk};
 use crate::cloud::extra_bytes::existing;
-use crate::cloud::gathered::{CHUNK_POINTS, Clock, Gathered, Head, Rounding};
+use crate::cloud::gathered::{CHUNK_POINTS, Clock, Created, Gathered, Head, Rounding};
 use crate::cloud::{CloudError, PointChunk, ReadSummary};
 
 /// Gathers all points and says what the header tells of them.
@@ -66,7 +66,7 @@ fn head(source: &LasSource) -> Head {
     Head {
         format: format!("{family} {}, point format {number}", header.version()),
         software: Some(software.to_owned()).filter(|s| !s.is_empty()),
-        created: header.date().map(|date| date.to_string()),
+        created: header.date().map(|date| Created::Day(date.to_string())),
         clock: match header.gps_time_type() {
             GpsTimeType::Week => Clock::GpsWeek,
             GpsTimeType::Standard => Clock::AdjustedGps,

@@ -60,6 +60,7 @@ pub fn scans(path: &Path) -> Result<Vec<Scan>, CloudError> {
         name: "scan 1".to_owned(),
         records: header.points,
         origin: Some(origin),
+        ..Scan::default()
     });
     Ok(scan.into_iter().collect())
 }
