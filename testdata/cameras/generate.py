@@ -356,9 +356,39 @@ def nerfstudio():
     return expected
 
 
+def openmvg():
+    """Older and newer layout of intrinsics, and a photo without a pose."""
+    lenses = {
+        "pinhole.jpg": ({}, False, lambda p: opencv(p, FX, FX, CX, CY, [0, 0, 0, 0])),
+        "k1.jpg": ({"disto_k1": K[:1]}, True, lambda p: opencv(p, FX, FX, CX, CY, [K[0], 0, 0, 0])),
+        "k3.jpg": ({"disto_k3": K}, False, lambda p: opencv(p, FX, FX, CX, CY, K[:2] + [0, 0] + K[2:])),
+        "t2.jpg": ({"disto_t2": K + P}, True, lambda p: opencv(p, FX, FX, CX, CY, K[:2] + P + K[2:])),
+        "fisheye.jpg": ({"fisheye": [0.031, -0.0142, 0.0051, -0.0009]}, True,
+                        lambda p: opencv_fisheye(p, FX, FX, CX, CY, [0.031, -0.0142, 0.0051, -0.0009])),
+    }
+    pointer = lambda content: {"polymorphic_id": 1073741824, "ptr_wrapper": {"id": 2147483649, "data": content}}
+    views, intrinsics, extrinsics, expected = [], [], [], {}
+    for i, (name, (lens, is_new, project)) in enumerate(lenses.items()):
+        q, centre = random_quaternion(), rng.uniform(-9, 9, 3)
+        r = quaternion_to_matrix(q)
+        points = rays(W, H, FX, 20)
+        expected[name] = rounded(np.hstack([points @ r + centre, project(points)]))
+        base = {"width": W, "height": H, "focal_length": FX, "principal_point": [CX, CY]}
+        intrinsics.append({"key": 10 + i, "value": pointer({**({"value0": base} if is_new else base), **lens})})
+        extrinsics.append({"key": 20 + i, "value": {"rotation": r.tolist(), "center": centre.tolist()}})
+        views.append({"key": i, "value": pointer({"local_path": "", "filename": name, "width": W, "height": H, "id_view": i,
+                                                  "id_intrinsic": 10 + i, "id_pose": 20 + i})})
+    lost = {"local_path": "", "filename": "lost.jpg", "width": W, "height": H, "id_view": 9, "id_intrinsic": 10, "id_pose": 99}
+    views.append({"key": 9, "value": pointer(lost)})
+    content = {"sfm_data_version": "0.3", "root_path": "images", "views": views, "intrinsics": intrinsics,
+               "extrinsics": extrinsics, "structure": [], "control_points": []}
+    (HERE / "sfm_data.json").write_text(json.dumps(content, indent=1) + "\n")
+    return expected
+
+
 if __name__ == "__main__":
     compact = lambda value: json.dumps(value, separators=(",", ":")).replace('{"name"', '\n{"name"')
     (HERE / "lens.json").write_text(compact(list(lens_cases())) + "\n")
     files = {"colmap": colmap(), "metashape": metashape_file(), "opensfm": opensfm(), "pix4d": pix4d(),
-             "nerfstudio": nerfstudio()}
+             "nerfstudio": nerfstudio(), "openmvg": openmvg()}
     (HERE / "expected.json").write_text(json.dumps(files, separators=(",", ":")) + "\n")

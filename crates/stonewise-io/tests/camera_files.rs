@@ -102,7 +102,14 @@ fn pix4d_and_nerfstudio_put_points_where_opencv_does() {
 }
 
 #[test]
-fn pix4d_and_nerfstudio_files_that_cannot_be_read_say_why() {
+fn openmvg_puts_points_where_opencv_does() {
+    let file = read_cameras(&fixture("sfm_data.json")).unwrap();
+    assert_pixels(&file, &expected("openmvg"));
+    assert_eq!(file.skipped, [("lost.jpg".to_owned(), Remark::NotAligned)]);
+}
+
+#[test]
+fn files_of_other_programs_that_cannot_be_read_say_why() {
     let folder = tempfile::tempdir().unwrap();
     for (source, from, to, part) in [
         (
@@ -116,6 +123,18 @@ fn pix4d_and_nerfstudio_files_that_cannot_be_read_say_why() {
             "2900.5 0",
             "-2900.5 0",
             "photo DJI 0001.JPG: its focal lengths must be positive",
+        ),
+        (
+            "sfm_data.json",
+            "\"disto_k1\": [",
+            "\"disto_k1\": [1,",
+            "camera of view k1.jpg: its lens has a wrong number of parameters",
+        ),
+        (
+            "sfm_data.json",
+            "\"rotation\": [",
+            "\"rotation\": [[0, 0, 0],",
+            "view pinhole.jpg: its pose needs a rotation of 3 x 3 and a center",
         ),
         (
             "transforms.json",

@@ -1,4 +1,5 @@
-//! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM, Pix4D, nerfstudio.
+//! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM, Pix4D,
+//! OpenMVG, nerfstudio.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
@@ -10,6 +11,7 @@ mod error;
 mod map_frame;
 mod metashape;
 mod nerfstudio;
+mod openmvg;
 mod opensfm;
 mod photos;
 mod pix4d;

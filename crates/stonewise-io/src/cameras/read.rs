@@ -1,7 +1,8 @@
 //! Camera files of any of the known formats.
 
 use super::{
-    CameraError, CameraFile, MapFrame, colmap, malformed, metashape, nerfstudio, opensfm, pix4d, read_text,
+    CameraError, CameraFile, MapFrame, colmap, malformed, metashape, nerfstudio, openmvg, opensfm, pix4d,
+    read_text,
 };
 use std::path::Path;
 use stonewise_core::geometry::View;
@@ -17,6 +18,7 @@ const MAX_PIXELS: u64 = 1 << 30;
 /// - OpenSfM: reconstruction.json.
 /// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
 /// - nerfstudio and instant-ngp: transforms.json.
+/// - OpenMVG: sfm_data.json.
 ///
 /// ```
 /// use stonewise_io::cameras::read_cameras;
@@ -51,8 +53,7 @@ pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, Ca
     } else {
         match extension(path).as_str() {
             "xml" => metashape::read(path, map)?,
-            "json" if nerfstudio::is_transforms(&read_text(path)?) => nerfstudio::read(path)?,
-            "json" => opensfm::read(path)?,
+            "json" => read_json(path)?,
             "txt" if pix4d::is_pix4d(path) => pix4d::read(path)?,
             "txt" | "bin" => colmap::read_folder(path.parent().unwrap_or(Path::new(".")))?,
             _ => {
@@ -73,6 +74,17 @@ pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, Ca
     Ok(file)
 }
 
+fn read_json(path: &Path) -> Result<CameraFile, CameraError> {
+    let text = read_text(path)?;
+    if openmvg::is_openmvg(&text) {
+        openmvg::read(path)
+    } else if nerfstudio::is_transforms(&text) {
+        nerfstudio::read(path)
+    } else {
+        opensfm::read(path)
+    }
+}
+
 /// Whether a file bears the name of a camera file, by which it is told from masks and clouds.
 pub fn is_camera_file(path: &Path) -> bool {
     let name = path
@@ -82,7 +94,9 @@ pub fn is_camera_file(path: &Path) -> bool {
         .to_lowercase();
     match extension(path).as_str() {
         "xml" => true,
-        "json" => name.contains("reconstruction") || name.contains("transforms"),
+        "json" => ["reconstruction", "transforms", "sfm_data"]
+            .iter()
+            .any(|n| name.contains(n)),
         _ => pix4d::is_pix4d(path),
     }
 }

@@ -140,6 +140,7 @@ pub fn targets() -> Vec<Target> {
             cameras,
         )
         .beside(testdata(&["cameras/colmap_txt/cameras.txt"])),
+        Target::of_text("sfm_data", testdata(&["cameras/sfm_data.json"]), cameras),
         Target::of_text("transforms", testdata(&["cameras/transforms.json"]), cameras),
         Target::of_text(
             "pix4d",
