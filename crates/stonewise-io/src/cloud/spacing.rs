@@ -9,8 +9,11 @@ use stonewise_core::geometry::cell_of;
 const CELLS_M: [f64; 3] = [0.05, 0.5, 8.0];
 /// Points that are kept of each size.
 const MOST_POINTS: usize = 100_000;
-/// Points whose neighbours are looked for.
-const SEARCHES: usize = 5000;
+/// Points that are looked at: of those of a surface about a quarter lie inside.
+const LOOKS: usize = 20_000;
+/// Points nearer than this to the border of their cell, as a share of its size, are not searched from: their
+/// neighbours may lie beyond it.
+const MARGIN: f64 = 0.25;
 
 /// A sample of whole cells, chosen by their place alone.
 pub(super) struct Spacing(Vec<Sample>);
@@ -43,10 +46,10 @@ impl Spacing {
     /// Median distance from a point to the nearest other one, metres; points at the same place are one.
     pub fn median_m(&self) -> Option<f64> {
         let found: Vec<(f64, usize, usize)> = self.0.iter().filter_map(Sample::median_m).collect();
-        // In the smallest cells most neighbours are hidden by the border, unless the cloud is dense.
+        // In the smallest cells many neighbours are hidden by the border, unless the cloud is dense.
         let trusted = found
             .iter()
-            .find(|(_, found, searched)| found * 10 > searched * 9);
+            .find(|(_, found, searched)| found * 100 > searched * 95);
         trusted.or(found.last()).map(|(median, _, _)| *median)
     }
 }
@@ -67,25 +70,25 @@ impl Sample {
         }
     }
 
-    /// The median, and of how many searches how many found a neighbour nearer than the border of the cell.
+    /// The median, and how many searches found a neighbour within the margin, of how many.
     fn median_m(&self) -> Option<(f64, usize, usize)> {
         let mut cells: Vec<(&[i64; 3], &Vec<Point3<f64>>)> = self.cells.iter().collect();
         cells.sort_unstable_by_key(|(cell, _)| **cell);
-        let step = self.points.div_ceil(SEARCHES).max(1);
+        let step = self.points.div_ceil(LOOKS).max(1);
         let (mut distances, mut searched, mut next) = (Vec::new(), 0, 0);
         for (cell, points) in cells {
             let mut sorted = points.clone();
             sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
             while next < sorted.len() {
-                searched += 1;
-                let nearest = nearest_m(&sorted, next);
                 let p = sorted[next];
-                let to_border = |axis: usize| {
+                let is_inside = (0..3).all(|axis| {
                     let low = cell[axis] as f64 * self.cell_m;
-                    (p[axis] - low).min(low + self.cell_m - p[axis])
-                };
-                if nearest <= (0..3).map(to_border).fold(f64::INFINITY, f64::min) {
-                    distances.push(nearest);
+                    (p[axis] - low).min(low + self.cell_m - p[axis]) >= MARGIN * self.cell_m
+                });
+                if is_inside {
+                    searched += 1;
+                    let nearest = nearest_m(&sorted, next);
+                    distances.extend((nearest <= MARGIN * self.cell_m).then_some(nearest));
                 }
                 next += step;
             }
@@ -141,5 +144,27 @@ mod tests {
             assert!((found / step - 1.0).abs() < 1e-6, "{step}: {found}");
         }
         assert_eq!(Spacing::new().median_m(), None);
+    }
+
+    /// Of points strewn at random over a plane, n to the square metre, half have a neighbour within
+    /// sqrt(ln 2 / (pi n)).
+    #[test]
+    fn the_spacing_of_strewn_points_is_that_of_a_poisson_process() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        for (side_m, n) in [(20.0, 400.0), (2.0, 40_000.0)] {
+            let mut spacing = Spacing::new();
+            for _ in 0..160_000 {
+                spacing.add(&[Point3::new(side_m * random(), 2.23, side_m * random())]);
+            }
+            let expected = (std::f64::consts::LN_2 / (std::f64::consts::PI * n)).sqrt();
+            let found = spacing.median_m().unwrap();
+            assert!((found / expected - 1.0).abs() < 0.05, "{found} and {expected}");
+        }
     }
 }
