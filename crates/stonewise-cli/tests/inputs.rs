@@ -114,7 +114,7 @@ fn info_tells_what_a_surveyor_asks() {
         "  and 100 more sources\n",
         "  CRS PROJCS[\"ETRS89 / UTM zone 32N\"",
         "  PTX, 132 points\n  12 of them have no position\n",
-        "  scan scan 2: 55 points, scanner at (350020.000, 5649980.000, 99.250)\n",
+        "  scan 2: 55 points, scanner at (350020.000, 5649980.000, 99.250)\n",
         "  no CRS\n",
         "  DJI FC6310, f 8.8 mm, 24 mm on 35 mm film\n  taken 2025-04-12 09:31:02\n",
         "  GPS -51.0879833, 7.7360556, -12.3 m\n",

@@ -71,7 +71,8 @@ fn text(details: &CloudDetails) -> String {
         let begun = scan.begun_s.and_then(date_of);
         let begun = begun.map_or(String::new(), |date| format!(", begun {date} GPS time"));
         let points = counted(scan.records, "point");
-        line(format!("scan {}: {points}{place}{sensor}{begun}", scan.name));
+        let name = scan.name.strip_prefix("scan ").unwrap_or(&scan.name);
+        line(format!("scan {name}: {points}{place}{sensor}{begun}"));
     }
     if details.scans.is_empty() {
         for source in details.sources.iter().take(MOST_SOURCES) {
