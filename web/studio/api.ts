@@ -172,6 +172,8 @@ export interface RunShown {
   readonly seconds: number;
   /** The verdict in a sentence, once there is one. */
   readonly sentence?: string | null;
+  /** What was left out, such as edits without effect, one sentence each. */
+  readonly skipped: readonly (string)[];
   /** Its steps in order. */
   readonly steps: readonly (StepShown)[];
 }
@@ -180,6 +182,8 @@ export interface RunShown {
 export interface State {
   /** The look at the survey. */
   readonly check: CheckShown;
+  /** A run that was started elsewhere and has not finished. */
+  readonly elsewhere?: Unfinished | null;
   /** Whether the project file is there. */
   readonly has_project: boolean;
   /** Whether edits or the project changed after the report was written. */
@@ -213,6 +217,16 @@ export interface StepShown {
 
 /** What became of a step. */
 export type StepState = "waiting" | "working" | "done" | "earlier";
+
+/** Results that are not finished: a run in a terminal works on them, or was interrupted. */
+export interface Unfinished {
+  /** The step that finished last, as its folder is named. */
+  readonly last_step?: string | null;
+  /** How long ago, seconds. */
+  readonly seconds: number;
+  /** Number of steps whose files are there. */
+  readonly steps: number;
+}
 
 /** What a finding means for a run. */
 export type Weight = "fine" | "note" | "doubt" | "wrong" | "unreadable";

@@ -26,19 +26,21 @@ export const runPage: Page = (place, live, until) => {
   const phase = el("p", { class: "phase", role: "status" });
   const sentence = el("p", { class: "sentence", hidden: true });
   const doubts = el("div", { class: "banner soft", hidden: true });
+  const skipped = el("div", { class: "banner soft", hidden: true });
+  const elsewhere = el("p", { class: "banner soft", hidden: true });
   const toResults = el("a", { href: "#results", class: "more", hidden: true }, tx("toResults"));
   const steps = el("ol", { class: "steps" });
   const lines = el("ul", { class: "lines" });
   const log = el("section", {}, el("h2", {}, tx("log")), lines);
   const folder = el("p", { class: "note" });
   place.append(
-    el("div", { class: "acts" }, start, stop), phase, error, sentence, doubts, toResults,
+    el("div", { class: "acts" }, start, stop), phase, elsewhere, error, sentence, doubts, skipped, toResults,
     el("section", {}, el("h2", {}, tx("steps")), steps), log, folder, el("p", { class: "note" }, tx("runNote")),
   );
   live.watch((state) => {
     const { run } = state;
     const isAtWork = run.phase === "running" || run.phase === "stopping";
-    start.textContent = tx(run.phase === "stopped" ? "continue" : state.report ? "runAgain" : "start");
+    start.textContent = tx(run.phase === "stopped" || state.elsewhere ? "continue" : state.report ? "runAgain" : "start");
     start.hidden = isAtWork || state.view;
     start.disabled = !state.has_project;
     stop.hidden = !isAtWork || state.view;
@@ -50,6 +52,11 @@ export const runPage: Page = (place, live, until) => {
     toResults.hidden = run.phase !== "done" || !state.report;
     doubts.hidden = run.doubts.length === 0;
     doubts.replaceChildren(el("strong", {}, tx("doubtsTitle")), el("ul", {}, ...run.doubts.map((d) => el("li", {}, d))));
+    skipped.hidden = run.skipped.length === 0;
+    skipped.replaceChildren(el("strong", {}, tx("skippedTitle")), el("ul", {}, ...run.skipped.map((d) => el("li", {}, d))));
+    const other = run.phase === "idle" ? state.elsewhere : null;
+    elsewhere.hidden = !other;
+    if (other) elsewhere.textContent = tx("elsewhere", { n: other.steps, step: other.last_step ?? "", ago: span(other.seconds) });
     if (run.error) {
       error.textContent = run.error;
       error.hidden = false;

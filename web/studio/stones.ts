@@ -156,8 +156,9 @@ class Room {
     const isAtWork = state.run.phase === "running" || state.run.phase === "stopping";
     this.#apply.hidden = state.view;
     this.#apply.disabled = isAtWork || !state.is_outdated;
-    this.#status.hidden = !isAtWork;
-    this.#status.textContent = isAtWork ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : "";
+    const { skipped } = state.run;
+    this.#status.hidden = !isAtWork && skipped.length === 0;
+    this.#status.textContent = isAtWork ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : skipped.map((s) => `${tx("skippedTitle")}: ${s}`).join(" ");
     if (state.run.error) this.#fail(state.run.error);
   }
 

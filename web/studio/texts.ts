@@ -70,6 +70,8 @@ const TEXTS = {
   "runNote": ["A run goes on when this page is closed.", "Ein Lauf geht weiter, wenn diese Seite geschlossen wird."],
   "steps": ["Steps", "Schritte"],
   "log": ["Messages", "Meldungen"],
+  "skippedTitle": ["Left out", "Ausgelassen"],
+  "elsewhere": ["A run that was started elsewhere works in this folder, or was interrupted: steps whose files are there: {n}; the last one, {step}, {ago} ago.", "Ein anderswo gestarteter Lauf arbeitet in diesem Ordner oder wurde unterbrochen: Schritte, deren Dateien da sind: {n}; der letzte, {step}, vor {ago}."],
   "doubtsTitle": ["The results are in doubt", "Die Ergebnisse sind zweifelhaft"],
   "toResults": ["Open the report", "Bericht öffnen"],
   "resultsIn": ["Results go to {folder}", "Ergebnisse gehen nach {folder}"],

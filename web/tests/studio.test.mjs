@@ -235,3 +235,21 @@ test("existing results open within a second, also narrow, dark and in German", a
   await tablet.close();
   await end();
 });
+
+test("a run that was started in a terminal is told, and shares its lock", async () => {
+  const survey = join(folder, "elsewhere");
+  cpSync(join(folder, "made"), survey, { recursive: true });
+  const run = spawn(program, ["run", "--quiet", join(survey, "stonewise.toml"), "--out", join(survey, "results")], { stdio: "ignore" });
+  const ended = new Promise((done) => run.once("exit", done));
+  const { address, end } = await studio(survey);
+  const { page, close } = await open(address);
+  await page.click("nav >> text=Run");
+  await page.waitForSelector("text=A run that was started elsewhere");
+  await page.click(".acts button.primary");
+  await page.waitForSelector("text=another run works in this folder");
+  await shot(page, "12-elsewhere");
+  await ended;
+  await page.waitForSelector("text=A run that was started elsewhere", { state: "hidden" });
+  await close();
+  await end();
+});

@@ -5,6 +5,7 @@
 
 mod api;
 mod assets;
+mod elsewhere;
 mod epochs;
 mod guard;
 mod http;

@@ -3,9 +3,13 @@
 use std::fs::File;
 use std::io;
 use std::path::{Component, Path, PathBuf};
+use stonewise::UNFINISHED_FILE;
+use stonewise::results::names::{RUN, WORK_DIR};
 
 /// Name of the project file in the folder of a survey.
 const PROJECT_FILE: &str = "stonewise.toml";
+/// What a run says of itself in the folder of its steps.
+const MARKER_FILE: &str = "marker.json";
 /// Name of the results' folder beside a project file.
 const RESULTS_DIR: &str = "results";
 
@@ -82,14 +86,19 @@ fn confined(folder: &Path, path: &str) -> Option<PathBuf> {
 
 /// Whether a run wrote into a folder.
 fn is_results(folder: &Path) -> bool {
-    folder.join("run.json").is_file() && folder.join("stones.parquet").is_file()
+    folder.join(RUN).is_file() && folder.join("stones.parquet").is_file() || is_unfinished(folder)
+}
+
+/// Whether a run began in a folder and has not finished.
+fn is_unfinished(folder: &Path) -> bool {
+    folder.join(UNFINISHED_FILE).is_file() && folder.join(WORK_DIR).is_dir()
 }
 
 /// The project that results name, if it is still there.
 fn project_of(results: &Path) -> Option<PathBuf> {
-    let text = std::fs::read_to_string(results.join("run.json")).ok()?;
-    let record: serde_json::Value = serde_json::from_str(&text).ok()?;
-    let named = PathBuf::from(record.get("project")?.get("file")?.as_str()?);
+    let marker = results.join(WORK_DIR).join(MARKER_FILE);
+    let named =
+        named_in(&results.join(RUN), "/project/file").or_else(|| named_in(&marker, "/owner/identity"))?;
     // A folder that was moved together with its survey: the usual places beside it.
     let file_name = named.file_name()?.to_owned();
     let beside = results.parent().map(|p| p.join(&file_name));
@@ -99,6 +108,12 @@ fn project_of(results: &Path) -> Option<PathBuf> {
         .flatten()
         .find(|p| p.is_file());
     found?.canonicalize().ok()
+}
+
+/// The path that a JSON file holds at a place.
+fn named_in(file: &Path, place: &str) -> Option<PathBuf> {
+    let record: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(file).ok()?).ok()?;
+    Some(PathBuf::from(record.pointer(place)?.as_str()?))
 }
 
 #[cfg(test)]
@@ -155,6 +170,13 @@ mod tests {
             project: Some(project.clone()),
             results: results.clone(),
         };
+        assert_eq!(Place::of(&results).unwrap(), expected);
+        // While a run works, results lie aside.
+        fs::remove_file(results.join("run.json")).unwrap();
+        fs::create_dir(results.join(WORK_DIR)).unwrap();
+        fs::write(results.join(UNFINISHED_FILE), "").unwrap();
+        let marker = serde_json::json!({ "owner": { "kind": "project", "identity": project } });
+        fs::write(results.join(WORK_DIR).join(MARKER_FILE), marker.to_string()).unwrap();
         assert_eq!(Place::of(&results).unwrap(), expected);
         fs::remove_file(project).unwrap();
         assert_eq!(Place::of(&results).unwrap().project, None);

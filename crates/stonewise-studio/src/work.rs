@@ -90,6 +90,8 @@ pub struct RunShown {
     pub lines: VecDeque<String>,
     /// Why the results as a whole are in doubt, one sentence each.
     pub doubts: Vec<String>,
+    /// What was left out, such as edits without effect, one sentence each.
+    pub skipped: Vec<String>,
     /// The verdict in a sentence, once there is one.
     pub sentence: Option<String>,
     /// Why it failed.

@@ -5,6 +5,7 @@ use super::types::{
     ProposalShown, State, Weight,
 };
 use crate::assets;
+use crate::elsewhere::unfinished;
 use crate::epochs::{epochs, picture};
 use crate::guard::Guard;
 use crate::http::{Body, Head, Method, Request, Response, Site};
@@ -269,6 +270,7 @@ impl Api {
             .into_iter()
             .map(Path::to_path_buf)
             .chain(self.edits_path().ok());
+        let run = self.run.shown().0;
         let is_newer = |path: PathBuf| written.is_some() && changed(&path) > written;
         State {
             view: self.guard.is_view(),
@@ -277,7 +279,12 @@ impl Api {
             has_project: project.is_some_and(Path::is_file),
             report: version(&report),
             is_outdated: inputs.into_iter().any(is_newer),
-            run: self.run.shown().0,
+            elsewhere: if run.phase.is_at_work() {
+                None
+            } else {
+                unfinished(results)
+            },
+            run,
             check: locked(&self.look).shown.clone(),
             project_version: project.and_then(version).unwrap_or_default(),
         }
@@ -463,6 +470,8 @@ impl Api {
                         format!("{}: {}", w.subject, german.unwrap_or_else(|| w.message.clone()))
                     };
                     shown.doubts = summary.doubts().map(said).collect();
+                    let skipped = summary.warnings.iter().filter(|w| w.skipped_input && !w.doubt);
+                    shown.skipped = skipped.map(said).collect();
                     shown.sentence = summary.verdict.as_ref().map(|v| v.sentence.clone());
                 }),
                 Ok(Err(Error::Interrupted)) => api.run.end(Phase::Stopped, |_| {}),

@@ -1,5 +1,6 @@
 //! What the API takes and gives, beside what other modules show.
 
+use crate::elsewhere::Unfinished;
 use crate::epochs::EpochShown;
 use crate::project_text::Step;
 use crate::work::RunShown;
@@ -25,6 +26,8 @@ pub struct State {
     pub is_outdated: bool,
     /// The run.
     pub run: RunShown,
+    /// A run that was started elsewhere and has not finished.
+    pub elsewhere: Option<Unfinished>,
     /// The look at the survey.
     pub check: CheckShown,
     /// The number of the project file's version: it changes with every change of the file.

@@ -1,0 +1,75 @@
+//! A run that this program did not start: how far it has come, from what it leaves in the results' folder.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use std::fs;
+use std::path::Path;
+use std::time::SystemTime;
+use stonewise::UNFINISHED_FILE;
+use stonewise::results::names::WORK_DIR;
+
+/// Names the file that a finished step leaves in its folder.
+const DONE_FILE: &str = "done";
+
+/// Results that are not finished: a run in a terminal works on them, or was interrupted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Unfinished {
+    /// The step that finished last, as its folder is named.
+    pub last_step: Option<String>,
+    /// How long ago, seconds.
+    pub seconds: u64,
+    /// Number of steps whose files are there.
+    pub steps: usize,
+}
+
+/// How far the run has come that has not finished in this folder; `None` where none has begun.
+pub fn unfinished(results: &Path) -> Option<Unfinished> {
+    if !results.join(UNFINISHED_FILE).exists() {
+        return None;
+    }
+    let mut done: Vec<(SystemTime, String)> = Vec::new();
+    for step in entries(&results.join(WORK_DIR)) {
+        let name = step.file_name().to_string_lossy().into_owned();
+        let keys = entries(&step.path()).map(|key| key.path().join(DONE_FILE));
+        let last = keys
+            .filter_map(|file| file.metadata().ok()?.modified().ok())
+            .max();
+        done.extend(last.map(|time| (time, name)));
+    }
+    let last = done.iter().max();
+    Some(Unfinished {
+        last_step: last.map(|(_, name)| name.clone()),
+        seconds: last
+            .and_then(|(time, _)| time.elapsed().ok())
+            .map_or(0, |t| t.as_secs()),
+        steps: done.len(),
+    })
+}
+
+fn entries(folder: &Path) -> impl Iterator<Item = fs::DirEntry> {
+    fs::read_dir(folder).into_iter().flatten().flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_finished_step_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(unfinished(dir.path()), None);
+        fs::write(dir.path().join(UNFINISHED_FILE), "").unwrap();
+        assert_eq!(unfinished(dir.path()).unwrap().steps, 0);
+        let folder = |step: &str| dir.path().join(WORK_DIR).join(step).join("0123");
+        for (step, age) in [("ingest-1", 60), ("label-1", 20), ("ingest-2", 40)] {
+            fs::create_dir_all(folder(step)).unwrap();
+            let done = fs::File::create(folder(step).join(DONE_FILE)).unwrap();
+            done.set_modified(SystemTime::now() - std::time::Duration::from_secs(age))
+                .unwrap();
+        }
+        fs::create_dir_all(folder("match-2")).unwrap();
+        let found = unfinished(dir.path()).unwrap();
+        assert_eq!((found.last_step.as_deref(), found.steps), (Some("label-1"), 3));
+        assert!((19..=30).contains(&found.seconds), "{found:?}");
+    }
+}
