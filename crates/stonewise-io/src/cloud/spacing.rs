@@ -15,8 +15,15 @@ const LOOKS: usize = 20_000;
 /// neighbours may lie beyond it.
 const MARGIN: f64 = 0.25;
 
-/// A sample of whole cells, chosen by their place alone.
-pub(super) struct Spacing(Vec<Sample>);
+/// Clouds of fewer points are kept whole.
+const FEW_POINTS: usize = 5000;
+
+/// The points of a small cloud, and samples of whole cells of a large one, chosen by their place alone.
+pub(super) struct Spacing {
+    samples: Vec<Sample>,
+    /// `None` once there are too many.
+    few: Option<Vec<Point3<f64>>>,
+}
 
 struct Sample {
     cell_m: f64,
@@ -34,18 +41,28 @@ impl Spacing {
             points: 0,
             limit: u64::MAX,
         };
-        Self(CELLS_M.map(sample).into())
+        Self {
+            samples: CELLS_M.map(sample).into(),
+            few: Some(Vec::new()),
+        }
     }
 
     pub fn add(&mut self, points: &[Point3<f64>]) {
-        for sample in &mut self.0 {
+        if let Some(few) = &mut self.few {
+            few.extend_from_slice(points);
+        }
+        self.few.take_if(|few| few.len() > FEW_POINTS);
+        for sample in &mut self.samples {
             points.iter().for_each(|p| sample.add(p));
         }
     }
 
     /// Median distance from a point to the nearest other one, metres; points at the same place are one.
     pub fn median_m(&self) -> Option<f64> {
-        let found: Vec<(f64, usize, usize)> = self.0.iter().filter_map(Sample::median_m).collect();
+        if let Some(few) = &self.few {
+            return median_of_all(few);
+        }
+        let found: Vec<(f64, usize, usize)> = self.samples.iter().filter_map(Sample::median_m).collect();
         // In the smallest cells many neighbours are hidden by the border, unless the cloud is dense.
         let trusted = found
             .iter()
@@ -99,6 +116,16 @@ impl Sample {
     }
 }
 
+/// The median of the distances of all points.
+fn median_of_all(points: &[Point3<f64>]) -> Option<f64> {
+    let mut sorted = points.to_vec();
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+    let distances = (0..sorted.len()).map(|of| nearest_m(&sorted, of));
+    let mut distances: Vec<f64> = distances.filter(|d| d.is_finite()).collect();
+    distances.sort_unstable_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied()
+}
+
 /// Distance of a point to the nearest other one, of points in order of x.
 fn nearest_m(sorted: &[Point3<f64>], of: usize) -> f64 {
     let p = sorted[of];
@@ -143,7 +170,11 @@ mod tests {
             let found = spacing.median_m().unwrap();
             assert!((found / step - 1.0).abs() < 1e-6, "{step}: {found}");
         }
-        assert_eq!(Spacing::new().median_m(), None);
+        let mut spacing = Spacing::new();
+        assert_eq!(spacing.median_m(), None);
+        spacing.add(&[0.0, 1.0, 1.5, 9.0].map(|x| Point3::new(x, 0.0, 0.0)));
+        // 1, 0.5, 0.5 and 7.5.
+        assert_eq!(spacing.median_m(), Some(1.0));
     }
 
     /// Of points strewn at random over a plane, n to the square metre, half have a neighbour within

@@ -309,8 +309,15 @@ impl Parameters<'_> {
             "northingatfalseorigin",
             "northingatprojectioncentre",
         ]);
+        let latitude = self.angle(&latitude).unwrap_or(0.0);
+        // Definitions round the size of a degree, and a pole must not lie beyond itself.
+        let is_pole = (latitude.abs() - FRAC_PI_2).abs() < 1e-9;
         MapOrigin {
-            latitude: self.angle(&latitude).unwrap_or(0.0),
+            latitude: if is_pole {
+                FRAC_PI_2.copysign(latitude)
+            } else {
+                latitude
+            },
             longitude: self.angle(&longitude).unwrap_or(0.0) + self.meridian.to_radians(),
             false_m: [east.unwrap_or(0.0), north.unwrap_or(0.0)],
         }
