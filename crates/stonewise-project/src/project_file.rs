@@ -79,7 +79,7 @@ struct RawConditions {
     file: Spanned<PathBuf>,
     /// Longest time between two readings that is interpolated, days. Nothing is extrapolated.
     #[serde(default = "longest_gap_days")]
-    #[schemars(with = "f64", range(min = 0.0))]
+    #[schemars(with = "f64", range(min = 0))]
     longest_gap_days: Spanned<f64>,
 }
 

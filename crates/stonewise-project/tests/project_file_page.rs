@@ -173,7 +173,9 @@ fn is_accepted(row: &Row, number: f64) -> bool {
 fn numbers_are_accepted_in_the_ranges_of_the_page_and_nowhere_else() {
     let schema = project_schema();
     let mut ranges = 0;
-    for row in rows(&docs("project-file.md")) {
+    // Conditions are read from a file and are no parameters of a step; the tests of `project_file` try their limits.
+    let of_steps = |row: &Row| row.table != "conditions";
+    for row in rows(&docs("project-file.md")).into_iter().filter(of_steps) {
         let name = format!("{}.{}", row.table, row.key);
         let Some((least, is_closed, most)) = range_of(&row.allowed) else {
             assert!(
