@@ -171,11 +171,11 @@ mod tests {
         let said = series_verdict(&record(answers.clone()), Language::English);
         assert_eq!(
             said.sentence,
-            "Series of 6 epochs: trend: 2 of 180 stones move in proportion to time, the fastest by 2.00 mm a year (95 % interval 1.70 to \
-             2.30 mm), stone 412; no stone moved abruptly; the newest epoch is as predicted; it continues the past."
+            "Series of 6 epochs: trend: 2 of 180 stones move in proportion to time, the fastest by 2.0 mm a year (95 % interval 1.7 to \
+             2.3 mm), stone 412; no stone moved abruptly; the newest epoch is as predicted; it continues the past."
         );
         let german = series_verdict(&record(answers), Language::German);
-        assert!(german.sentence.contains("2,00 mm im Jahr"), "{}", german.sentence);
+        assert!(german.sentence.contains("2,0 mm im Jahr"), "{}", german.sentence);
     }
 
     #[test]
