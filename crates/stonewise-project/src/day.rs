@@ -1,11 +1,11 @@
 //! Days of dates, to count with.
 
+use stonewise_results::calendar::{civil_from_days, days_from_civil};
+
 /// Days of a mean year.
 pub const DAYS_A_YEAR: f64 = 365.25;
 
 /// The day of an ISO 8601 date, with a time or without, since 1970-01-01. `None` for text that is no date.
-///
-/// Source: the proleptic Gregorian calendar by Hinnant's `days_from_civil`.
 pub fn day_of(date: &str) -> Option<f64> {
     let (date, time) = match date.trim().split_once(['T', ' ']) {
         Some((date, time)) => (date, Some(time)),
@@ -17,22 +17,11 @@ pub fn day_of(date: &str) -> Option<f64> {
         return None;
     }
     let (year, month, day): (i64, i64, i64) = (year.parse().ok()?, month.parse().ok()?, day.parse().ok()?);
-    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let last = match month {
-        2 if is_leap => 29,
-        2 => 28,
-        4 | 6 | 9 | 11 => 30,
-        1..=12 => 31,
-        _ => return None,
-    };
-    if !(1..=last).contains(&day) {
+    let days = days_from_civil(year, month, day);
+    // A day that its month does not have is one of another month.
+    if civil_from_days(days) != (year, month, day) {
         return None;
     }
-    let shifted = if month <= 2 { year - 1 } else { year };
-    let era = shifted.div_euclid(400);
-    let of_era = shifted - 400 * era;
-    let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
-    let days = 146_097 * era + 365 * of_era + of_era / 4 - of_era / 100 + of_year - 719_468;
     Some(days as f64 + time.map_or(Some(0.0), part_of_day)?)
 }
 

@@ -1,6 +1,7 @@
 //! The result files of a run as types: stones and their columns, outlines, the unrolled wall, joints,
 //! evidence, records.
 
+pub mod calendar;
 mod change_points;
 mod columns;
 mod comparison;

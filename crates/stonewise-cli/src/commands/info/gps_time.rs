@@ -1,5 +1,7 @@
 //! Dates of GPS times.
 
+use stonewise::results::calendar::civil_from_days;
+
 /// Days from 1 January 1970 to 6 January 1980, where GPS time begins.
 const GPS_BEGIN: i64 = 3657;
 const DAY_S: f64 = 86_400.0;
@@ -10,24 +12,12 @@ pub fn date_of(seconds: f64) -> Option<String> {
     if !(0.0..4e9).contains(&seconds) {
         return None;
     }
-    let (year, month, day) = civil(GPS_BEGIN + (seconds / DAY_S).floor() as i64);
+    let (year, month, day) = civil_from_days(GPS_BEGIN + (seconds / DAY_S).floor() as i64);
     let second = (seconds % DAY_S) as i64;
     let [hour, minute, second] = [second / 3600, second / 60 % 60, second % 60];
     Some(format!(
         "{year}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}"
     ))
-}
-
-/// Year, month and day of a day counted from 1 January 1970, in the Gregorian calendar (Richards 2013,
-/// "Calendars", algorithm 4).
-fn civil(day: i64) -> (i64, i64, i64) {
-    let j = day + 2_440_588;
-    let f = j + 1401 + (4 * j + 274_277) / 146_097 * 3 / 4 - 38;
-    let e = 4 * f + 3;
-    let g = e % 1461 / 4;
-    let h = 5 * g + 2;
-    let (d, m) = (h % 153 / 5 + 1, (h / 153 + 2) % 12 + 1);
-    (e / 1461 - 4716 + (14 - m) / 12, m, d)
 }
 
 #[cfg(test)]
