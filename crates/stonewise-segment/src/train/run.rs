@@ -7,7 +7,7 @@ use super::error::TrainError;
 use super::plot::draw_curves;
 use super::source::{Prefetch, SampleSource};
 use super::trainer::{StepFigures, Trainer};
-use crate::evaluation::{MaskScore, pair_masks};
+use crate::evaluation::{MaskScore, PhotoPairs, pair_masks};
 use crate::model::{Precision, save_model};
 use crate::tiling::{TilingError, TilingOptions, segment_photo};
 use crate::{Detector, Sample, StoneFinder};
@@ -143,13 +143,24 @@ pub fn evaluate_samples<D: Detector>(
     detector: &D,
     samples: &[Sample],
 ) -> Result<MaskScore, TilingError<D::Error>> {
-    let mut pairs = Vec::new();
-    for sample in samples {
+    Ok(MaskScore::of(&pair_samples(detector, samples, &Silent)?))
+}
+
+/// The stones that a detector finds in images that it sees as a whole; `progress` advances by one for each.
+///
+/// # Errors
+/// The detector could not run, or the caller stopped it.
+pub fn pair_samples<D: Detector>(
+    detector: &D,
+    samples: &[Sample],
+    progress: &dyn Progress,
+) -> Result<Vec<PhotoPairs>, TilingError<D::Error>> {
+    let pairs = samples.iter().map(|sample| {
         let options = TilingOptions::whole(sample.image());
-        let found = segment_photo(detector, sample.image(), sample.relief(), &options, &Silent)?;
-        pairs.push(pair_masks(&found, sample.labels(), sample.ignore()));
-    }
-    Ok(MaskScore::of(&pairs))
+        let found = segment_photo(detector, sample.image(), sample.relief(), &options, progress)?;
+        Ok(pair_masks(&found, sample.labels(), sample.ignore()))
+    });
+    pairs.collect()
 }
 
 /// Where a training leaves its detector.

@@ -1,37 +1,14 @@
 //! Whether a detector finds more than another.
 
-use crate::error::Result;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
-use stonewise_core::progress::{Progress, Silent};
-use stonewise_segment::evaluation::{PhotoPairs, pair_masks};
-use stonewise_segment::tiling::{TilingOptions, segment_photo};
-use stonewise_segment::{Sample, StoneFinder, Weights};
+use stonewise_segment::evaluation::{MaskScore, PhotoPairs};
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 2000;
 /// Seed of the bootstrap.
 const SEED: u64 = 1;
-
-/// The stones that a detector finds in each image.
-pub fn measure(
-    weights: &Weights,
-    images: &[Sample],
-    tiling: &TilingOptions,
-    progress: &dyn Progress,
-) -> Result<Vec<PhotoPairs>> {
-    let detector = StoneFinder::open(weights, tiling.min_score as f32)?;
-    progress.begin("measuring", images.len() as u64);
-    let pairs = images.iter().map(|image| {
-        progress.check()?;
-        let options = TilingOptions::whole(image.image());
-        let found = segment_photo(&detector, image.image(), image.relief(), &options, &Silent)?;
-        progress.advance(1);
-        Ok(pair_masks(&found, image.labels(), image.ignore()))
-    });
-    pairs.collect()
-}
 
 /// Change of F1 from one detector to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,11 +70,11 @@ struct Counts {
 
 impl Counts {
     fn add(&mut self, pairs: &PhotoPairs) {
-        let counted = pairs.found.iter().filter(|f| f.counts());
+        let score = MaskScore::of(std::slice::from_ref(pairs));
         *self = self.plus(&Self {
-            found: counted.clone().count(),
-            right: counted.filter(|f| f.iou.is_some()).count(),
-            references: pairs.references.len(),
+            found: score.found,
+            right: score.right,
+            references: score.references,
         });
     }
 

@@ -9,21 +9,22 @@ mod lesson;
 mod survey_photos;
 
 use crate::error::Result;
-use crate::files::{create_results_folder, write_readable_json};
+use crate::files::write_readable_json;
 use crate::output::OutputFolder;
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
-use gain::{Gain, measure};
+use crate::segmentation::train_for;
+use gain::Gain;
 use lesson::lesson;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
 use stonewise_io::atomic::write_atomically;
-use stonewise_segment::Weights;
 use stonewise_segment::dataset::PhotoCrops;
-use stonewise_segment::evaluation::MaskScore;
-use stonewise_segment::train::{self, Start, Stop, Total, TrainParams, model_path, open_training};
+use stonewise_segment::evaluation::{MaskScore, PhotoPairs};
+use stonewise_segment::train::{Start, TrainParams, model_path, pair_samples};
+use stonewise_segment::{StoneFinder, Weights};
 use survey_photos::SurveyPhotos;
 
 /// What was decided, in the output folder.
@@ -94,26 +95,23 @@ pub fn adapt(
         .path()
         .join("training")
         .join(&lesson.key.as_str()[..FOLDER_DIGITS]);
-    create_results_folder(&folder)?;
-    let total = Total::Minutes(minutes);
     let start = Start::Weights(from.clone());
-    let mut trainer = open_training(&folder, &start, Some(training), Some(total), None)?;
-    if total.share_done(trainer.elapsed()) < 1.0 || !model_path(&folder).exists() {
-        let run = train::Run {
-            source: &crops,
-            validation: &[],
-            out: &folder,
-            minutes: None,
-            threads: 1,
-            progress,
-        };
-        if run.train(&mut trainer)? == Stop::Interrupted {
-            progress.check()?;
-        }
-    }
+    let no_images = || Ok(Vec::new());
+    let elapsed = train_for(
+        minutes,
+        &folder,
+        (&start, Some(training)),
+        &crops,
+        no_images,
+        progress,
+    )?;
     let kept = crops.validation()?;
     let trained = Weights::File(model_path(&folder));
-    let found = |weights: &Weights| measure(weights, &kept, &params.tiling, progress);
+    let found = |weights: &Weights| -> Result<Vec<PhotoPairs>> {
+        let detector = StoneFinder::open(weights, params.tiling.min_score as f32)?;
+        progress.begin("measuring", kept.len() as u64);
+        Ok(pair_samples(&detector, &kept, progress)?)
+    };
     let (before, after) = (found(&from)?, found(&trained)?);
     let gain = Gain::of(&before, &after, |label| lesson.block(label));
     let model = match gain.is_shown() {
@@ -123,7 +121,6 @@ pub fn adapt(
         )?),
         false => None,
     };
-    let elapsed = trainer.elapsed();
     let adapted = Adapted {
         photos: lesson.photos.len(),
         stones: lesson.blocks.len(),

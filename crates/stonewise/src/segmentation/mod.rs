@@ -2,11 +2,13 @@
 
 mod folder;
 mod overlay;
+mod training;
 
 use crate::address_space;
 use crate::error::Result;
 pub use folder::{FolderJob, FolderSummary, MaskEvaluation, PhotoScore, segment_folder};
 pub use overlay::outlined;
+pub(crate) use training::train_for;
 
 /// Compares the limit on the address space with what [`segment_folder`] takes.
 ///

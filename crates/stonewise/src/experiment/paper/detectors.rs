@@ -1,8 +1,9 @@
 //! The paper's segmentation: a detector trained on nine tenths of each photo and measured on the rest.
 
 use crate::error::{Error, Result};
-use crate::files::{create_results_folder, read_json, write_json};
+use crate::files::{read_json, write_json};
 use crate::project::Epoch;
+use crate::segmentation::train_for;
 use crate::settings::SegmentParams;
 use crate::storage::step::Key;
 use crate::storage::store::StepStore;
@@ -12,7 +13,7 @@ use stonewise_io::image_io::image_size;
 use stonewise_segment::dataset::{LabelledPhotos, PhotoCrops};
 use stonewise_segment::evaluation::{MaskScore, PhotoPairs, pair_masks};
 use stonewise_segment::tiling::segment_photo;
-use stonewise_segment::train::{Run, Start, Total, TrainParams, model_path, open_training};
+use stonewise_segment::train::{Start, TrainParams, model_path};
 use stonewise_segment::{StoneFinder, Weights};
 
 /// The step that measures a detector.
@@ -146,23 +147,9 @@ impl DetectorTraining<'_> {
 
     /// Trains until the time is up, and returns the name of the detector.
     fn train(&self, crops: &PhotoCrops, folder: &Path, progress: &dyn Progress) -> Result<String> {
-        create_results_folder(folder)?;
         let start = Start::Weights(Weights::named(&self.params.model));
-        let total = Total::Minutes(self.minutes);
-        let mut trainer = open_training(folder, &start, None, Some(total), None)?;
-        if total.share_done(trainer.elapsed()) < 1.0 || !model_path(folder).exists() {
-            let run = Run {
-                source: crops,
-                validation: &crops.validation()?,
-                out: folder,
-                minutes: None,
-                threads: 1,
-                progress,
-            };
-            run.train(&mut trainer)?;
-            progress.check()?;
-        }
-        let elapsed = trainer.elapsed();
+        let validation = || Ok(crops.validation()?);
+        let elapsed = train_for(self.minutes, folder, (&start, None), crops, validation, progress)?;
         Ok(format!(
             "trained on nine tenths of each photo ({} step{} in {:.1} min)",
             elapsed.steps,
