@@ -12,7 +12,7 @@
 //! zone of 1 and 3 m, mm.
 
 use crate::Outcome;
-use crate::figures::{Z95, rms};
+use crate::figures::{coverage, rms_of_axes};
 use crate::survey::ScannedWall;
 use crate::table::Table;
 use crate::words::Words;
@@ -186,17 +186,8 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
         )
     };
     let stones: Vec<&[Vector3<f64>; 2]> = walls.iter().flat_map(|w| &w.stones).collect();
-    let held = |axis: usize| {
-        let inside = stones
-            .iter()
-            .filter(|[e, sd]| e[axis].abs() <= Z95 * sd[axis])
-            .count();
-        format!("{:.3}", inside as f64 / stones.len().max(1) as f64)
-    };
-    let of_axes = |part: usize| {
-        let axis = |a: usize| format!("{:.3}", 1e3 * rms(stones.iter().map(|s| s[part][a])));
-        [0, 1, 2].map(axis).join(" / ")
-    };
+    let held = |axis: usize| coverage(&stones, axis);
+    let of_axes = |part: usize| rms_of_axes(&stones, part);
     let overlaps: Vec<f64> = walls.iter().filter_map(|w| w.overlap).collect();
     let limit = |k: usize| {
         let known: Vec<f64> = walls.iter().filter_map(|w| w.limits_m[k]).collect();

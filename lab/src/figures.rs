@@ -25,6 +25,18 @@ pub fn share(count: usize, holds: impl Fn(usize) -> bool) -> f64 {
     (0..count).filter(|&i| holds(i)).count() as f64 / count as f64
 }
 
+/// Coverage of the 95 % intervals of errors on an axis; `errors`: errors and their standard deviations.
+pub fn coverage(errors: &[&[Vector3<f64>; 2]], axis: usize) -> String {
+    let inside = errors.iter().filter(|[e, sd]| e[axis].abs() <= Z95 * sd[axis]);
+    format!("{:.3}", inside.count() as f64 / errors.len().max(1) as f64)
+}
+
+/// Root mean squares of errors (`part` 0) or standard deviations (1) along, up and out, thousandths of their unit.
+pub fn rms_of_axes(errors: &[&[Vector3<f64>; 2]], part: usize) -> String {
+    let axis = |a: usize| format!("{:.3}", 1e3 * rms(errors.iter().map(|s| s[part][a])));
+    [0, 1, 2].map(axis).join(" / ")
+}
+
 /// Square of a vector in units of its covariance; infinite where that has no inverse.
 pub fn chi_square(v: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     covariance

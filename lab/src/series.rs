@@ -12,7 +12,7 @@
 //! in the past is claimed; share of stones that creep by more than half of the bulge and are named.
 
 use crate::Outcome;
-use crate::figures::{Z95, rms};
+use crate::figures::{coverage, rms_of_axes};
 use crate::survey::ScannedWall;
 use crate::table::Table;
 use crate::words::Words;
@@ -208,17 +208,8 @@ fn cells(creep: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
         percent(walls.iter().filter(|w| is(&w.answers)).count(), walls.len())
     };
     let stones: Vec<&[Vector3<f64>; 2]> = walls.iter().flat_map(|w| &w.stones).collect();
-    let held = |axis: usize| {
-        let inside = stones
-            .iter()
-            .filter(|[e, sd]| e[axis].abs() <= Z95 * sd[axis])
-            .count();
-        format!("{:.3}", inside as f64 / stones.len().max(1) as f64)
-    };
-    let of_axes = |part: usize| {
-        let axis = |a: usize| format!("{:.3}", 1e3 * rms(stones.iter().map(|s| s[part][a])));
-        [0, 1, 2].map(axis).join(" / ")
-    };
+    let held = |axis: usize| coverage(&stones, axis);
+    let of_axes = |part: usize| rms_of_axes(&stones, part);
     let [creeping, named] = [0, 1].map(|k| walls.iter().map(|w| w.creeping[k]).sum::<usize>());
     vec![
         creep.to_owned(),
