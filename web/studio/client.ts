@@ -37,7 +37,7 @@ export const server = {
   redo: (id: string) => again(() => call<EditsShown>("POST", "/edits/redo", { id })),
 };
 
-/** Sends an act once more where its answer was lost: the server knows it by its name. */
+/** Sends an act once more where its answer was lost: the server does an act of the same name only once. */
 async function again<T>(send: () => Promise<T>): Promise<T> {
   try {
     return await send();

@@ -3,15 +3,13 @@
 import { el } from "../src/dom.ts";
 import type { State } from "./api.ts";
 import { Live } from "./client.ts";
+import { isAtWork, type Page } from "./page.ts";
 import { resultsPage } from "./results.ts";
 import { runPage } from "./run.ts";
 import { stonesPage } from "./stones.ts";
 import { surveyPage } from "./survey.ts";
 import { tx } from "./texts.ts";
 import "./studio.css";
-
-/** Fills a place with a page, until the signal ends it. */
-export type Page = (place: HTMLElement, live: Live, until: AbortSignal) => void;
 
 const PAGES = { survey: surveyPage, run: runPage, stones: stonesPage, results: resultsPage } as const satisfies Record<string, Page>;
 type Name = keyof typeof PAGES;
@@ -52,10 +50,9 @@ function start(root: HTMLElement): void {
   live.watch((state) => {
     title.textContent = structure(state);
     view.hidden = !state.view;
-    const isAtWork = state.run.phase === "running" || state.run.phase === "stopping";
-    progress.hidden = !isAtWork;
+    progress.hidden = !isAtWork(state);
     const ended = state.run.steps.filter((s) => s.state === "done" || s.state === "earlier").length;
-    if (isAtWork) progress.textContent = `${tx("run")} ${ended}/${state.run.steps.length}`;
+    if (isAtWork(state)) progress.textContent = `${tx("run")} ${ended}/${state.run.steps.length}`;
     if (!shown) show();
   }, new AbortController().signal);
 }

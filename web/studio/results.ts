@@ -1,7 +1,7 @@
 // The report as it is, in a frame that reaches nothing of the studio.
 
 import { el } from "../src/dom.ts";
-import type { Page } from "./main.ts";
+import type { Page } from "./page.ts";
 import { tx } from "./texts.ts";
 
 export const resultsPage: Page = (place, live, until) => {

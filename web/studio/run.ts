@@ -4,7 +4,7 @@ import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
 import type { State, StepShown } from "./api.ts";
 import { server } from "./client.ts";
-import type { Page } from "./main.ts";
+import { isAtWork, type Page } from "./page.ts";
 import { tx } from "./texts.ts";
 
 const MARKS = { waiting: "·", working: "▸", done: "✓", earlier: "✓" } as const;
@@ -39,14 +39,14 @@ export const runPage: Page = (place, live, until) => {
   );
   live.watch((state) => {
     const { run } = state;
-    const isAtWork = run.phase === "running" || run.phase === "stopping";
+    const works = isAtWork(state);
     start.textContent = tx(run.phase === "stopped" || state.elsewhere ? "continue" : state.report ? "runAgain" : "start");
-    start.hidden = isAtWork || state.view;
+    start.hidden = works || state.view;
     start.disabled = !state.has_project;
-    stop.hidden = !isAtWork || state.view;
+    stop.hidden = !works || state.view;
     stop.disabled = run.phase === "stopping";
     const seconds = run.phase === "idle" ? "" : ` ${span(run.seconds)}`;
-    phase.textContent = tx(`phase_${run.phase}`) + (isAtWork ? "" : seconds);
+    phase.textContent = tx(`phase_${run.phase}`) + (works ? "" : seconds);
     sentence.hidden = !run.sentence;
     sentence.textContent = run.sentence ?? "";
     toResults.hidden = run.phase !== "done" || !state.report;

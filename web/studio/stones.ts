@@ -7,7 +7,7 @@ import { Photos } from "../src/views/photos.ts";
 import type { Action, Change, Edit, EditsShown, ProjectShown, State } from "./api.ts";
 import { type Live, newId, server } from "./client.ts";
 import { type Area, Face, type Point } from "./face.ts";
-import type { Page } from "./main.ts";
+import { isAtWork, type Page } from "./page.ts";
 import { loadReport } from "./report.ts";
 import { type Word, tx } from "./texts.ts";
 
@@ -153,12 +153,12 @@ class Room {
   }
 
   #told(state: State): void {
-    const isAtWork = state.run.phase === "running" || state.run.phase === "stopping";
+    const works = isAtWork(state);
     this.#apply.hidden = state.view;
-    this.#apply.disabled = isAtWork || !state.is_outdated;
+    this.#apply.disabled = works || !state.is_outdated;
     const { skipped } = state.run;
-    this.#status.hidden = !isAtWork && skipped.length === 0;
-    this.#status.textContent = isAtWork ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : skipped.map((s) => `${tx("skippedTitle")}: ${s}`).join(" ");
+    this.#status.hidden = !works && skipped.length === 0;
+    this.#status.textContent = works ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : skipped.map((s) => `${tx("skippedTitle")}: ${s}`).join(" ");
     if (state.run.error) this.#fail(state.run.error);
   }
 

@@ -4,7 +4,7 @@ import { button, el } from "../src/dom.ts";
 import type { EpochShown, FindingShown, ProjectShown, State } from "./api.ts";
 import { type Live, Refused, server } from "./client.ts";
 import { Form, type Schema } from "./form.ts";
-import type { Page } from "./main.ts";
+import type { Page } from "./page.ts";
 import { tx } from "./texts.ts";
 
 export const surveyPage: Page = (place, live, until) => {
