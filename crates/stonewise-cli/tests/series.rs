@@ -109,7 +109,10 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     for answer in ["trend", "anomaly"] {
         assert_eq!(verdict["series"][answer]["answer"], "no", "{verdict}");
     }
-    let levels: Vec<&Value> = { record["epochs"].as_array().unwrap().iter() }
+    let levels: Vec<&Value> = record["epochs"]
+        .as_array()
+        .unwrap()
+        .iter()
         .map(|e| &e["conditions"]["level_m"])
         .collect();
     assert_eq!(levels, [8.0, 11.0, 14.0, 9.0]);

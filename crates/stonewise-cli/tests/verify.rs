@@ -152,7 +152,8 @@ fn results_are_held_against_their_run_and_every_change_is_found() {
     fs::rename(dir.path().join("digests.b3"), out.join("digests.b3")).unwrap();
 
     // An input that was changed: another motion is another parameter of the epoch, other masks another input.
-    let masks = { contents(dir.path(), &["results"]).into_iter() }
+    let masks = contents(dir.path(), &["results"])
+        .into_iter()
         .find(|(file, _)| file.extension().is_some_and(|e| e == "json") && file.starts_with("masks"));
     if let Some((masks, bytes)) = masks {
         let mut text = String::from_utf8(bytes).unwrap();

@@ -11,9 +11,7 @@ use stonewise::{OutputFolder, Owner, Project};
 
 /// Makes a certificate; its figures go to stdout.
 pub fn certify(args: &CertifyArgs, force: bool, printer: &Printer) -> Result<Outcome> {
-    let project = { args.project.as_deref() }
-        .map(Project::read_for_split)
-        .transpose()?;
+    let project = args.project.as_deref().map(Project::read_for_split).transpose()?;
     let files: Vec<_> = project.iter().map(|p| p.path.clone()).collect();
     let owner = Owner::inputs("certificate", &files);
     let inputs = project.as_ref().map(Project::inputs).unwrap_or_default();

@@ -97,7 +97,7 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
     let components = {
         let context = Context::with_store(&repeated, &folder, Arc::clone(&store), &quiet)?;
         let registered = Run::new(&context, Until::Registered).registered(later)?;
-        { registered.epoch_errors.as_ref() }.and_then(|e| e.components)
+        registered.epoch_errors.as_ref().and_then(|e| e.components)
     };
     progress.advance(1);
     if let Some(components) = components {
@@ -130,7 +130,9 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         let shared = if is_known { 2.0 * shared_m * shared_m } else { 0.0 };
         expect(all, registration, shared, sources, motion.deformation_sd)
     };
-    let all: Vec<Option<Expected>> = { measured.rows.iter() }
+    let all: Vec<Option<Expected>> = measured
+        .rows
+        .iter()
         .map(|row| row.motion.as_ref().map(|motion| expected(row, motion)))
         .collect();
     let found: Vec<&Expected> = all.iter().flatten().collect();
@@ -145,7 +147,10 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
             median(&mut values).map(|sd| 1e3 * sd)
         })
     };
-    let limits = { registered.deformation.as_ref() }.map_or([None; 3], |d| d.detection_limits_m);
+    let limits = registered
+        .deformation
+        .as_ref()
+        .map_or([None; 3], |d| d.detection_limits_m);
     let design = Design {
         epoch: project.epochs.reference().name.clone(),
         seed,
@@ -170,7 +175,9 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
     write_parquet(&out.join("design.parquet"), &table)?;
     write_csv(&out.join("design.csv"), &table, DESCRIPTION, Some("stone_id"))?;
     let facade = facade_of(measured.rows.iter().map(|r| (r.stone_id, r.centroid)), &outlines);
-    let places: Vec<[f64; 2]> = { measured.rows.iter() }
+    let places: Vec<[f64; 2]> = measured
+        .rows
+        .iter()
         .map(|row| facade.place(&row.centroid))
         .map(|p| [p.x, p.y])
         .collect();
@@ -206,7 +213,9 @@ impl StationError {
 
 /// The clouds of an epoch with every station moved by an error of its own.
 fn moved_clouds(epoch: &Epoch, sizes: [f64; 2], seed: u64, store: &StepStore) -> Result<Vec<PathBuf>> {
-    let digests: Vec<String> = { epoch.clouds.iter() }
+    let digests: Vec<String> = epoch
+        .clouds
+        .iter()
         .map(|cloud| store.digest(cloud))
         .collect::<Result<_>>()?;
     let digests: Vec<&str> = digests.iter().map(String::as_str).collect();
@@ -249,9 +258,13 @@ fn move_cloud(
                 SourceRule::None => 0,
             };
             let mut errors: BTreeMap<u64, StationError> = BTreeMap::new();
-            let moved: Vec<Point3<f64>> = { chunk.positions.iter().enumerate() }
+            let moved: Vec<Point3<f64>> = chunk
+                .positions
+                .iter()
+                .enumerate()
                 .map(|(i, p)| {
-                    let error = { errors.entry(station(i)) }
+                    let error = errors
+                        .entry(station(i))
                         .or_insert_with(|| StationError::draw(station(i), sizes, seed));
                     error.moved(p, &middle)
                 })
@@ -324,9 +337,7 @@ fn stones(rows: &[StoneRow], all: &[Option<Expected>]) -> Result<Table> {
     ];
     for (name, meaning, of) in columns {
         for (axis, word) in ["along", "up", "out"].into_iter().enumerate() {
-            let cells: Vec<Option<f64>> = { all.iter() }
-                .map(|e| e.as_ref().and_then(|e| of(e, axis)))
-                .collect();
+            let cells: Vec<Option<f64>> = all.iter().map(|e| e.as_ref().and_then(|e| of(e, axis))).collect();
             table.push(
                 &format!("{name}_{word}"),
                 "m",
@@ -401,7 +412,9 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
         }),
     ];
     for (name, colour, radius_px, is_of) in kinds {
-        let points: Vec<[f64; 2]> = { places.iter().zip(all) }
+        let points: Vec<[f64; 2]> = places
+            .iter()
+            .zip(all)
             .filter(|(_, e)| is_of(e.as_ref(), limit))
             .map(|(place, _)| *place)
             .collect();

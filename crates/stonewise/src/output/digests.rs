@@ -51,7 +51,8 @@ impl Digests {
     /// Writes them into the folder, one line a file.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let line = |(name, digest): (&PathBuf, &String)| {
-            let parts: Vec<_> = { name.components() }
+            let parts: Vec<_> = name
+                .components()
                 .map(|part| part.as_os_str().to_string_lossy())
                 .collect();
             format!("{digest}  {}\n", parts.join("/"))

@@ -44,6 +44,12 @@ impl Summary {
         self.warnings.iter().any(|w| w.skipped_input)
     }
 
+    /// Number of stones that the verdict says moved, over all later epochs.
+    pub(crate) fn moved(&self) -> usize {
+        let epochs = self.verdict.iter().flat_map(|v| &v.epochs);
+        epochs.map(|e| e.wall.moved).sum()
+    }
+
     /// Why the results as a whole cannot be relied on; none where they can, as far as the intervals say.
     pub fn doubts(&self) -> impl Iterator<Item = &Warning> {
         self.warnings.iter().filter(|w| w.doubt)

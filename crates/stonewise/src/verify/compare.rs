@@ -90,7 +90,10 @@ fn different_at(
                 })
                 .next()
         }
-        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => { a.iter().zip(b).enumerate() }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => a
+            .iter()
+            .zip(b)
+            .enumerate()
             .find_map(|(i, (a, b))| different_at(&below(&i.to_string()), name, a, b, tolerance)),
         // Counts and numbers of stones are equal or not.
         (Value::Number(x), Value::Number(y)) if !(x.is_u64() && y.is_u64()) => {

@@ -151,11 +151,16 @@ fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
     let found: Value = read_json(&results.join(&name))?;
     let set = ResultSet::read_measured(results, pair)?;
     let normal = |row: &StoneRow| set.outlines.get(&row.stone_id).map_or(Vector3::x(), |o| o.normal);
-    let outcomes: Vec<StoneOutcome> = { set.stones.iter() }
+    let outcomes: Vec<StoneOutcome> = set
+        .stones
+        .iter()
         .map(|row| outcome(row, normal(row), set.datum()))
         .collect();
     let at = |epoch: &EpochRecord, p: &Point3<f64>| {
-        { epoch.motion.as_ref() }.map_or_else(Vector3::zeros, |motion| motion.displacement_at(p))
+        epoch
+            .motion
+            .as_ref()
+            .map_or_else(Vector3::zeros, |motion| motion.displacement_at(p))
     };
     let truth = |p: &Point3<f64>| at(later, p) - at(first, p);
     let score = score_stones(&outcomes, truth, &run.parameters.evaluate);
@@ -172,7 +177,9 @@ fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
 fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     let scratch = Scratch::new()?;
     copy_results(results, scratch.path())?;
-    let reports = { named_results_in(results).into_iter() }.filter(|file| file.starts_with(REPORT_DIR));
+    let reports = named_results_in(results)
+        .into_iter()
+        .filter(|file| file.starts_with(REPORT_DIR));
     let mut files: Vec<PathBuf> = reports.collect();
     // A run that ended with the registration has neither.
     if files.is_empty() {

@@ -49,10 +49,6 @@ pub(super) fn figures(
     let motions = || rows.iter().filter_map(|r| r.motion.as_ref());
     let mut limits: Vec<f64> = motions().map(|m| m.detection_limit_m).collect();
     let limit = median(&mut limits).ok_or_else(|| Error::Survey("no stone was measured".to_owned()))?;
-    let called: usize = { still.verdict.iter() }
-        .flat_map(|v| &v.epochs)
-        .map(|e| e.wall.moved)
-        .sum();
     let mut figures = vec![
         Figure::shown(PART, "median lod95, mm", Some(1e3 * limit)).with(format!(
             "{} of {} stones measured",
@@ -62,7 +58,7 @@ pub(super) fn figures(
         Figure::at_most(
             PART,
             "stones of unmoved halves that are called moved",
-            called as f64,
+            still.moved() as f64,
             MOST_ALARMS,
         ),
     ];
@@ -86,7 +82,10 @@ pub(super) fn figures(
             }
         };
         let summary = run(motion.name, Some(field))?;
-        let score = { summary.pairs.into_iter().next() }
+        let score = summary
+            .pairs
+            .into_iter()
+            .next()
             .and_then(|p| p.evaluation)
             .and_then(|e| e.stones)
             .ok_or_else(|| Error::Survey("the halves have no scores".to_owned()))?;

@@ -45,9 +45,7 @@ pub(super) fn write(certificate: &Certificate, path: &Path) -> Result<()> {
         }
     ));
     for [part, heading, text] in PARTS {
-        let figures: Vec<&Figure> = { certificate.figures.iter() }
-            .filter(|f| f.part == part)
-            .collect();
+        let figures: Vec<&Figure> = certificate.figures.iter().filter(|f| f.part == part).collect();
         if figures.is_empty() {
             continue;
         }

@@ -51,7 +51,9 @@ fn centred(set: &Dataset) -> Figure {
             let mut rows = rows.clone();
             for k in 0..6 {
                 let column: Vec<f64> = rows.iter().map(|row| row[k]).collect();
-                { rows.iter_mut().zip(standard(&column)) }.for_each(|(row, x)| row[k] = x);
+                rows.iter_mut()
+                    .zip(standard(&column))
+                    .for_each(|(row, x)| row[k] = x);
             }
             Columns::Several(rows)
         }
@@ -78,10 +80,12 @@ fn centred(set: &Dataset) -> Figure {
 /// Rows of the design matrix, the constant first.
 fn rows(set: &Dataset, columns: &Columns) -> Vec<Vec<f64>> {
     match columns {
-        Columns::Several(rows) => { rows.iter() }
+        Columns::Several(rows) => rows
+            .iter()
             .map(|row| std::iter::once(1.0).chain(row.iter().copied()).collect())
             .collect(),
-        Columns::Powers(x) => { x.iter() }
+        Columns::Powers(x) => x
+            .iter()
             .map(|x| (0..set.coefficients.len() as i32).map(|k| x.powi(k)).collect())
             .collect(),
     }

@@ -112,7 +112,9 @@ pub(super) fn figures(
 
 /// Mean over walls, weighted by their stones; `None` where no wall has the figure.
 fn pooled(walls: &[Wall], of: impl Fn(&Wall) -> Option<f64>) -> Option<f64> {
-    let all = { walls.iter() }.filter_map(|w| Some((of(w)?, w.score.estimated as f64)));
+    let all = walls
+        .iter()
+        .filter_map(|w| Some((of(w)?, w.score.estimated as f64)));
     let (sum, stones) = all.fold((0.0, 0.0), |(sum, n), (share, stones)| {
         (sum + share * stones, n + stones)
     });
@@ -155,15 +157,11 @@ fn measured(
     let summary = run_in(&context, Until::Registered)?;
     let truth = survey.join("truth/stones.csv");
     let evaluation = evaluate_truth(&folder, &truth, &project.settings.evaluate)?;
-    let called = { summary.verdict.iter() }
-        .flat_map(|v| &v.epochs)
-        .map(|e| e.wall.moved)
-        .sum();
     let score = evaluation.external.map(|e| e.motions);
     Ok(Wall {
         is_still,
         score: score.ok_or_else(|| Error::Survey("a simulated wall has no scores".to_owned()))?,
-        called,
+        called: summary.moved(),
     })
 }
 
