@@ -39,7 +39,7 @@ fn survey() -> tempfile::TempDir {
     dir
 }
 
-/// A studio, and who may ask it.
+/// A studio, with the cookie that it accepts.
 struct Studio {
     child: Child,
     host: String,

@@ -1,4 +1,4 @@
-//! Who may ask: the person to whom this program said its address, from this program's own page.
+//! Which requests are served: those of the page that this program opened, by its address and cookie.
 //!
 //! A page of another site can make the browser send requests here, also under a name of its own (DNS rebinding:
 //! Jackson et al. 2007). So each request must name this address (Host), come from this page (Origin,
@@ -76,7 +76,7 @@ impl Guard {
     /// Looks at a request before it is answered.
     ///
     /// # Errors
-    /// The answer to somebody who may not ask this; or, to the first address, the cookie.
+    /// The refusal of a request that is not served; for the first address, the cookie.
     pub fn admit(&self, head: &Head) -> Result<(), Response> {
         self.check_host(head)?;
         if head.path == "/"
@@ -118,7 +118,7 @@ impl Guard {
         ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port))
     }
 
-    /// A page of another site must not ask, nor a page of another port of this machine.
+    /// Requests of pages of other sites, or of another port of this machine, are refused.
     fn check_origin(&self, head: &Head) -> Result<(), Response> {
         let host = head.header("host").unwrap_or("");
         let is_own = |origin: &str| origin.strip_prefix("http://") == Some(host);
@@ -133,7 +133,7 @@ impl Guard {
     }
 
     fn cookie_name(&self) -> String {
-        // Cookies do not know ports: two studios have two names.
+        // Cookies are shared by all ports of a host, so that each studio needs a name of its own.
         format!("stonewise-{}", self.port)
     }
 

@@ -69,7 +69,7 @@ pub struct Answer {
     /// Why there is none.
     #[serde(default)]
     pub reason: Option<Unanswered>,
-    /// Stones that were asked.
+    /// Stones that were tested.
     pub tested: usize,
     /// Stones that are named, with the false discovery rate controlled at 5 %.
     pub stones: Vec<u32>,

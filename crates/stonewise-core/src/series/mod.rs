@@ -4,7 +4,7 @@
 //! difference is therefore taken apart into two looks, one of each epoch, whose errors are independent (`look`). Over
 //! the looks of all epochs a line in time and what conditions add to it are fitted to each stone (`fit`), with the
 //! terms that epochs can carry (`terms`), a variance factor that stones lend each other (`moderated`), and the answers
-//! to the four questions that engineers of dams ask (`answers`; Lombardi 2001). Which epoch is the reference then does
+//! to the four questions that a reading of a dam raises (`answers`; Lombardi 2001). Which epoch is the reference then does
 //! not matter to velocities.
 
 mod analyse;

@@ -1,4 +1,4 @@
-//! What a surveyor asks of a cloud file.
+//! Details of a cloud file: format, fields, sources, spacing, scanners, dates.
 
 use std::path::Path;
 

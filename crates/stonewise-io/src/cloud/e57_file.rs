@@ -12,7 +12,7 @@ use super::guard::guarded;
 use super::scan::Scan;
 use super::{CloudError, ReadSummary};
 
-/// Points decoded between two checks whether the caller wants to stop.
+/// Points decoded between two checks for an interruption.
 const STEP_POINTS: usize = 8192;
 
 type Reader = E57Reader<BufReader<File>>;

@@ -10,7 +10,7 @@ const MOST: usize = 64;
 /// An open connection.
 struct Open {
     stream: TcpStream,
-    /// Whether a whole request of somebody who may ask has arrived and is being answered.
+    /// Whether a whole, admitted request has arrived and is being answered.
     is_at_work: bool,
 }
 

@@ -21,7 +21,7 @@ pub trait Site: Send + Sync {
     /// Looks at a head before its body is read.
     ///
     /// # Errors
-    /// The answer to somebody who may not ask this.
+    /// The refusal of a request that is not served.
     fn admit(&self, head: &Head) -> Result<(), Response>;
 
     /// Answers a request that was admitted.

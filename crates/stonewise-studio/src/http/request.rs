@@ -16,7 +16,7 @@ const IDLE: Duration = Duration::from_secs(60);
 /// Time for a head to arrive once it has begun, and for a body.
 const ARRIVAL: Duration = Duration::from_secs(10);
 
-/// A method that the server knows.
+/// A method that the server supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Reads.

@@ -44,7 +44,7 @@ impl Answer {
     }
 }
 
-/// A studio, its folder, and the cookie of a person who may ask.
+/// A studio, its folder, and the cookie that it accepts.
 pub struct Tested {
     pub dir: TempDir,
     pub studio: Studio,

@@ -19,7 +19,7 @@ const MOST_SOURCES: usize = 20;
 /// Seconds between the beginning of GPS time and that of adjusted GPS times.
 const ADJUSTED_S: f64 = 1e9;
 
-/// What a surveyor asks of a cloud.
+/// Details of a cloud, as `info` prints them.
 pub fn cloud(path: &Path) -> Result<Described> {
     let details = cloud_details(path)?;
     Ok(Described {

@@ -100,7 +100,7 @@ fn zones(run: &Run, order: &[EpochId], stones: &[StoneTrend]) -> Result<Vec<Zone
         .collect())
 }
 
-/// The epoch with the conditions that the model knows: the first whose name has "level" or "temp" in it.
+/// The epoch with the conditions that the model takes: the first whose name has "level" or "temp" in it.
 fn epoch(epoch: &Epoch, day: Option<f64>) -> SeriesEpoch {
     let condition = |part: &str| {
         let named = epoch
