@@ -160,6 +160,7 @@ impl Guard {
         }
         // A strict cookie is not sent along a redirection that began on another site, but from a page of this one.
         let page = "<!doctype html><html lang=\"en\"><meta charset=\"utf-8\"><title>stonewise</title>\
+                    <link rel=\"icon\" href=\"data:,\">\
                     <meta http-equiv=\"refresh\" content=\"0;url=/\"><a href=\"/\">stonewise studio</a></html>";
         let cookie = format!(
             "{}={}; HttpOnly; SameSite=Strict; Path=/",
