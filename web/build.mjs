@@ -20,7 +20,7 @@ function digest(parts) {
 
 /** What is built: its name, the folders of its sources, the crate that embeds it, and whether three.js is in it. */
 const BUNDLES = [
-  { name: "report", folders: ["src"], crate: "stonewise", hasThree: true },
+  { name: "report", folders: ["src"], crate: "stonewise-report", hasThree: true },
   { name: "studio", folders: ["src", "studio"], crate: "stonewise-studio", hasThree: false },
 ];
 

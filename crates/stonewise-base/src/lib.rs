@@ -1,4 +1,6 @@
 //! What results, report, project and pipeline share: errors, warnings, messages, parameters, small files.
+//!
+//! Programs that use stonewise take these from the crate `stonewise`, which names them again.
 
 pub mod address_space;
 pub mod error;

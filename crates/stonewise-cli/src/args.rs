@@ -19,6 +19,9 @@ pub struct Args {
     /// never), and run a survey even where the check found an error.
     #[arg(long, global = true)]
     pub force: bool,
+    /// With --version: commit, system, processor class and weights as well.
+    #[arg(long, requires = "version")]
+    pub verbose: bool,
     /// The command.
     #[command(subcommand)]
     pub command: Command,

@@ -10,8 +10,10 @@ mod printer;
 mod screen;
 mod steps;
 
+use clap::error::ErrorKind;
 pub use commands::measure;
 use std::ffi::OsString;
+use std::io::Write;
 
 /// Everything was done.
 const DONE: u8 = 0;
@@ -27,11 +29,15 @@ const VERDICT: u8 = 4;
 /// Runs the command of these arguments, the first of which is the program's name; returns the exit code.
 pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
     say_panics_once();
-    let args = match <args::Args as clap::Parser>::try_parse_from(args) {
+    let words: Vec<OsString> = args.into_iter().collect();
+    let args = match <args::Args as clap::Parser>::try_parse_from(&words) {
         Ok(args) => args,
         Err(error) => {
             // A closed stream is no reason to fail.
             let _ = error.print();
+            if error.kind() == ErrorKind::DisplayVersion && words.iter().any(|word| word == "--verbose") {
+                let _ = write!(std::io::stdout(), "{}", commands::version_details());
+            }
             return if error.use_stderr() { WRONG_USAGE } else { DONE };
         }
     };

@@ -80,6 +80,23 @@ fn every_command_has_a_man_page_and_none_is_overwritten() {
 }
 
 #[test]
+fn the_version_is_one_line_and_its_details_name_the_weights() {
+    let said = |words: &[&str]| {
+        let output = stonewise().args(words).output().unwrap();
+        assert!(output.status.success(), "{words:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let line = format!("stonewise {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(said(&["--version"]), line);
+    let details = said(&["--version", "--verbose"]);
+    assert!(details.starts_with(&line), "{details}");
+    assert_eq!(said(&["--verbose", "--version"]), details);
+    let parts = ["1", "2", "3"].map(|n| fs::read(format!("../stonewise-weights-{n}/weights.part")).unwrap());
+    let digest = blake3::hash(&parts.concat()).to_hex();
+    assert!(details.contains(digest.as_str()), "{details}");
+}
+
+#[test]
 fn doctor_says_what_an_empty_environment_lacks() {
     let nothing = tempfile::tempdir().unwrap();
     let mut command = stonewise();

@@ -1,7 +1,7 @@
 //! The embedded bundle of the report is what its sources in `web/` make.
 
-const BUNDLE: &str = include_str!("../../stonewise/assets/report.js");
-const STYLE: &str = include_str!("../../stonewise/assets/report.css");
+const BUNDLE: &str = include_str!("../assets/report.js");
+const STYLE: &str = include_str!("../assets/report.css");
 
 #[test]
 fn bundle_and_sources_agree() {

@@ -1,12 +1,8 @@
 //! The detector that comes with the program.
 
 use crate::model::{MaskRcnn, WeightsError, config_from_bytes, model_from_bytes};
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Weights trained on rendered photos, see docs/src/method/built-in-weights.md. A static, because a constant
-/// would lie in the program once for each use.
-static BUILT_IN: &[u8] = include_bytes!("../weights/built-in.safetensors");
 /// What the built-in detector is called where a file could be given.
 const NAME: &str = "built-in";
 
@@ -35,7 +31,7 @@ impl Weights {
     /// The file cannot be read.
     pub fn bytes(&self) -> Result<Vec<u8>, WeightsError> {
         match self {
-            Self::BuiltIn => Ok(BUILT_IN.to_vec()),
+            Self::BuiltIn => Ok(built_in()),
             Self::File(path) => std::fs::read(path).map_err(|source| WeightsError::File {
                 path: path.clone(),
                 source,
@@ -53,12 +49,23 @@ impl Weights {
     }
 
     /// All bytes, and what messages call them.
-    fn named_bytes(&self) -> Result<(Cow<'static, [u8]>, String), WeightsError> {
-        Ok(match self {
-            Self::BuiltIn => (Cow::Borrowed(BUILT_IN), NAME.to_owned()),
-            Self::File(path) => (Cow::Owned(self.bytes()?), path.display().to_string()),
-        })
+    fn named_bytes(&self) -> Result<(Vec<u8>, String), WeightsError> {
+        let name = match self {
+            Self::BuiltIn => NAME.to_owned(),
+            Self::File(path) => path.display().to_string(),
+        };
+        Ok((self.bytes()?, name))
     }
+}
+
+/// Weights trained on rendered photos, see docs/src/method/built-in-weights.md.
+fn built_in() -> Vec<u8> {
+    [
+        stonewise_weights_1::PART,
+        stonewise_weights_2::PART,
+        stonewise_weights_3::PART,
+    ]
+    .concat()
 }
 
 /// The detector of these weights. With `relief`, weights that were trained on colour alone get input channels

@@ -3,6 +3,15 @@
 //!
 //! `world` makes clouds, photos and masks in memory; `files` writes them. Lengths are metres, angles radians;
 //! equal parameters give equal bytes for any number of threads.
+//!
+//! ```
+//! use stonewise_simulate::{SurveyParams, World};
+//!
+//! let world = World::new(&SurveyParams::demo().scene.seeded(7));
+//! let motion = &world.motions[0];
+//! println!("{} stones; the first moves by {:?} m", world.wall.stones.len(), motion);
+//! # assert_eq!(world.wall.stones.len(), world.motions.len());
+//! ```
 
 mod files;
 mod world;

@@ -1,4 +1,22 @@
 //! From surveys to a statement about how a masonry dam moves: the project file, the pipeline, the results.
+//!
+//! [`run`] is the whole chain, [`compare_clouds`] M3C2, C2C and C2M of two clouds, [`nalgebra`] the one that the types
+//! are made of. Below it, each of use without the others: `stonewise_core` (the algorithms, in memory),
+//! `stonewise_io` (clouds, cameras, masks, tables), `stonewise_segment` (stones in photos), `stonewise_simulate`
+//! (surveys with known truth).
+//!
+//! ```no_run
+//! use stonewise::{OutputFolder, Project, Until, results::ResultSet, run};
+//! use stonewise_core::progress::Silent;
+//!
+//! let project = Project::read("survey/stonewise.toml".as_ref())?;
+//! let folder = OutputFolder::of_project("results".as_ref(), &project, false)?;
+//! run(&project, &folder, Until::Reported, &Silent)?;
+//! for stone in &ResultSet::read(folder.path())?.stones {
+//!     println!("{} {:?}", stone.stone_id, stone.motion.as_ref().map(|m| m.displacement));
+//! }
+//! # Ok::<(), stonewise::Error>(())
+//! ```
 
 mod adapt;
 pub mod experiment;
@@ -34,6 +52,7 @@ pub use processor::processor_class;
 pub use report_params::{Language, ReportParams};
 pub use settings::{IngestParams, RegistrationParams, SegmentParams, Settings};
 pub use stable::StableArea;
+pub use stonewise_core::nalgebra;
 pub use stonewise_project as project;
 pub use stonewise_project::{
     Epoch, Halves, Initialised, Project, SPLIT_FILES, ScansProject, check, edits, init, is_scan, split,

@@ -25,12 +25,14 @@ mod train;
 mod tune;
 mod units;
 mod verify;
+mod version;
 
 use crate::args::{Args, Command};
 use crate::printer::Printer;
 use anyhow::{Context, Result};
 pub use outcome::Outcome;
 pub use run::measure;
+pub use version::version_details;
 use std::error::Error;
 use std::num::NonZero;
 use stonewise::{Until, require_start};

@@ -23,9 +23,9 @@ use stonewise_results::records::DatumState;
 use stonewise_results::{Joint, JointMotion, ResultSet, RowMotion, Sorted, Status, StoneRow};
 
 /// The program; `web/README.md` says how it is built from its sources.
-pub(crate) const SCRIPT: &str = include_str!("../../../stonewise/assets/report.js");
+pub(crate) const SCRIPT: &str = include_str!("../../assets/report.js");
 /// Its style sheet.
-pub(crate) const STYLE: &str = include_str!("../../../stonewise/assets/report.css");
+pub(crate) const STYLE: &str = include_str!("../../assets/report.css");
 
 /// Where the program puts its views; hidden until it starts.
 pub(super) const PLACE: &str = "<div id=\"explore\" hidden></div>\n";

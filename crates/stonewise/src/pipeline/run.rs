@@ -61,21 +61,7 @@ impl Summary {
 ///
 /// Results of an earlier run lie aside until this one has finished.
 ///
-/// ```no_run
-/// use std::path::Path;
-/// use stonewise::results::ResultSet;
-/// use stonewise::{OutputFolder, Project, Until, run};
-/// use stonewise_core::progress::Silent;
-///
-/// let (project, out) = (Project::read(Path::new("survey/stonewise.toml"))?, Path::new("results"));
-/// let folder = OutputFolder::of_project(out, &project, false)?;
-/// let summary = run(&project, &folder, Until::Reported, &Silent)?;
-/// println!("{} warnings", summary.warnings.len());
-/// for stone in &ResultSet::read(out)?.stones {
-///     println!("{} {:?}", stone.stone_id, stone.motion.as_ref().map(|m| m.displacement));
-/// }
-/// # Ok::<(), stonewise::Error>(())
-/// ```
+/// The example of this crate shows it at work.
 ///
 /// # Errors
 /// An input that cannot be used, epochs that do not overlap, a full disk, interruption. Finished steps stay,
