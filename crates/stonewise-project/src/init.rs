@@ -222,7 +222,7 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
     text
 }
 
-/// A TOML string.
+/// A TOML string; paths are written with slashes, which Windows reads as well.
 pub(crate) fn quoted(text: &str) -> String {
     toml::Value::String(text.replace('\\', "/")).to_string()
 }

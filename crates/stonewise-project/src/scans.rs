@@ -38,7 +38,7 @@ impl ScansProject {
         }
         let scans: Vec<PathBuf> = scans
             .iter()
-            .map(|scan| scan.canonicalize().map_err(Error::io("finding", scan)))
+            .map(|scan| dunce::canonicalize(scan).map_err(Error::io("finding", scan)))
             .collect::<Result<_>>()?;
         if path.exists() {
             let project = Project::read(&path)?;

@@ -57,7 +57,9 @@ fn locale() -> Option<String> {
 }
 
 fn python() -> Option<String> {
-    let answer = Command::new("python3").arg("--version").output().ok()?;
+    // On Windows it is called python.
+    let version = |name| Command::new(name).arg("--version").output().ok();
+    let answer = version("python3").or_else(|| version("python"))?;
     let text = String::from_utf8(answer.stdout).ok()?;
     Some(text.trim().to_owned()).filter(|t| !t.is_empty())
 }

@@ -152,6 +152,6 @@ fn write_clouds(
 }
 
 fn absolute(path: &Path) -> Result<String> {
-    let path = path.canonicalize().map_err(Error::io("finding", path))?;
+    let path = dunce::canonicalize(path).map_err(Error::io("finding", path))?;
     Ok(quoted(&path.to_string_lossy()))
 }
