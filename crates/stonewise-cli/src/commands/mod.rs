@@ -32,10 +32,10 @@ use crate::printer::Printer;
 use anyhow::{Context, Result};
 pub use outcome::Outcome;
 pub use run::measure;
-pub use version::version_details;
 use std::error::Error;
 use std::num::NonZero;
 use stonewise::{Until, require_start};
+pub use version::version_details;
 
 /// Runs the command that the arguments name.
 pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {

@@ -7,7 +7,11 @@ use stonewise_segment::Weights;
 /// What tells one build from another and decides the last digits of results, one line each.
 pub fn version_details() -> String {
     let commit = option_env!("STONEWISE_COMMIT").unwrap_or("not given to the build (STONEWISE_COMMIT)");
-    let build = if cfg!(debug_assertions) { "development" } else { "release" };
+    let build = if cfg!(debug_assertions) {
+        "development"
+    } else {
+        "release"
+    };
     let weights = match Weights::BuiltIn.bytes() {
         Ok(bytes) => format!("BLAKE3 {}", blake3::hash(&bytes).to_hex()),
         Err(error) => error.to_string(),
