@@ -35,12 +35,38 @@ class Detector:
         :param image: (height, width, 3) of ``uint8``, red, green, blue, or a picture of Pillow.
         :param progress: As in :func:`run`.
         """
-        array = np.asarray(image)
-        if array.ndim == 2:
-            array = np.repeat(array[:, :, None], 3, axis=2)
-        if array.ndim != 3 or array.shape[2] not in (3, 4) or array.dtype != np.uint8:
-            raise Error(f"image must be (height, width, 3) of uint8, not {array.shape} of {array.dtype}")
-        photo = np.ascontiguousarray(array[:, :, :3])
         with listener(progress) as told:
-            found, _ = self._native.segment(photo, told)
+            found, _ = self._native.segment(_photo(image), told)
         return found
+
+    def outline(self, image: Any, boxes: Any, *, progress: Union[bool, Progress] = False) -> NDArray[np.int32]:
+        """Pixels of the stones that boxes hold, (height, width): 1 for the stone of the first box, and so on.
+
+        The mask head of the detector draws the stones; a person, or another detector, says where they are.
+        Where masks overlap, the smaller one is on top.
+
+        :param image: As in :meth:`segment`.
+        :param boxes: (n, 4): left, top, right, bottom, pixels.
+        :param progress: As in :func:`run`.
+
+        >>> import numpy as np
+        >>> bool(Detector().outline(np.zeros((64, 96, 3), np.uint8), np.empty((0, 4))).any())
+        False
+        """
+        corners = np.asarray(boxes, np.float64)
+        is_box = corners.ndim == 2 and corners.shape[1] == 4 and np.isfinite(corners).all()
+        if not is_box or (corners[:, 2:] <= corners[:, :2]).any():
+            raise Error("boxes must be (n, 4): left < right and top < bottom, as left, top, right, bottom")
+        with listener(progress) as told:
+            found, _ = self._native.outline(_photo(image), corners.tolist(), told)
+        return found
+
+
+def _photo(image: Any) -> NDArray[np.uint8]:
+    """Red, green, blue of an image that a caller gave."""
+    array = np.asarray(image)
+    if array.ndim == 2:
+        array = np.repeat(array[:, :, None], 3, axis=2)
+    if array.ndim != 3 or array.shape[2] not in (3, 4) or array.dtype != np.uint8:
+        raise Error(f"image must be (height, width, 3) of uint8, not {array.shape} of {array.dtype}")
+    return np.ascontiguousarray(array[:, :, :3])

@@ -61,6 +61,9 @@ class Detector:
     def segment(
         self, image: NDArray[np.uint8], progress: _Progress
     ) -> tuple[NDArray[np.int32], list[tuple[int, float]]]: ...
+    def outline(
+        self, image: NDArray[np.uint8], boxes: list[list[float]], progress: _Progress
+    ) -> tuple[NDArray[np.int32], list[tuple[int, float]]]: ...
 
 def command(args: list[str]) -> int: ...
 def run(

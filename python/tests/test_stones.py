@@ -107,6 +107,18 @@ def test_the_detector_is_the_command_segment(command, survey, epochs, tmp_path):
     assert expected.max() > 3
     np.testing.assert_array_equal(labels, expected)
     shutil.rmtree(tmp_path / "out")
+
+    boxes, stones = [], [stone for stone in range(1, labels.max() + 1) if (labels == stone).sum() > 400]
+    for stone in stones:
+        rows, columns = np.nonzero(labels == stone)
+        boxes.append([columns.min(), rows.min(), columns.max() + 1, rows.max() + 1])
+    outlined = stonewise.Detector().outline(image, boxes)
+    for number, stone in enumerate(stones, 1):
+        a, b = outlined == number, labels == stone
+        assert (a & b).sum() > 0.7 * (a | b).sum(), stone
+    with pytest.raises(stonewise.Error, match="left < right"):
+        stonewise.Detector().outline(image, [[20.0, 0.0, 10.0, 5.0]])
+
     with pytest.raises(stonewise.Error, match="uint8"):
         stonewise.Detector().segment(image.astype(float))
     with pytest.raises(stonewise.Error, match="unknown field"):

@@ -33,6 +33,8 @@ export interface CheckShown {
 export interface Edit {
   /** Places in stones. */
   readonly at?: readonly (readonly [number, number])[];
+  /** Two opposite corners of a box on the wall; the detector outlines the stone in it. */
+  readonly box?: readonly (readonly [number, number])[];
   /** What it does. */
   readonly do: Action;
   /** The epoch of that photo; absent: the first. */

@@ -17,9 +17,9 @@ export interface Area {
   readonly polygon: readonly Point[];
 }
 
-/** What is drawn at the moment: a line or a polygon. */
+/** What is drawn at the moment: a line, a polygon, or a box by two opposite corners. */
 interface Drawing {
-  readonly kind: "line" | "polygon";
+  readonly kind: "line" | "polygon" | "box";
   readonly points: Point[];
   readonly done: (points: Point[]) => void;
 }
@@ -83,7 +83,7 @@ export class Face {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
   }
 
-  /** Begins a line or a polygon; `done` gets its vertices. */
+  /** Begins a drawing; `done` gets its vertices, of a box its two corners. */
   draw(kind: Drawing["kind"], done: Drawing["done"]): void {
     this.#drawing = { kind, points: [], done };
     this.#canvas.focus();
@@ -95,7 +95,7 @@ export class Face {
   finish(): void {
     const drawing = this.#drawing;
     if (!drawing) return;
-    const least = drawing.kind === "line" ? 2 : 3;
+    const least = drawing.kind === "polygon" ? 3 : 2;
     if (drawing.points.length < least) return;
     this.cancel();
     drawing.done(drawing.points);
@@ -263,6 +263,7 @@ export class Face {
     if (last && Math.hypot(last[0] - place[0], last[1] - place[1]) < near) return;
     // A millimetre is finer than anyone draws.
     points.push([Math.round(place[0] * 1e3) / 1e3, Math.round(place[1] * 1e3) / 1e3]);
+    if (this.#drawing!.kind === "box" && points.length === 2) this.finish();
     this.redraw();
   }
 
@@ -341,6 +342,7 @@ export class Face {
       }
     }
     if (edit.line?.length) this.#trace(edit.line, false, colour, 3);
+    if (edit.box?.length) this.#trace(rectangle(edit.box), true, colour, 2.4);
     if (edit.outline?.length) this.#trace(edit.outline, true, colour, 2.4, edit.do === "ignore" ? [6, 4] : []);
   }
 
@@ -355,7 +357,8 @@ export class Face {
     if (!drawing) return;
     const points = [...drawing.points];
     if (this.#pointer) points.push(this.#pointer);
-    this.#trace(points, drawing.kind === "polygon" && points.length > 2, "#0a6ed1", 2);
+    if (drawing.kind === "box") this.#trace(rectangle(points), true, "#0a6ed1", 2);
+    else this.#trace(points, drawing.kind === "polygon" && points.length > 2, "#0a6ed1", 2);
     const pen = this.#pen, ratio = window.devicePixelRatio || 1;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     for (const point of drawing.points) {
@@ -416,4 +419,11 @@ export class Face {
     pen.fillText(text, x + 4, y - 6);
     pen.restore();
   }
+}
+
+/** The corners of a box, of which two opposite ones are given. */
+function rectangle(points: readonly (readonly [number, number])[]): Point[] {
+  const [first, last] = [points[0], points.at(-1)];
+  if (!first || !last) return [];
+  return [[first[0], first[1]], [last[0], first[1]], [last[0], last[1]], [first[0], last[1]]];
 }

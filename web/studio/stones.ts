@@ -113,6 +113,7 @@ class Room {
         tool("join", "joinHint", () => this.#join()),
         tool("split", "splitHint", () => this.#split()),
         tool("redraw", "redrawHint", () => this.#redraw()),
+        tool("box", "boxHint", () => this.#box()),
         tool("add", "addHint", () => this.#outline("add")),
         tool("delete", "deleteHint", () => this.#delete()),
         tool("ignore", "ignoreHint", () => this.#outline("ignore")),
@@ -219,7 +220,7 @@ class Room {
       return;
     }
     const acts: Record<string, () => void> = {
-      j: () => this.#join(), s: () => this.#split(), r: () => this.#redraw(), a: () => this.#outline("add"), i: () => this.#outline("ignore"),
+      j: () => this.#join(), s: () => this.#split(), r: () => this.#redraw(), a: () => this.#outline("add"), b: () => this.#box(), i: () => this.#outline("ignore"),
       z: () => this.#zone(), n: () => this.#walk(1), p: () => this.#walk(-1), Delete: () => this.#delete(),
       Escape: () => {
         this.#face.selected.clear();
@@ -259,6 +260,11 @@ class Room {
 
   #outline(action: "add" | "ignore"): void {
     this.#face.draw("polygon", (outline) => this.#add([{ ...this.#signed(action), outline }]));
+  }
+
+  /** A stone of which only the box is drawn: the detector outlines it in the photos. */
+  #box(): void {
+    this.#face.draw("box", (box) => this.#add([{ ...this.#signed("add"), box }]));
   }
 
   /** Another border: the stone goes, and one with the new border comes. */

@@ -176,8 +176,17 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   for (const [x, y] of [[0.1, 0.1], [0.2, 0.1], [0.2, 0.2]]) await click(x, y);
   await page.keyboard.press("Enter");
   await page.waitForSelector(".edits >> text=added");
-  await page.keyboard.press("Control+z");
-  await page.waitForFunction(() => !document.querySelector(".edits").textContent.includes("added"));
+  const takeBack = async () => {
+    await page.keyboard.press("Control+z");
+    await page.waitForFunction(() => !document.querySelector(".edits").textContent.includes("added"));
+  };
+  await takeBack();
+  // A box has two corners.
+  await page.keyboard.press("b");
+  for (const [x, y] of [[0.1, 0.1], [0.2, 0.2]]) await click(x, y);
+  await page.waitForSelector(".edits >> text=added");
+  await shot(page, "8-box");
+  await takeBack();
 
   // A zone with thresholds goes into the project file.
   await page.keyboard.press("z");

@@ -402,6 +402,9 @@ pub struct SegmentArgs {
     /// Lowest score of a stone to keep, 0 to 1.
     #[arg(long, value_name = "P")]
     pub min_score: Option<f64>,
+    /// Outline the stones in these boxes instead of finding stones: COCO json with a bbox for each stone.
+    #[arg(long, value_name = "FILE")]
+    pub boxes: Option<PathBuf>,
     /// Reference masks to score the result against: COCO json or a folder of label PNGs.
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,

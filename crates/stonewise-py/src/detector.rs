@@ -10,8 +10,8 @@ use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use stonewise::Settings;
 use stonewise_core::raster::RgbImage;
-use stonewise_segment::tiling::{TilingOptions, segment_photo};
-use stonewise_segment::{StoneFinder, Weights};
+use stonewise_segment::tiling::{TilingOptions, outline_boxes, segment_photo};
+use stonewise_segment::{Segmentation, StoneFinder, Weights};
 
 /// Stone of every pixel, and the score of each stone.
 type Found<'py> = (Bound<'py, PyArray2<i32>>, Vec<(u32, f32)>);
@@ -54,11 +54,34 @@ impl Detector {
             progress.begin("stones", self.tiling.tile_count(photo.width(), photo.height()));
             segment_photo(&self.finder, &photo, None, &self.tiling, progress).map_err(stonewise::Error::from)
         })?;
-        let found = found.map_err(explained)?;
-        let labels = found.labels.data().iter().map(|&l| l as i32).collect();
-        let labels = table(py, photo.height() as usize, photo.width() as usize, labels)?;
-        Ok((labels, found.scores.into_iter().collect()))
+        arrays(py, found.map_err(explained)?)
     }
+
+    /// Pixels of the stones in boxes (left, top, right, bottom), counted from 1, and the score of each stone.
+    fn outline<'py>(
+        &self,
+        py: Python<'py>,
+        image: PyReadonlyArray3<'py, u8>,
+        boxes: Vec<[f64; 4]>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Found<'py>> {
+        let photo = photo(&image).ok_or_else(|| error("an image of shape (height, width, 3) is needed"))?;
+        let found = attended(py, &Listeners::progress(progress), |progress| {
+            progress.begin("stones", boxes.len() as u64);
+            outline_boxes(&self.finder, &photo, None, &boxes, &self.tiling, progress)
+                .map_err(stonewise::Error::from)
+        })?;
+        arrays(py, found.map_err(explained)?)
+    }
+}
+
+fn arrays(py: Python<'_>, found: Segmentation) -> PyResult<Found<'_>> {
+    let (width, height) = (found.labels.width() as usize, found.labels.height() as usize);
+    let labels = found.labels.data().iter().map(|&l| l as i32).collect();
+    Ok((
+        table(py, height, width, labels)?,
+        found.scores.into_iter().collect(),
+    ))
 }
 
 /// The photo of an array of shape (height, width, 3).

@@ -22,6 +22,16 @@ impl StoneFinder {
     pub fn open(weights: &Weights, min_score: f32) -> Result<Self, WeightsError> {
         Ok(Self::new(open_model(weights, false)?.with_min_score(min_score)))
     }
+
+    /// The stones that boxes of an image hold, one a box, in their order ([`MaskRcnn::outline`]).
+    pub fn outline(
+        &self,
+        image: &RgbImage,
+        relief: Option<&ReliefMap>,
+        boxes: &[[f32; 4]],
+    ) -> Vec<Detection> {
+        self.0.outline(image, relief, boxes)
+    }
 }
 
 impl Detector for StoneFinder {

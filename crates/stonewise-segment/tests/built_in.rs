@@ -3,10 +3,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail here")]
 
+use std::collections::BTreeMap;
+use stonewise_core::progress::Silent;
 use stonewise_core::raster::{Raster, RgbImage};
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::{CocoMasks, ValidRegions};
-use stonewise_segment::tiling::TilingOptions;
+use stonewise_segment::evaluation::{MaskScore, pair_masks};
+use stonewise_segment::tiling::{TilingOptions, outline_boxes};
 use stonewise_segment::train::evaluate_samples;
 use stonewise_segment::train::synth::{Survey, SurveyKind, masonry_photo, surveyed_photo_by};
 use stonewise_segment::{Detector, Sample, StoneFinder, Weights};
@@ -47,6 +50,50 @@ fn relief_shows_the_built_in_weights_more_stones() {
     let (with, without) = (f1(&walls), f1(&photos));
     // 0.75 and 0.63 when the weights were built in.
     assert!(with > without + 0.05, "{with} with clouds, {without} without");
+}
+
+/// Boxes around the stones of a label image, a twentieth wider on every side: left, top, right, bottom.
+fn wide_boxes(labels: &Raster<u32>) -> BTreeMap<u32, [f64; 4]> {
+    let mut boxes: BTreeMap<u32, [f64; 4]> = BTreeMap::new();
+    for (i, label) in labels.data().iter().enumerate().filter(|(_, l)| **l != 0) {
+        let [x, y] = [i as u32 % labels.width(), i as u32 / labels.width()].map(f64::from);
+        let bounds = boxes.entry(*label).or_insert([x, y, x + 1.0, y + 1.0]);
+        *bounds = [
+            bounds[0].min(x),
+            bounds[1].min(y),
+            bounds[2].max(x + 1.0),
+            bounds[3].max(y + 1.0),
+        ];
+    }
+    for [left, top, right, bottom] in boxes.values_mut() {
+        let [dx, dy] = [(*right - *left) / 20.0, (*bottom - *top) / 20.0];
+        [*left, *top, *right, *bottom] = [*left - dx, *top - dy, *right + dx, *bottom + dy];
+    }
+    boxes
+}
+
+#[test]
+fn stones_in_boxes_are_outlined() {
+    let detector = built_in();
+    let mut pairs = Vec::new();
+    for wall in SEEDS.map(|seed| masonry_photo(seed, 320, 320)) {
+        let boxes: Vec<[f64; 4]> = wide_boxes(wall.labels()).into_values().collect();
+        let options = TilingOptions::default();
+        let found = outline_boxes(&detector, wall.image(), None, &boxes, &options, &Silent).unwrap();
+        assert!(
+            found
+                .scores
+                .keys()
+                .all(|label| (1..=boxes.len() as u32).contains(label))
+        );
+        pairs.push(pair_masks(&found, wall.labels(), wall.ignore()));
+    }
+    let score = MaskScore::of(&pairs);
+    println!("{score:?}");
+    assert!(
+        score.recall.unwrap() > 0.8 && score.mean_iou.unwrap() > 0.8,
+        "{score:?}"
+    );
 }
 
 #[test]

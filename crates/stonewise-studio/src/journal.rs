@@ -337,6 +337,7 @@ mod tests {
             at: vec![[along, 1.0]],
             line: Vec::new(),
             outline: Vec::new(),
+            corners: Vec::new(),
             who: "A. Keller".to_owned(),
             when: "2026-11-20".to_owned(),
             why: "door".to_owned(),

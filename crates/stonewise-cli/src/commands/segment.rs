@@ -33,10 +33,15 @@ fn refuse_options(args: &SegmentArgs) -> Result<()> {
     if let Some((_, option, parameter)) = parameters.iter().find(|(is_given, ..)| *is_given) {
         bail!("{file}: --{option} cannot be used with a project file; set {parameter} instead");
     }
-    if args.reference.is_some() {
-        bail!(
-            "{file}: --reference cannot be used with a project file; give the folder of its photos as input instead"
-        );
+    for (is_given, option) in [
+        (args.boxes.is_some(), "boxes"),
+        (args.reference.is_some(), "reference"),
+    ] {
+        if is_given {
+            bail!(
+                "{file}: --{option} cannot be used with a project file; give the folder of its photos as input instead"
+            );
+        }
     }
     Ok(())
 }
@@ -81,6 +86,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
             out: folder.path(),
             weights: &args.model.as_deref().map_or(Weights::BuiltIn, Weights::named),
             tiling: &tiling,
+            boxes: args.boxes.as_deref(),
             reference: reference.as_ref(),
         },
         printer,

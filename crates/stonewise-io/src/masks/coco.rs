@@ -57,7 +57,10 @@ struct RawAnnotation {
     image_id: u64,
     #[serde(default)]
     category_id: Option<u64>,
+    #[serde(default)]
     segmentation: RawSegmentation,
+    /// Left, top, width, height, pixels.
+    bbox: Option<[f64; 4]>,
     #[serde(default)]
     iscrowd: u8,
     score: Option<f64>,
@@ -79,6 +82,12 @@ enum RawSegmentation {
         size: [u32; 2],
         counts: String,
     },
+}
+
+impl Default for RawSegmentation {
+    fn default() -> Self {
+        Self::Polygons(Vec::new())
+    }
 }
 
 /// Horizontal runs (y, begin, end) of a mask, cut to the image.
@@ -206,6 +215,52 @@ impl CocoMasks {
             instances,
             warnings,
         }))
+    }
+
+    /// The boxes of a photo's annotations: left, top, right, bottom, pixels. `None` where the file does not list
+    /// the photo.
+    ///
+    /// # Errors
+    /// Two images of the file fit the name; the photo has another size; an annotation has no `bbox`, or an empty
+    /// one, or one outside the photo.
+    pub fn boxes_for(
+        &self,
+        photo_name: &str,
+        width: u32,
+        height: u32,
+    ) -> Result<Option<Vec<[f64; 4]>>, MaskError> {
+        let Some(image) = self.find(photo_name)? else {
+            return Ok(None);
+        };
+        MaskError::check_size(
+            &self.path,
+            photo_name,
+            (image.width, image.height),
+            (width, height),
+        )?;
+        let corners = |annotation: &RawAnnotation| {
+            let bounds = annotation.bbox.map(|[x, y, w, h]| [x, y, x + w, y + h]);
+            let [width, height] = [width, height].map(f64::from);
+            let shows = |[left, top, right, bottom]: &[f64; 4]| {
+                left < right
+                    && top < bottom
+                    && *left < width
+                    && *top < height
+                    && *right > 0.0
+                    && *bottom > 0.0
+            };
+            bounds.filter(shows).ok_or_else(|| MaskError::BadAnnotation {
+                path: self.path.clone(),
+                annotation: annotation.id,
+                problem: "it needs a bbox: left, top, width, height in pixels of the photo".to_owned(),
+            })
+        };
+        let annotations = self.annotations.get(&image.id).map_or(&[][..], Vec::as_slice);
+        annotations
+            .iter()
+            .map(corners)
+            .collect::<Result<_, _>>()
+            .map(Some)
     }
 
     /// The one image that fits a photo's name best.

@@ -43,7 +43,7 @@ pub enum Action {
     Split,
     /// There is no stone at the places `at`, or inside `outline`.
     Delete,
-    /// `outline` is a stone.
+    /// `outline` is a stone, or `box` holds one.
     Add,
     /// There are no stones inside `outline`.
     Ignore,
@@ -87,6 +87,9 @@ pub struct Edit {
     /// A polygon; the first vertex is not repeated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outline: Vec<[f64; 2]>,
+    /// Two opposite corners of a box on the wall; the detector outlines the stone in it.
+    #[serde(default, rename = "box", skip_serializing_if = "Vec::is_empty")]
+    pub corners: Vec<[f64; 2]>,
     /// Who decided it.
     pub who: String,
     /// When: a date, YYYY-MM-DD, with a time or without.
@@ -98,7 +101,7 @@ pub struct Edit {
 impl Edit {
     /// The vertices of its shape.
     pub fn shape(&self) -> &[[f64; 2]] {
-        [&self.at, &self.line, &self.outline]
+        [&self.at, &self.line, &self.outline, &self.corners]
             .into_iter()
             .find(|s| !s.is_empty())
             .map_or(&[], Vec::as_slice)
@@ -132,11 +135,13 @@ impl Edit {
             ("at", self.at.len()),
             ("line", self.line.len()),
             ("outline", self.outline.len()),
+            ("box", self.corners.len()),
         ];
         let fits = |key: &str| match self.action {
             Action::Merge | Action::Delete => key == "at" || key == "outline",
             Action::Split => key == "line" || key == "outline",
-            Action::Add | Action::Ignore => key == "outline",
+            Action::Add => key == "outline" || key == "box",
+            Action::Ignore => key == "outline",
         };
         let wanted = match self.action {
             Action::Merge => {
@@ -144,7 +149,10 @@ impl Edit {
             }
             Action::Delete => "\"at\" with a place [x, y] in each stone, or an \"outline\" around them",
             Action::Split => "\"line\" with two vertices [x, y] or more, or \"outline\" with three or more",
-            Action::Add | Action::Ignore => "\"outline\" with three vertices [x, y] or more",
+            Action::Add => {
+                "\"outline\" with three vertices [x, y] or more, or \"box\" with two opposite corners"
+            }
+            Action::Ignore => "\"outline\" with three vertices [x, y] or more",
         };
         let present: Vec<_> = given.into_iter().filter(|g| g.1 > 0).collect();
         let least = |key: &str| match (key, self.action) {
@@ -155,7 +163,9 @@ impl Edit {
         let [(key, vertices)] = present[..] else {
             return Some(format!("{word} needs {wanted}, and no other shape"));
         };
-        if !fits(key) || vertices < least(key) {
+        let is_no_box =
+            key == "box" && (vertices != 2 || (0..2).any(|k| self.corners[0][k] == self.corners[1][k]));
+        if !fits(key) || vertices < least(key) || is_no_box {
             return Some(format!("{word} needs {wanted}"));
         }
         let shape = self.shape();
@@ -168,6 +178,9 @@ impl Edit {
             return Some(format!(
                 "a coordinate beyond {MAX_COORDINATE}: shapes are in {frame}"
             ));
+        }
+        if self.photo.is_some() && key == "box" {
+            return Some("a \"box\" lies on the wall: leave out \"photo\"".to_owned());
         }
         if self.photo.is_none() && self.epoch.is_some() {
             return Some(
@@ -409,6 +422,12 @@ mod tests {
                 "larger than a wall",
             ),
             (r#""do": "delete", "at": [[1, 4e9]]"#, "a coordinate beyond"),
+            (r#""do": "ignore", "box": [[0, 0], [1, 1]]"#, "ignore needs"),
+            (r#""do": "add", "box": [[0, 0], [0, 1]]"#, "two opposite corners"),
+            (
+                r#""do": "add", "photo": "a.jpg", "box": [[0, 0], [1, 1]]"#,
+                "lies on the wall",
+            ),
             (r#""do": "remove", "at": [[1, 2]]"#, "unknown variant `remove`"),
             (
                 r#""do": "delete", "at": [[1, 2]], "because": "x""#,

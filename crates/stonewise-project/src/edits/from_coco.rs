@@ -86,6 +86,7 @@ pub(super) fn edits(path: &Path, epoch: Option<&str>, signed: &Signed) -> Result
                 at: Vec::new(),
                 line: Vec::new(),
                 outline: polygon.chunks_exact(2).map(|p| [p[0], p[1]]).collect(),
+                corners: Vec::new(),
                 who: text("who", &signed.who),
                 when: text("when", &signed.when),
                 why: text("why", &signed.why),

@@ -24,6 +24,7 @@ impl Signed {
             at: Vec::new(),
             line: Vec::new(),
             outline: Vec::new(),
+            corners: Vec::new(),
             who: self.who,
             when: self.when,
             why: self.why,

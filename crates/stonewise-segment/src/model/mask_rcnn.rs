@@ -126,29 +126,51 @@ impl MaskRcnn {
     /// The stones of an image, best score first; none where the image shows neither an edge nor a texture.
     /// `relief`: that of the whole image, at any resolution.
     pub fn detect(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Vec<Detection> {
-        let size = [image.width(), image.height()];
-        let detection = |instance: Instance| Detection {
-            bounds: instance.bounds,
-            score: instance.score,
-            mask: paste_mask(
-                &instance.mask,
-                2 * self.config.roi.mask_cells,
-                instance.bounds,
-                size,
-            ),
-        };
         let instances = self.instances(image, relief).into_iter();
         instances
             .filter(|i| has_contrast(image, i.bounds))
-            .map(detection)
+            .map(|i| self.pasted(&i, image))
             .collect()
+    }
+
+    /// The stones that boxes of an image hold, one a box, in their order: what the heads say of regions that
+    /// a person gives instead of the proposal network.
+    ///
+    /// `boxes`: left, top, right, bottom, pixels. The box head fits each to its stone before the mask is
+    /// drawn; the score is the probability that there is one.
+    pub fn outline(&self, image: &RgbImage, relief: Option<&ReliefMap>, boxes: &[Bounds]) -> Vec<Detection> {
+        let (seen, sight) = self.look_at(image, relief);
+        let [sx, sy] = seen.scale;
+        let regions: Vec<Bounds> = boxes
+            .iter()
+            .map(|[left, top, right, bottom]| [left * sx, top * sy, right * sx, bottom * sy])
+            .collect();
+        let judged = self.judged(&sight.rows, &regions, seen);
+        let best = |of_region: &[Instance]| {
+            of_region
+                .iter()
+                .max_by(|a, b| a.score.total_cmp(&b.score))
+                .cloned()
+        };
+        let mut found: Vec<Instance> = judged.chunks(self.config.classes - 1).filter_map(best).collect();
+        self.draw(&sight.rows, &mut found, seen, image);
+        found.iter().map(|i| self.pasted(i, image)).collect()
+    }
+
+    /// An object with its mask in the pixels of the image.
+    fn pasted(&self, instance: &Instance, image: &RgbImage) -> Detection {
+        let size = [image.width(), image.height()];
+        let cells = 2 * self.config.roi.mask_cells;
+        Detection {
+            bounds: instance.bounds,
+            score: instance.score,
+            mask: paste_mask(&instance.mask, cells, instance.bounds, size),
+        }
     }
 
     /// The objects of an image, best score first, their masks still on the model's grid.
     pub fn instances(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> Vec<Instance> {
-        let seen = Seen::new(image, self.config.resize);
-        let images = batch(&[image], &[seen], &self.config);
-        let sight = self.look(&images, &[relief], &[seen]);
+        let (seen, sight) = self.look_at(image, relief);
         let [before, after] = [
             self.config.proposals.before_nms[1],
             self.config.proposals.after_nms[1],
@@ -162,13 +184,26 @@ impl MaskRcnn {
             &self.config.proposals,
         );
         let mut found = self.classify(&sight.rows, &regions, seen);
+        self.draw(&sight.rows, &mut found, seen, image);
+        found
+    }
+
+    /// One image at the size of the model.
+    fn look_at(&self, image: &RgbImage, relief: Option<&ReliefMap>) -> (Seen, Sight) {
+        let seen = Seen::new(image, self.config.resize);
+        let images = batch(&[image], &[seen], &self.config);
+        (seen, self.look(&images, &[relief], &[seen]))
+    }
+
+    /// Gives objects their masks, and bounds in pixels of the image instead of the model's.
+    fn draw(&self, rows: &FeatureRows, found: &mut [Instance], seen: Seen, image: &RgbImage) {
         if found.is_empty() {
-            return found;
+            return;
         }
         let regions: Vec<_> = found.iter().map(|instance| (0, instance.bounds)).collect();
         let masks = self
             .roi_heads
-            .masks(sight.rows.cut(&regions, &self.align(self.config.roi.mask_cells)));
+            .masks(rows.cut(&regions, &self.align(self.config.roi.mask_cells)));
         let classes = found.iter().map(|instance| instance.class).enumerate();
         let masks = of_classes(masks, classes);
         let cells = masks.values().len() / found.len();
@@ -179,7 +214,6 @@ impl MaskRcnn {
             let bounds = [left / sx, top / sy, right / sx, bottom / sy];
             instance.bounds = clip(bounds, image.width() as f32, image.height() as f32);
         }
-        found
     }
 
     /// Looks at images [batch, 3, rows, columns] and their relief.
@@ -205,6 +239,20 @@ impl MaskRcnn {
 
     /// The objects in regions of one image, best first, without masks; bounds in pixels of the model.
     fn classify(&self, rows: &FeatureRows, regions: &[Bounds], seen: Seen) -> Vec<Instance> {
+        let mut found = self.judged(rows, regions, seen);
+        found.retain(|i| i.score > self.config.score_threshold && is_large(i.bounds, MIN_SIDE));
+        let bounds: Vec<Bounds> = found.iter().map(|i| i.bounds).collect();
+        let scores: Vec<f32> = found.iter().map(|i| i.score).collect();
+        let classes: Vec<usize> = found.iter().map(|i| i.class).collect();
+        let best = suppress(&bounds, &scores, &classes, self.config.nms_iou).into_iter();
+        best.take(self.config.detections)
+            .map(|place| found[place].clone())
+            .collect()
+    }
+
+    /// What the box head says of regions of one image: for each region every class but the background, without
+    /// masks; bounds in pixels of the model.
+    fn judged(&self, rows: &FeatureRows, regions: &[Bounds], seen: Seen) -> Vec<Instance> {
         if regions.is_empty() {
             return Vec::new();
         }
@@ -216,31 +264,20 @@ impl MaskRcnn {
         let classes = self.config.classes;
         let scores: Vec<f32> = logits.values().chunks(classes).flat_map(softmax).collect();
         let offsets = offsets.values();
-        let (mut boxes, mut kept_scores, mut kept_classes) = (Vec::new(), Vec::new(), Vec::new());
-        for (region, &reference) in regions.iter().enumerate() {
-            for class in 1..classes {
-                let place = region * classes + class;
-                let offset = &offsets[4 * place..][..4];
-                let offset = [offset[0], offset[1], offset[2], offset[3]];
-                let bounds = clip(decode(reference, offset, HEAD_WEIGHTS), width, height);
-                if scores[place] > self.config.score_threshold && is_large(bounds, MIN_SIDE) {
-                    boxes.push(bounds);
-                    kept_scores.push(scores[place]);
-                    kept_classes.push(class);
-                }
-            }
-        }
-        let best = suppress(&boxes, &kept_scores, &kept_classes, self.config.nms_iou);
-        let instance = |place: usize| Instance {
-            bounds: boxes[place],
-            class: kept_classes[place],
-            score: kept_scores[place],
-            mask: Vec::new(),
+        let judge = |(region, &reference): (usize, &Bounds)| {
+            (1..classes).map(move |class| (region * classes + class, class, reference))
         };
-        best.into_iter()
-            .take(self.config.detections)
-            .map(instance)
-            .collect()
+        let instance = |(place, class, reference): (usize, usize, Bounds)| {
+            let offset = &offsets[4 * place..][..4];
+            let offset = [offset[0], offset[1], offset[2], offset[3]];
+            Instance {
+                bounds: clip(decode(reference, offset, HEAD_WEIGHTS), width, height),
+                class,
+                score: scores[place],
+                mask: Vec::new(),
+            }
+        };
+        regions.iter().enumerate().flat_map(judge).map(instance).collect()
     }
 
     /// How regions are cut into this number of cells along a side.

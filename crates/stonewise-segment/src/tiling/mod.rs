@@ -10,11 +10,13 @@ mod choice;
 mod grid;
 mod merge;
 mod options;
+mod outline;
 mod overlap;
 mod pyramid;
 mod segment;
 
 pub use options::TilingOptions;
+pub use outline::outline_boxes;
 pub(crate) use pyramid::at_scale;
 pub use segment::{TilingError, segment_photo};
 

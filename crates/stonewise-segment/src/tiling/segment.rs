@@ -76,13 +76,13 @@ pub fn segment_photo<D: Detector>(
 }
 
 /// A photo at one size.
-struct Size {
-    image: RgbImage,
-    scaling: Scaling,
+pub(super) struct Size {
+    pub image: RgbImage,
+    pub scaling: Scaling,
 }
 
 impl Size {
-    fn of(photo: &RgbImage, scales: &[f64], index: usize) -> Self {
+    pub fn of(photo: &RgbImage, scales: &[f64], index: usize) -> Self {
         let image = at_scale(photo, scales[index]);
         let scaling = Scaling {
             index,
@@ -102,7 +102,7 @@ impl Size {
     }
 
     /// The relief of a tile.
-    fn relief(&self, relief: &ReliefMap, tile: &Rect) -> ReliefMap {
+    pub fn relief(&self, relief: &ReliefMap, tile: &Rect) -> ReliefMap {
         let [width, height] = self.scaling.scaled.map(f64::from);
         let part = [
             f64::from(tile.left) / width,

@@ -12,10 +12,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise_core::progress::Progress;
 use stonewise_io::image_io::{image_size, photos_in, read_rgb, write_jpeg};
-use stonewise_io::masks::{CocoFile, CocoPhoto, InstanceInfo, read_label_png, write_label_png};
+use stonewise_io::masks::{CocoFile, CocoMasks, CocoPhoto, InstanceInfo, read_label_png, write_label_png};
 use stonewise_segment::dataset::Reference;
 use stonewise_segment::evaluation::{MaskScore, PhotoPairs, pair_masks};
-use stonewise_segment::tiling::{TilingOptions, segment_photo};
+use stonewise_segment::tiling::{TilingOptions, outline_boxes, segment_photo};
 use stonewise_segment::{Segmentation, StoneFinder, Weights};
 
 const STEP: &str = "segment";
@@ -33,6 +33,8 @@ pub struct FolderJob<'a> {
     pub weights: &'a Weights,
     /// How photos are cut into tiles.
     pub tiling: &'a TilingOptions,
+    /// A COCO file with a box for each stone; absent: the detector finds the stones.
+    pub boxes: Option<&'a Path>,
     /// Masks to measure the result on.
     pub reference: Option<&'a Reference>,
 }
@@ -79,7 +81,7 @@ struct Done {
     scores: BTreeMap<u32, f32>,
 }
 
-/// Finds the stones of all photos of a folder and writes, in `out`:
+/// Finds the stones of all photos of a folder, or outlines those in given boxes, and writes, in `out`:
 ///
 /// - `labels/NAME.png`: stone of every pixel, 16 bits,
 /// - `overlays/NAME.jpg`: the photo with the outlines of its stones,
@@ -95,14 +97,24 @@ struct Done {
 pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<FolderSummary> {
     let (root, photos) = photos_of(job.photos)?;
     let detector = blake3::hash(&job.weights.bytes()?).to_hex().to_string();
-    let key = Key::new(STEP, job.tiling, &[&detector]);
+    let boxes = job.boxes.map(CocoMasks::open).transpose()?;
+    let digest = job.boxes.map(path_digest).transpose()?;
+    let key = Key::new(STEP, &(job.tiling, digest), &[&detector]);
     let step = StepDir::open(job.out.join("work").join(STEP), key)?;
     let detector = StoneFinder::open(job.weights, job.tiling.min_score as f32)?;
     let warnings = Warnings::default();
-    let tiles = |photo: &PathBuf| image_size(photo).map_or(0, |(w, h)| job.tiling.tile_count(w, h));
+    // Tiles, or boxes.
+    let work = |photo: &PathBuf| match (image_size(photo), &boxes) {
+        (Ok((width, height)), None) => job.tiling.tile_count(width, height),
+        (Ok((width, height)), Some(boxes)) => {
+            let of_photo = boxes.boxes_for(&photo.to_string_lossy(), width, height);
+            of_photo.ok().flatten().map_or(0, |b| b.len() as u64)
+        }
+        (Err(_), _) => 0,
+    };
     progress.agenda(&["stones in the photos".to_owned()]);
     progress.enter(0);
-    progress.begin("stones", photos.iter().map(tiles).sum());
+    progress.begin("stones", photos.iter().map(work).sum());
     let mut masks = CocoFile::default();
     let (mut count, mut stones) = (0, 0);
     let mut scores: Vec<(String, PhotoPairs)> = Vec::new();
@@ -112,7 +124,7 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
         let name = photo.strip_prefix(&root).unwrap_or(photo);
         let segmented = match taken_over(job, &step, photo, name)? {
             Some(segmented) => {
-                progress.advance(tiles(photo));
+                progress.advance(work(photo));
                 segmented
             }
             None => {
@@ -123,7 +135,15 @@ pub fn segment_folder(job: &FolderJob, progress: &dyn Progress) -> Result<Folder
                         continue;
                     }
                 };
-                let segmented = segment_photo(&detector, &image, None, job.tiling, progress)?;
+                let segmented = match &boxes {
+                    None => segment_photo(&detector, &image, None, job.tiling, progress)?,
+                    Some(boxes) => {
+                        let of_photo =
+                            boxes.boxes_for(&photo.to_string_lossy(), image.width(), image.height())?;
+                        let of_photo = of_photo.unwrap_or_default();
+                        outline_boxes(&detector, &image, None, &of_photo, job.tiling, progress)?
+                    }
+                };
                 let overlay = file_in(&job.out.join("overlays"), name, "jpg")?;
                 write_jpeg(&overlay, &outlined(&image, &segmented.labels), JPEG_QUALITY)?;
                 let labels = label_path(job, name)?;

@@ -4,6 +4,7 @@
 //! votes are taken over from a run without them, and stones that no edit touches keep their points and their
 //! number.
 
+mod boxes;
 mod photo_places;
 
 use super::carry::CARRY;

@@ -1,5 +1,6 @@
-//! Edits drawn in photos, brought onto the wall.
+//! Edits drawn in photos, and boxes whose stones photos show, brought onto the wall.
 
+use super::boxes::stones_in_boxes;
 use crate::edits::{Edit, EditsFile, photo_named};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
@@ -16,6 +17,7 @@ use stonewise_core::cloud::TileSource;
 use stonewise_core::epoch::Epochs;
 use stonewise_core::geometry::{Bounds, Plane, View, cell_of};
 use stonewise_core::transfer::NoEffect;
+use stonewise_segment::Weights;
 
 /// Points of stones this far from the ray of a pixel say where the face is, metres: the neighbourhood in
 /// which a stone's normal is found.
@@ -31,8 +33,8 @@ const RELIEF_M: f64 = 0.1;
 /// Where an edit lies on the wall, or why it lies nowhere.
 pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
-/// Where each edit lies on the unrolled wall: its own shape, or the pixels of its photo carried along their
-/// rays onto the stones that the photo's epoch shows there.
+/// Where each edit lies on the unrolled wall: its own shape, the pixels of its photo carried along their rays
+/// onto the stones that the photo's epoch shows there, or the stone that photos show in its box.
 pub(super) fn photo_places(
     run: &Run,
     file: &EditsFile,
@@ -47,24 +49,42 @@ pub(super) fn photo_places(
         .collect();
     for (id, labelled) in labelled.with_ids() {
         let name = &context.project.epochs[id].name;
-        let is_here = |edit: &&Edit| edit.epoch.as_ref().map_or(id.is_reference(), |e| e == name);
-        let drawn = file.edits.iter().enumerate().filter(|(_, e)| e.photo.is_some());
-        let drawn: Vec<(usize, &Edit)> = drawn.filter(|(_, e)| is_here(e)).collect();
-        if drawn.is_empty() {
+        let is_here = |edit: &Edit| edit.epoch.as_ref().map_or(id.is_reference(), |e| e == name);
+        let concerned = |edit: &Edit| context.project.epochs.iter().find(|e| edit.concerns(&e.name));
+        let is_boxed_here = |edit: &Edit| concerned(edit).is_some_and(|e| e.name == *name);
+        let (mut drawn, mut boxed) = (Vec::new(), Vec::new());
+        for (index, edit) in file.edits.iter().enumerate() {
+            match (edit.photo.is_some(), edit.corners.is_empty()) {
+                (true, _) if is_here(edit) => drawn.push((index, edit)),
+                (false, false) if is_boxed_here(edit) => boxed.push((index, edit)),
+                _ => {}
+            }
+        }
+        if drawn.is_empty() && boxed.is_empty() {
             continue;
         }
         let shapes: Vec<_> = drawn.iter().map(|(_, e)| (&e.photo, e.shape())).collect();
-        let key = Key::new("edit-places", &(&shapes, wall), &[labelled.key.as_str()]);
+        let boxes: Vec<_> = boxed.iter().map(|(_, e)| e.shape()).collect();
+        let segment = (!boxes.is_empty()).then_some(&context.project.settings.segment);
+        let weights = match segment.map(|s| Weights::named(&s.model)) {
+            Some(weights) => blake3::hash(&weights.bytes()?).to_hex().to_string(),
+            None => String::new(),
+        };
+        let inputs = [labelled.key.as_str(), weights.as_str()];
+        let key = Key::new("edit-places", &(&shapes, &boxes, segment, wall), &inputs);
         let step = context.step(&format!("edit-places-{id}"), key, |step, _| {
             let mut found: Vec<Places> = Vec::new();
             let photos = run.posed(id)?;
             for (_, edit) in &drawn {
                 found.push(carry(context, edit, wall, &photos, labelled)?);
             }
+            if !boxes.is_empty() {
+                found.extend(stones_in_boxes(context, &boxes, wall, &photos, labelled)?);
+            }
             write_json(&step.file(PLACES), &found)
         })?;
         let found: Vec<Places> = read_json(&step.file(PLACES))?;
-        for ((index, _), found) in drawn.into_iter().zip(found) {
+        for ((index, _), found) in drawn.into_iter().chain(boxed).zip(found) {
             places[index] = found;
         }
     }
