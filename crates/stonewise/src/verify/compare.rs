@@ -40,18 +40,48 @@ impl Tolerance {
         relative: 0.1,
     };
 
+    /// The same for turns of stones that photos alone show: 0.1 mm on a stone of a few centimetres.
+    const TURNS: Self = Self {
+        absolute: 3e-3,
+        relative: 0.1,
+    };
+    /// The same for probabilities, some of which are shares of 999 simulations.
+    const PROBABILITIES: Self = Self {
+        absolute: 2e-2,
+        relative: 3e-2,
+    };
+    /// The same for lengths in millimetres and pixels.
+    const MILLIMETRES: Self = Self {
+        absolute: 3e-2,
+        relative: 3e-2,
+    };
+
+    /// Which of two photos that show a stone equally well its picture is cut from.
+    const CHOICE: Self = Self {
+        absolute: f64::INFINITY,
+        relative: 0.0,
+    };
+
     /// The tolerance between machines for a quantity of this name.
     pub fn of_machines(name: &str) -> Self {
         match name {
+            "photo_1" | "photo_2" => Self::CHOICE,
+            "p" => Self::PROBABILITIES,
+            "turn_rad" | "turn_sd_rad" => Self::TURNS,
+            name if name.starts_with("p_") => Self::PROBABILITIES,
+            name if name.ends_with("_mm") || name.ends_with("_px") => Self::MILLIMETRES,
             name if name.contains("cov") => Self::VARIANCES,
             name if name.starts_with("photos_") || name.starts_with("shift_") => Self::PHOTOS,
             _ => Self::MACHINES,
         }
     }
 
-    fn admits(self, a: f64, b: f64) -> bool {
+    /// `size`: what the relative part refers to if the numbers themselves are smaller. A covariance is small
+    /// beside the variances that it belongs to where their errors are independent.
+    fn admits(self, a: f64, b: f64, size: f64) -> bool {
         let apart = (a - b).abs();
-        a == b || (a.is_nan() && b.is_nan()) || apart <= self.absolute + self.relative * a.abs().max(b.abs())
+        let size = a.abs().max(b.abs()).max(size);
+        a == b || (a.is_nan() && b.is_nan()) || apart <= self.absolute + self.relative * size
     }
 }
 
@@ -66,12 +96,13 @@ pub(super) fn first_difference(
     b: &Value,
     tolerance: &dyn Fn(&str) -> Tolerance,
 ) -> Option<String> {
-    different_at("", "", a, b, tolerance)
+    different_at("", "", 0.0, a, b, tolerance)
 }
 
 fn different_at(
     path: &str,
     name: &str,
+    size: f64,
     a: &Value,
     b: &Value,
     tolerance: &dyn Fn(&str) -> Tolerance,
@@ -86,19 +117,30 @@ fn different_at(
             names
                 .filter_map(|key| {
                     let values = [a.get(key), b.get(key)].map(|v| v.unwrap_or(&Value::Null));
-                    different_at(&below(key), key, values[0], values[1], tolerance)
+                    different_at(&below(key), key, 0.0, values[0], values[1], tolerance)
                 })
                 .next()
         }
-        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => a
-            .iter()
-            .zip(b)
-            .enumerate()
-            .find_map(|(i, (a, b))| different_at(&below(&i.to_string()), name, a, b, tolerance)),
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            let deviations = deviations(name, a);
+            let row = |(i, (a, b)): (usize, (&Value, &Value))| {
+                let path = below(&i.to_string());
+                match (&deviations, a, b) {
+                    (Some(sd), Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+                        let mut cells = a.iter().zip(b).zip(sd).enumerate();
+                        cells.find_map(|(j, ((a, b), other))| {
+                            different_at(&format!("{path}.{j}"), name, sd[i] * other, a, b, tolerance)
+                        })
+                    }
+                    _ => different_at(&path, name, 0.0, a, b, tolerance),
+                }
+            };
+            a.iter().zip(b).enumerate().find_map(row)
+        }
         // Counts and numbers of stones are equal or not.
         (Value::Number(x), Value::Number(y)) if !(x.is_u64() && y.is_u64()) => {
             let [x, y] = [x, y].map(|n| n.as_f64().unwrap_or(f64::NAN));
-            (!tolerance(name).admits(x, y)).then(|| format!("{path}: {a} and {b}"))
+            (!tolerance(name).admits(x, y, size)).then(|| format!("{path}: {a} and {b}"))
         }
         // Sentences repeat numbers that stand elsewhere.
         (Value::String(x), Value::String(y))
@@ -109,6 +151,21 @@ fn different_at(
         _ if a == b => None,
         _ => Some(format!("{path}: {} and {}", brief(a), brief(b))),
     }
+}
+
+/// The standard deviations of a covariance matrix; `None` of anything else.
+fn deviations(name: &str, rows: &[Value]) -> Option<Vec<f64>> {
+    let variance = |(i, row): (usize, &Value)| {
+        let row = row.as_array().filter(|row| row.len() == rows.len())?;
+        row[i].as_f64()
+    };
+    let variances = rows
+        .iter()
+        .enumerate()
+        .map(variance)
+        .collect::<Option<Vec<f64>>>()?;
+    name.contains("cov")
+        .then(|| variances.into_iter().map(f64::sqrt).collect())
 }
 
 fn without_numbers(text: &str) -> String {
@@ -124,26 +181,61 @@ fn brief(value: &Value) -> String {
     }
 }
 
+/// Columns of the variances that belong to a column such as `cov_rel_xy` or `shift_cov_along_up`: by letters or by
+/// words.
+fn variances_of(name: &str) -> Vec<[String; 2]> {
+    let Some((stem, last)) = name.rsplit_once('_').filter(|_| name.contains("cov")) else {
+        return Vec::new();
+    };
+    let letters: Vec<char> = last.chars().collect();
+    let by_letters = match letters.as_slice() {
+        [a, b] => Some([a, b].map(|axis| format!("{stem}_{axis}{axis}"))),
+        _ => None,
+    };
+    let by_words = stem
+        .rsplit_once('_')
+        .map(|(stem, first)| [first, last].map(|axis| format!("{stem}_{axis}_{axis}")));
+    by_letters.into_iter().chain(by_words).collect()
+}
+
 /// Where two tables of text differ first by more than the tolerance of the column, in words.
 pub(super) fn first_cell(a: &str, b: &str, tolerance: &dyn Fn(&str) -> Tolerance) -> Option<String> {
     let head: Vec<&str> = a.lines().next().unwrap_or_default().split(',').collect();
+    // Of a covariance: the product of the standard deviations in the same row.
+    let size = |name: &str, cells: &[&str]| {
+        let variance = |name: String| {
+            let column = head.iter().position(|other| *other == name)?;
+            cells.get(column)?.parse::<f64>().ok()
+        };
+        let all = variances_of(name).into_iter();
+        let product = |[a, b]: [String; 2]| Some((variance(a)? * variance(b)?).sqrt());
+        all.filter_map(product).next().unwrap_or(0.0)
+    };
     for (number, (x, y)) in a.lines().zip(b.lines()).enumerate() {
         if x == y {
             continue;
         }
-        let (x, y): (Vec<&str>, Vec<&str>) = (x.split(',').collect(), y.split(',').collect());
+        let cells: [Vec<&str>; 2] = [x, y].map(|line| line.split(',').collect());
         let place = |column: usize| {
             let name = head.get(column).copied().unwrap_or_default();
             format!("line {}, column {name}", number + 1)
         };
-        if x.len() != y.len() {
-            return Some(format!("line {}: {} and {} cells", number + 1, x.len(), y.len()));
+        let counts = [cells[0].len(), cells[1].len()];
+        if counts[0] != counts[1] {
+            return Some(format!(
+                "line {}: {} and {} cells",
+                number + 1,
+                counts[0],
+                counts[1]
+            ));
         }
-        for (column, (x, y)) in x.iter().zip(&y).enumerate() {
-            let tolerance = tolerance(head.get(column).copied().unwrap_or_default());
+        for (column, (x, y)) in cells[0].iter().zip(&cells[1]).enumerate() {
+            let name = head.get(column).copied().unwrap_or_default();
+            let tolerance = tolerance(name);
             let are_counts = [x, y].iter().all(|cell| cell.parse::<u64>().is_ok());
             let is_same = match (x.parse::<f64>(), y.parse::<f64>()) {
-                (Ok(x), Ok(y)) if !are_counts => tolerance.admits(x, y),
+                _ if tolerance.absolute.is_infinite() => true,
+                (Ok(x), Ok(y)) if !are_counts => tolerance.admits(x, y, size(name, &cells[0])),
                 _ => x == y,
             };
             if !is_same {
@@ -173,6 +265,14 @@ mod tests {
         let wider = json!({ "n": 3, "wall": { "rmse_m": [1.0, 2.0], "cov": 1.5e-8 } });
         assert!(first_difference(&a, &wider, &machines).is_some());
         assert!(first_difference(&a, &json!({ "n": 3 }), &machines).is_some());
+        // Almost independent errors: what their covariance is says nothing beside their variances.
+        let matrix = |off: f64| json!({ "covariance": [[1e-6, off], [off, 1e-4]] });
+        assert_eq!(first_difference(&matrix(1e-8), &matrix(5e-7), &machines), None);
+        let difference = first_difference(&matrix(1e-8), &matrix(3e-6), &machines).unwrap();
+        assert!(difference.starts_with("covariance.0.1: "), "{difference}");
+        let [half, less, much_less] = [0.5, 0.49, 0.45].map(|p| json!({ "p": p }));
+        assert_eq!(first_difference(&half, &less, &machines), None);
+        assert!(first_difference(&half, &much_less, &machines).is_some());
         let [said, other] = ["limit 2.1 mm", "limit 2.0 mm"].map(|text| json!({ "sentence": text }));
         assert_eq!(first_difference(&said, &other, &machines), None);
         assert!(first_difference(&said, &other, &exact).is_some());
@@ -185,6 +285,19 @@ mod tests {
         assert_eq!(first_cell(a, &a.replace("0.01", "0.010005"), &machines), None);
         let moved = first_cell(a, &a.replace("0.01", "0.0105"), &machines);
         assert_eq!(moved.unwrap(), "line 2, column dx: \"0.01\" and \"0.0105\"");
+        let table = |off: &str| format!("stone_id,cov_xx,cov_xy,cov_yy\n1,1e-6,{off},1e-4\n");
+        assert_eq!(first_cell(&table("1e-8"), &table("5e-7"), &machines), None);
+        let other = first_cell(&table("1e-8"), &table("3e-6"), &machines).unwrap();
+        assert!(other.starts_with("line 2, column cov_xy"), "{other}");
+        let by_words = |text: String| {
+            text.replace("cov_xx", "shift_cov_along_along")
+                .replace("cov_xy", "shift_cov_along_up")
+                .replace("cov_yy", "shift_cov_up_up")
+        };
+        assert_eq!(
+            first_cell(&by_words(table("1e-8")), &by_words(table("5e-7")), &machines),
+            None
+        );
         let many = a.replace("\n1,", "\n100,");
         assert!(first_cell(&many, &many.replace("100,", "101,"), &machines).is_some());
         for (from, to) in [
