@@ -25,6 +25,14 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
         .map_err(Error::io("writing", path))
 }
 
+/// Whether something lies there. A file that cannot be looked at is not taken for a missing one.
+///
+/// # Errors
+/// It cannot be looked at.
+pub fn is_there(path: &Path) -> Result<bool> {
+    path.try_exists().map_err(Error::io("looking at", path))
+}
+
 /// Reads a file as it is.
 ///
 /// # Errors

@@ -8,31 +8,14 @@
 
 mod support;
 
-use std::collections::BTreeMap;
-use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Dice, contents, program, run, tiny_survey};
+use support::{Dice, contents, damage, program, results, run, tiny_survey};
 
 /// Kills where the environment does not say how many.
 const KILLS: usize = 20;
-
-/// Result files with their bytes; not those that hold times, and not what lies aside or is stonewise's own.
-fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let but = [
-        "work",
-        "previous",
-        "UNFINISHED.txt",
-        "run.json",
-        "digests.b3",
-        "report",
-    ];
-    let all = contents(out, &but).into_iter();
-    all.filter(|(name, _)| !name.to_string_lossy().ends_with(".partial"))
-        .collect()
-}
 
 fn start(out: &Path) -> Child {
     Command::new(program())
@@ -92,27 +75,6 @@ fn kill_in(out: &Path, number: usize, wait: Duration) -> Option<usize> {
     child.wait().unwrap();
     at = lines.filter_map(reached).last().or(at);
     at.filter(|_| at_work)
-}
-
-/// Flips a bit of, cuts, or removes a random file of a random step. The stamp of a step stays: a folder
-/// without one is not stonewise's, and a run refuses to empty it.
-fn damage(out: &Path, dice: &mut Dice) {
-    let files = contents(&out.join("work"), &["lock", "marker.json"]);
-    if files.is_empty() {
-        return;
-    }
-    let (name, mut bytes) = files[dice.next() as usize % files.len()].clone();
-    let path = out.join("work").join(name);
-    match dice.next() % 3 {
-        0 if !bytes.is_empty() => {
-            let at = dice.next() as usize % bytes.len();
-            bytes[at] ^= 1 << (dice.next() % 8);
-            fs::write(path, bytes).unwrap();
-        }
-        1 => fs::write(path, &bytes[..bytes.len() / 2]).unwrap(),
-        _ if path.ends_with("step.json") => {}
-        _ => fs::remove_file(path).unwrap(),
-    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_base::error::Error;
+use stonewise_base::files::is_there;
 use stonewise_core::evaluate::Evaluation;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::stone::NeighbourCovariance;
@@ -96,7 +97,7 @@ impl ResultSet {
     /// As [`Self::read_pair`].
     pub fn read_measured(dir: &Path, pair: usize) -> Result<Self, Error> {
         let path = dir.join(PairFile::StonesParquet.name(pair));
-        if !path.exists() {
+        if !is_there(&path)? {
             return Err(Error::NoResults(dir.into()));
         }
         let mut stones = read_stones(&path)?;
@@ -110,9 +111,7 @@ impl ResultSet {
             stones,
             outlines,
             pair,
-            pairs: (1..)
-                .take_while(|p| dir.join(PairFile::StonesParquet.name(*p)).exists())
-                .count(),
+            pairs: pairs_in(dir)?,
             distances: core.distances,
             without_distance: core.without_distance,
             evaluation: read_json(&dir.join(PairFile::Evaluation.name(pair)))?,
@@ -212,6 +211,15 @@ pub fn facade_of(
         known = centroids.into_iter().map(|c| (c, normal)).collect();
     }
     Facade::new(&known)
+}
+
+/// Number of pairs of epochs that have a stone table.
+fn pairs_in(dir: &Path) -> Result<usize, Error> {
+    let mut pairs = 0;
+    while is_there(&dir.join(PairFile::StonesParquet.name(pairs + 1)))? {
+        pairs += 1;
+    }
+    Ok(pairs)
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>, Error> {

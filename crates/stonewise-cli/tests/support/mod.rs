@@ -4,6 +4,7 @@
 pub mod stones;
 
 use assert_cmd::Command;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -177,7 +178,10 @@ pub fn run(survey: &Path, out: &Path, extra: &[&str]) -> (i32, String) {
 /// Every file below a folder with its bytes, ascending by name; `but`: names at its top that are left out.
 pub fn contents(folder: &Path, but: &[&str]) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
-    let mut open = vec![folder.to_path_buf()];
+    let mut open: Vec<PathBuf> = [folder.to_path_buf()]
+        .into_iter()
+        .filter(|dir| dir.exists())
+        .collect();
     while let Some(dir) = open.pop() {
         for path in fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()) {
             let below = path.strip_prefix(folder).unwrap().to_path_buf();
@@ -193,4 +197,40 @@ pub fn contents(folder: &Path, but: &[&str]) -> Vec<(PathBuf, Vec<u8>)> {
     }
     files.sort();
     files
+}
+
+/// Result files with their bytes; not those that hold times, and not what lies aside or is stonewise's own.
+pub fn results(out: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let but = [
+        "work",
+        "previous",
+        "UNFINISHED.txt",
+        "run.json",
+        "digests.b3",
+        "report",
+    ];
+    let all = contents(out, &but).into_iter();
+    all.filter(|(name, _)| !name.to_string_lossy().ends_with(".partial"))
+        .collect()
+}
+
+/// Flips a bit of, cuts, or removes a random file of a random step. The stamp of a step stays: a folder
+/// without one is not stonewise's, and a run refuses to empty it.
+pub fn damage(out: &Path, dice: &mut Dice) {
+    let files = contents(&out.join("work"), &["lock", "marker.json"]);
+    if files.is_empty() {
+        return;
+    }
+    let (name, mut bytes) = files[dice.next() as usize % files.len()].clone();
+    let path = out.join("work").join(name);
+    match dice.next() % 3 {
+        0 if !bytes.is_empty() => {
+            let at = dice.next() as usize % bytes.len();
+            bytes[at] ^= 1 << (dice.next() % 8);
+            fs::write(path, bytes).unwrap();
+        }
+        1 => fs::write(path, &bytes[..bytes.len() / 2]).unwrap(),
+        _ if path.ends_with("step.json") => {}
+        _ => fs::remove_file(path).unwrap(),
+    }
 }

@@ -98,11 +98,12 @@ pub(super) fn check(layer: &Layer) -> Result<(), LayerError> {
 
 fn fill(path: &Path, layers: &[Layer], last_change: &str) -> rusqlite::Result<()> {
     let mut connection = Connection::open(path)?;
-    connection.pragma_update(None, "application_id", APPLICATION_ID)?;
-    connection.pragma_update(None, "user_version", USER_VERSION)?;
-    // The file is renamed into place when it is complete, so no journal is needed.
+    // The file is renamed into place when it is complete, so no journal is needed; first, because what is
+    // written before has one, and a full disk leaves it behind.
     connection.pragma_update(None, "journal_mode", "OFF")?;
     connection.pragma_update(None, "synchronous", "OFF")?;
+    connection.pragma_update(None, "application_id", APPLICATION_ID)?;
+    connection.pragma_update(None, "user_version", USER_VERSION)?;
     let transaction = connection.transaction()?;
     transaction.execute_batch(TABLES)?;
     transaction.execute(

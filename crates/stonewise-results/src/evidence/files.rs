@@ -3,6 +3,7 @@
 use crate::names::EVIDENCE_DIR;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Error;
+use stonewise_base::files::is_there;
 use stonewise_io::table::{Table, read_parquet};
 
 /// A file of the folder.
@@ -30,7 +31,7 @@ pub(super) fn metadata_number(table: &Table, key: &str, path: &Path) -> Result<u
 
 /// A table, or `None` where the file is missing.
 pub fn read_table(path: &Path) -> Result<Option<Table>, Error> {
-    if !path.exists() {
+    if !is_there(path)? {
         return Ok(None);
     }
     Ok(Some(read_parquet(path)?))

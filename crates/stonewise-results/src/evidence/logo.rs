@@ -4,7 +4,7 @@ use super::files::make_dir;
 use crate::names::EVIDENCE_DIR;
 use std::path::Path;
 use stonewise_base::error::{Error, Result};
-use stonewise_base::files::read_bytes;
+use stonewise_base::files::{is_there, read_bytes};
 use stonewise_io::atomic::write_atomically;
 
 /// Names of the file with its media type.
@@ -38,7 +38,7 @@ pub fn write_logo(dir: &Path, picture: &Path, media_type: &str) -> Result<()> {
 pub(super) fn read_logo(dir: &Path) -> Result<Option<Logo>> {
     for (name, media_type) in FILES {
         let path = dir.join(EVIDENCE_DIR).join(name);
-        if path.exists() {
+        if is_there(&path)? {
             let bytes = read_bytes(&path)?;
             return Ok(Some(Logo { media_type, bytes }));
         }

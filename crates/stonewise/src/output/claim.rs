@@ -119,9 +119,9 @@ impl OutputFolder {
     /// Notes the digests of all results and says that they are finished; `all`: nothing of an earlier run is
     /// needed any more.
     pub(crate) fn finish_results(&self, project: &Project, all: bool) -> Result<()> {
-        let results = previous::results_in(&self.path, project);
-        Digests::of(&self.path, results)?.write(&self.path)?;
-        previous::finish(&self.path, all)
+        let results = previous::results_in(&self.path, project)?;
+        Digests::of(&self.path, &results)?.write(&self.path)?;
+        previous::finish(&self.path, &results, all)
     }
 
     /// Notes the digests of results that a command has made anew from others: the report, the layers, scores
@@ -133,9 +133,9 @@ impl OutputFolder {
         let Some(mut digests) = Digests::read(&self.path)? else {
             return Ok(());
         };
-        let present = previous::named_results_in(&self.path);
-        let anew = present.into_iter().filter(|file| is_made_anew(file)).collect();
-        digests.replace(Digests::of(&self.path, anew)?);
+        let present = previous::named_results_in(&self.path)?;
+        let anew: Vec<PathBuf> = present.into_iter().filter(|file| is_made_anew(file)).collect();
+        digests.replace(Digests::of(&self.path, &anew)?);
         digests.write(&self.path)
     }
 

@@ -14,9 +14,9 @@ pub(crate) struct Digests(BTreeMap<PathBuf, String>);
 
 impl Digests {
     /// Reads these files from end to end; the list of digests itself does not count.
-    pub fn of(folder: &Path, files: Vec<PathBuf>) -> Result<Self> {
-        let files = files.into_iter().filter(|file| file != Path::new(DIGESTS));
-        let digest = |file: PathBuf| Ok((file.clone(), file_digest(&folder.join(file))?));
+    pub fn of(folder: &Path, files: &[PathBuf]) -> Result<Self> {
+        let files = files.iter().filter(|file| *file != Path::new(DIGESTS));
+        let digest = |file: &PathBuf| Ok((file.clone(), file_digest(&folder.join(file))?));
         files.map(digest).collect::<Result<_>>().map(Self)
     }
 
@@ -88,7 +88,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir(dir.path().join("report")).unwrap();
         fs::write(dir.path().join("report/index.html"), "abc").unwrap();
-        let digests = Digests::of(dir.path(), vec!["report/index.html".into()]).unwrap();
+        let digests = Digests::of(dir.path(), &["report/index.html".into()]).unwrap();
         digests.write(dir.path()).unwrap();
         // `printf abc | b3sum`
         assert_eq!(

@@ -6,10 +6,12 @@
 
 use super::result_names::{PREVIOUS_DIR, cloud_names, is_result};
 use crate::error::{Error, Result};
-use crate::files::write_text;
+use crate::files::{is_there, write_text};
 use crate::project::Project;
-use crate::results::names::{EVIDENCE_DIR, REPORT_DIR};
-use std::fs;
+use crate::results::names::{DIGESTS, EVIDENCE_DIR, REPORT_DIR};
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Says that the results beside it are not finished.
@@ -21,8 +23,8 @@ pub const UNFINISHED_FILE: &str = "UNFINISHED.txt";
 /// After a run that did not finish, `previous` keeps what it holds: the last finished run's.
 pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
     let (marker, previous) = (folder.join(UNFINISHED_FILE), folder.join(PREVIOUS_DIR));
-    let results = results_in(folder, project);
-    let was_finished = !marker.exists();
+    let results = results_in(folder, project)?;
+    let was_finished = !is_there(&marker)?;
     if was_finished && !results.is_empty() {
         remove_previous(folder)?;
         fs::create_dir_all(&previous).map_err(Error::io("making a folder", &previous))?;
@@ -35,9 +37,14 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
         project.name
     );
     write_text(&marker, &text)?;
-    for file in results {
+    sync_folder(folder)?;
+    // The list of digests is moved last: where it lies aside, all that belongs to it does.
+    let digests = Path::new(DIGESTS);
+    let is_complete = !is_there(&previous)? || is_there(&previous.join(digests))?;
+    let (last, others): (Vec<_>, Vec<_>) = results.into_iter().partition(|file| file == digests);
+    for file in others.into_iter().chain(last) {
         let (from, to) = (folder.join(&file), previous.join(&file));
-        if previous.exists() && !to.exists() {
+        if !is_complete && !is_there(&to)? {
             move_file(&from, &to)?;
         } else if is_result(&file) {
             fs::remove_file(&from).map_err(Error::io("removing an unfinished result", &from))?;
@@ -47,28 +54,47 @@ pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
 }
 
 /// Brings labelled clouds of the last run back, where it wrote them: the step that made them compares their
-/// digests.
+/// digests. They stay aside, too, where the file system has links.
 pub(super) fn bring_back(folder: &Path, file: &Path) -> Result<()> {
     let (from, to) = (folder.join(PREVIOUS_DIR).join(file), folder.join(file));
-    if from.exists() && !to.exists() {
-        move_file(&from, &to)?;
+    match is_there(&from)? && !is_there(&to)? {
+        true => fs::hard_link(&from, &to).or_else(|_| move_file(&from, &to)),
+        false => Ok(()),
     }
-    Ok(())
 }
 
-/// Says that the results are finished. With `all`, none of an earlier run is needed any more.
-pub(super) fn finish(folder: &Path, all: bool) -> Result<()> {
+/// Says that the results, these files, are finished, once their names are on the disk. With `all`, none of an
+/// earlier run is needed any more; they go last, so that there is always one whole set of results.
+pub(super) fn finish(folder: &Path, results: &[PathBuf], all: bool) -> Result<()> {
+    let below = results.iter().filter_map(|file| file.parent());
+    let folders: BTreeSet<PathBuf> = below.map(|parent| folder.join(parent)).collect();
+    folders.iter().try_for_each(|folder| sync_folder(folder))?;
     let marker = folder.join(UNFINISHED_FILE);
-    if all {
-        remove_previous(folder)?;
+    fs::remove_file(&marker).map_err(Error::io("removing", &marker))?;
+    sync_folder(folder)?;
+    match all {
+        true => remove_previous(folder),
+        false => Ok(()),
     }
-    fs::remove_file(&marker).map_err(Error::io("removing", &marker))
+}
+
+/// Waits until the names in a folder are on the disk: files are synced when they are written, their names are
+/// not. A file system that cannot do so for a folder is no error.
+fn sync_folder(folder: &Path) -> Result<()> {
+    if !cfg!(unix) {
+        return Ok(());
+    }
+    let synced = File::open(folder).and_then(|opened| opened.sync_all());
+    match synced.map_err(|error| (error.kind(), error)) {
+        Err((ErrorKind::InvalidInput | ErrorKind::Unsupported, _)) | Ok(()) => Ok(()),
+        Err((_, error)) => Err(Error::io("writing to the disk", folder)(error)),
+    }
 }
 
 fn remove_previous(folder: &Path) -> Result<()> {
     let previous = folder.join(PREVIOUS_DIR);
     match fs::remove_dir_all(&previous) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+        Err(e) if e.kind() != ErrorKind::NotFound => {
             Err(Error::io("removing the results of an earlier run", &previous)(e))
         }
         _ => Ok(()),
@@ -82,28 +108,45 @@ fn move_file(from: &Path, to: &Path) -> Result<()> {
 }
 
 /// Result files in a folder, relative to it. Files that others put there are none.
-pub(super) fn results_in(folder: &Path, project: &Project) -> Vec<PathBuf> {
+///
+/// # Errors
+/// The folder cannot be listed.
+pub(super) fn results_in(folder: &Path, project: &Project) -> Result<Vec<PathBuf>> {
     let clouds = project.epochs.iter().zip(1..);
     let clouds = clouds.flat_map(|(epoch, number)| cloud_names(number, &epoch.clouds));
-    let mut results: Vec<PathBuf> = clouds.filter(|c| folder.join(c).is_file()).collect();
-    results.extend(named_results_in(folder));
+    let mut results = named_results_in(folder)?;
+    for cloud in clouds {
+        if is_there(&folder.join(&cloud))? {
+            results.push(cloud);
+        }
+    }
     results.sort();
-    results
+    Ok(results)
 }
 
 /// The same without the labelled clouds, whose names only the project tells.
-pub(crate) fn named_results_in(folder: &Path) -> Vec<PathBuf> {
+///
+/// # Errors
+/// The folder cannot be listed.
+pub(crate) fn named_results_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut results = Vec::new();
     for below in ["", EVIDENCE_DIR, REPORT_DIR] {
-        let Ok(entries) = fs::read_dir(folder.join(below)) else {
-            continue;
+        let listed = folder.join(below);
+        let entries = match fs::read_dir(&listed) {
+            Err(e) if e.kind() == ErrorKind::NotFound => continue,
+            entries => entries.map_err(Error::io("listing", &listed))?,
         };
-        let files = entries.flatten().filter(|e| e.path().is_file());
-        let names = files.map(|e| Path::new(below).join(e.file_name()));
-        results.extend(names.filter(|n| is_result(n)));
+        for entry in entries {
+            let entry = entry.map_err(Error::io("listing", &listed))?;
+            let name = Path::new(below).join(entry.file_name());
+            let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+            if !is_folder && is_result(&name) {
+                results.push(name);
+            }
+        }
     }
     results.sort();
-    results
+    Ok(results)
 }
 
 #[cfg(test)]
@@ -134,6 +177,7 @@ mod tests {
             "stones.csv",
             "report/index.html",
             "epoch1/wall.laz",
+            "digests.b3",
             "notes.txt",
             "report/notes.txt",
         ] {
@@ -153,14 +197,20 @@ mod tests {
         // finishes.
         for _ in 0..2 {
             write(out, "stones.csv", "half");
+            // Of an epoch that the first run did not have.
+            write(out, "stones_2.csv", "half");
             set_aside(out, &project).unwrap();
             assert_eq!(read(out, "stones.csv"), None);
+            assert_eq!(read(out, "stones_2.csv"), None);
             assert_eq!(read(out, "previous/stones.csv").unwrap(), "first");
+            assert_eq!(read(out, "previous/stones_2.csv"), None);
         }
         bring_back(out, Path::new("epoch1/wall.laz")).unwrap();
-        assert_eq!(read(out, "epoch1/wall.laz").unwrap(), "first");
+        for place in ["epoch1/wall.laz", "previous/epoch1/wall.laz"] {
+            assert_eq!(read(out, place).unwrap(), "first");
+        }
         write(out, "stones.csv", "second");
-        finish(out, true).unwrap();
+        finish(out, &["stones.csv".into()], true).unwrap();
         assert!(!out.join(PREVIOUS_DIR).exists() && !out.join(UNFINISHED_FILE).exists());
         assert_eq!(read(out, "stones.csv").unwrap(), "second");
         assert_eq!(read(out, "notes.txt").unwrap(), "first");

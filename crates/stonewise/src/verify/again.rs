@@ -130,7 +130,7 @@ fn strip(value: &mut Value) {
 fn files_of_both(old: &Path, new: &Path, project: &Project) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for folder in [old, new] {
-        files.extend(crate::output::named_results_in(folder));
+        files.extend(crate::output::named_results_in(folder)?);
         let digests = Digests::read(folder).ok().flatten().unwrap_or_default();
         files.extend(digests.iter().map(|(file, _)| file.to_path_buf()));
     }

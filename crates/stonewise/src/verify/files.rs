@@ -43,7 +43,7 @@ pub(super) fn files(results: &Path, progress: &dyn Progress) -> Result<Vec<Findi
         }
         progress.advance(1);
     }
-    for file in named_results_in(results) {
+    for file in named_results_in(results)? {
         if file != Path::new(DIGESTS) && !digests.holds(&file) {
             let message = "has the name of a result, but the run did not make it";
             findings.push(Finding::of(&file, KIND, Answer::Open, message));

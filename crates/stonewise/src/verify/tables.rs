@@ -177,7 +177,7 @@ fn evaluation(results: &Path, run: &RunRecord, pair: usize) -> Compared {
 fn made_again(results: &Path, run: &RunRecord) -> Result<Vec<Finding>> {
     let scratch = Scratch::new()?;
     copy_results(results, scratch.path())?;
-    let reports = named_results_in(results)
+    let reports = named_results_in(results)?
         .into_iter()
         .filter(|file| file.starts_with(REPORT_DIR));
     let mut files: Vec<PathBuf> = reports.collect();
@@ -212,7 +212,7 @@ fn copy_results(from: &Path, to: &Path) -> Result<()> {
         let is_cloud = file.extension().is_some_and(|e| e == "laz");
         !is_cloud && !file.starts_with(REPORT_DIR)
     };
-    for file in named_results_in(from).into_iter().filter(sources) {
+    for file in named_results_in(from)?.into_iter().filter(sources) {
         copy(&from.join(&file), &to.join(&file))?;
     }
     Ok(())
