@@ -118,6 +118,7 @@ fn alone(project: &Path, model: &Path, out: &Path) -> LabelImage {
         weights: &Weights::named(model),
         tiling: &TilingOptions::default(),
         reference: None,
+        boxes: None,
     };
     segment_folder(&job, &Silent).unwrap();
     let labels = fs::read_dir(out.join("labels")).unwrap().next().unwrap().unwrap();

@@ -49,6 +49,7 @@ fn segment(photos: &Path, out: &Path, weights: &Weights, reference: Option<&Refe
         weights,
         tiling: &tiling,
         reference,
+        boxes: None,
     };
     segment_folder(&job, &Silent).unwrap()
 }
