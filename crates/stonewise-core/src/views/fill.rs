@@ -2,16 +2,13 @@
 
 use crate::raster::RgbImage;
 
-/// Gaps up to twice as wide are filled, pixels: holes of stereo clouds on smooth stones, no windows.
-const HALF_GAP_PX: usize = 8;
-
-/// Fills gaps of up to 16 pixels with the mean of the known pixels around; larger gaps, and what lies
-/// outside the cloud, stay as they are.
-pub(super) fn fill_gaps(image: &mut RgbImage, known: &mut [bool]) {
+/// Fills gaps of up to twice `half_gap` pixels with the mean of the known pixels around; larger gaps, and what
+/// lies outside the cloud, stay as they are.
+pub(super) fn fill_gaps(image: &mut RgbImage, known: &mut [bool], half_gap: usize) {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let wanted = closed(known, width, height);
+    let wanted = closed(known, width, height, half_gap);
     // From the rims inward, one pixel a round, so that a gap takes the colours of its own border.
-    for _ in 0..=HALF_GAP_PX {
+    for _ in 0..=half_gap {
         let mut filled = Vec::new();
         for at in (0..known.len()).filter(|&at| wanted[at] && !known[at]) {
             let (x, y) = (at % width, at / width);
@@ -42,24 +39,24 @@ pub(super) fn fill_gaps(image: &mut RgbImage, known: &mut [bool]) {
 }
 
 /// Morphological closing with a square: what a square that fits into the unknown never covers.
-fn closed(known: &[bool], width: usize, height: usize) -> Vec<bool> {
-    let dilated = spread(known, width, height, true);
-    spread(&dilated, width, height, false)
+fn closed(known: &[bool], width: usize, height: usize, half_gap: usize) -> Vec<bool> {
+    let dilated = spread(known, width, height, half_gap, true);
+    spread(&dilated, width, height, half_gap, false)
 }
 
 /// Lets one value win wherever it occurs within the square around a pixel; outside the image nothing counts.
-fn spread(pixels: &[bool], width: usize, height: usize, winner: bool) -> Vec<bool> {
+fn spread(pixels: &[bool], width: usize, height: usize, half_side: usize, winner: bool) -> Vec<bool> {
     let along = |from: &[bool], length: usize, at: &dyn Fn(usize) -> usize, into: &mut [bool]| {
         let mut last: Option<usize> = None;
         let mut next = 0;
         for i in 0..length {
-            while next < length && next <= i + HALF_GAP_PX {
+            while next < length && next <= i + half_side {
                 if from[at(next)] == winner {
                     last = Some(next);
                 }
                 next += 1;
             }
-            let is_near = last.is_some_and(|l| l + HALF_GAP_PX >= i);
+            let is_near = last.is_some_and(|l| l + half_side >= i);
             into[at(i)] = if is_near { winner } else { !winner };
         }
     };
@@ -78,6 +75,8 @@ fn spread(pixels: &[bool], width: usize, height: usize, winner: bool) -> Vec<boo
 mod tests {
     use super::*;
 
+    const HALF_GAP: usize = 8;
+
     #[test]
     fn narrow_gaps_are_filled_and_wide_ones_stay() {
         let (width, height) = (80, 60);
@@ -93,7 +92,7 @@ mod tests {
                 *pixel = [0; 3];
             }
         }
-        fill_gaps(&mut image, &mut known);
+        fill_gaps(&mut image, &mut known, HALF_GAP);
         assert_eq!(image.get(17, 30), Some(&[90, 120, 200]));
         assert_eq!(image.get(51, 30), Some(&[0; 3]));
         assert_eq!(image.get(42, 30), Some(&[0; 3]), "a wide gap keeps its border");
@@ -105,9 +104,9 @@ mod tests {
         let known: Vec<bool> = (0..width * height)
             .map(|i| (i * i * 31 + i * 7) % 97 < 3)
             .collect();
-        let found = closed(&known, width, height);
+        let found = closed(&known, width, height, HALF_GAP);
         let around = |x: usize, y: usize| {
-            let r = HALF_GAP_PX;
+            let r = HALF_GAP;
             (y.saturating_sub(r)..=(y + r).min(height - 1))
                 .flat_map(move |v| (x.saturating_sub(r)..=(x + r).min(width - 1)).map(move |u| (u, v)))
         };

@@ -13,6 +13,10 @@ pub struct ViewParams {
     /// What the pixels show. Absent: the best that the points have.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub show: Option<Shade>,
+    /// A place from which the wall is seen, world frame, metres: says which side is outside. Absent: the positions
+    /// of scanners or cameras say it, else what the clouds show.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outside: Option<[f64; 3]>,
     /// Edge of the cells whose normals decide where cameras stand, metres: about one stone, so that its relief
     /// does not count.
     pub cell_m: f64,
@@ -23,7 +27,7 @@ pub struct ViewParams {
     pub turn_rad: f64,
     /// Normals within this angle of the axis of a view are seen well, radians.
     pub spread_rad: f64,
-    /// Least size of a pixel on the wall, metres; a pixel is never smaller than the spacing of the points.
+    /// Least size of a pixel on the wall, metres. A pixel is 0.6 times as large as the spacing of the points.
     pub pixel_m: f64,
     /// Pixels of all views of an epoch together at most, millions; pixels grow until they fit.
     pub megapixels: f64,
@@ -35,9 +39,10 @@ impl Default for ViewParams {
     fn default() -> Self {
         Self {
             show: None,
+            outside: None,
             cell_m: 0.25,
             distance_m: 12.0,
-            turn_rad: 0.25,
+            turn_rad: 0.4,
             spread_rad: 0.6,
             pixel_m: 0.003,
             megapixels: 200.0,

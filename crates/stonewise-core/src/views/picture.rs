@@ -1,14 +1,23 @@
 //! What a camera sees of a cloud.
 
+use super::PlannedView;
 use super::fill::fill_gaps;
-use super::shade::relief_shade;
+use super::shade::{Side, relief_shade};
 use crate::cloud::Cloud;
-use crate::geometry::{Bounds, View, floor};
+use crate::geometry::{Bounds, View};
 use crate::raster::{DepthMap, Raster, RgbImage};
 use nalgebra::Point3;
 
-/// Standard deviation of the spot of a point, pixels: spots of neighbouring points overlap and stay sharp.
-const SPOT_PX: f64 = 0.6;
+/// Standard deviation of the spot of a point, in distances between points: spots of neighbouring points overlap
+/// and stay sharp.
+const SPOT: f64 = 0.6;
+/// Half the side of the square that a spot covers, in its standard deviations.
+const SPOT_SIDE: f64 = 2.5;
+/// Gaps up to twice as wide are filled, in distances between points: holes of stereo clouds on smooth stones, no
+/// windows.
+const HALF_GAP: f64 = 8.0;
+/// Half the side of the window of a slope of the relief, in distances between points.
+const HALF_SLOPE: f64 = 2.0;
 /// How far behind the nearest surface a point still belongs to it, metres.
 const TOLERANCE_M: f64 = 0.03;
 /// Shortest distance of a point from the camera, metres.
@@ -18,6 +27,7 @@ const NEAREST_M: f64 = 0.5;
 /// mean of the points on it.
 pub struct Picture<'a> {
     view: &'a View,
+    spacing_px: f64,
     nearest: DepthMap,
     /// Weighted sums of three values and of the depth behind the nearest, metres; and the weight.
     sums: Raster<[f32; 5]>,
@@ -28,10 +38,11 @@ impl<'a> Picture<'a> {
     pub const PIXEL_BYTES: u64 = 24;
 
     /// An empty picture.
-    pub fn new(view: &'a View) -> Self {
+    pub fn new(PlannedView { view, spacing_px }: &'a PlannedView) -> Self {
         let (width, height) = (view.camera.width, view.camera.height);
         Self {
             view,
+            spacing_px: *spacing_px,
             nearest: DepthMap::filled(width, height, f32::INFINITY),
             sums: Raster::filled(width, height, [0.0; 5]),
         }
@@ -101,11 +112,12 @@ impl<'a> Picture<'a> {
                 *pixel = [r, g, b].map(|v| (v / weight).round().clamp(0.0, 255.0) as u8);
             }
         }
-        fill_gaps(&mut image, &mut known);
+        fill_gaps(&mut image, &mut known, self.in_pixels(HALF_GAP));
         image
     }
 
-    /// The picture of the relief, as bright as its values.
+    /// The picture of the relief, as bright as its values, lit from the upper left and in every second view from
+    /// the upper right.
     pub fn relief(&self) -> RgbImage {
         let mut depth = self.nearest.clone();
         for (depth, [.., behind, weight]) in depth.data_mut().iter_mut().zip(self.sums.data()) {
@@ -113,7 +125,11 @@ impl<'a> Picture<'a> {
                 *depth += behind / weight;
             }
         }
-        let mut image = relief_shade(&depth, &self.view.camera);
+        let side = match self.view.image.0 % 2 {
+            0 => Side::Left,
+            _ => Side::Right,
+        };
+        let mut image = relief_shade(&depth, &self.view.camera, side, self.in_pixels(HALF_SLOPE));
         for (pixel, [value, .., weight]) in image.data_mut().iter_mut().zip(self.sums.data()) {
             if *weight > 0.0 {
                 let share = value / weight / 255.0;
@@ -123,41 +139,45 @@ impl<'a> Picture<'a> {
         image
     }
 
+    /// A length in distances between points, in whole pixels.
+    fn in_pixels(&self, spacings: f64) -> usize {
+        (spacings * self.spacing_px).round() as usize
+    }
+
     /// Where a point leaves its spot.
     fn spot(&self, world: &Point3<f64>) -> Option<Spot> {
         let seen = self.view.project(world)?;
         (seen.depth_m > NEAREST_M && self.view.is_inside(seen.pixel)).then_some(Spot {
             pixel: seen.pixel,
             depth_m: seen.depth_m,
+            sd_px: SPOT * self.spacing_px,
         })
     }
 }
 
-/// The 3 x 3 pixels around a projected point.
+/// The pixels around a projected point.
 struct Spot {
     pixel: [f64; 2],
     depth_m: f64,
+    sd_px: f64,
 }
 
 impl Spot {
     /// Calls `visit` with each pixel inside the picture and its weight.
     fn each_pixel(&self, width: u32, height: u32, mut visit: impl FnMut(u32, u32, f32)) {
-        let first = self.pixel.map(|p| floor(p) - 1);
-        let weights = [0, 1].map(|axis| {
-            [0, 1, 2].map(|step| {
-                let apart = (first[axis] + step) as f64 + 0.5 - self.pixel[axis];
-                (-0.5 * (apart / SPOT_PX).powi(2)).exp()
-            })
+        let half = SPOT_SIDE * self.sd_px;
+        let [columns, rows] = [(0, width), (1, height)].map(|(axis, side)| {
+            let [low, high] = [-half, half].map(|reach| (self.pixel[axis] + reach).round().max(0.0) as u32);
+            low..high.min(side)
         });
-        for (row, y_weight) in weights[1].into_iter().enumerate() {
-            for (column, x_weight) in weights[0].into_iter().enumerate() {
-                let at = [first[0] + column as i64, first[1] + row as i64].map(u32::try_from);
-                if let [Ok(x), Ok(y)] = at
-                    && x < width
-                    && y < height
-                {
-                    visit(x, y, (x_weight * y_weight) as f32);
-                }
+        let weight = |axis: usize, pixel: u32| {
+            let apart = f64::from(pixel) + 0.5 - self.pixel[axis];
+            (-0.5 * (apart / self.sd_px).powi(2)).exp()
+        };
+        for y in rows {
+            let y_weight = weight(1, y);
+            for x in columns.clone() {
+                visit(x, y, (weight(0, x) * y_weight) as f32);
             }
         }
     }
@@ -169,12 +189,15 @@ mod tests {
     use crate::geometry::{Camera, Rigid3};
     use crate::id::ImageId;
 
-    fn view() -> View {
-        View {
-            image: ImageId(0),
-            name: String::new(),
-            camera: Camera::pinhole(80, 60, 100.0),
-            cam_from_world: Rigid3::identity(),
+    fn view(number: u32) -> PlannedView {
+        PlannedView {
+            view: View {
+                image: ImageId(number),
+                name: String::new(),
+                camera: Camera::pinhole(80, 60, 100.0),
+                cam_from_world: Rigid3::identity(),
+            },
+            spacing_px: 1.0,
         }
     }
 
@@ -182,7 +205,7 @@ mod tests {
     /// shows through a window in the first.
     #[test]
     fn a_pixel_shows_the_nearest_surface() {
-        let view = view();
+        let view = view(0);
         let grid = |depth: f64| {
             let places = (0..80).flat_map(|i| (0..60).map(move |j| [f64::from(i) + 0.3, f64::from(j) + 0.6]));
             places
@@ -209,9 +232,9 @@ mod tests {
 
     /// Lambert's law by hand: a plane that leans to the light is brighter than one that leans away.
     #[test]
-    fn relief_is_lit_from_the_upper_left() {
-        let view = view();
-        let grey = |slope: f64| {
+    fn relief_is_lit_from_the_upper_left_and_right_in_turn() {
+        let grey = |number: u32, slope: f64| {
+            let view = view(number);
             let mut picture = Picture::new(&view);
             let points =
                 (0..160).flat_map(|i| (0..120).map(move |j| [0.5 * f64::from(i), 0.5 * f64::from(j)]));
@@ -230,18 +253,19 @@ mod tests {
                 .map(|p| f64::from(p[0]))
                 .unwrap_or_default()
         };
-        let expected = |slope: f64| {
+        let expected = |across: f64, slope: f64| {
             let normal = nalgebra::Vector3::new(slope, 0.0, -1.0).normalize();
-            let light = nalgebra::Vector3::new(-0.5, -0.6, -0.62).normalize();
+            let light = nalgebra::Vector3::new(across, -0.6, -0.62).normalize();
             255.0 * (0.25 + 0.75 * normal.dot(&light).max(0.0))
         };
-        for slope in [-0.5, 0.0, 0.5] {
-            assert!(
-                (grey(slope) - expected(slope)).abs() < 4.0,
-                "{slope}: {} {}",
-                grey(slope),
-                expected(slope)
-            );
+        for (number, across) in [(0, -0.5), (1, 0.5), (2, -0.5)] {
+            for slope in [-0.5, 0.0, 0.5] {
+                let [found, expected] = [grey(number, slope), expected(across, slope)];
+                assert!(
+                    (found - expected).abs() < 4.0,
+                    "{number}, {slope}: {found} {expected}"
+                );
+            }
         }
     }
 }

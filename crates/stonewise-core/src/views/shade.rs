@@ -1,16 +1,22 @@
-//! Shaded relief: a surface of one grey under light from the upper left.
+//! Shaded relief: a surface of one grey under light from above and from one side.
 
 use crate::geometry::Camera;
 use crate::raster::{DepthMap, RgbImage, SumTable};
 
-/// Half the side of the window of a slope, pixels: smooths the noise of single points.
-const SLOPE_PX: usize = 2;
+/// The side from which light comes. A joint that runs towards the light shows little.
+#[derive(Clone, Copy)]
+pub(super) enum Side {
+    Left,
+    Right,
+}
 
 /// Grey picture of the surface that a depth map holds; black where it is empty.
 ///
-/// Lambert's law for a distant light from the upper left. Darker joints, as under the light of the sky, let the
+/// `half_window`: half the side of the window of a slope, pixels, which smooths the noise of single points.
+///
+/// Lambert's law for a distant light from the upper left, or from the upper right. Darker joints, as under the light of the sky, let the
 /// detector find fewer stones.
-pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera) -> RgbImage {
+pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera, side: Side, half_window: usize) -> RgbImage {
     let (width, height) = (depth.width() as usize, depth.height() as usize);
     let mean = mean_depth(depth);
     let table = SumTable::new([width, height], |x, y| {
@@ -20,11 +26,15 @@ pub(super) fn relief_shade(depth: &DepthMap, camera: &Camera) -> RgbImage {
         d.is_finite()
             .then_some([1.0, q, x, y, x * x, x * y, y * y, x * q, y * q])
     });
-    let light = nalgebra::Vector3::new(-0.5, -0.6, -0.62).normalize();
+    let across = match side {
+        Side::Left => -0.5,
+        Side::Right => 0.5,
+    };
+    let light = nalgebra::Vector3::new(across, -0.6, -0.62).normalize();
     let mut image = RgbImage::filled(depth.width(), depth.height(), [0; 3]);
     for (at, pixel) in image.data_mut().iter_mut().enumerate() {
         let place = [at % width, at / width];
-        let [n, q, x, y, xx, xy, yy, xq, yq] = table.window(place, SLOPE_PX);
+        let [n, q, x, y, xx, xy, yy, xq, yq] = table.window(place, half_window);
         if n < 6.0 {
             continue;
         }

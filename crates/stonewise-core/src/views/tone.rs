@@ -33,7 +33,7 @@ pub enum Shade {
     Colour,
     /// Their intensity, as grey.
     Intensity,
-    /// Their relief under light from the upper left, as grey.
+    /// Their relief under light from the upper left or the upper right, as grey.
     Relief,
 }
 

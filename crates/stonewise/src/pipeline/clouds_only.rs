@@ -18,7 +18,7 @@ use stonewise_core::change::{MeshIndex, OutwardReference, PointDistances, c2c_su
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::View;
 use stonewise_core::progress::Progress;
-use stonewise_core::surface::{Outside, orient, surface_cells};
+use stonewise_core::surface::{Outside, SURE_OF_OUTSIDE, oriented_surface};
 use stonewise_io::cloud::{Dimension, ExtraColumn, read_mesh, write_points_laz};
 
 /// Name of the comparison along normals, which a run of the project finds.
@@ -116,13 +116,13 @@ pub fn compare_clouds(
 fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
     let epoch = context.project.epochs.reference();
     let scanners = scanners(epoch)?;
-    let cells = surface_cells::<_, Error>(&first.tiles.surveyed, CELL_M, context.progress)?;
-    let found = orient(cells, &scanners);
+    let tiles = &first.tiles.surveyed;
+    let found = oriented_surface::<_, Error>(tiles, CELL_M, &scanners, context.progress)?;
     let evidence = found.evidence;
     let reason = match scanners.len() {
         0 => format!(
             "no camera or scanner position says which side is outside; level surfaces, joints and batter do by {:.1}, {:.1} and \
-             {:.1} standard deviations",
+             {:.1} (logarithms of the odds; {SURE_OF_OUTSIDE} together is sure)",
             evidence.level, evidence.joints, evidence.batter
         ),
         1 => "normals point to the side of the scanner".to_owned(),

@@ -18,8 +18,8 @@ use std::sync::Arc;
 use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
-use stonewise_core::surface::{orient, surface_cells};
-use stonewise_core::views::{Picture, Shade, Tones, Toning, Walls, plan_views};
+use stonewise_core::surface::oriented_surface;
+use stonewise_core::views::{Picture, PlannedView, Shade, Tones, Toning, Walls, plan_views};
 use stonewise_io::cameras::write_metashape;
 use stonewise_io::image_io::write_png_rgb;
 
@@ -69,11 +69,19 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
-    /// Places from which the wall of an epoch is seen: those of its scanners, else of cameras: of photos, or of
-    /// the views of the reference, so that all epochs have the same outside. None where nothing is known.
+    /// Places from which the wall of an epoch is seen: that which the project names, else those of its scanners, else
+    /// of cameras: of photos, or of the views of the reference, so that all epochs have the same outside. None
+    /// where nothing is known.
     fn outside(&self, id: EpochId) -> Result<Vec<Point3<f64>>> {
         let project = self.context.project;
         let epochs = &project.epochs;
+        // Places of another epoch lie in another frame.
+        let is_own_frame = project.settings.registration.align == Align::None;
+        if let Some(place) = project.settings.views.outside
+            && (is_own_frame || id == EpochId::REFERENCE)
+        {
+            return Ok(vec![place.into()]);
+        }
         let scanners = scanners(&epochs[id])?;
         if !scanners.is_empty() {
             return Ok(scanners);
@@ -81,8 +89,7 @@ impl Run<'_> {
         let centres = |epoch: &Epoch| -> Result<Vec<Point3<f64>>> {
             Ok(epoch.read_cameras()?.views.iter().map(View::centre).collect())
         };
-        if project.settings.registration.align == Align::Stones {
-            // Cameras of another epoch lie in another frame.
+        if !is_own_frame {
             return Ok(Vec::new());
         }
         match epochs.iter().find(|e| e.photos.is_some()) {
@@ -102,8 +109,7 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
     let key = Key::new(STEP, &(params, outside), &[ingested.step.key().as_str()]);
     context.step(&format!("{STEP}-{id}"), key, |step, warnings| {
         let tiles = &ingested.tiles.surveyed;
-        let cells = surface_cells::<_, Error>(tiles, params.cell_m, context.progress)?;
-        let surface = orient(cells, outside);
+        let surface = oriented_surface::<_, Error>(tiles, params.cell_m, outside, context.progress)?;
         if outside.is_empty() && !surface.is_sure() {
             warnings.doubt(STEP, &epoch.name, &SIDE_UNSURE);
         }
@@ -133,23 +139,24 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
             walls: &walls,
         };
         for batch in batches(&views) {
-            for (view, picture) in batch.iter().zip(drawing.pictures(batch)?) {
+            for (planned, picture) in batch.iter().zip(drawing.pictures(batch)?) {
                 let image = match toning.shade() {
                     Shade::Relief => picture.relief(),
                     Shade::Colour | Shade::Intensity => picture.image(),
                 };
-                write_png_rgb(&images.join(&view.name), &image)?;
+                write_png_rgb(&images.join(&planned.view.name), &image)?;
             }
         }
-        Ok(write_metashape(&step.file(CAMERAS), &views, None)?)
+        let cameras: Vec<View> = views.into_iter().map(|planned| planned.view).collect();
+        Ok(write_metashape(&step.file(CAMERAS), &cameras, None)?)
     })
 }
 
 /// Views whose pictures fit into memory together.
-fn batches(views: &[View]) -> Vec<&[View]> {
+fn batches(views: &[PlannedView]) -> Vec<&[PlannedView]> {
     let mut batches = Vec::new();
     let (mut start, mut bytes) = (0, 0);
-    for (i, view) in views.iter().enumerate() {
+    for (i, PlannedView { view, .. }) in views.iter().enumerate() {
         let own = Picture::PIXEL_BYTES * u64::from(view.camera.width) * u64::from(view.camera.height);
         if i > start && bytes + own > PICTURE_BYTES {
             batches.push(&views[start..i]);
@@ -189,7 +196,7 @@ struct Drawing<'a> {
 
 impl Drawing<'_> {
     /// The pictures of a few views.
-    fn pictures<'v>(&self, views: &'v [View]) -> Result<Vec<Picture<'v>>> {
+    fn pictures<'v>(&self, views: &'v [PlannedView]) -> Result<Vec<Picture<'v>>> {
         let mut pictures: Vec<Picture> = views.iter().map(Picture::new).collect();
         self.pass(&mut pictures, "depths", |_, cloud| {
             Ok(Box::new(move |picture: &mut Picture| picture.add_depths(cloud)))
