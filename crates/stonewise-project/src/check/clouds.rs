@@ -6,8 +6,8 @@ use crate::{Epoch, Project};
 use nalgebra::{Point3, Vector3};
 use stonewise_base::messages::findings::{
     CENTIMETRES, CLOUDS, DEGREES, EXTENT, FEET, FIRST_EPOCH, INCHES, LITTLE_OVERLAP, MILLIMETRES, NO_OVERLAP,
-    NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_WIDE, SYSTEM, SYSTEM_UNIT, SYSTEMS,
-    THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
+    NO_POINTS, OVERLAP, SAME_FILE, SPACING, SPACING_UNKNOWN, SPACING_VIEWS, SPACING_WIDE, SYSTEM,
+    SYSTEM_UNIT, SYSTEMS, THIS_EPOCH, TOO_LONG, TOO_SMALL, UNIT_RATIO, UNITS,
 };
 use stonewise_base::messages::{Message, Said};
 use stonewise_base::settings::Align;
@@ -31,12 +31,15 @@ const SMALLEST_M: f64 = 0.3;
 const LEAST_OVERLAP: f64 = 0.5;
 /// A spacing beyond this shows no stone's relief, metres.
 const WIDEST_SPACING_M: f64 = 0.05;
+/// Distances between points across a stone (root of its area) from which on views show nearly all stones
+/// (docs/src/views.md).
+const FOUND_WELL: f64 = 25.0;
 
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
     for (epoch, survey) in read(project, surveys) {
         found.push(extent(&epoch.name, survey));
-        found.push(spacing(&epoch.name, survey));
+        found.push(spacing(epoch, survey));
         found.extend(unit_of_system(&epoch.name, survey));
     }
     if surveys.iter().any(Option::is_some) {
@@ -96,8 +99,15 @@ fn extent(name: &str, survey: &Sample) -> Finding {
     Finding::new(name, &EXTENT, verdict, text)
 }
 
-fn spacing(name: &str, survey: &Sample) -> Finding {
+fn spacing(epoch: &Epoch, survey: &Sample) -> Finding {
     let (verdict, text) = match survey.spacing_m {
+        Some(m) if m <= WIDEST_SPACING_M && epoch.photos.is_none() => {
+            let size_m = FOUND_WELL * m;
+            let spacing = Said::numbers(format!("{:.1}", 1e3 * m));
+            let size = format!("{:.0}", (1e2 * size_m).ceil());
+            let values = [("spacing", spacing), ("size", size.into())];
+            (Verdict::Fine, SPACING_VIEWS.say(&values))
+        }
         Some(m) if m <= WIDEST_SPACING_M => (Verdict::Fine, format!("{:.1} mm", 1e3 * m).into()),
         Some(m) => {
             let spacing = format!("{:.0}", 1e3 * m);
@@ -105,7 +115,7 @@ fn spacing(name: &str, survey: &Sample) -> Finding {
         }
         None => (Verdict::Doubt, SPACING_UNKNOWN.say(&[])),
     };
-    Finding::new(name, &SPACING, verdict, text)
+    Finding::new(&epoch.name, &SPACING, verdict, text)
 }
 
 /// A coordinate system whose unit is not the metre.

@@ -43,7 +43,9 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     let fit = Fit::of(&registered);
     // The first epoch takes part in every pair.
     let first_time = usize::from(later != EpochId::at(1));
-    for (epoch, labels) in epochs.zip(labelled).into_iter().skip(first_time) {
+    // Views fit the clouds that they were made of.
+    let with_photos = epochs.zip(labelled).into_iter().skip(first_time);
+    for (epoch, labels) in with_photos.filter(|(epoch, _)| epoch.photos.is_some()) {
         match Votes::of(&labels.stones) {
             Some(votes) if votes.are_torn(fit) => {
                 context.warnings.doubt("label", &epoch.name, votes.torn(fit));
