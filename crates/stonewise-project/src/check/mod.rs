@@ -42,6 +42,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     let mut report = Report::default();
     let mut unreadable = Unreadable::new(depth);
     let mut surveys = Vec::new();
+    let mut searched = Vec::new();
     for epoch in &project.epochs {
         progress.check()?;
         let survey = sample::sample(epoch, depth, &mut unreadable)?;
@@ -57,6 +58,12 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
             let photos = unreadable.keep(epoch, &PHOTOS, photos::look(project, epoch, files, &cameras))?;
             let are_listed = photos.is_some();
             let (findings, photos) = photos.unwrap_or_default();
+            if epoch.masks.is_none() {
+                let sizes = photos
+                    .iter()
+                    .map(|(view, _)| [view.camera.width, view.camera.height]);
+                searched.extend(sizes);
+            }
             report.findings.extend(findings);
             // A run finds out while it reads them.
             if depth == Depth::Full && are_listed {
@@ -82,7 +89,9 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     report.findings.extend(clouds::look(project, &surveys));
     report.findings.extend(repeats::look(project, &surveys));
     if surveys.iter().all(Option::is_some) {
-        report.findings.extend(resources::look(project, &surveys, out));
+        report
+            .findings
+            .extend(resources::look(project, &surveys, &searched, depth, out));
     }
     report.sort(project);
     Ok(report)

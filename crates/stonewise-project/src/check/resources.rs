@@ -1,15 +1,21 @@
 //! Disk, memory and time that a run will need, and what is there.
 
+use super::Depth;
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use std::time::Instant;
 use stonewise_base::address_space;
 use stonewise_base::address_space::detector_memory;
 use stonewise_base::error::Result;
+use stonewise_core::parallel::on_one_thread;
+use stonewise_core::raster::Raster;
 use stonewise_io::cloud::claimed_records;
+use stonewise_segment::tiling::TilingOptions;
+use stonewise_segment::{Detector, StoneFinder, Weights};
 
 /// Disk that a point needs while a run works: tiles, labels, pairs of stones, the labelled cloud. Measured on
 /// surveys of 1 to 200 million points (docs/src/performance.md), rounded up.
@@ -17,21 +23,34 @@ const DISK_PER_POINT: u64 = 90;
 /// Memory at rest, and per point: 185 MB at 1.3 million points, 404 MB at 5.2 million, 4.9 GB at 133 million.
 const MEMORY_BASE: u64 = 200 << 20;
 const MEMORY_PER_POINT: u64 = 45;
-/// Processor time per point: 10 us at 1.3 million points, 9 at 5.2 million, 10 at 133 million.
-const SECONDS_PER_POINT: f64 = 2e-5;
+/// Processor time per point, without the search for stones, where a tile takes [`SECONDS_PER_TILE`]: 28 us at 1.3
+/// million points, 29 at 5.2 million, 19 at 332 million. It depends on the number of stones, which is not known
+/// yet.
+const SECONDS_PER_POINT: f64 = 2.5e-5;
+/// Where photos track no stones: 22 us at 0.6 million points, 13 at 332 million.
+const SECONDS_PER_POINT_WITHOUT_PHOTOS: f64 = 1.6e-5;
+/// Processor time of a tile of the detector on the machine on which the others were measured.
+const SECONDS_PER_TILE: f64 = 0.3;
+/// Edge of the image on which the speed of the machine is measured, pixels.
+const TILE_PX: u32 = 640;
+/// Factor by which a run may take longer or less: the number of stones is not known yet.
+const SPREAD: f64 = 1.4;
 const GIB: f64 = (1u64 << 30) as f64;
 
-pub(super) fn look(project: &Project, surveys: &[Option<Sample>], out: &Path) -> Vec<Finding> {
+/// `photos`: width and height of those in which stones are searched for, pixels.
+pub(super) fn look(
+    project: &Project,
+    surveys: &[Option<Sample>],
+    photos: &[[u32; 2]],
+    depth: Depth,
+    out: &Path,
+) -> Vec<Finding> {
     let points: u64 = surveys.iter().flatten().map(|s| s.records).sum();
-    let cores = rayon::current_num_threads().max(1);
-    let minutes = 0.1 + SECONDS_PER_POINT * points as f64 / cores as f64 / 60.0;
-    let without_masks = project.epochs.iter().filter(|e| e.masks.is_none()).count();
-    let search = match without_masks {
-        0 => String::new(),
-        1 => "; the search for stones in the photos of 1 epoch comes on top".to_owned(),
-        n => format!("; the search for stones in the photos of {n} epochs comes on top"),
+    let time = match depth {
+        Depth::Full => tile_seconds().map(|tile| time(project, points, photos, tile)),
+        Depth::Quick => None,
     };
-    vec![
+    [
         amount(
             "disk",
             DISK_PER_POINT * points,
@@ -44,13 +63,61 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>], out: &Path) ->
             free_memory(),
             "end other programs, or run on a part of the survey",
         ),
-        Finding::new(
-            "",
-            "time",
-            Verdict::Fine,
-            format!("about {:.0} min on {cores} cores{search}", minutes.max(1.0)),
-        ),
     ]
+    .into_iter()
+    .chain(time.map(|text| Finding::new("", "time", Verdict::Fine, text)))
+    .collect()
+}
+
+/// How long the run will take on this machine, on which a tile of the detector takes `tile` seconds.
+fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> String {
+    let cores = rayon::current_num_threads().max(1);
+    let has_tracks =
+        project.settings.registration.photos.enabled && project.epochs.iter().any(|e| e.photos.is_some());
+    let per_point = match has_tracks {
+        true => SECONDS_PER_POINT,
+        false => SECONDS_PER_POINT_WITHOUT_PHOTOS,
+    };
+    // Enlarged photos are looked at in few places.
+    let mut tiling = project.settings.segment.tiling.clone();
+    tiling.scales.retain(|scale| *scale <= 1.0);
+    let tiles: u64 = photos
+        .iter()
+        .map(|[width, height]| tiling.tile_count(*width, *height))
+        .sum();
+    let seconds = tile * (per_point / SECONDS_PER_TILE * points as f64 + tiles as f64) / cores as f64;
+    let has_views = project
+        .epochs
+        .iter()
+        .any(|e| e.masks.is_none() && e.photos.is_none());
+    let views = match has_views {
+        true => "; the search for stones in views of the clouds comes on top",
+        false => "",
+    };
+    let minutes = |factor: f64| (seconds * factor / 60.0).round().max(1.0);
+    let (low, high) = (minutes(1.0 / SPREAD), minutes(SPREAD));
+    match low < high {
+        true => format!("{low} to {high} min on {cores} cores{views}"),
+        false => format!("about {low} min on {cores} cores{views}"),
+    }
+}
+
+/// Seconds that this machine takes for one tile of the detector, on one thread: the faster of two. `None` where the
+/// limit on the address space leaves no room for it.
+fn tile_seconds() -> Option<f64> {
+    if address_space::room().is_some_and(|room| room < detector_memory()) {
+        return None;
+    }
+    let finder = StoneFinder::open(&Weights::BuiltIn, TilingOptions::default().min_score as f32).ok()?;
+    // Noise of grey values: what the image shows hardly matters for the time.
+    let grey = |i: u32| [(i.wrapping_mul(2_654_435_761) >> 24) as u8; 3];
+    let image = Raster::from_vec(TILE_PX, TILE_PX, (0..TILE_PX * TILE_PX).map(grey).collect())?;
+    let once = || {
+        let begin = Instant::now();
+        on_one_thread(|| finder.detect(&image, None)).ok()?;
+        Some(begin.elapsed().as_secs_f64())
+    };
+    Some(once()?.min(once()?))
 }
 
 /// What is needed beside what is free, bytes; `None`: the system does not report how much is free.
@@ -104,8 +171,7 @@ fn memory(project: &Project, points: u64) -> u64 {
         true => detector_memory(),
         false => 0,
     };
-    // The photos are looked at before most points are in memory.
-    memory_of_points(points).max(detector)
+    memory_of_points(points).saturating_add(detector)
 }
 
 fn memory_of_points(points: u64) -> u64 {
