@@ -1,5 +1,6 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
+use super::candidate::Moving;
 use super::field::{covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
@@ -24,56 +25,68 @@ pub(crate) struct Estimate {
     pub by_field: Matrix9,
 }
 
+/// What holds of a stone if it moved in one of the ways that are possible.
+struct Case {
+    probability: f64,
+    mean: StoneVector,
+    covariance: Matrix9,
+    relative_covariance: Matrix3<f64>,
+    by_field: Matrix9,
+}
+
 impl Adjustment {
     /// A stone's motion about the common translation.
     ///
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
     /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the
-    /// mixture of both motions.
+    /// mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
+    /// only photos and neighbours say where it is.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
     /// relative covariance.
     pub fn estimate(&self, i: usize, solution: &Solution, shared: &[f64; 9]) -> Estimate {
         let (stone, equations) = (&self.stones[i], &solution.equations[i]);
         let prediction = &solution.field.from_others[i];
-        let own = self.prior.own_variances();
-        let tied = posterior(&equations.with_field, prediction, &own);
-        let mut covariance = tied.covariance;
-        let mut relative_covariance = covariance_against(&tied, prediction, &own, shared);
         // What counts as an error might be a motion after all.
-        let slide_m = self.undetected_slide_m(i);
-        for k in 0..2 {
-            covariance[(k, k)] += slide_m * slide_m;
-            relative_covariance[(k, k)] += slide_m * slide_m;
-        }
+        let slide_m2 = self.undetected_slide_m(i).powi(2);
+        let case = |probability: f64, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
+            let found = posterior(equations, prediction, own);
+            let mut covariance = found.covariance;
+            let mut relative_covariance = covariance_against(&found, prediction, own, shared);
+            for k in 0..2 {
+                covariance[(k, k)] += slide_m2;
+                relative_covariance[(k, k)] += slide_m2;
+            }
+            Case {
+                probability,
+                mean: found.mean,
+                covariance,
+                relative_covariance,
+                by_field: by_field(equations, own),
+            }
+        };
+        let own = self.prior.own_variances();
         let p_loose = self.p_loose(stone);
-        let tied_by_field = by_field(&equations.with_field, &own);
-        let at_own = equations.on_own.as_ref().filter(|_| stone.on_own.is_some());
-        let Some(at_own) = at_own else {
+        let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
+            let tied = case(1.0, &equations.with_field, &own, slide_m2);
             let factor = widening(p_loose);
             return Estimate {
                 mean: tied.mean,
-                covariance: covariance * factor,
-                relative_covariance: relative_covariance * factor,
+                covariance: tied.covariance * factor,
+                relative_covariance: tied.relative_covariance * factor,
                 missed: p_loose,
-                by_field: tied_by_field,
+                by_field: tied.by_field,
             };
         };
-        let wide = self.prior.loose_variances();
-        let loose = posterior(at_own, prediction, &wide);
-        let p = 1.0 - p_loose;
-        let apart = (tied.mean - loose.mean).unknowns().to_owned();
-        let between = apart * apart.transpose() * (p * p_loose);
-        let loose_relative = covariance_against(&loose, prediction, &wide, shared);
-        Estimate {
-            mean: tied.mean.scaled(p) + loose.mean.scaled(p_loose),
-            covariance: covariance * p + loose.covariance * p_loose + between,
-            relative_covariance: relative_covariance * p
-                + loose_relative * p_loose
-                + between.fixed_view::<3, 3>(0, 0),
-            missed: 0.0,
-            by_field: tied_by_field * p + by_field(at_own, &wide) * p_loose,
-        }
+        let p_wrong = (1.0 - stone.p_with_field) * stone.doubt;
+        let p_tied = 1.0 - p_loose - p_wrong;
+        let photos = self.observed_by_photos(i, Moving::WithField);
+        let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
+        Estimate::of(&[
+            case(p_tied, &equations.with_field, &own, slide_m2),
+            case(p_loose, at_own, &self.prior.loose_variances(), 0.0),
+            case(p_wrong, &without_clouds, &own, slide_m2),
+        ])
     }
 
     /// Probability that a stone is loose; what is expected of any stone where its own observations cannot
@@ -81,8 +94,34 @@ impl Adjustment {
     pub fn p_loose(&self, stone: &StoneState) -> f64 {
         match stone.is_undecided {
             true => self.prior.loose.share,
-            false => 1.0 - stone.p_with_field,
+            false => (1.0 - stone.p_with_field) * (1.0 - stone.doubt),
         }
+    }
+}
+
+impl Estimate {
+    /// Mean and covariance over these cases.
+    fn of(cases: &[Case]) -> Self {
+        let mut mean = StoneVector::zeros();
+        for case in cases {
+            mean = mean + case.mean.scaled(case.probability);
+        }
+        let mut sum = Self {
+            mean,
+            covariance: Matrix9::zeros(),
+            relative_covariance: Matrix3::zeros(),
+            missed: 0.0,
+            by_field: Matrix9::zeros(),
+        };
+        for case in cases {
+            let p = case.probability;
+            let apart = *(case.mean - mean).unknowns();
+            let between = apart * apart.transpose();
+            sum.covariance += (case.covariance + between) * p;
+            sum.relative_covariance += (case.relative_covariance + between.fixed_view::<3, 3>(0, 0)) * p;
+            sum.by_field += case.by_field * p;
+        }
+        sum
     }
 }
 

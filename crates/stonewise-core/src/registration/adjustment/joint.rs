@@ -1,5 +1,6 @@
 //! The joint distribution of the motions, from the last solution.
 
+use super::candidate::Moving;
 use super::estimate::{Estimate, widening};
 use super::field::{information, stone_from_field};
 use super::joint_motions::{JointMotions, JointStone};
@@ -64,7 +65,8 @@ pub(super) fn joint_motions(
             place: node.centroid,
             face_from_world: frame,
             body: results[i].body,
-            is_loose: motion.loose,
+            // Nor is a stone firm whose clouds show it elsewhere, whether they are right or not.
+            is_loose: motion.loose || adjustment.stones[i].moving() == Moving::OnOwn,
             displacement: motion.displacement,
             by_field,
             own,

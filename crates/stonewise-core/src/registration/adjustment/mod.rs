@@ -23,6 +23,7 @@ pub(crate) mod observation;
 mod octaves;
 mod outcome;
 mod params;
+mod partial_view;
 mod phases;
 mod restart;
 mod significance;

@@ -27,12 +27,12 @@ pub(crate) struct Tested {
 /// stones make. A p-value alone is no test: scans show departures of tenths of a millimetre that come from
 /// how stations overlap.
 pub(crate) fn test_stones(adjustment: &Adjustment, solution: &Solution) -> Vec<Tested> {
-    let p_with_field: Vec<Option<f64>> = adjustment
+    let p_error: Vec<Option<f64>> = adjustment
         .stones
         .iter()
-        .map(|s| s.on_own.as_ref().map(|_| s.p_with_field))
+        .map(|s| s.on_own.as_ref().map(|_| 1.0 - adjustment.p_loose(s)))
         .collect();
-    let loose = within_error_rate(&p_with_field, adjustment.params.false_discovery_rate);
+    let loose = within_error_rate(&p_error, adjustment.params.false_discovery_rate);
     p_values(adjustment, solution)
         .iter()
         .zip(loose)

@@ -2,11 +2,13 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Subgraph, VarianceComponents, estimated_share,
-    find_crack, most_likely_components, posterior, probabilities_with_field, reweight_ties, solve,
+    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Prediction, Subgraph, VarianceComponents,
+    estimated_share, find_crack, most_likely_components, posterior, probabilities_with_field, reweight_ties,
+    solve,
 };
 use super::observation::NormalEquations;
-use super::state::Adjustment;
+use super::partial_view::estimated_rate;
+use super::state::{Adjustment, StoneState};
 use crate::progress::{Interrupted, Progress};
 use nalgebra::Matrix3;
 
@@ -166,14 +168,34 @@ impl Adjustment {
     fn reweight_stones(&mut self, equations: &[StoneEquations], field: &Field) {
         let problem = self.problem(equations.iter().map(|e| &e.with_field));
         let on_own: Vec<Option<&NormalEquations>> = equations.iter().map(|e| e.on_own.as_ref()).collect();
-        let probabilities = probabilities_with_field(&problem, &on_own, field, &self.shared_variances(1.0));
+        let stones = 0..self.stones.len();
+        let shares: Vec<f64> = stones
+            .map(|i| self.prior.loose.share + self.wrong_share(i))
+            .collect();
+        let shared = self.shared_variances(1.0);
+        let probabilities = probabilities_with_field(&problem, &on_own, field, &shared, &shares);
         for (stone, p) in self.stones.iter_mut().zip(probabilities) {
             stone.p_with_field = p;
         }
         self.return_to_field(equations, field);
-        let decided = self.stones.iter().filter(|s| !s.is_undecided);
-        self.prior.loose.share =
-            estimated_share(self.params.loose_share, decided.map(|s| 1.0 - s.p_with_field));
+        for (i, prediction) in field.from_others.iter().enumerate() {
+            self.stones[i].doubt = self.doubt(i, prediction);
+        }
+        let decided = || self.stones.iter().filter(|s| !s.is_undecided);
+        let wrong = |s: &StoneState| (s.info.hidden.powi(2), (1.0 - s.p_with_field) * s.doubt);
+        self.wrong_rate = estimated_rate(decided().map(wrong));
+        let p_loose = |s: &StoneState| (1.0 - s.p_with_field) * (1.0 - s.doubt);
+        self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(p_loose));
+    }
+
+    /// Probability that the clouds are wrong about a stone, if they show it away from its neighbours; none where
+    /// its photos show that it left them, too.
+    fn doubt(&self, i: usize, prediction: &Prediction) -> f64 {
+        let wrong = self.wrong_share(i);
+        if wrong == 0.0 || self.photos_show_own_motion(i, prediction) {
+            return 0.0;
+        }
+        wrong / (wrong + self.prior.loose.share)
     }
 
     /// Returns stones to the field whose own optimum shows no motion: those whose points barely constrain it
@@ -249,6 +271,44 @@ mod tests {
         let (still, moved) = (Vector3::zeros(), Vector3::new(0.0, 0.008, 0.004));
         assert!(is_parted(moved, moved));
         assert!(!is_parted(still, moved));
+    }
+
+    #[test]
+    fn a_stone_of_which_one_epoch_shows_little_is_not_called_loose_by_its_clouds_alone() {
+        let moved = Vector3::new(0.0, 0.015, 0.0);
+        let motion = |k| moved * f64::from(u8::from(k == 20));
+        let source = MemoryPairs::new(wall(5, [0.001; 2], motion));
+        let [seen, hidden] = [0.0, 0.7].map(|hidden| {
+            let (mut adjustment, points) = begun(&source);
+            adjustment.stones[20].info.hidden = hidden;
+            adjustment.estimate_noise(&points.sample);
+            let mut last = None;
+            for _ in 0..8 {
+                adjustment.evaluate(&points).unwrap();
+                let equations = adjustment.equations();
+                let field = adjustment.solve_and_reweight(&equations).unwrap();
+                let solution = Solution { equations, field };
+                adjustment.step(&solution);
+                last = Some(solution);
+            }
+            let estimate = adjustment.estimate(20, &last.unwrap(), &adjustment.shared_variances(1.0));
+            let along = estimate.mean + adjustment.prior.common_in(20);
+            let sd = estimate.covariance[(0, 0)].sqrt();
+            let p_loose = adjustment.p_loose(&adjustment.stones[20]);
+            (along.translation().x.abs(), sd, p_loose)
+        });
+        let (along, sd, p_loose) = seen;
+        assert!(
+            (along - 0.015).abs() < 5e-4 && sd < 1e-3 && p_loose > 0.95,
+            "{seen:?}"
+        );
+        // A loose stone and clouds at a wrong place are about as probable: the interval holds either.
+        let (along, sd, p_loose) = hidden;
+        assert!((0.2..0.9).contains(&p_loose), "{hidden:?}");
+        assert!(
+            (along - 0.015).abs() < 1.96 * sd && along < 1.96 * sd,
+            "{hidden:?}"
+        );
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::hypothesis::LikelihoodRatio;
 use super::observation::photo::PhotoModel;
 use super::observation::surface::{Layout, StoneSurface, SurfaceModel};
 use super::params::AdjustmentParams;
+use super::partial_view::expected_rate;
 use super::stone_vector::StoneVector;
 use super::survey::{StoneInfo, smoothed_shifts};
 use crate::statistics::component_median;
@@ -19,6 +20,8 @@ pub(crate) struct Adjustment {
     pub surface: SurfaceModel,
     /// What photos show of the stones, where they are used.
     pub photos: Option<PhotoModel>,
+    /// How often the clouds show stones at a wrong place, see [`Self::wrong_share`].
+    pub wrong_rate: f64,
     pub params: AdjustmentParams,
 }
 
@@ -35,6 +38,8 @@ pub(crate) struct StoneState {
     pub ratio: LikelihoodRatio,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
+    /// Probability that the clouds show it at a wrong place, if they show it away from its neighbours.
+    pub doubt: f64,
     /// Whether its observations are too weak, or contradict each other too much, to tell a loose stone from
     /// one that moves with the field.
     pub is_undecided: bool,
@@ -72,8 +77,15 @@ impl Adjustment {
             prior,
             surface: SurfaceModel::start(layout),
             photos: None,
+            wrong_rate: expected_rate(),
             params: params.clone(),
         })
+    }
+
+    /// Probability beforehand that the clouds show a stone at a wrong place: it grows with the square of what one
+    /// epoch does not show of the face.
+    pub fn wrong_share(&self, i: usize) -> f64 {
+        self.wrong_rate * self.stones[i].info.hidden.powi(2)
     }
 }
 
@@ -86,6 +98,7 @@ impl StoneState {
             on_own: None,
             ratio: LikelihoodRatio::default(),
             p_with_field: 1.0,
+            doubt: 0.0,
             is_undecided: false,
             moves: false,
             swings: false,

@@ -74,12 +74,13 @@ impl Adjustment {
         let prediction = &field.from_others[i];
         let origin = self.prior.common_in(i);
         let limits = StepLimits::of(self);
+        let expected = self.prior.loose.share + self.wrong_share(i);
         let stone = &mut self.stones[i];
         let p_loose = 1.0 - stone.p_with_field;
         if let (Some(own), Some(equations)) = (&mut stone.on_own, &equations.on_own) {
             return limits.follow(own, &posterior(equations, prediction, &wide), &origin, p_loose);
         }
-        let is_suspect = p_loose > SUSPECT * self.prior.loose.share;
+        let is_suspect = p_loose > SUSPECT * expected;
         if is_suspect {
             let observed = equations.on_own.as_ref().unwrap_or(&equations.with_field);
             let start = posterior(observed, prediction, &wide).mean + origin;

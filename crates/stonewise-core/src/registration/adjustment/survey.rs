@@ -3,6 +3,7 @@
 use super::error::AdjustError;
 use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
+use super::partial_view::hidden;
 use crate::id::StoneId;
 use crate::progress::Progress;
 use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
@@ -24,6 +25,8 @@ pub(crate) struct StoneInfo {
     pub usable: bool,
     /// Noise of each epoch's points over that of most stones: 1 unless another sensor measured the stone.
     pub noise_factors: [f64; 2],
+    /// How much less of its face one epoch shows than is usual, as a share.
+    pub hidden: f64,
 }
 
 /// All pairs, with and without their points.
@@ -95,6 +98,13 @@ pub(crate) fn survey<'a, S: PairSource>(
         }
     }
     set_noise_factors(&mut stones, &windows);
+    let shared: Vec<f64> = windows
+        .iter()
+        .map(|w| w.as_deref().map_or(1.0, Window::shared))
+        .collect();
+    for (stone, hidden) in stones.iter_mut().zip(hidden(&shared)) {
+        stone.hidden = hidden;
+    }
     sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);
     Ok(Survey {
@@ -119,6 +129,7 @@ impl StoneInfo {
             shift: pair.centroid_second - pair.centroid,
             counts,
             noise_factors: [1.0; 2],
+            hidden: 0.0,
             usable: counts.iter().all(|&n| n >= params.min_points),
         }
     }

@@ -1,0 +1,59 @@
+//! Stones of which one epoch shows a part only.
+//!
+//! Where a mask or the cloud ends within a stone, the part that both epochs show lies at an edge, where clouds are
+//! warped and points are mixed, and it may fit at a wrong place as well as a whole face fits at the right one. Such
+//! a stone looks loose. How often that happens, the stones themselves show: it is counted how many more of those
+//! that are partly seen leave their neighbours.
+
+use crate::statistics::upper_median;
+
+/// Share of stones that fit at a wrong place, of those of which one epoch shows next to nothing, before the
+/// stones of the survey count: as many as are expected to be loose.
+const EXPECTED: f64 = 0.03;
+/// Sum of the squared hidden shares of as many stones as count for that: some thirty of which half is hidden.
+const STONES_EXPECTED: f64 = 10.0;
+
+/// How often the clouds are wrong, from the squared hidden share of each stone and the probability that they are
+/// wrong about it: one step of expectation maximisation (Dempster, Laird & Rubin 1977).
+pub(super) fn estimated_rate(stones: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (hidden, wrong) = stones.fold((0.0, 0.0), |sum, stone| (sum.0 + stone.0, sum.1 + stone.1));
+    (STONES_EXPECTED * EXPECTED + wrong) / (STONES_EXPECTED + hidden)
+}
+
+/// The same before any stone counts.
+pub(super) fn expected_rate() -> f64 {
+    estimated_rate(std::iter::empty())
+}
+
+/// How much less one epoch shows of each stone than is usual in the survey, as a share; `shared`: share of the
+/// face that both epochs show.
+pub(super) fn hidden(shared: &[f64]) -> Vec<f64> {
+    let Some(usual) = upper_median(&mut shared.to_vec()).filter(|u| *u > 0.0) else {
+        return vec![0.0; shared.len()];
+    };
+    shared.iter().map(|s| (1.0 - s / usual).max(0.0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_usual_hides_nothing() {
+        let found = hidden(&[0.9, 0.9, 0.8, 0.3, 1.0]);
+        let expected = [0.0, 0.0, 1.0 / 9.0, 2.0 / 3.0, 0.0];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert_eq!(hidden(&[0.0, 0.0, 0.5]), [0.0; 3]);
+        assert!(hidden(&[]).is_empty());
+    }
+
+    #[test]
+    fn the_rate_is_that_of_the_stones_once_they_are_many() {
+        let rate = |stones: usize, wrong: f64| estimated_rate((0..stones).map(|_| (0.25, 0.25 * wrong)));
+        assert!((rate(0, 0.0) - 0.03).abs() < 1e-15);
+        assert!((rate(40, 0.0) - 0.015).abs() < 1e-15);
+        assert!((rate(40_000, 0.4) - 0.4).abs() < 1e-3);
+    }
+}
