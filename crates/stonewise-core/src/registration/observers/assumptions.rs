@@ -3,6 +3,7 @@
 use super::components::{ObserverComponents, SensorClass};
 use super::model::{Prior, Problem, Unknowns};
 use super::observation::Observation;
+use nalgebra::{Matrix3, Vector3};
 
 /// Factor on the error of the whole epoch where areas alone are to determine it. With it left open,
 /// directions that no area sees would seem to show anything.
@@ -14,10 +15,10 @@ const SURPRISING: f64 = 2.0;
 #[derive(Clone, Copy)]
 pub(super) struct Model {
     pub components: ObserverComponents,
-    /// Of the later epoch against the reference as a whole, per axis, metres.
-    pub whole_m: f64,
-    /// Error of the later epoch where it is left open, so that areas alone determine it, metres.
-    pub open_m: f64,
+    /// Covariance of the error of the later epoch against the reference as a whole, m^2.
+    pub whole: Matrix3<f64>,
+    /// The same where it is left open, so that areas alone determine it, m^2.
+    pub open: Matrix3<f64>,
     /// Of a source on a plane of a stable area, metres.
     pub plane_m: f64,
     pub class: SensorClass,
@@ -27,35 +28,47 @@ impl Model {
     /// With all errors of the sources times `factor`.
     pub fn scaled(&self, factor: f64) -> (Prior, ObserverComponents) {
         let components = self.components.scaled(factor);
-        let prior = Prior::with_planes(&components, self.whole_m, self.plane_m);
+        let prior = Prior::with_planes(&components, self.whole, self.plane_m);
         (prior, components)
     }
 
     /// With an error of the whole epoch so wide that areas alone determine it.
     pub fn opened(&self) -> (Prior, ObserverComponents) {
-        self.with_whole(self.open_m)
-    }
-
-    /// With another error of the whole epoch, metres.
-    fn with_whole(&self, whole_m: f64) -> (Prior, ObserverComponents) {
-        let prior = Prior::with_planes(&self.components, whole_m, self.plane_m);
+        let prior = Prior::with_planes(&self.components, self.open, self.plane_m);
         (prior, self.components)
     }
 
-    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is
-    /// assumed: an assumption that does not hold would pull the error towards none.
+    /// With the error of the whole epoch as large as stable areas show it, along the directions in which that is
+    /// far more than is assumed: an assumption that does not hold would pull the error towards none. Along what
+    /// the areas hardly show, the assumption holds: an error that is left open is no error that is seen.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
         let (prior, components) = self.opened();
-        let solution = Problem::new(unknowns, observations).solve(&prior, &components);
-        let shown_m = solution.map_or(0.0, |s| s.mean.fixed_rows::<3>(unknowns.whole()).amax());
-        match shown_m > SURPRISING * self.whole_m && self.whole_m > 0.0 {
-            true => Self {
-                whole_m: shown_m.max(self.open_m),
-                open_m: shown_m.max(self.open_m),
-                ..self
-            },
-            false => self,
+        let Some(solution) = Problem::new(unknowns, observations).solve(&prior, &components) else {
+            return self;
+        };
+        let shown = solution.mean.fixed_rows::<3>(unknowns.whole()).into_owned();
+        let covariance = solution
+            .covariance
+            .fixed_view::<3, 3>(unknowns.whole(), unknowns.whole())
+            .into_owned();
+        self.widened_to(&shown, &covariance)
+    }
+
+    /// With an error of the whole epoch that was found with this covariance, left open.
+    fn widened_to(self, shown: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
+        let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+        let mut wider = self;
+        for (variance, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let along = |m: &Matrix3<f64>| direction.dot(&(m * direction));
+            let (assumed, open) = (along(&self.whole), along(&self.open));
+            let square = direction.dot(shown).powi(2);
+            if assumed > 0.0 && square > SURPRISING * SURPRISING * (assumed + variance) {
+                let outer = direction * direction.transpose();
+                wider.whole += outer * (square.max(open) - assumed);
+                wider.open += outer * (square.max(open) - open);
+            }
         }
+        wider
     }
 }
 
@@ -85,6 +98,35 @@ pub(super) fn whole_m(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_is_widened_along_what_is_seen_alone() {
+        let class = SensorClass::Airborne;
+        let model = Model {
+            components: ObserverComponents::expected(class),
+            whole: Matrix3::identity() * 9e-6,
+            open: Matrix3::identity() * 225e-6,
+            plane_m: 0.0,
+            class,
+        };
+        // Seen to a millimetre along an axis between x and y, hardly along the others.
+        let axis = Vector3::new(0.6, 0.8, 0.0);
+        let covariance = Matrix3::identity() * 150e-6 - axis * axis.transpose() * 149e-6;
+        let beside = Vector3::new(-0.8, 0.6, 0.0) * 0.013;
+        let near = model.widened_to(&(axis * 0.005 + beside), &covariance);
+        assert_eq!([near.whole, near.open], [model.whole, model.open]);
+        let far = model.widened_to(&(axis * 0.02 + beside), &covariance);
+        let expected = model.whole + axis * axis.transpose() * (400e-6 - 9e-6);
+        assert!((far.whole - expected).norm() < 1e-9);
+        assert!((axis.dot(&(far.open * axis)) - 400e-6).abs() < 1e-9);
+        // An error that is stated as none stays none.
+        let none = Model {
+            whole: Matrix3::zeros(),
+            open: Matrix3::zeros(),
+            ..model
+        };
+        assert_eq!(none.widened_to(&(axis * 0.02), &covariance).whole, none.whole);
+    }
 
     #[test]
     fn sources_that_agree_too_well_hide_their_error_in_their_mean() {

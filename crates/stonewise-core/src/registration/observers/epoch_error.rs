@@ -153,8 +153,8 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
             true => components,
             false => opened(components),
         },
-        whole_m,
-        open_m: WIDE * whole_m,
+        whole: Matrix3::identity() * (whole_m * whole_m),
+        open: Matrix3::identity() * (WIDE * whole_m).powi(2),
         plane_m: PLANE_SHARE * params.stable.systematic_share * pair.sigma_m,
         class,
     };

@@ -63,8 +63,8 @@ pub(super) struct Prior {
     pub rotation_m: f64,
     pub drift_m: f64,
     pub drift_length: f64,
-    /// Of the later epoch against the reference, as a whole; 0: none.
-    pub whole_m: f64,
+    /// Covariance of the error of the later epoch against the reference, as a whole, m^2; 0: none.
+    pub whole: Matrix3<f64>,
     /// Of a source on a plane of the stable areas.
     pub plane_m: f64,
     /// Drift of an epoch whose files keep no sources apart, along the wall; `None`: that of a source.
@@ -74,16 +74,16 @@ pub(super) struct Prior {
 impl Prior {
     /// Where no planes are looked at.
     pub fn new(components: &ObserverComponents, whole_m: f64) -> Self {
-        Self::with_planes(components, whole_m, LEAST_M)
+        Self::with_planes(components, Matrix3::identity() * (whole_m * whole_m), LEAST_M)
     }
 
-    pub fn with_planes(components: &ObserverComponents, whole_m: f64, plane_m: f64) -> Self {
+    pub fn with_planes(components: &ObserverComponents, whole: Matrix3<f64>, plane_m: f64) -> Self {
         Self {
             translation_m: components.translation_m,
             rotation_m: components.rotation_m,
             drift_m: components.drift_m,
             drift_length: components.drift_length,
-            whole_m,
+            whole,
             plane_m,
             merged: None,
         }
@@ -253,13 +253,20 @@ impl Unknowns {
             diagonal(&mut matrix, block.first, [prior.translation_m; 3]);
             diagonal(&mut matrix, block.first + 3, [prior.rotation_m; 3]);
         }
-        diagonal(&mut matrix, self.whole, [prior.whole_m.max(LEAST_M); 3]);
         if let Some((first, sd)) = self.stretch {
             diagonal(&mut matrix, first, [sd.shared, sd.of_epoch, sd.of_epoch]);
         }
         for first in self.planes.values() {
             diagonal(&mut matrix, *first, [prior.plane_m.max(LEAST_M); 3]);
         }
+        let of_whole = prior.whole.symmetric_eigen();
+        let information = of_whole.eigenvalues.map(|v| v.max(LEAST_M * LEAST_M).recip());
+        log_det += information.map(f64::ln).sum();
+        matrix.fixed_view_mut::<3, 3>(self.whole, self.whole).copy_from(
+            &(of_whole.eigenvectors
+                * Matrix3::from_diagonal(&information)
+                * of_whole.eigenvectors.transpose()),
+        );
         for block in &self.blocks {
             let (inverse, knots_log_det) = knot_information(&block.knots, prior.drift(block));
             log_det += 3.0 * knots_log_det;

@@ -356,7 +356,7 @@ fn a_motion_of_some_cells_is_that_of_generalised_least_squares_with_all_unknowns
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
     let unknowns = Unknowns::new(&sources(2), &sights, SensorClass::Airborne).with_planes(&list);
     let c = ObserverComponents::expected(SensorClass::Airborne);
-    let prior = Prior::with_planes(&c, 0.01, 0.001);
+    let prior = Prior::with_planes(&c, Matrix3::identity() * 1e-4, 0.001);
     let problem = Problem::new(&unknowns, &all);
     let solution = problem.solve(&prior, &c).unwrap();
     let number = |o: &Observation| o.plane().map(|p| p.number);
