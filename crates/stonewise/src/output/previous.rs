@@ -4,6 +4,7 @@
 //! What lies under its final name is so always the current run's, and `UNFINISHED.txt` says where that is not
 //! finished.
 
+use super::digests::Digests;
 use super::result_names::{PREVIOUS_DIR, cloud_names, is_result};
 use crate::error::{Error, Result};
 use crate::files::{is_there, write_text};
@@ -23,7 +24,15 @@ pub const UNFINISHED_FILE: &str = "UNFINISHED.txt";
 /// After a run that did not finish, `previous` keeps what it holds: the last finished run's.
 pub(super) fn set_aside(folder: &Path, project: &Project) -> Result<()> {
     let (marker, previous) = (folder.join(UNFINISHED_FILE), folder.join(PREVIOUS_DIR));
-    let results = results_in(folder, project)?;
+    let mut results = results_in(folder, project)?;
+    // Labelled clouds of an epoch that the project no longer has.
+    for (listed, _) in Digests::read(folder).ok().flatten().unwrap_or_default().iter() {
+        if is_there(&folder.join(listed))? {
+            results.push(listed.to_path_buf());
+        }
+    }
+    results.sort();
+    results.dedup();
     let was_finished = !is_there(&marker)?;
     if was_finished && !results.is_empty() {
         remove_previous(folder)?;
@@ -214,6 +223,23 @@ mod tests {
         assert!(!out.join(PREVIOUS_DIR).exists() && !out.join(UNFINISHED_FILE).exists());
         assert_eq!(read(out, "stones.csv").unwrap(), "second");
         assert_eq!(read(out, "notes.txt").unwrap(), "first");
+    }
+
+    #[test]
+    fn clouds_of_an_epoch_that_the_project_no_longer_has_go_with_the_run_that_made_them() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path();
+        let project = Project::of_clouds(Path::new("a/x.laz"), Path::new("b/x.laz"), M3c2Params::default());
+        for name in ["stones.csv", "epoch3/x.laz", "epoch3/mine.laz"] {
+            write(out, name, "first");
+        }
+        let made = ["stones.csv".into(), "epoch3/x.laz".into()];
+        Digests::of(out, &made).unwrap().write(out).unwrap();
+        set_aside(out, &project).unwrap();
+        assert_eq!(read(out, "epoch3/x.laz"), None);
+        assert_eq!(read(out, "previous/epoch3/x.laz").unwrap(), "first");
+        finish(out, &["stones.csv".into()], true).unwrap();
+        assert_eq!(read(out, "epoch3/mine.laz").unwrap(), "first");
     }
 
     #[test]
