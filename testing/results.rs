@@ -59,6 +59,7 @@ pub fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
         epochs: epochs.iter().map(epoch).collect(),
         part: None,
         edits: None,
+        conditions: None,
         parameters: Settings::default(),
         steps: Vec::new(),
         warnings: Vec::new(),

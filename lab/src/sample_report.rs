@@ -396,6 +396,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         epochs: vec![epoch("2025 <b>"), epoch("2026")],
         part: None,
         edits: None,
+        conditions: None,
         parameters: settings(case, language)?,
         steps: vec![StepTime {
             step: "ingest-1".to_owned(),

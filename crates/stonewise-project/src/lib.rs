@@ -27,6 +27,7 @@ mod schema;
 pub mod sources;
 mod split;
 
+pub use conditions::{ConditionsAt, ConditionsFile};
 pub use day::{DAYS_A_YEAR, day_of};
 pub use init::{Initialised, Proposal, init, propose};
 pub use project_type::{Epoch, PhotoFiles, Project};

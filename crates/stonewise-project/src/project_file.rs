@@ -258,7 +258,7 @@ impl Project {
             settings,
             notes,
             edits,
-            conditions: conditions.map(|file| file.path),
+            conditions,
             part: None,
         })
     }

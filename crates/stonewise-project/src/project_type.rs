@@ -1,5 +1,6 @@
 //! A project: which surveys, and every parameter.
 
+use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
 use crate::sources::SourceRule;
 use std::collections::BTreeMap;
@@ -31,7 +32,7 @@ pub struct Project {
     /// Corrections by hand; absent where the project names none.
     pub edits: Option<EditsFile>,
     /// The file of readings; absent where the project names none.
-    pub conditions: Option<PathBuf>,
+    pub conditions: Option<ConditionsFile>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -109,7 +110,7 @@ impl Project {
         }
         inputs.extend(self.settings.report.logo.clone());
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
-        inputs.extend(self.conditions.clone());
+        inputs.extend(self.conditions.as_ref().map(|file| file.path.clone()));
         inputs
     }
 

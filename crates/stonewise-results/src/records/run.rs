@@ -38,6 +38,9 @@ pub struct RunRecord {
     /// The file of edits by hand; absent where the project has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edits: Option<InputRecord>,
+    /// The file of conditions; absent where the project names none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub conditions: Option<InputRecord>,
     /// Every parameter as it was used.
     pub parameters: Settings,
     /// The steps, in order.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 const KIND: &str = "inputs";
 
-/// Epochs, parameters, and the digests of clouds, cameras, masks and edits. Photos have no digest in
+/// Epochs, parameters, and the digests of clouds, cameras, masks, edits and conditions. Photos have no digest in
 /// `run.json`: the run again shows whether they are the same.
 pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
@@ -65,6 +65,8 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
     }
     let edits = project.edits.as_ref().map(|e| e.path.as_path());
     compare("edits", run.edits.as_ref(), edits)?;
+    let conditions = project.conditions.as_ref().map(|c| c.path.as_path());
+    compare("conditions", run.conditions.as_ref(), conditions)?;
     let message = format!("{agree} inputs are those of the run");
     findings.push(Finding::new(KIND, "digests", Answer::Holds, message));
     Ok(findings)

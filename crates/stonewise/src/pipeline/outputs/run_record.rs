@@ -57,6 +57,11 @@ fn write_run_record(run: &Run) -> Result<()> {
             .as_ref()
             .map(|edits| input(context, &edits.path))
             .transpose()?,
+        conditions: project
+            .conditions
+            .as_ref()
+            .map(|file| input(context, &file.path))
+            .transpose()?,
         parameters: project.settings.clone(),
         steps: context.times(),
         warnings: context.warnings.recorded(project.settings.report.language),
