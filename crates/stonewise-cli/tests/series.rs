@@ -3,10 +3,14 @@
 
 mod support;
 
+use nalgebra::{Point3, Vector3};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use stonewise_io::cloud::{CloudError, read_cloud, write_points_laz};
 use stonewise_io::table::{Table, read_parquet};
+use support::stones::{number, rows};
 use support::{outcome, run, simulated, stonewise};
 
 /// The wall and its noise; `seed`: of the noise.
@@ -18,8 +22,32 @@ fn params(seed: u64) -> String {
     )
 }
 
-/// Four surveys of one wall that stands still, as one project; the reference is the second.
-fn project(dir: &Path) {
+/// Removes the points of the stone nearest to the middle of the wall, and of its joints, from a cloud; returns its
+/// place.
+fn hide(survey: &Path, cloud: &Path) -> Point3<f64> {
+    let truth = rows(&survey.join("truth/stones.csv"));
+    let middle = |row: &BTreeMap<String, String>| number(row, "cy").hypot(number(row, "cz") - 0.5);
+    let stone = truth
+        .values()
+        .min_by(|a, b| middle(a).total_cmp(&middle(b)))
+        .unwrap();
+    let [x, y, z, width, height] = ["cx", "cy", "cz", "width", "height"].map(|name| number(stone, name));
+    let middle = Point3::new(x, y, z);
+    let half = Vector3::new(1.0, 0.5 * width + 0.02, 0.5 * height + 0.02);
+    let mut points: Vec<Point3<f64>> = Vec::new();
+    read_cloud(cloud, 1 << 20, |chunk| {
+        let is_left = |p: &&Point3<f64>| (0..3).any(|k| (p[k] - middle[k]).abs() > half[k]);
+        points.extend(chunk.positions.iter().filter(is_left));
+        Ok::<(), CloudError>(())
+    })
+    .unwrap();
+    write_points_laz(cloud, None, &points, &[]).unwrap();
+    middle
+}
+
+/// Four surveys of one wall that stands still, as one project; the reference is the second, and misses the stone at the
+/// place that is returned.
+fn project(dir: &Path) -> Point3<f64> {
     let mut text =
         "[project]\nname = \"Series wall\"\nreference = \"2020-04\"\n[conditions]\nfile = \"levels.csv\"\n\
                     [registration.photos]\nenabled = false\n"
@@ -41,6 +69,38 @@ fn project(dir: &Path) {
     fs::write(dir.join("stonewise.toml"), text).unwrap();
     let levels = "date,level_m\n2019-09-30,10\n2019-10-02,12\n2020-04-01,8\n2020-10-01,14\n2021-04-01,9\n";
     fs::write(dir.join("levels.csv"), levels).unwrap();
+    hide(&dir.join("s0"), &dir.join("s0/epoch2/cloud_tls.laz"))
+}
+
+/// The rows of the stone that the reference misses: measured from the first epoch on, beside the others in the same
+/// tables.
+fn check_hidden(series: &Table, trends: &Table, place: &Point3<f64>) {
+    let since = series.required::<String>("since").unwrap();
+    let (epochs, states) = (
+        series.required::<String>("epoch").unwrap(),
+        series.required::<String>("state").unwrap(),
+    );
+    let stones = series.required::<u32>("stone_id").unwrap();
+    let [x, y, z] = ["x", "y", "z"].map(|name| series.required::<f64>(name).unwrap());
+    let is_there = |i: &usize| (Point3::new(x[*i], y[*i], z[*i]) - place).norm() < 0.1;
+    let found: Vec<usize> = (0..since.len())
+        .filter(|i| since[*i] == "2019-10" && is_there(i))
+        .collect();
+    let of_rows: Vec<(&str, &str)> = found
+        .iter()
+        .map(|&i| (epochs[i].as_str(), states[i].as_str()))
+        .collect();
+    assert_eq!(of_rows, [("2020-10", "seen"), ("2021-04", "seen")]);
+    let [dx, dy, dz] = ["dx", "dy", "dz"].map(|name| reals(series, name));
+    let motion = |i: usize| Some(Vector3::new(dx[i]?, dy[i]?, dz[i]?));
+    assert!(found.iter().all(|&i| motion(i).unwrap().norm() < 3e-3));
+    let (own, before) = (reals(series, "cov_xx"), reals(series, "cov_prev_xx"));
+    // The epoch before the third is the reference, which misses it.
+    assert!(before[found[0]].is_none() && before[found[1]].unwrap() < 2.0 * own[found[1]].unwrap());
+    let trended = trends.required::<u32>("stone_id").unwrap();
+    let row = trended.iter().position(|id| *id == stones[found[0]]).unwrap();
+    assert_eq!(trends.optional::<u32>("epochs").unwrap()[row], Some(3));
+    assert!(reals(trends, "v_out")[row].unwrap().abs() < 2e-3);
 }
 
 fn reals(table: &Table, name: &str) -> Vec<Option<f64>> {
@@ -50,22 +110,19 @@ fn reals(table: &Table, name: &str) -> Vec<Option<f64>> {
 #[test]
 fn a_series_has_its_tables_its_answers_and_its_section() {
     let (dir, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    project(dir.path());
+    let hidden = project(dir.path());
     let (code, log) = run(dir.path(), out.path(), &[]);
     assert!([0, 3].contains(&code), "{log}");
 
     let series = read_parquet(&out.path().join("series.parquet")).unwrap();
     let epochs = series.required::<String>("epoch").unwrap();
     assert_eq!(epochs[0], "2019-10");
-    assert!(
-        series
-            .required::<String>("since")
-            .unwrap()
-            .iter()
-            .all(|s| s == "2020-04")
-    );
+    let since = series.required::<String>("since").unwrap();
     let [own, before] = ["cov_xx", "cov_prev_xx"].map(|name| reals(&series, name));
-    let of = |epoch: &str| -> Vec<usize> { (0..epochs.len()).filter(|&i| epochs[i] == epoch).collect() };
+    let of = |epoch: &str| -> Vec<usize> {
+        let of_reference = |i: &usize| epochs[*i] == epoch && since[*i] == "2020-04";
+        (0..epochs.len()).filter(of_reference).collect()
+    };
     // There is nothing before the first epoch; before the third lies the reference; the fourth is free of it.
     assert!(of("2019-10").iter().all(|&i| before[i].is_none()));
     assert!(of("2020-10").iter().all(|&i| before[i] == own[i]));
@@ -77,7 +134,8 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
 
     let trends = read_parquet(&out.path().join("trends.parquet")).unwrap();
     let velocities = reals(&trends, "v_out");
-    assert_eq!(velocities.len(), of("2021-04").len());
+    assert!(velocities.len() > of("2021-04").len());
+    check_hidden(&series, &trends, &hidden);
     let known: Vec<f64> = velocities.into_iter().flatten().collect();
     assert!(
         known.len() > 5 && known.iter().all(|v| v.abs() < 2e-3),

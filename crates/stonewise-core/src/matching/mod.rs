@@ -14,6 +14,7 @@ mod match_stones;
 mod offset;
 mod params;
 mod shift;
+mod tracks;
 
 pub use align::{AlignError, Alignment, align_stones};
 pub use face_patch::{FaceGrid, FacePatch};
@@ -21,3 +22,4 @@ pub use footprints::{Footprints, footprint_overlap};
 pub use match_stones::{MatchQuality, MatchReport, Overlap, Surroundings, match_stones};
 pub use offset::{Offset, OffsetVote};
 pub use params::MatchParams;
+pub use tracks::{LaterStones, Track, tracks};

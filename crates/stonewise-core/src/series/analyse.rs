@@ -1,14 +1,17 @@
 //! From the looks of all epochs to the model of every stone and the four answers.
 
-use super::answers::{Answer, LEVEL, SeriesAnswers, Unanswered, Word};
+use super::answers::{Answer, CLAIM_LEVEL, Extrapolation, LEVEL, SeriesAnswers, Unanswered, Word};
+use super::basis::{Basis, SeriesEpoch, Term};
 use super::fit::Fit;
 use super::look::StoneSeries;
 use super::moderated::VarianceFactor;
-use super::stone_model::{Coefficient, Seen, Step, coefficient, likeliest_step, of_term, with_step};
-use super::terms::{Inseparable, Model, SeriesEpoch, Term, WhyInseparable, models};
+use super::stone_model::{
+    AxisModel, Coefficient, Seen, Step, Wave, coefficient, likeliest_step, of_term, scale_of, wave, with_step,
+};
+use super::terms::{Inseparable, Model, WhyInseparable, models};
 use crate::id::StoneId;
 use crate::statistics::q_values;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
@@ -20,6 +23,8 @@ const LEAST_OF_A_LINE: usize = 3;
 const ROUNDS: usize = 3;
 /// Factor on variances beyond which a stone loses weight in the choice of terms.
 const OUTLYING_FACTOR: f64 = 9.0;
+/// Part of a year within which epochs lie in one season: two months.
+const SEASON_APART: f64 = 1.0 / 6.0;
 
 /// A coefficient of a stone's model: along the wall, up and out, with standard deviations of which 1.96 hold 95 %.
 pub type Trend = Coefficient;
@@ -27,8 +32,8 @@ pub type Trend = Coefficient;
 /// What was found of a series.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SeriesFindings {
-    /// Terms of the model, the trend first; none where there is no model.
-    pub terms: Vec<Term>,
+    /// Columns of the model, the trend first of its terms; `None` where there is no model.
+    pub basis: Option<Basis>,
     /// Terms that the epochs cannot carry.
     pub inseparable: Vec<Inseparable>,
     /// Epochs without a date, which take no part.
@@ -37,8 +42,17 @@ pub struct SeriesFindings {
     pub factors: Option<[VarianceFactor; 3]>,
     /// Stones that were measured in epochs enough, in the order given.
     pub stones: Vec<StoneTrend>,
+    /// How far the newest epoch lies from what the model says that is fitted to the others, by stone.
+    pub departures: Vec<(StoneId, Trend)>,
     /// The four answers.
     pub answers: SeriesAnswers,
+}
+
+impl SeriesFindings {
+    /// Terms of the model, the trend first; none where there is no model.
+    pub fn terms(&self) -> &[Term] {
+        self.basis.as_ref().map_or(&[], |b| &b.terms)
+    }
 }
 
 /// The model of a stone.
@@ -58,8 +72,14 @@ pub struct StoneTrend {
     pub temperature: Option<Trend>,
     /// Metres: cosine and sine of the year.
     pub season: Option<[Trend; 2]>,
+    /// Its amplitude, and when it is largest.
+    pub wave: Option<Wave>,
     /// An abrupt motion, where one is shown.
     pub step: Option<Step>,
+    /// All of it: along the wall, up and out.
+    pub model: [AxisModel; 3],
+    /// Factors on the standard deviations of single looks.
+    pub scale: Vector3<f64>,
 }
 
 /// A stone while the model is fitted.
@@ -108,16 +128,20 @@ pub fn analyse(epochs: &[SeriesEpoch], stones: &[StoneSeries]) -> SeriesFindings
         return found;
     };
     let (fitted, factors) = settle(model, &stones);
-    found.terms.clone_from(&model.terms);
+    found.basis = Some(model.basis.clone());
     found.factors = Some(factors);
     found.stones = described(&fitted, model, &factors, &dated);
     if epochs.len() < LEAST_EPOCHS {
         return found;
     }
     let plain = &models[0];
+    found.departures = departures(&fitted, model);
     found.answers = SeriesAnswers {
-        as_predicted: continued(&fitted, model),
-        as_in_the_past: continued(&fitted, plain),
+        as_predicted: Answer {
+            extrapolated: extrapolated(&epochs, model),
+            ..continued(&found.departures)
+        },
+        as_in_the_past: continued(&departures(&fitted, plain)),
         trend: trend(&found),
         anomaly: anomaly(&fitted, model, &factors, &epochs),
     };
@@ -195,7 +219,7 @@ fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFacto
         let p: Vec<f64> = steps.iter().map(|s| s.as_ref().map_or(1.0, |s| s.1)).collect();
         let shown = q_values(&p);
         for ((stone, step), q) in fitted.iter_mut().zip(&steps).zip(shown) {
-            stone.step = step.filter(|_| q <= LEVEL).map(|s| s.0);
+            stone.step = step.filter(|_| q <= CLAIM_LEVEL).map(|s| s.0);
             let design = match &stone.step {
                 Some(step) => with_step(&model.design, step.epoch),
                 None => model.design.clone(),
@@ -229,6 +253,8 @@ fn described(
     let describe = |f: &Fitted| {
         let term = |term: Term| of_term(&f.fits, factors, model, term);
         let season = model.place(Term::Season);
+        let of_axis = |axis: usize| AxisModel::of(&f.fits[axis], &factors[axis]);
+        let axes = [of_axis(0), of_axis(1), of_axis(2)];
         Some(StoneTrend {
             stone: f.stone,
             epochs: f.seen.epochs.len(),
@@ -237,6 +263,9 @@ fn described(
             level: term(Term::Level),
             temperature: term(Term::Temperature),
             season: season.map(|c| [c, c + 1].map(|c| coefficient(&f.fits, factors, c))),
+            wave: season.map(|c| wave(&axes, c)),
+            scale: Vector3::from_fn(|axis, _| scale_of(&f.fits[axis], &factors[axis])),
+            model: axes,
             step: f.step.map(|step| Step {
                 epoch: places[step.epoch],
                 ..step
@@ -251,9 +280,8 @@ fn described(
     all
 }
 
-/// Whether the newest epoch is where the others say by a model: its look gets an unknown of its own, which is the
-/// departure from the prediction.
-fn continued(fitted: &[Fitted], model: &Model) -> Answer {
+/// How far the newest epoch is from where the others say by a model: its look gets an unknown of its own.
+fn departures(fitted: &[Fitted], model: &Model) -> Vec<(StoneId, Trend)> {
     let newest = model.design.nrows() - 1;
     let depart = |f: &Fitted| {
         if f.seen.epochs.last() != Some(&newest) {
@@ -271,18 +299,56 @@ fn continued(fitted: &[Fitted], model: &Model) -> Answer {
             .filter(|f| f[0].freedom > 0)?;
         Some((f.stone, fits, column))
     };
-    let departures: Vec<(StoneId, [Fit; 3], usize)> = fitted.par_iter().filter_map(depart).collect();
-    let factors = factors_of(departures.iter().map(|d| &d.1));
+    let found: Vec<(StoneId, [Fit; 3], usize)> = fitted.par_iter().filter_map(depart).collect();
+    let factors = factors_of(found.iter().map(|d| &d.1));
+    let found = found.iter();
+    found
+        .map(|(stone, fits, column)| (*stone, coefficient(fits, &factors, *column)))
+        .collect()
+}
+
+fn continued(departures: &[(StoneId, Trend)]) -> Answer {
     let found: Vec<_> = departures
         .iter()
-        .map(|(stone, fits, column)| (*stone, coefficient(fits, &factors, *column), None))
+        .map(|(stone, departure)| (*stone, *departure, None))
         .collect();
-    Answer::of(&found, Word::No)
+    Answer::of(&found, Word::No, LEVEL)
+}
+
+/// The conditions of the model in which the newest epoch lies beyond the others.
+fn extrapolated(epochs: &[&SeriesEpoch], model: &Model) -> Vec<Extrapolation> {
+    let Some((newest, others)) = epochs.split_last() else {
+        return Vec::new();
+    };
+    let of_term = |&term: &Term| match term {
+        Term::Trend => None,
+        Term::Season => {
+            let apart = |e: &SeriesEpoch| {
+                let apart = (e.of_year - newest.of_year).rem_euclid(1.0);
+                apart.min(1.0 - apart)
+            };
+            let nearest = others.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+            (apart(nearest) > SEASON_APART).then_some(Extrapolation {
+                term,
+                value: newest.of_year,
+                range: [nearest.of_year; 2],
+            })
+        }
+        Term::Level | Term::Temperature => {
+            let value = term.value(newest)?;
+            let values = others.iter().filter_map(|e| term.value(e));
+            let range = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                [low.min(v), high.max(v)]
+            });
+            (value < range[0] || value > range[1]).then_some(Extrapolation { term, value, range })
+        }
+    };
+    model.basis.terms.iter().filter_map(of_term).collect()
 }
 
 fn trend(found: &SeriesFindings) -> Answer {
     let velocities: Vec<_> = found.stones.iter().map(|s| (s.stone, s.velocity, None)).collect();
-    let mut answer = Answer::of(&velocities, Word::Yes);
+    let mut answer = Answer::of(&velocities, Word::Yes, CLAIM_LEVEL);
     let cause = found
         .inseparable
         .iter()
@@ -310,5 +376,5 @@ fn anomaly(
         Some((f.stone, found, Some(epochs[step.epoch].name.clone())))
     };
     let found: Vec<_> = fitted.par_iter().filter_map(step).collect();
-    Answer::of(&found, Word::Yes)
+    Answer::of(&found, Word::Yes, CLAIM_LEVEL)
 }

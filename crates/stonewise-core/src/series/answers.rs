@@ -1,7 +1,7 @@
 //! The four answers that a series gives.
 
+use super::basis::Term;
 use super::stone_model::Coefficient;
-use super::terms::Term;
 use crate::id::StoneId;
 use crate::statistics::{median, q_values};
 use serde::{Deserialize, Serialize};
@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Share of false ones that is accepted among the stones that are named; of a wall on which nothing happened, the
 /// probability that one is named.
 pub(super) const LEVEL: f64 = 0.05;
+/// The same for trends and for steps, so that either of the two is claimed of a still wall with the probability above.
+pub(super) const CLAIM_LEVEL: f64 = LEVEL / 2.0;
 /// Half the width of a normal 95 % interval in standard deviations.
 const Z: f64 = 1.96;
 
@@ -61,6 +63,17 @@ pub struct Departure {
     pub epoch: Option<String>,
 }
 
+/// A condition of the newest epoch that lies beyond those of the others, on which its prediction rests.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extrapolation {
+    /// The term.
+    pub term: Term,
+    /// What the newest epoch has: metres, degrees, or the part of the year that has passed.
+    pub value: f64,
+    /// The smallest and the largest of the others; of the season the part of the year of the nearest, twice.
+    pub range: [f64; 2],
+}
+
 /// An answer with its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
@@ -71,7 +84,7 @@ pub struct Answer {
     pub reason: Option<Unanswered>,
     /// Stones that were tested.
     pub tested: usize,
-    /// Stones that are named, with the false discovery rate controlled at 5 %.
+    /// Stones that are named, with the false discovery rate controlled at 5 %, of trends and steps at 2.5 %.
     pub stones: Vec<u32>,
     /// Smallest q value of a stone.
     pub smallest_q: Option<f64>,
@@ -80,6 +93,9 @@ pub struct Answer {
     /// Half the width of a stone's 95 % interval, millimetres (of a velocity in a year): median over the stones, of
     /// each its least certain direction.
     pub half_width_mm: Option<f64>,
+    /// Conditions of the newest epoch that lie beyond those of the others, where the answer rests on them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub extrapolated: Vec<Extrapolation>,
 }
 
 /// The four answers.
@@ -105,13 +121,13 @@ impl Answer {
     }
 
     /// From what each stone does. `if_named`: the answer where stones are named; otherwise the opposite.
-    pub(super) fn of(found: &[(StoneId, Coefficient, Option<String>)], if_named: Word) -> Self {
+    pub(super) fn of(found: &[(StoneId, Coefficient, Option<String>)], if_named: Word, level: f64) -> Self {
         if found.is_empty() {
             return Self::none(Unanswered::NothingMeasured);
         }
         let p: Vec<f64> = found.iter().map(|f| f.1.p).collect();
         let q = q_values(&p);
-        let named: Vec<usize> = (0..found.len()).filter(|&i| q[i] <= LEVEL).collect();
+        let named: Vec<usize> = (0..found.len()).filter(|&i| q[i] <= level).collect();
         let length = |i: &usize| found[*i].1.value.norm();
         let largest = named
             .iter()
@@ -131,6 +147,7 @@ impl Answer {
             smallest_q: q.iter().copied().reduce(f64::min),
             largest: largest.map(|i| departure(&found[i])),
             half_width_mm: median(&mut widths),
+            extrapolated: Vec::new(),
         }
     }
 }

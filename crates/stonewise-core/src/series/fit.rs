@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     pub coefficients: DVector<f64>,
-    /// Their variances, for the variances that the observations claim.
-    pub variances: DVector<f64>,
+    /// Their covariance, for the variances that the observations claim.
+    pub covariance: DMatrix<f64>,
     /// Sum of the squared standardised residuals.
     pub residuals: f64,
     /// Observations less unknowns.
@@ -42,14 +42,11 @@ pub(super) fn fit(design: &DMatrix<f64>, values: &[f64], variances: &[f64]) -> O
     let inverse = normal.cholesky()?.inverse();
     let mut coefficients = &inverse * (a.transpose() * &y);
     let residuals = (&y - &a * &coefficients).norm_squared();
-    let mut of_coefficients = inverse.diagonal();
-    for c in 0..unknowns {
-        coefficients[c] /= scale[c];
-        of_coefficients[c] /= scale[c] * scale[c];
-    }
+    coefficients.iter_mut().zip(&scale).for_each(|(c, s)| *c /= s);
+    let covariance = inverse.map_with_location(|r, c, v| v / (scale[r] * scale[c]));
     Some(Fit {
         coefficients,
-        variances: of_coefficients,
+        covariance,
         residuals,
         freedom: rows - unknowns,
     })

@@ -9,19 +9,23 @@
 
 mod analyse;
 mod answers;
+mod basis;
 mod congruent;
 mod fit;
 mod look;
 mod moderated;
+mod path;
 mod stone_model;
 mod terms;
 #[cfg(test)]
 mod tests;
 
 pub use analyse::{SeriesFindings, StoneTrend, Trend, analyse};
-pub use answers::{Answer, Departure, SeriesAnswers, Unanswered, Word};
+pub use answers::{Answer, Departure, Extrapolation, SeriesAnswers, Unanswered, Word};
+pub use basis::{Basis, SeriesEpoch, Term};
 pub use congruent::{SeriesPlace, keep_congruent};
 pub use look::{Look, PairLook, StoneSeries, covariance_between};
 pub use moderated::VarianceFactor;
-pub use stone_model::Step;
-pub use terms::{Inseparable, SeriesEpoch, Term, WhyInseparable};
+pub use path::Group;
+pub use stone_model::{AxisModel, Estimate, Step, Wave};
+pub use terms::{Inseparable, WhyInseparable};

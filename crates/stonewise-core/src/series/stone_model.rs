@@ -1,11 +1,13 @@
 //! The model of one stone: the terms of the wall, and a step where one is shown.
 
+use super::basis::Term;
 use super::fit::{Fit, fit};
 use super::look::{Look, StoneSeries};
 use super::moderated::{VarianceFactor, p_value, sd_of};
-use super::terms::{Model, Term};
-use nalgebra::{DMatrix, Vector3};
+use super::terms::Model;
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// A coefficient: along the wall, up and out, with standard deviations of which 1.96 hold 95 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +29,99 @@ pub struct Step {
     pub value: Vector3<f64>,
     /// Standard deviations.
     pub sd: Vector3<f64>,
+}
+
+/// A value along the wall, up and out, with standard deviations of which 1.96 hold 95 %; metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: Vector3<f64>,
+    /// Its standard deviations.
+    pub sd: Vector3<f64>,
+}
+
+impl Estimate {
+    /// Means of values and of standard deviations, as of errors that all share; `None` of nothing.
+    pub fn mean(all: &[Self]) -> Option<Self> {
+        let count = all.len() as f64;
+        (!all.is_empty()).then(|| Self {
+            value: all.iter().map(|e| e.value).sum::<Vector3<f64>>() / count,
+            sd: all.iter().map(|e| e.sd).sum::<Vector3<f64>>() / count,
+        })
+    }
+}
+
+/// The yearly wave in each component.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wave {
+    /// Half of what lies between its ends, metres.
+    pub amplitude: Estimate,
+    /// The part of the year, 0 to 1, at which it is largest.
+    pub phase: Estimate,
+}
+
+/// One component of a model: coefficients of its columns with their covariance, of which 1.96 standard deviations hold
+/// 95 %.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisModel {
+    /// One for each column of the basis; then that of the step, where the stone has one.
+    pub coefficients: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+}
+
+impl AxisModel {
+    pub(super) fn of(fit: &Fit, factor: &VarianceFactor) -> Self {
+        let scale = scale_of(fit, factor);
+        Self {
+            coefficients: fit.coefficients.clone(),
+            covariance: &fit.covariance * (scale * scale),
+        }
+    }
+
+    /// The value of a row of the basis and its standard deviation. `stepped`: whether it comes after the stone's step.
+    pub fn at(&self, row: &[f64], stepped: bool) -> (f64, f64) {
+        let step = f64::from(u8::from(stepped));
+        let full = DVector::from_fn(self.coefficients.len(), |c, _| {
+            row.get(c).copied().unwrap_or(step)
+        });
+        let variance = full.dot(&(&self.covariance * &full));
+        (full.dot(&self.coefficients), variance.max(0.0).sqrt())
+    }
+}
+
+/// The yearly wave of a model whose cosine has the column `cos` and whose sine the next.
+pub(super) fn wave(axes: &[AxisModel; 3], cos: usize) -> Wave {
+    let of = |axis: usize| {
+        let AxisModel {
+            coefficients,
+            covariance,
+        } = &axes[axis];
+        let (c, s) = (coefficients[cos], coefficients[cos + 1]);
+        let (cc, ss) = (covariance[(cos, cos)], covariance[(cos + 1, cos + 1)]);
+        let cs = covariance[(cos, cos + 1)];
+        let amplitude = c.hypot(s).max(f64::MIN_POSITIVE);
+        // Along the vector (c, s), and across it.
+        let along = (c * c * cc + 2.0 * c * s * cs + s * s * ss).max(0.0).sqrt() / amplitude;
+        let across = (s * s * cc - 2.0 * c * s * cs + c * c * ss).max(0.0).sqrt() / amplitude;
+        let phase = (s.atan2(c) / TAU).rem_euclid(1.0);
+        [[amplitude, along], [phase, across / amplitude / TAU]]
+    };
+    let parts = [of(0), of(1), of(2)];
+    let gather = |part: usize| Estimate {
+        value: Vector3::from_fn(|axis, _| parts[axis][part][0]),
+        sd: Vector3::from_fn(|axis, _| parts[axis][part][1]),
+    };
+    Wave {
+        amplitude: gather(0),
+        phase: gather(1),
+    }
+}
+
+/// The factor on standard deviations of what a fit says, with Student's law in it.
+pub(super) fn scale_of(fit: &Fit, factor: &VarianceFactor) -> f64 {
+    let (factor, freedom) = factor.at(fit.residuals, fit.freedom);
+    sd_of(1.0, factor, freedom)
 }
 
 /// The epochs that saw a stone, with what they saw.
@@ -64,7 +159,8 @@ pub(super) fn coefficient(fits: &[Fit; 3], factors: &[VarianceFactor; 3], column
     let at = |axis: usize| {
         let fit = &fits[axis];
         let (factor, freedom) = factors[axis].at(fit.residuals, fit.freedom);
-        (fit.coefficients[column], fit.variances[column], factor, freedom)
+        let variance = fit.covariance[(column, column)];
+        (fit.coefficients[column], variance, factor, freedom)
     };
     let p = |axis: usize| {
         let (value, variance, factor, freedom) = at(axis);

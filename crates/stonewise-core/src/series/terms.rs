@@ -1,8 +1,8 @@
 //! The terms of the model in time, and which of them the epochs can carry.
 
+use super::basis::{Basis, SeriesEpoch, Term};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::TAU;
 
 /// Variance inflation beyond which a term cannot be told from others (Marquardt 1970).
 const LARGEST_INFLATION: f64 = 10.0;
@@ -11,35 +11,6 @@ const LEAST_LEFT: usize = 2;
 /// Dates whose mean direction on the circle of the year is longer than this lie within one season: half a year's circle
 /// of thirty days to either side.
 const ONE_SEASON: f64 = 0.85;
-
-/// An epoch as the model in time sees it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SeriesEpoch {
-    /// Its name.
-    pub name: String,
-    /// Its date as years since any day; `None`: not dated.
-    pub years: Option<f64>,
-    /// The part of the year that has passed, 0 to 1.
-    pub of_year: f64,
-    /// Level of the reservoir, metres.
-    pub level: Option<f64>,
-    /// Temperature, degrees.
-    pub temperature: Option<f64>,
-}
-
-/// What moves a stone besides chance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Term {
-    /// In proportion to time.
-    Trend,
-    /// In proportion to the level of the reservoir.
-    Level,
-    /// In proportion to the temperature.
-    Temperature,
-    /// One wave a year.
-    Season,
-}
 
 /// A term that a model does not have, and why.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,47 +48,11 @@ pub enum WhyInseparable {
     },
 }
 
-impl Term {
-    /// Terms beside the trend, in the order in which they are tried.
-    pub const OTHERS: [Self; 3] = [Self::Level, Self::Temperature, Self::Season];
-
-    /// Its columns of the design, one value for each epoch; `None` where an epoch lacks the condition.
-    fn columns(self, epochs: &[&SeriesEpoch]) -> Option<Vec<Vec<f64>>> {
-        let of = |value: fn(&SeriesEpoch) -> Option<f64>| {
-            let column: Option<Vec<f64>> = epochs.iter().map(|e| value(e)).collect();
-            // About the mean, so that the constant stays the motion under mean conditions.
-            column.map(|c| {
-                let mean = c.iter().sum::<f64>() / c.len().max(1) as f64;
-                vec![c.into_iter().map(|v| v - mean).collect()]
-            })
-        };
-        match self {
-            Self::Trend => of(|e| e.years),
-            Self::Level => of(|e| e.level),
-            Self::Temperature => of(|e| e.temperature),
-            Self::Season => {
-                let wave = |f: fn(f64) -> f64| epochs.iter().map(|e| f(TAU * e.of_year)).collect();
-                Some(vec![wave(f64::cos), wave(f64::sin)])
-            }
-        }
-    }
-
-    /// Names of the epochs that lack its condition.
-    fn missing(self, epochs: &[&SeriesEpoch]) -> Vec<String> {
-        let lacks = |e: &&&SeriesEpoch| match self {
-            Self::Trend | Self::Season => false,
-            Self::Level => e.level.is_none(),
-            Self::Temperature => e.temperature.is_none(),
-        };
-        epochs.iter().filter(lacks).map(|e| e.name.clone()).collect()
-    }
-}
-
 /// A model: a constant, the trend, and terms.
 #[derive(Clone, Debug)]
 pub(super) struct Model {
-    /// The trend first.
-    pub terms: Vec<Term>,
+    /// Its columns, the trend first of the terms.
+    pub basis: Basis,
     /// A row for each epoch.
     pub design: DMatrix<f64>,
 }
@@ -125,20 +60,16 @@ pub(super) struct Model {
 impl Model {
     /// `terms` beside the trend. `None` where an epoch lacks a condition.
     pub fn new(epochs: &[&SeriesEpoch], terms: &[Term]) -> Option<Self> {
-        let mut columns = vec![vec![1.0; epochs.len()]];
         let terms: Vec<Term> = [Term::Trend].into_iter().chain(terms.iter().copied()).collect();
-        for term in &terms {
-            columns.extend(term.columns(epochs)?);
-        }
-        let design = DMatrix::from_fn(epochs.len(), columns.len(), |r, c| columns[c][r]);
-        Some(Self { terms, design })
+        let basis = Basis::of(epochs, &terms)?;
+        let rows: Vec<Vec<f64>> = epochs.iter().map(|e| basis.row(e)).collect::<Option<_>>()?;
+        let design = DMatrix::from_fn(epochs.len(), rows.first()?.len(), |r, c| rows[r][c]);
+        Some(Self { basis, design })
     }
 
-    /// The columns of a term.
+    /// The first column of a term.
     pub fn place(&self, term: Term) -> Option<usize> {
-        let before = self.terms.iter().position(|t| *t == term)?;
-        // Only the season has two columns, and it is the last.
-        Some(1 + before)
+        self.basis.place(term)
     }
 
     pub fn unknowns(&self) -> usize {

@@ -1,14 +1,14 @@
 //! What the path over all epochs means.
 
 use super::html::{figure, section, table, with_units};
-use crate::draw::{MapLayout, MapPicture, stone_map};
+use crate::draw::{MapLayout, MapPicture, PathChart, path_chart, stone_map};
 use crate::summary::Summary;
 use crate::texts::{SeriesTexts, Texts, counted, fill};
 use crate::verdict::term_name;
 use std::fmt::Write;
 use stonewise_core::series::Word;
 use stonewise_figure::{Scale, escape};
-use stonewise_results::records::{AnswerVerdict, TrendsRecord};
+use stonewise_results::records::{AnswerVerdict, EstimateRecord, TrendsRecord, ZoneTrend};
 use stonewise_results::{ResultSet, StoneRow, nice_scale_m};
 
 /// The four answers, the model and the map of velocity; empty where there are only two epochs.
@@ -36,6 +36,7 @@ pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
     let mut body = format!("<p>{}</p>", with_units(&escape(&answers.sentence)));
     body.push_str(&table(&[names.question, names.answer, ""], &rows, 3));
     body.push_str(&model(trends, texts));
+    body.push_str(&paths(trends, results, texts));
     body.push_str(&map(results, facts));
     section("series", names.heading, &body)
 }
@@ -67,24 +68,82 @@ fn model(trends: &TrendsRecord, texts: &Texts) -> String {
             &[("epochs", &*trends.undated.join(", "))],
         )));
     }
-    rest.extend(trends.zones.iter().map(|zone| {
-        let [along, up, out] = zone.velocity.map(|v| texts.mm(v));
-        let half = texts.mm(1.96 * zone.sd.iter().copied().fold(0.0, f64::max));
-        let id = zone.zone_id.to_string();
-        let values = [
-            ("id", &*id),
-            ("epoch", &*zone.epoch),
-            ("along", &*along),
-            ("up", &*up),
-            ("out", &*out),
-            ("half", &*half),
-        ];
-        with_units(&escape(&counted(names.zone, zone.stones, &values)))
-    }));
     if !rest.is_empty() {
         let _ = write!(out, "<ul><li>{}</li></ul>", rest.join("</li><li>"));
     }
     out
+}
+
+/// The path of every zone with its model, and the conditions beneath.
+fn paths(trends: &TrendsRecord, results: &ResultSet, texts: &Texts) -> String {
+    let names = texts.series;
+    let thresholds = results.run.as_ref().map(|run| &run.parameters.thresholds);
+    let levels = thresholds.map(|t| match t.deformation.is_empty() {
+        true => t.wall.length,
+        false => t.deformation,
+    });
+    let one = |zone: &ZoneTrend| {
+        let title = fill(
+            names.path,
+            &[("id", &*zone.zone_id.to_string()), ("epoch", &*zone.epoch)],
+        );
+        let picture = path_chart(&PathChart {
+            title: &title,
+            zone,
+            labels: names.components,
+            conditions: &trends.conditions,
+            thresholds: levels.unwrap_or_default(),
+            texts,
+        });
+        figure(
+            &title,
+            &picture,
+            &with_units(&escape(&path_in_words(zone, texts))),
+        )
+    };
+    let pictures: String = trends.zones.iter().map(one).collect();
+    match pictures.is_empty() {
+        true => pictures,
+        false => format!(
+            "<div class=\"paths\">{pictures}</div><p class=\"note\">{}</p>",
+            names.path_note
+        ),
+    }
+}
+
+/// A sentence with its values filled in.
+type Say<'a> = dyn Fn(&[(&str, &str)]) -> String + 'a;
+
+/// What a zone does, in sentences.
+fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
+    let names = texts.series;
+    // A coefficient for ten units, so that the number has digits.
+    let said = |found: &EstimateRecord, factor: f64, say: &Say| {
+        let [along, up, out] = found.value.map(|v| texts.mm(v * factor));
+        let largest = found.sd.iter().copied().fold(0.0, f64::max);
+        let half = texts.mm(1.96 * largest * factor);
+        say(&[("along", &along), ("up", &up), ("out", &out), ("half", &half)])
+    };
+    let velocity = EstimateRecord {
+        value: zone.velocity,
+        sd: zone.sd,
+    };
+    let mut all = vec![said(&velocity, 1.0, &|v| counted(names.zone, zone.stones, v))];
+    all.extend(
+        zone.level
+            .iter()
+            .map(|c| said(c, 10.0, &|v| fill(names.by_level, v))),
+    );
+    let temperature = zone.temperature.iter();
+    all.extend(temperature.map(|c| said(c, 10.0, &|v| fill(names.by_temperature, v))));
+    let season = zone.season.iter().map(|s| &s.amplitude);
+    all.extend(season.map(|c| said(c, 1.0, &|v| fill(names.by_season, v))));
+    all.extend(
+        zone.departure
+            .iter()
+            .map(|c| said(c, 1.0, &|v| fill(names.departs, v))),
+    );
+    all.join(" ")
 }
 
 /// How fast every stone moves.

@@ -2,8 +2,8 @@
 
 use crate::texts::{Texts, counted, fill};
 use stonewise_base::report_params::Language;
-use stonewise_core::series::{Answer, Inseparable, Term, Unanswered, WhyInseparable, Word};
-use stonewise_figure::count;
+use stonewise_core::series::{Answer, Extrapolation, Inseparable, Term, Unanswered, WhyInseparable, Word};
+use stonewise_figure::{count, number};
 use stonewise_results::records::{AnswerVerdict, SeriesVerdict, TrendsRecord};
 
 /// The four answers with their sentences.
@@ -12,7 +12,11 @@ pub fn series_verdict(found: &TrendsRecord, language: Language) -> SeriesVerdict
     let names = &texts.series;
     let answers = &found.answers;
     let [predicted, past, trend, anomaly] = [
-        in_words(&answers.as_predicted, names.not_predicted, names.predicted, texts),
+        with_extrapolations(
+            in_words(&answers.as_predicted, names.not_predicted, names.predicted, texts),
+            &answers.as_predicted,
+            texts,
+        ),
         in_words(&answers.as_in_the_past, names.not_past, names.past, texts),
         in_words(&answers.trend, names.trend, names.no_trend, texts),
         in_words(&answers.anomaly, names.anomaly, names.no_anomaly, texts),
@@ -41,6 +45,30 @@ pub fn series_verdict(found: &TrendsRecord, language: Language) -> SeriesVerdict
         as_in_the_past: with(past, &answers.as_in_the_past),
         trend: with(trend, &answers.trend),
         anomaly: with(anomaly, &answers.anomaly),
+    }
+}
+
+/// Names the conditions of the newest epoch that lie beyond those of the others.
+fn with_extrapolations(said: String, answer: &Answer, texts: &Texts) -> String {
+    let names = &texts.series;
+    let number = |v: f64| number(v, 1).replace('.', texts.decimal);
+    let one = |found: &Extrapolation| match found.term {
+        Term::Season => names.beyond_season.to_owned(),
+        term => {
+            let [low, high] = found.range.map(number);
+            let values = [
+                ("term", name(term, texts)),
+                ("value", &*number(found.value)),
+                ("low", &*low),
+                ("high", &*high),
+            ];
+            fill(names.beyond, &values)
+        }
+    };
+    let beyond: Vec<String> = answer.extrapolated.iter().map(one).collect();
+    match beyond.is_empty() {
+        true => said,
+        false => format!("{said} ({})", beyond.join(", ")),
     }
 }
 
@@ -135,8 +163,11 @@ mod tests {
             epochs: vec!["a".to_owned(); 6],
             undated: Vec::new(),
             terms: vec![Term::Trend],
+            basis: None,
             not_separable: Vec::new(),
+            conditions: Vec::new(),
             variance_factors: None,
+            wall: None,
             zones: Vec::new(),
             answers,
         }
@@ -176,6 +207,29 @@ mod tests {
         );
         let german = series_verdict(&record(answers), Language::German);
         assert!(german.sentence.contains("2,0 mm im Jahr"), "{}", german.sentence);
+    }
+
+    #[test]
+    fn a_level_that_no_other_epoch_had_is_named() {
+        let beyond = |term, value, range| Extrapolation { term, value, range };
+        let answer = Answer {
+            answer: Word::Yes,
+            extrapolated: vec![
+                beyond(Term::Level, 162.02, [152.76, 159.2]),
+                beyond(Term::Season, 0.5, [0.2, 0.2]),
+            ],
+            ..Answer::default()
+        };
+        let answers = SeriesAnswers {
+            as_predicted: answer,
+            ..SeriesAnswers::default()
+        };
+        let said = series_verdict(&record(answers), Language::English);
+        assert_eq!(
+            said.as_predicted.text,
+            "the newest epoch is as predicted (extrapolated: its level of 162.0 lies outside that of the other epochs, 152.8 to \
+             159.2, extrapolated: no other epoch lies within two months of its season)"
+        );
     }
 
     #[test]

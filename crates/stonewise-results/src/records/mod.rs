@@ -14,7 +14,10 @@ pub use registration::{
 };
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
-pub use trends::{InseparableRecord, TRENDS_VERSION, TrendsRecord, ZoneTrend};
+pub use trends::{
+    ConditionRecord, CurvePoint, EstimateRecord, InseparableRecord, PathPoint, SeasonRecord, TRENDS_VERSION,
+    TrendsRecord, ZoneTrend,
+};
 pub use verdict::{
     AnswerVerdict, Area, DeformationVerdict, DeformedZone, DetectionLimit, EpochVerdict, Headline, Headlines,
     JointVerdict, Largest, Reason, ReasonCode, SeriesVerdict, State, StoneVerdict, VERDICT_VERSION, Verdict,

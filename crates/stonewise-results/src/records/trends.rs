@@ -1,10 +1,10 @@
 //! `trends.json`: what the path of the wall over several epochs means.
 
 use serde::{Deserialize, Serialize};
-use stonewise_core::series::{Inseparable, SeriesAnswers, Term, VarianceFactor};
+use stonewise_core::series::{Basis, Estimate, Inseparable, SeriesAnswers, Term, VarianceFactor};
 
 /// Version of the file's layout.
-pub const TRENDS_VERSION: u32 = 1;
+pub const TRENDS_VERSION: u32 = 2;
 
 /// What was found of a series.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,29 +17,112 @@ pub struct TrendsRecord {
     pub undated: Vec<String>,
     /// Terms of the model, the trend first; none where there is no model.
     pub terms: Vec<Term>,
+    /// The columns of the model with the values at which they are zero: of the trend years since 1970, of level and
+    /// temperature their mean over the epochs.
+    pub basis: Option<Basis>,
     /// Terms that the epochs cannot carry.
     pub not_separable: Vec<InseparableRecord>,
+    /// Level and temperature over the time of the series, where they are known.
+    pub conditions: Vec<ConditionRecord>,
     /// How much larger the variances of errors are than claimed: along the wall, up and out.
     pub variance_factors: Option<[VarianceFactor; 3]>,
-    /// Velocities of the newest epoch's zones of deformation.
+    /// All stones that have a model, as zone 0.
+    pub wall: Option<ZoneTrend>,
+    /// The zones of deformation of the newest epoch that shows any.
     pub zones: Vec<ZoneTrend>,
     /// The four answers.
     pub answers: SeriesAnswers,
 }
 
-/// How fast a zone of deformation moves: the mean of its stones.
+/// What a zone of deformation does over time, or the wall: the mean of its stones. Standard deviations are the means of
+/// theirs, for errors that all of them share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZoneTrend {
-    /// Epoch of the zone.
+    /// Epoch of the zone; empty for the wall.
     pub epoch: String,
-    /// As in the stone table of the epoch.
+    /// As in the stone table of the epoch; 0 for the wall.
     pub zone_id: u32,
-    /// Its stones that have a velocity.
+    /// Its stones that have a model.
     pub stones: usize,
     /// Along the wall, up and out, metres a year.
     pub velocity: [f64; 3],
-    /// Standard deviations, for errors that all of its stones share: the mean of theirs.
+    /// Standard deviations.
     pub sd: [f64; 3],
+    /// Metres for each metre of level, where the model has that.
+    pub level: Option<EstimateRecord>,
+    /// Metres for each degree, where the model has that.
+    pub temperature: Option<EstimateRecord>,
+    /// The yearly wave, where the model has that.
+    pub season: Option<SeasonRecord>,
+    /// Each epoch with a date.
+    pub path: Vec<PathPoint>,
+    /// The model between the epochs and half a year beyond, on days whose conditions are known.
+    pub curve: Vec<CurvePoint>,
+    /// The newest epoch less what the others predict for it under its conditions; absent where it shows too little.
+    pub departure: Option<EstimateRecord>,
+}
+
+/// Values along the wall, up and out, with standard deviations of which 1.96 hold 95 %.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EstimateRecord {
+    /// The values.
+    pub value: [f64; 3],
+    /// Their standard deviations.
+    pub sd: [f64; 3],
+}
+
+impl From<Estimate> for EstimateRecord {
+    fn from(estimate: Estimate) -> Self {
+        Self {
+            value: estimate.value.into(),
+            sd: estimate.sd.into(),
+        }
+    }
+}
+
+/// A yearly wave.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeasonRecord {
+    /// Half of what lies between its ends, metres.
+    pub amplitude: EstimateRecord,
+    /// Days since New Year at which it is largest.
+    pub largest_on: EstimateRecord,
+}
+
+/// An epoch on the path of a zone; metres, along the wall, up and out, from where the reference shows it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathPoint {
+    /// Name of the epoch.
+    pub epoch: String,
+    /// Its date.
+    pub date: String,
+    /// What it shows, with the error of that epoch alone; absent where it shows no stone of the zone.
+    pub measured: Option<EstimateRecord>,
+    /// What the model says of it.
+    pub model: EstimateRecord,
+}
+
+/// The model on a day.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CurvePoint {
+    /// The day.
+    pub date: String,
+    /// As in the path.
+    #[serde(flatten)]
+    pub model: EstimateRecord,
+    /// Whether the day comes after the newest epoch, or its conditions lie beyond those of the epochs.
+    pub extrapolated: bool,
+}
+
+/// A condition over the time of the series.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConditionRecord {
+    /// The term that it is.
+    pub term: Term,
+    /// Name as the project has it.
+    pub name: String,
+    /// Days with their values, of the epochs and between them.
+    pub readings: Vec<(String, f64)>,
 }
 
 /// A term that the epochs cannot carry.

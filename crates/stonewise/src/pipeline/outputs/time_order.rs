@@ -6,12 +6,12 @@ use crate::results::records::EstimatorRecord;
 use stonewise_core::epoch::EpochId;
 
 /// The day of an epoch, where it is dated.
-pub(super) fn day(project: &Project, epoch: EpochId) -> Option<f64> {
+pub fn day(project: &Project, epoch: EpochId) -> Option<f64> {
     project.epochs[epoch].date.as_deref().and_then(day_of)
 }
 
 /// All epochs in the order of time: by their dates if all have one, else as they are numbered.
-pub(super) fn in_time_order(project: &Project) -> Vec<EpochId> {
+pub fn in_time_order(project: &Project) -> Vec<EpochId> {
     let mut ids: Vec<EpochId> = project.epochs.ids().collect();
     let days: Option<Vec<f64>> = ids.iter().map(|id| day(project, *id)).collect();
     if let Some(days) = days {
@@ -22,7 +22,7 @@ pub(super) fn in_time_order(project: &Project) -> Vec<EpochId> {
 
 /// The part of a motion's variance that the reference brings in: in proportion to the variances of the means of the
 /// points of both epochs. A half where the estimator gives no noise.
-pub(super) fn reference_share(estimator: &EstimatorRecord, row: &StoneRow) -> f64 {
+pub fn reference_share(estimator: &EstimatorRecord, row: &StoneRow) -> f64 {
     let EstimatorRecord::Adjustment(record) = estimator else {
         return 0.5;
     };

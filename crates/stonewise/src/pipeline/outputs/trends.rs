@@ -1,23 +1,24 @@
 //! What the path over more than two epochs means: the model in time of every stone, and the four answers.
 
 use super::time_order::{day, in_time_order, reference_share};
+use super::trend_groups::{TimedSeries, under};
 use crate::error::Result;
 use crate::files::write_readable_json;
 use crate::pipeline::graph::{Need, Run, Step};
-use crate::pipeline::steps::measure::MEASURE;
+use crate::pipeline::steps::tracks::{TRACKS, Tracked};
 use crate::pipeline::until::Until;
-use crate::project::{DAYS_A_YEAR, Epoch};
+use crate::project::DAYS_A_YEAR;
 use crate::results::StoneRow;
 use crate::results::names::{TRENDS as FILE, TRENDS_TABLE};
 use crate::results::records::{InseparableRecord, TRENDS_VERSION, TrendsRecord, ZoneTrend};
 use crate::verdict::inseparable_in_words;
-use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::id::StoneId;
 use stonewise_core::series::{
-    PairLook, SeriesEpoch, SeriesFindings, SeriesPlace, StoneSeries, StoneTrend, Trend, analyse,
+    Estimate, PairLook, SeriesEpoch, SeriesFindings, SeriesPlace, StoneSeries, StoneTrend, Trend, analyse,
     keep_congruent,
 };
 use stonewise_core::stone::Stone;
@@ -26,7 +27,7 @@ use stonewise_io::table::{Table, TableError, write_parquet};
 /// Writes `trends.parquet` and `trends.json` where there are more than two epochs.
 pub static TRENDS: Step = Step {
     name: "trends",
-    needs: &[Need::all(&MEASURE)],
+    needs: &[Need::same(&TRACKS)],
     wanted: |until| until >= Until::Registered,
     applies: |project, _| project.epochs.len() > 2,
     make: |run, _| write_trends(run),
@@ -36,90 +37,76 @@ pub static TRENDS: Step = Step {
 fn write_trends(run: &Run) -> Result<()> {
     let (context, project) = (run.context, run.context.project);
     let order = in_time_order(project);
-    let epochs: Vec<SeriesEpoch> = order
-        .iter()
-        .map(|id| epoch(&project.epochs[*id], day(project, *id)))
-        .collect();
+    let epoch = |id: &EpochId| {
+        let epoch = &project.epochs[*id];
+        under(&epoch.conditions, &epoch.name, day(project, *id))
+    };
+    let epochs: Vec<SeriesEpoch> = order.iter().map(epoch).collect();
     let first = run.labelled(EpochId::REFERENCE)?;
-    let found = analyse(&epochs, &series(run, &order, &first.stones)?);
+    let tracked = run.tracked()?;
+    let stones = series(run, &order, &first.stones, &tracked)?;
+    let found = analyse(&epochs, &stones);
     let ids: Vec<StoneId> = first.stones.iter().map(|s| s.id).collect();
+    let all: Vec<StoneId> = stones.iter().map(|s| s.stone).collect();
     let names: Vec<&str> = order.iter().map(|id| project.epochs[*id].name.as_str()).collect();
-    write_parquet(&context.out.join(TRENDS_TABLE), &table(&ids, &found, &names)?)?;
+    write_parquet(&context.out.join(TRENDS_TABLE), &table(&all, &found, &names)?)?;
+    let timed = TimedSeries {
+        project,
+        order: &order,
+        epochs: &epochs,
+        found: &found,
+        stones: &stones,
+    };
     let language = project.settings.report.language;
-    let dated = epochs.iter().filter(|e| e.years.is_some());
-    let dated: Vec<String> = dated.map(|e| e.name.clone()).collect();
-    let not_separable = found
-        .inseparable
-        .into_iter()
-        .map(|inseparable| InseparableRecord {
-            text: inseparable_in_words(&inseparable, dated.len(), language),
-            inseparable,
-        });
+    let dated: Vec<String> = epochs
+        .iter()
+        .filter(|e| e.years.is_some())
+        .map(|e| e.name.clone())
+        .collect();
+    let not_separable = found.inseparable.iter().map(|inseparable| InseparableRecord {
+        text: inseparable_in_words(inseparable, dated.len(), language),
+        inseparable: inseparable.clone(),
+    });
     let record = TrendsRecord {
         version: TRENDS_VERSION,
-        zones: zones(run, &order, &found.stones)?,
         not_separable: not_separable.collect(),
-        epochs: dated,
-        undated: found.undated,
-        terms: found.terms,
+        terms: found.terms().to_vec(),
+        basis: found.basis.clone(),
+        conditions: timed.conditions(),
         variance_factors: found.factors,
-        answers: found.answers,
+        wall: timed.wall(&ids.iter().copied().collect()),
+        zones: zones(run, &timed)?,
+        epochs: dated,
+        undated: found.undated.clone(),
+        answers: found.answers.clone(),
     };
     write_readable_json(&context.out.join(FILE), &record)
 }
 
-/// Velocities of the zones of the newest epoch that is not the reference.
-fn zones(run: &Run, order: &[EpochId], stones: &[StoneTrend]) -> Result<Vec<ZoneTrend>> {
-    let Some(&newest) = order.iter().rev().find(|id| **id != EpochId::REFERENCE) else {
-        return Ok(Vec::new());
-    };
-    let measured = run.measured(newest)?;
-    let zone_of: BTreeMap<u32, u32> = measured.rows.iter().map(|r| (r.stone_id, r.zone_id)).collect();
-    let mut members: BTreeMap<u32, Vec<&Trend>> = BTreeMap::new();
-    for stone in stones {
-        let zone = zone_of.get(&stone.stone.0).copied().unwrap_or(0);
-        members.entry(zone).or_default().push(&stone.velocity);
-    }
-    let one = |(zone_id, members): (u32, Vec<&Trend>)| {
-        let mean = |of: fn(&Trend) -> Vector3<f64>| -> [f64; 3] {
-            let sum: Vector3<f64> = members.iter().map(|t| of(t)).sum();
-            (sum / members.len() as f64).into()
-        };
-        ZoneTrend {
-            epoch: run.context.project.epochs[newest].name.clone(),
-            zone_id,
-            stones: members.len(),
-            velocity: mean(|t| t.value),
-            sd: mean(|t| t.sd),
+/// The zones of deformation of the newest epoch that shows any.
+fn zones(run: &Run, timed: &TimedSeries) -> Result<Vec<ZoneTrend>> {
+    let later = timed.order.iter().rev().filter(|id| **id != EpochId::REFERENCE);
+    for id in later {
+        let mut zones: BTreeMap<u32, BTreeSet<StoneId>> = BTreeMap::new();
+        for row in run.measured(*id)?.rows.iter().filter(|r| r.zone_id > 0) {
+            zones
+                .entry(row.zone_id)
+                .or_default()
+                .insert(StoneId(row.stone_id));
         }
-    };
-    Ok(members
-        .into_iter()
-        .filter(|(zone, _)| *zone > 0)
-        .map(one)
-        .collect())
-}
-
-/// The epoch with the conditions that the model takes: the first whose name has "level" or "temp" in it.
-fn epoch(epoch: &Epoch, day: Option<f64>) -> SeriesEpoch {
-    let condition = |part: &str| {
-        let named = epoch
-            .conditions
-            .iter()
-            .find(|(name, _)| name.to_lowercase().contains(part));
-        named.map(|(_, value)| *value)
-    };
-    SeriesEpoch {
-        name: epoch.name.clone(),
-        years: day.map(|d| d / DAYS_A_YEAR),
-        of_year: day.map_or(0.0, |d| (d / DAYS_A_YEAR).rem_euclid(1.0)),
-        level: condition("level"),
-        temperature: condition("temp"),
+        if !zones.is_empty() {
+            let name = &timed.project.epochs[*id].name;
+            let zones = zones.iter();
+            return Ok(zones
+                .filter_map(|(zone, stones)| timed.of(stones, name, *zone))
+                .collect());
+        }
     }
+    Ok(Vec::new())
 }
 
 /// Every stone with its deformation in each epoch, in one frame.
-fn series(run: &Run, order: &[EpochId], stones: &[Stone]) -> Result<Vec<StoneSeries>> {
+fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> Result<Vec<StoneSeries>> {
     let place_of: BTreeMap<StoneId, usize> = stones.iter().map(|s| s.id).zip(0..).collect();
     let place = |s: &Stone| SeriesPlace {
         place: s.centroid,
@@ -147,20 +134,71 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone]) -> Result<Vec<StoneSer
     keep_congruent(&mut places);
     let reference = order.iter().position(|id| *id == EpochId::REFERENCE).unwrap_or(0);
     let one = |((stone, place), shares): ((&Stone, &SeriesPlace), &Vec<f64>)| {
-        let face = FaceFrame::from_normal(&stone.normal).face_from_world();
-        let deformations = place.deformations.iter().zip(shares);
-        let pairs = deformations.map(|(found, share)| {
-            let (deformation, covariance) = (*found)?;
-            Some(PairLook {
-                value: face * deformation,
-                variance: (face * covariance * face.transpose()).diagonal(),
-                reference_share: *share,
-            })
-        });
-        let pairs: Vec<Option<PairLook>> = pairs.collect();
+        let pairs: Vec<Option<PairLook>> = place
+            .deformations
+            .iter()
+            .zip(shares)
+            .map(|(found, share)| Some(look(stone, &(*found)?, *share)))
+            .collect();
         StoneSeries::of_pairs(stone.id, reference, &pairs)
     };
-    Ok(stones.iter().zip(&places).zip(&shares).map(one).collect())
+    let mut all: Vec<StoneSeries> = stones.iter().zip(&places).zip(&shares).map(one).collect();
+    all.extend(tracked_series(
+        order,
+        tracked,
+        &|stone, time| match time == reference {
+            true => Some(Vector3::zeros()),
+            false => Some(places[*place_of.get(&stone)?].deformations[time]?.0),
+        },
+    ));
+    Ok(all)
+}
+
+/// The stones that the reference does not show. `deformation`: of a stone of the reference at a time, in the frame of the
+/// series.
+fn tracked_series(
+    order: &[EpochId],
+    tracked: &Tracked,
+    deformation: &dyn Fn(StoneId, usize) -> Option<Vector3<f64>>,
+) -> Vec<StoneSeries> {
+    let time = |id: EpochId| order.iter().position(|o| *o == id).unwrap_or(0);
+    let mut looks: BTreeMap<StoneId, Vec<Option<PairLook>>> = tracked
+        .stones
+        .iter()
+        .map(|s| (s.stone.id, vec![None; order.len()]))
+        .collect();
+    let stones: BTreeMap<StoneId, &Stone> = tracked.stones.iter().map(|s| (s.stone.id, &s.stone)).collect();
+    for pair in &tracked.pairs {
+        let [first, later] = pair.epochs.map(time).into_array();
+        let known = |stone: StoneId| Some(deformation(stone, later)? - deformation(stone, first)?);
+        let found = pair.deformations(known);
+        for row in pair.rows.iter().filter(|row| row.motion.is_some()) {
+            let id = StoneId(row.stone_id);
+            if let (Some(found), Some(stone), Some(looks)) =
+                (found.get(&id), stones.get(&id), looks.get_mut(&id))
+            {
+                looks[later] = Some(look(stone, found, reference_share(&pair.estimator, row)));
+            }
+        }
+    }
+    let series = tracked.stones.iter();
+    series
+        .map(|s| StoneSeries::of_pairs(s.stone.id, time(s.since), &looks[&s.stone.id]))
+        .collect()
+}
+
+/// What a pair of epochs shows of a stone: its deformation with its covariance, world.
+fn look(
+    stone: &Stone,
+    (deformation, covariance): &(Vector3<f64>, Matrix3<f64>),
+    reference_share: f64,
+) -> PairLook {
+    let face = FaceFrame::from_normal(&stone.normal).face_from_world();
+    PairLook {
+        value: face * deformation,
+        variance: (face * covariance * face.transpose()).diagonal(),
+        reference_share,
+    }
 }
 
 fn table(
@@ -175,12 +213,12 @@ fn table(
     };
     let mut table = Table::new();
     let ids: Vec<u32> = stones.iter().map(|id| id.0).collect();
-    table.push("stone_id", "", "stone of the reference", ids)?;
+    table.push("stone_id", "", "stone, as in series.parquet", ids)?;
     let counts: Vec<Option<u32>> = rows.iter().map(|row| row.map(|r| r.epochs as u32)).collect();
     table.push(
         "epochs",
         "",
-        "epochs in which it was measured, the reference among them",
+        "epochs in which it was measured, the one that motions count from among them",
         counts,
     )?;
     let mut add = |name: &str, unit: &str, meaning: &str, of: &dyn Fn(&StoneTrend) -> Option<Trend>| {
@@ -211,6 +249,14 @@ fn table(
     add("season_cos", "m", wave, &|s| s.season.map(|[cos, _]| cos))?;
     let wave = "deformation with the yearly wave that is largest on 1 April";
     add("season_sin", "m", wave, &|s| s.season.map(|[_, sin]| sin))?;
+    let amplitude = "half of what lies between the ends of the yearly wave";
+    add("season_amplitude", "m", amplitude, &|s| {
+        s.wave.map(|w| of_estimate(w.amplitude, 1.0))
+    })?;
+    let largest = "days since New Year at which the yearly wave is largest";
+    add("season_day", "d", largest, &|s| {
+        s.wave.map(|w| of_estimate(w.phase, DAYS_A_YEAR))
+    })?;
     let step = |s: &StoneTrend| {
         s.step.map(|step| Trend {
             value: step.value,
@@ -245,6 +291,14 @@ fn table(
         q,
     )?;
     Ok(table)
+}
+
+fn of_estimate(estimate: Estimate, factor: f64) -> Trend {
+    Trend {
+        value: estimate.value * factor,
+        sd: estimate.sd * factor,
+        p: 0.0,
+    }
 }
 
 const AXES: [(&str, &str); 3] = [

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
-use crate::pipeline::steps::register::{REGISTER, datum};
+use crate::pipeline::steps::register::{REGISTER, datum, since_reference};
 use crate::pipeline::until::Until;
 use crate::results::StoneRow;
 use crate::results::records::Datum;
@@ -35,7 +35,12 @@ impl Run<'_> {
         self.once(&MEASURE, later, || {
             let (labelled, registered) = (self.labelled_pair(later)?, self.registered(later)?);
             let first = &labelled.first;
-            let datum = datum(self.context.project, later, &registered, &first.stones);
+            let datum = datum(
+                self.context.project,
+                since_reference(later),
+                &registered,
+                &first.stones,
+            );
             let datum = datum.against(motion_in_common(first, &registered).as_ref());
             let labelled = labelled.each_ref().map(|l| &**l);
             let facade = &self.outlined()?.facade;

@@ -21,4 +21,5 @@ pub mod register;
 pub mod segment;
 mod shapes;
 pub mod stone_outlines;
+pub mod tracks;
 pub mod views;

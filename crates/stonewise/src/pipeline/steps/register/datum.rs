@@ -9,24 +9,29 @@ use crate::texts::notices::{
     DATUM_ALIGNED, DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
 };
 use nalgebra::Matrix6;
-use stonewise_core::epoch::EpochId;
+use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::registration::observers::{self, EpochErrors};
 use stonewise_core::stone::{Stone, middle};
+
+/// Whether the later epoch is a part of the survey of the first, the reference, as `split` writes it.
+pub(super) fn is_one_survey(project: &Project, epochs: Pair<EpochId>) -> bool {
+    epochs.first.is_reference() && project.epochs[epochs.later].is_of_reference_survey()
+}
 
 /// The registration error of a later epoch, from the first of these that there is: stable areas, the error
 /// that the project states, differences between the sources of each epoch.
 ///
 /// `stones`: of the first epoch; their middle is the centre of a stated
 /// error.
-pub fn datum(project: &Project, later: EpochId, registered: &Registered, stones: &[Stone]) -> Datum {
-    let mut datum = of_errors(project, later, registered.epoch_errors.as_ref(), stones);
+pub fn datum(project: &Project, epochs: Pair<EpochId>, registered: &Registered, stones: &[Stone]) -> Datum {
+    let mut datum = of_errors(project, epochs, registered.epoch_errors.as_ref(), stones);
     if let Some(errors) = &registered.epoch_errors {
-        let epochs = project.epochs.pair(later).map(|e| e.name.clone()).into_array();
+        let names = epochs.map(|e| project.epochs[e].name.clone()).into_array();
         datum.sources = errors
             .sources
             .iter()
             .map(|s| SourceError {
-                epoch: epochs[s.epoch].clone(),
+                epoch: names[s.epoch].clone(),
                 source: s.name.clone(),
                 error_m: s.against_epoch.into(),
                 sd_m: s.sd.into(),
@@ -36,7 +41,12 @@ pub fn datum(project: &Project, later: EpochId, registered: &Registered, stones:
     datum.recorded(project.settings.report.language)
 }
 
-fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, stones: &[Stone]) -> Datum {
+fn of_errors(
+    project: &Project,
+    epochs: Pair<EpochId>,
+    errors: Option<&EpochErrors>,
+    stones: &[Stone],
+) -> Datum {
     let known = |state, errors: &EpochErrors, note| {
         Datum::known(state, &errors.rigid.centre, &errors.rigid.covariance, note)
     };
@@ -56,7 +66,7 @@ fn of_errors(project: &Project, later: EpochId, errors: Option<&EpochErrors>, st
         let note = DATUM_STATED.say(&[("error_mm", Said::numbers(format!("{:.1}", 1e3 * error_m)))]);
         return Datum::known(DatumState::Stated, &centre, &covariance, note);
     }
-    if project.epochs[later].is_of_reference_survey()
+    if is_one_survey(project, epochs)
         && let Some(errors) = errors
     {
         return known(DatumState::Stated, errors, Said::from(&DATUM_ONE_SURVEY));

@@ -1,5 +1,6 @@
 //! The error that all motions of an epoch share, as its sources and areas off the wall show it.
 
+use super::datum::is_one_survey;
 use super::off_wall::OffWall;
 use super::registered::Registered;
 use super::sights::Sights;
@@ -13,22 +14,21 @@ use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, epoch
 /// Estimates that error, and adds it to the covariances of neighbours.
 pub(super) fn add_epoch_error(
     context: &Context,
-    later: EpochId,
+    epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     registered: &mut Registered,
 ) -> Result<()> {
     let project = context.project;
     let params = &project.settings.registration;
-    let is_known = params.epoch_error_m.is_some()
-        || !params.stable.is_empty()
-        || project.epochs[later].is_of_reference_survey();
+    let is_known =
+        params.epoch_error_m.is_some() || !params.stable.is_empty() || is_one_survey(project, epochs);
     let off_wall = match params.auto_stable || !is_known {
         true => OffWall::find(labelled, context.progress)?,
         false => OffWall::default(),
     };
     registered.off_wall = off_wall.areas().to_vec();
-    let sights = Sights::gather(project, labelled, later, matches, &off_wall, context.progress)?;
+    let sights = Sights::gather(project, epochs, labelled, matches, &off_wall, context.progress)?;
     let neighbours = registered.neighbours_among(&sights.stones);
     let pair = EpochPair {
         sources: &sights.sources,

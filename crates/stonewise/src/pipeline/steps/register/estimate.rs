@@ -23,7 +23,7 @@ use stonewise_core::stone::PairResult;
 /// estimator gives one.
 pub(super) fn estimate(
     run: &Run,
-    later: EpochId,
+    epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     step: &StepDir,
@@ -31,7 +31,7 @@ pub(super) fn estimate(
 ) -> Result<(Registered, Option<JointMotions>)> {
     let project = run.context.project;
     match project.settings.registration.estimator {
-        Estimator::Adjustment => adjust(run, later, labelled, matches, step, warnings),
+        Estimator::Adjustment => adjust(run, epochs, labelled, matches, step, warnings),
         Estimator::Gicp => {
             let size_m = project.settings.ingest.size_m;
             let params = &project.settings.registration.gicp;
@@ -44,7 +44,7 @@ pub(super) fn estimate(
 
 fn adjust(
     run: &Run,
-    later: EpochId,
+    epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     step: &StepDir,
@@ -53,9 +53,9 @@ fn adjust(
     let context = run.context;
     let params = &context.project.settings.registration;
     let pairs = DiskPairs::gather(labelled, matches, params.border_noises, step, context.progress)?;
-    let photos = match tracks_photos(context.project, later) {
+    let photos = match tracks_photos(context.project, epochs) {
         true => {
-            let photos = Pair::new(run.posed(EpochId::REFERENCE)?, run.posed(later)?);
+            let photos = Pair::new(run.posed(epochs.first)?, run.posed(epochs.later)?);
             let photos = photos.each_ref().map(|p| &**p);
             DiskPhotos::gather(context, photos, labelled, &pairs, step, warnings)?
         }

@@ -48,7 +48,7 @@ pub static REGISTER: Step = Step {
     needs: &[Need::same(&MATCH)],
     wanted: |until| until >= Until::Registered,
     cost: Some(|sizes, epoch| {
-        let photos: Vec<PathBuf> = match tracks_photos(sizes.project, epoch) {
+        let photos: Vec<PathBuf> = match tracks_photos(sizes.project, since_reference(epoch)) {
             true => {
                 let epochs = sizes.project.epochs.pair(epoch).into_array();
                 epochs
@@ -73,31 +73,58 @@ impl Run<'_> {
     pub fn registered(&self, later: EpochId) -> Result<Arc<Registered>> {
         self.once(&REGISTER, later, || {
             let labelled = self.labelled_pair(later)?;
-            let mut registered = register(self, later, labelled.each_ref().map(|l| &**l))?;
-            let limit_m = self.context.project.settings.carry.max_height_m;
-            drop_contradictions(limit_m, labelled.each_ref().map(|l| &**l), &mut registered);
-            Ok(registered)
+            // The pairs themselves, not how they were found: other parameters of the matching that find the same
+            // pairs cost nothing.
+            let matches = self.matched(later)?.pairs();
+            let labelled = labelled.each_ref().map(|l| &**l);
+            self.registered_between(since_reference(later), labelled, &matches)
         })
+    }
+
+    /// The motions of these stones between two epochs of which the first need not be the reference.
+    pub fn registered_between(
+        &self,
+        epochs: Pair<EpochId>,
+        labelled: Pair<&Labelled>,
+        matches: &[(StoneId, StoneId)],
+    ) -> Result<Registered> {
+        let mut registered = register(self, epochs, labelled, matches)?;
+        let limit_m = self.context.project.settings.carry.max_height_m;
+        drop_contradictions(limit_m, labelled, &mut registered);
+        Ok(registered)
     }
 }
 
-fn register(run: &Run, later: EpochId, labelled: Pair<&Labelled>) -> Result<Registered> {
-    // The pairs themselves, not how they were found: other parameters of the matching that find the same
-    // pairs cost nothing.
-    let matches = run.matched(later)?.pairs();
-    let key = key(run, later, labelled, &matches)?;
-    let step = run
-        .context
-        .step(&format!("{STEP}-{later}"), key, |step, warnings| {
-            let (mut registered, joint) = estimate(run, later, labelled, &matches, step, warnings)?;
-            add_epoch_error(run.context, later, labelled, &matches, &mut registered)?;
+/// The reference and a later epoch.
+pub fn since_reference(later: EpochId) -> Pair<EpochId> {
+    Pair::new(EpochId::REFERENCE, later)
+}
+
+fn register(
+    run: &Run,
+    epochs: Pair<EpochId>,
+    labelled: Pair<&Labelled>,
+    matches: &[(StoneId, StoneId)],
+) -> Result<Registered> {
+    let key = key(run, epochs, labelled, matches)?;
+    let since = match epochs.first.is_reference() {
+        true => String::new(),
+        false => format!("-since-{}", epochs.first),
+    };
+    let step = run.context.step(
+        &format!("{STEP}-{}{since}", epochs.later),
+        key,
+        |step, warnings| {
+            let (mut registered, joint) = estimate(run, epochs, labelled, matches, step, warnings)?;
+            add_epoch_error(run.context, epochs, labelled, matches, &mut registered)?;
             if let Some(joint) = joint {
                 let errors = registered.epoch_errors.as_ref().and_then(|e| e.joint.as_ref());
                 let errors = errors.map(|e| (e, registered.error_stones.as_slice()));
                 registered.deformation = Some(deformation(&joint, errors, run.context.progress)?);
             }
             write_json(&step.file(MOTIONS), &registered)
-        })?;
+        },
+    )?;
     Ok(Registered {
         folder: step.path().to_path_buf(),
         ..read_json(&step.file(MOTIONS))?
@@ -107,18 +134,23 @@ fn register(run: &Run, later: EpochId, labelled: Pair<&Labelled>) -> Result<Regi
 /// What the step found, in its folder.
 const MOTIONS: &str = "motions.json";
 
-fn key(run: &Run, later: EpochId, labelled: Pair<&Labelled>, matches: &[(StoneId, StoneId)]) -> Result<Key> {
+fn key(
+    run: &Run,
+    epochs: Pair<EpochId>,
+    labelled: Pair<&Labelled>,
+    matches: &[(StoneId, StoneId)],
+) -> Result<Key> {
     let project = run.context.project;
     let params = &project.settings.registration;
     let mut inputs = Vec::from(labelled.map(|l| l.key.as_str().to_owned()).into_array());
-    if tracks_photos(project, later) {
-        for epoch in [EpochId::REFERENCE, later] {
+    if tracks_photos(project, epochs) {
+        for epoch in epochs.into_array() {
             for photo in &run.posed(epoch)?.photos {
                 inputs.push(run.context.digest(&photo.path)?);
             }
         }
     }
-    let same_survey = project.epochs[later].same_survey_as;
+    let same_survey = project.epochs[epochs.later].same_survey_as;
     let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
     Ok(Key::new(STEP, &(params, matches, same_survey), &inputs))
 }

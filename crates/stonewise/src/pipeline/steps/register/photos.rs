@@ -23,10 +23,10 @@ use stonewise_core::registration::PairSource;
 use stonewise_core::registration::photos::{Chip, Photo, PhotoCamera, PhotoParams, PhotoSource};
 use stonewise_io::image_io::read_rgb;
 
-/// Whether stones are tracked in photos of the reference and of a later epoch. Views of clouds measure nothing
+/// Whether stones are tracked in photos of these two epochs. Views of clouds measure nothing
 /// that the clouds do not.
-pub(super) fn tracks_photos(project: &Project, later: EpochId) -> bool {
-    let photographed = project.epochs.pair(later).map(|e| e.photos.is_some());
+pub(super) fn tracks_photos(project: &Project, epochs: Pair<EpochId>) -> bool {
+    let photographed = epochs.map(|e| project.epochs[e].photos.is_some());
     project.settings.registration.photos.enabled && photographed.into_array() == [true; 2]
 }
 

@@ -1,6 +1,7 @@
 //! What each station and strip shows of the matched stones and of the stable areas, gathered in one pass over
 //! the tiles.
 
+use super::datum::is_one_survey;
 use super::off_wall::OffWall;
 use crate::error::Result;
 use crate::pipeline::steps::label::Labelled;
@@ -46,14 +47,14 @@ impl Sights {
     /// evenly chosen among the matches.
     pub fn gather(
         project: &Project,
-        epochs: Pair<&Labelled>,
-        later: EpochId,
+        epochs: Pair<EpochId>,
+        labelled: Pair<&Labelled>,
         matches: &[(StoneId, StoneId)],
         off_wall: &OffWall,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut of_epoch = Vec::new();
-        for (labelled, epoch) in epochs.zip(project.epochs.pair(later)) {
+        for (labelled, epoch) in labelled.zip(epochs.map(|e| &project.epochs[e])) {
             let raw = labelled.ingested.tiles.surveyed.raw_sources()?;
             of_epoch.push(EpochSources::new(&raw, &epoch.clouds));
         }
@@ -69,10 +70,10 @@ impl Sights {
                 })
             })
             .collect();
-        if project.epochs[later].is_of_reference_survey() {
+        if is_one_survey(project, epochs) {
             share_errors(&mut sources);
         }
-        let places = matched_stones(&epochs.first.stones, matches);
+        let places = matched_stones(&labelled.first.stones, matches);
         let mut sights = Self {
             stones: places.iter().map(|(first, _, _)| *first).collect(),
             seen: Vec::new(),
@@ -88,7 +89,7 @@ impl Sights {
         let most_stones = project.settings.registration.observers.contrasts.max_stones;
         let stride = places.len().div_ceil(most_stones.max(1)).max(1);
         let mut collected: Vec<BTreeMap<usize, Collected>> = vec![BTreeMap::new(); places.len()];
-        for (e, epoch) in epochs.into_iter().enumerate() {
+        for (e, epoch) in labelled.into_iter().enumerate() {
             let ids = places
                 .iter()
                 .enumerate()
