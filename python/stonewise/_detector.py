@@ -40,9 +40,9 @@ class Detector:
         return found
 
     def outline(self, image: Any, boxes: Any, *, progress: Union[bool, Progress] = False) -> NDArray[np.int32]:
-        """Pixels of the stones that boxes hold, (height, width): 1 for the stone of the first box, and so on.
+        """Labels of the stones in given boxes, (height, width): 1 for the stone of the first box, and so on.
 
-        The mask head of the detector draws the stones; a person, or another detector, says where they are.
+        The mask head of the detector outlines the stones; the boxes come from a person or another detector.
         Where masks overlap, the smaller one is on top.
 
         :param image: As in :meth:`segment`.

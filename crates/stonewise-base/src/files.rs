@@ -30,7 +30,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<()> {
 /// # Errors
 /// It cannot be looked at.
 pub fn is_there(path: &Path) -> Result<bool> {
-    path.try_exists().map_err(Error::io("looking at", path))
+    path.try_exists().map_err(Error::io("accessing", path))
 }
 
 /// Reads a file as it is.

@@ -19,7 +19,7 @@ pub struct Args {
     /// never), and run a survey even where the check found an error.
     #[arg(long, global = true)]
     pub force: bool,
-    /// With --version: commit, system, processor class and weights as well.
+    /// With --version: also print commit, system, build, processor class and weights.
     #[arg(long, requires = "version")]
     pub verbose: bool,
     /// The command.
@@ -402,7 +402,7 @@ pub struct SegmentArgs {
     /// Lowest score of a stone to keep, 0 to 1.
     #[arg(long, value_name = "P")]
     pub min_score: Option<f64>,
-    /// Outline the stones in these boxes instead of finding stones: COCO json with a bbox for each stone.
+    /// Outline the stones in given boxes instead of searching for stones: COCO json with a bbox for each stone.
     #[arg(long, value_name = "FILE")]
     pub boxes: Option<PathBuf>,
     /// Reference masks to score the result against: COCO json or a folder of label PNGs.

@@ -11,8 +11,8 @@ messages! {
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern? Die Punktwolke auf das Bauwerk zuschneiden";
         TOO_SMALL: "{x} x {y} x {z} m, {points} points: are the coordinates in metres?",
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern?";
-        SPACING_VIEWS: "{spacing} mm: views of the cloud show stones of {size} cm across and more well, smaller ones in part",
-            "{spacing} mm: Ansichten der Punktwolke zeigen Steine ab {size} cm Breite gut, kleinere zum Teil";
+        SPACING_VIEWS: "{spacing} mm: in views of the cloud, nearly all stones at least {size} cm across are found, and some of the smaller ones",
+            "{spacing} mm: in Ansichten der Punktwolke werden fast alle Steine ab {size} cm Breite gefunden, kleinere zum Teil";
         SPACING_WIDE: "{spacing} mm: too wide to show the relief of single stones",
             "{spacing} mm: zu weit, um das Relief einzelner Steine zu zeigen";
         SPACING_UNKNOWN: "too few points to tell", "zu wenige Punkte für eine Aussage";

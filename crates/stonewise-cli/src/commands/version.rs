@@ -6,7 +6,8 @@ use stonewise_segment::Weights;
 
 /// What tells one build from another and decides the last digits of results, one line each.
 pub fn version_details() -> String {
-    let commit = option_env!("STONEWISE_COMMIT").unwrap_or("not given to the build (STONEWISE_COMMIT)");
+    let commit =
+        option_env!("STONEWISE_COMMIT").unwrap_or("unknown (STONEWISE_COMMIT was not set for the build)");
     let build = if cfg!(debug_assertions) {
         "development"
     } else {

@@ -252,7 +252,8 @@ impl CocoMasks {
             bounds.filter(shows).ok_or_else(|| MaskError::BadAnnotation {
                 path: self.path.clone(),
                 annotation: annotation.id,
-                problem: "it needs a bbox: left, top, width, height in pixels of the photo".to_owned(),
+                problem: "no usable bbox: it must be [left, top, width, height] in pixels, within the photo"
+                    .to_owned(),
             })
         };
         let annotations = self.annotations.get(&image.id).map_or(&[][..], Vec::as_slice);

@@ -91,7 +91,7 @@ fn time(project: &Project, points: u64, photos: &[[u32; 2]], tile: f64) -> Strin
         .iter()
         .any(|e| e.masks.is_none() && e.photos.is_none());
     let views = match has_views {
-        true => "; the search for stones in views of the clouds comes on top",
+        true => ", plus the search for stones in views of the clouds",
         false => "",
     };
     let minutes = |factor: f64| (seconds * factor / 60.0).round().max(1.0);

@@ -227,8 +227,8 @@ mod tests {
         let said = series_verdict(&record(answers), Language::English);
         assert_eq!(
             said.as_predicted.text,
-            "the newest epoch is as predicted (extrapolated: its level of 162.0 lies outside that of the other epochs, 152.8 to \
-             159.2, extrapolated: no other epoch lies within two months of its season)"
+            "the newest epoch is as predicted (extrapolated: its level, 162.0, is outside the range of the other epochs, 152.8 to \
+             159.2, extrapolated: no other epoch is within two months of its time of year)"
         );
     }
 

@@ -96,7 +96,7 @@ fn sync_folder(folder: &Path) -> Result<()> {
     let synced = File::open(folder).and_then(|opened| opened.sync_all());
     match synced.map_err(|error| (error.kind(), error)) {
         Err((ErrorKind::InvalidInput | ErrorKind::Unsupported, _)) | Ok(()) => Ok(()),
-        Err((_, error)) => Err(Error::io("writing to the disk", folder)(error)),
+        Err((_, error)) => Err(Error::io("syncing to the disk", folder)(error)),
     }
 }
 

@@ -90,10 +90,10 @@ fn write_series(run: &Run) -> Result<()> {
     let dates: Vec<String> = all.iter().map(date).collect();
     series.push("date", "", "its date; empty where the project gives none", dates)?;
     let since: Vec<String> = all.iter().map(|r| name(r.since)).collect();
-    series.push("since", "", "epoch that the motion counts from", since)?;
+    series.push("since", "", "epoch from which the motion is measured", since)?;
     let state = |r: &SeriesRow| r.state.map_or(String::new(), |s| s.word().to_owned());
     let states: Vec<String> = all.iter().map(state).collect();
-    let meaning = "what became of the stone: seen, hidden, changed, lost, replaced, new; `status` says why it has no motion";
+    let meaning = "what the epoch shows of the stone: seen, hidden, changed, lost, replaced, new; `status` says why there is no motion";
     series.push("state", "", meaning, states)?;
     let previous: Vec<Option<Matrix3<f64>>> = all.iter().map(|r| r.previous).collect();
     let rows: Vec<StoneRow> = all.into_iter().map(|r| r.row).collect();

@@ -218,7 +218,7 @@ fn table(
     table.push(
         "epochs",
         "",
-        "epochs in which it was measured, the one that motions count from among them",
+        "number of epochs in which it was measured, including the one from which its motion is measured",
         counts,
     )?;
     let mut add = |name: &str, unit: &str, meaning: &str, of: &dyn Fn(&StoneTrend) -> Option<Trend>| {
@@ -249,11 +249,11 @@ fn table(
     add("season_cos", "m", wave, &|s| s.season.map(|[cos, _]| cos))?;
     let wave = "deformation with the yearly wave that is largest on 1 April";
     add("season_sin", "m", wave, &|s| s.season.map(|[_, sin]| sin))?;
-    let amplitude = "half of what lies between the ends of the yearly wave";
+    let amplitude = "amplitude of the yearly wave, half of its peak-to-peak range";
     add("season_amplitude", "m", amplitude, &|s| {
         s.wave.map(|w| of_estimate(w.amplitude, 1.0))
     })?;
-    let largest = "days since New Year at which the yearly wave is largest";
+    let largest = "day of the yearly maximum, days since New Year";
     add("season_day", "d", largest, &|s| {
         s.wave.map(|w| of_estimate(w.phase, DAYS_A_YEAR))
     })?;

@@ -151,7 +151,7 @@ pub(super) fn stones_in_boxes(
             .filter(|(_, votes)| 2 * **votes > photos_of[i]);
         let stone: Vec<Point2<f64>> = voted.map(|((at, _), _)| *at).collect();
         let ring = outline(&stone, &OutlineParams::default());
-        ring.ok_or_else(|| NoEffect::NoPlace("the detector finds no stone in the box".to_owned()))
+        ring.ok_or_else(|| NoEffect::NoPlace("the detector could not outline a stone in the box".to_owned()))
     };
     Ok((0..boxes.len()).map(outlined).collect())
 }
