@@ -1,6 +1,5 @@
 //! Stones in boxes that a person drew on the unrolled wall: the detector outlines them in the photos.
 
-use super::photo_places::Places;
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
@@ -27,6 +26,9 @@ const DEPTH_M: f64 = 0.3;
 const PHOTOS: usize = 4;
 /// A photo in which a box is less than this across does not show the stone well enough, pixels.
 const LEAST_PX: f64 = 12.0;
+
+/// Where an edit lies on the wall, or why it lies nowhere.
+pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
 /// A box on the wall with the points of the cloud in and around it.
 struct Boxed {

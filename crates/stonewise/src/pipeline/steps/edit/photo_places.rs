@@ -1,6 +1,6 @@
 //! Edits drawn in photos, and boxes whose stones photos show, brought onto the wall.
 
-use super::boxes::stones_in_boxes;
+use super::boxes::{Places, stones_in_boxes};
 use crate::edits::{Edit, EditsFile, photo_named};
 use crate::error::Result;
 use crate::files::{read_json, write_json};
@@ -29,9 +29,6 @@ const THIN_M: f64 = 0.05;
 const NEAREST: usize = 60;
 /// Points further than this from a first plane are left out of the second, metres: the relief of stones.
 const RELIEF_M: f64 = 0.1;
-
-/// Where an edit lies on the wall, or why it lies nowhere.
-pub(super) type Places = std::result::Result<Vec<Point2<f64>>, NoEffect>;
 
 /// Where each edit lies on the unrolled wall: its own shape, the pixels of its photo carried along their rays
 /// onto the stones that the photo's epoch shows there, or the stone that photos show in its box.
