@@ -2,7 +2,7 @@
 //! use each other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 6] = [
+const LAYERS: [&[&str]; 8] = [
     &[
         "detection",
         "engine",
@@ -12,9 +12,11 @@ const LAYERS: [&[&str]; 6] = [
         "seed",
         "segmentation",
     ],
-    &["evaluation", "model", "tiling"],
+    &["evaluation", "model"],
     &["built_in"],
-    &["stone_finder", "augment"],
+    &["stone_finder"],
+    &["tiling"],
+    &["augment"],
     &["train"],
     &["dataset"],
 ];
