@@ -31,10 +31,10 @@ messages! {
         SIDE_UNSURE:
             "no camera or scanner position tells which side of the wall is outside, and the cloud alone does not show it clearly \
             enough: out-of-plane motions may have the wrong sign. Look at the views in the report: if the wall is seen from behind, \
-            give a point in front of it, [views] outside = [x, y, z], or clouds that include the ground in front of the wall",
+            give a point in front of it, `[views] outside = [x, y, z]`, or clouds that include the ground in front of the wall",
             "keine Kamera- oder Scannerposition sagt, welche Seite der Mauer außen ist, und die Punktwolke zeigt es zu schwach: \
             Bewegungen aus der Ebene können das falsche Vorzeichen haben. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu \
-            sehen, einen Punkt vor ihr angeben, [views] outside = [x, y, z], oder Punktwolken, die den Boden vor der Mauer zeigen";
+            sehen, einen Punkt vor ihr angeben, `[views] outside = [x, y, z]`, oder Punktwolken, die den Boden vor der Mauer zeigen";
 
         BESIDE_COMPARED:
             "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
