@@ -40,17 +40,17 @@ pub fn tracks(reference: &[Stone], epochs: &[LaterStones], params: &MatchParams)
     let mut next = last + 1;
     let mut followed: Vec<Track> = Vec::new();
     for (place, epoch) in epochs.iter().enumerate() {
-        let all: Vec<Stone> = reference
-            .iter()
-            .cloned()
-            .chain(followed.iter().map(|t| t.stone.clone()))
-            .collect();
-        let surroundings = Surroundings {
-            covered: &|_| true,
-            overlap: None,
-        };
         let mut taken = epoch.known.clone();
         if !followed.is_empty() {
+            let all: Vec<Stone> = reference
+                .iter()
+                .cloned()
+                .chain(followed.iter().map(|t| t.stone.clone()))
+                .collect();
+            let surroundings = Surroundings {
+                covered: &|_| true,
+                overlap: None,
+            };
             let report = match_stones(&all, epoch.stones, &surroundings, params);
             for track in &mut followed {
                 let outcome = report.outcomes.binary_search_by_key(&track.stone.id, |o| o.0);

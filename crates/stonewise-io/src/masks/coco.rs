@@ -158,16 +158,9 @@ impl CocoMasks {
         width: u32,
         height: u32,
     ) -> Result<Option<LabelledPhoto>, MaskError> {
-        let Some(image) = self.find(photo_name)? else {
+        let Some(annotations) = self.annotations_of(photo_name, (width, height))? else {
             return Ok(None);
         };
-        MaskError::check_size(
-            &self.path,
-            photo_name,
-            (image.width, image.height),
-            (width, height),
-        )?;
-        let annotations = self.annotations.get(&image.id).map_or(&[][..], Vec::as_slice);
         let mut warnings = Vec::new();
         let mut masks: Vec<(u64, u32, Spans)> = Vec::new();
         for (index, annotation) in annotations.iter().enumerate() {
@@ -229,15 +222,9 @@ impl CocoMasks {
         width: u32,
         height: u32,
     ) -> Result<Option<Vec<[f64; 4]>>, MaskError> {
-        let Some(image) = self.find(photo_name)? else {
+        let Some(annotations) = self.annotations_of(photo_name, (width, height))? else {
             return Ok(None);
         };
-        MaskError::check_size(
-            &self.path,
-            photo_name,
-            (image.width, image.height),
-            (width, height),
-        )?;
         let corners = |annotation: &RawAnnotation| {
             let bounds = annotation.bbox.map(|[x, y, w, h]| [x, y, x + w, y + h]);
             let [width, height] = [width, height].map(f64::from);
@@ -256,12 +243,25 @@ impl CocoMasks {
                     .to_owned(),
             })
         };
-        let annotations = self.annotations.get(&image.id).map_or(&[][..], Vec::as_slice);
         annotations
             .iter()
             .map(corners)
             .collect::<Result<_, _>>()
             .map(Some)
+    }
+
+    /// The annotations of a photo of this size; `None` where the file does not list it.
+    fn annotations_of(
+        &self,
+        photo_name: &str,
+        size: (u32, u32),
+    ) -> Result<Option<&[RawAnnotation]>, MaskError> {
+        let Some(image) = self.find(photo_name)? else {
+            return Ok(None);
+        };
+        MaskError::check_size(&self.path, photo_name, (image.width, image.height), size)?;
+        let annotations = self.annotations.get(&image.id);
+        Ok(Some(annotations.map_or(&[][..], Vec::as_slice)))
     }
 
     /// The one image that fits a photo's name best.

@@ -78,7 +78,7 @@ impl Adjustment {
                 by_field: tied.by_field,
             };
         };
-        let p_wrong = (1.0 - stone.p_with_field) * stone.doubt;
+        let p_wrong = stone.p_wrong();
         let p_tied = 1.0 - p_loose - p_wrong;
         let photos = self.observed_by_photos(i, Moving::WithField);
         let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);

@@ -182,10 +182,9 @@ impl Adjustment {
             self.stones[i].doubt = self.doubt(i, prediction);
         }
         let decided = || self.stones.iter().filter(|s| !s.is_undecided);
-        let wrong = |s: &StoneState| (s.info.hidden.powi(2), (1.0 - s.p_with_field) * s.doubt);
+        let wrong = |s: &StoneState| (s.info.hidden.powi(2), s.p_wrong());
         self.wrong_rate = estimated_rate(decided().map(wrong));
-        let p_loose = |s: &StoneState| (1.0 - s.p_with_field) * (1.0 - s.doubt);
-        self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(p_loose));
+        self.prior.loose.share = estimated_share(self.params.loose_share, decided().map(|s| self.p_loose(s)));
     }
 
     /// Probability that the clouds are wrong about a stone, if they show it away from its neighbours; none where

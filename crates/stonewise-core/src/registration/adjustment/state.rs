@@ -90,6 +90,11 @@ impl Adjustment {
 }
 
 impl StoneState {
+    /// Probability that the clouds show it at a wrong place.
+    pub fn p_wrong(&self) -> f64 {
+        (1.0 - self.p_with_field) * self.doubt
+    }
+
     fn new(info: StoneInfo, translation: Vector3<f64>) -> Self {
         Self {
             info,

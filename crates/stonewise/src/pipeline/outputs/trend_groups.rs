@@ -146,6 +146,7 @@ impl TimedSeries<'_> {
 
     /// Level and temperature over the time of the series.
     pub fn conditions(&self) -> Vec<ConditionRecord> {
+        let days = self.days();
         let of = |term: Term| {
             let mut epochs = self.project.epochs.iter();
             let name = epochs.find_map(|e| named(e.conditions.keys(), term))?.clone();
@@ -153,9 +154,9 @@ impl TimedSeries<'_> {
                 let epoch = &self.project.epochs[*id];
                 Some((epoch.date.clone()?, *epoch.conditions.get(&name)?))
             };
-            let between = self.days().into_iter();
-            let mut readings: Vec<(String, f64)> = between
-                .filter_map(|(date, at)| Some((date, term.value(&at)?)))
+            let mut readings: Vec<(String, f64)> = days
+                .iter()
+                .filter_map(|(date, at)| Some((date.clone(), term.value(at)?)))
                 .chain(self.order.iter().filter_map(of_epoch))
                 .collect();
             readings.sort_by(|a, b| a.0.cmp(&b.0));

@@ -90,7 +90,8 @@ impl TrackedPair {
     /// The deformations of its stones in the frame of the whole wall. `known`: of a stone of the reference from the first
     /// epoch to the later one in that frame.
     ///
-    /// Surroundings know only their own shape: the rigid motion between their deformations and the known ones is added.
+    /// The adjustment of a part of the wall gives deformations up to a rigid motion of that part. That motion is the
+    /// best fit between its deformations of the stones around and those in the whole wall, and is added.
     pub fn deformations(
         &self,
         known: impl Fn(StoneId) -> Option<Vector3<f64>>,

@@ -134,12 +134,13 @@ pub(super) fn stones_in_boxes(
         for ((i, _), label) in shown.iter().zip(1..) {
             photos_of[*i] += 1;
             let is_stone = |p: &Point3<f64>| {
-                let pixel = photos.views[*photo].project(p)?.pixel;
-                let [x, y] = pixel.map(|v| v.floor().max(0.0) as u32);
-                (found.labels.get(x, y) == Some(&label)).then_some(())
+                photos.views[*photo].project(p).is_some_and(|seen| {
+                    let [x, y] = seen.pixel.map(|v| v.floor().max(0.0) as u32);
+                    found.labels.get(x, y) == Some(&label)
+                })
             };
             for (vote, (_, p)) in votes[*i].iter_mut().zip(&faces[*i]) {
-                *vote += u32::from(is_stone(p).is_some());
+                *vote += u32::from(is_stone(p));
             }
         }
     }
