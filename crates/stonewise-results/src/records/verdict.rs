@@ -479,15 +479,8 @@ mod tests {
 
     #[test]
     fn the_schema_in_the_docs_names_every_key_and_word() {
-        let docs = include_str!("../../../../docs/src/verdict.md");
-        let block = docs
-            .rsplit("```json")
-            .next()
-            .unwrap()
-            .split("```")
-            .next()
-            .unwrap();
-        let schema: Value = serde_json::from_str(block).unwrap();
+        let schema: Value =
+            serde_json::from_str(include_str!("../../../../docs/src/verdict.schema.json")).unwrap();
         let of = |name: &str| schema["$defs"][name].clone();
         let verdict = serde_json::to_value(sample()).unwrap();
         let epoch = &verdict["epochs"][0];
