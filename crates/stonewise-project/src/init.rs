@@ -135,7 +135,7 @@ pub fn propose(dir: &Path) -> Result<Proposal> {
             message,
         });
     }
-    let why = order(&mut epochs);
+    let why = order(dir, &mut epochs);
     let names: Vec<&str> = epochs.iter().map(|e| e.name.as_str()).collect();
     lines.push(format!("order of time: {} ({why})", names.join(", ")));
     for epoch in &epochs {

@@ -5,7 +5,7 @@ use std::path::Path;
 use nalgebra::Point3;
 use stonewise_core::geometry::Bounds;
 
-use super::gathered::CHUNK_POINTS;
+use super::gathered::{CHUNK_POINTS, Created};
 use super::scan::Scan;
 use super::{CloudError, CloudFormat, ReadSummary, e57_file, las, pcd, ply, ptx, read_cloud, text};
 
@@ -84,6 +84,28 @@ pub fn cloud_crs(path: &Path) -> Result<Option<String>, CloudError> {
     match CloudFormat::of(path)? {
         CloudFormat::Las => Ok(las::Layout::open(path)?.crs()),
         CloudFormat::E57 => Ok(e57_file::scans(path)?.1),
+        CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Pcd | CloudFormat::Text => Ok(None),
+    }
+}
+
+/// When the first scan of a file began, else when the file was written, from its head alone; `None` for formats that do
+/// not say it.
+///
+/// # Errors
+/// The file cannot be read, or its head is damaged.
+pub fn cloud_date(path: &Path) -> Result<Option<Created>, CloudError> {
+    match CloudFormat::of(path)? {
+        CloudFormat::Las => {
+            let written = las::Layout::open(path)?.header.date();
+            Ok(written.map(|date| Created::Day(date.to_string())))
+        }
+        CloudFormat::E57 => {
+            let scans = e57_file::scans(path)?.0;
+            match scans.iter().filter_map(|s| s.begun_s).reduce(f64::min) {
+                Some(begun_s) => Ok(Some(Created::Gps(begun_s))),
+                None => Ok(e57_file::created_s(path)?.map(Created::Gps)),
+            }
+        }
         CloudFormat::Ptx | CloudFormat::Ply | CloudFormat::Pcd | CloudFormat::Text => Ok(None),
     }
 }

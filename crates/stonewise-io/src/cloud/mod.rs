@@ -33,7 +33,7 @@ pub use error::CloudError;
 pub use extra_bytes::{Dimension, ExtraType};
 pub use format::CloudFormat;
 pub use gathered::{Clock, Created, FieldRange, Rounding, SourcePoints};
-pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_info, cloud_scans, measure_cloud};
+pub use info::{CloudInfo, claimed_records, cloud_crs, cloud_date, cloud_info, cloud_scans, measure_cloud};
 pub use label::{LabelColumns, PointLabel, PointMotion};
 pub use labelled::{select_points, write_labelled};
 pub use ply::read_mesh;

@@ -49,8 +49,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
         let cameras = match &epoch.photos {
             Some(files) => unreadable.keep(epoch, &CAMERAS, cameras_of(epoch, files, survey.is_some()))?,
             None => {
-                let spacing_m = survey.as_ref().and_then(|s| s.spacing_m);
-                report.findings.push(photos::none(epoch, spacing_m));
+                report.findings.push(photos::none(epoch));
                 None
             }
         };

@@ -14,24 +14,15 @@ use stonewise_io::image_io::image_size;
 
 /// Bytes at the end of a JPEG among which its end marker must be; some cameras append previews.
 const TAIL: u64 = 64 << 10;
-/// Stones with fewer spacings of the points across are found less often in views: on dam_small, 63 % of those
-/// with 10 to 15, 83 % with 15 to 20, 90 % with 20 to 25 and 94 % of larger ones.
-const SPACINGS_ACROSS: f64 = 20.0;
 /// Names in a message at most.
 const NAMES: usize = 4;
 
 /// A photo that is there, with its view.
 pub(super) type PosedPhoto<'a> = (&'a View, PathBuf);
 
-/// An epoch without photos; `spacing_m`: distance between its points.
-pub(super) fn none(epoch: &Epoch, spacing_m: Option<f64>) -> Finding {
-    let mut text = "none: stones are looked for in views of the clouds".to_owned();
-    if let Some(spacing_m) = spacing_m {
-        let cm = 1e2 * SPACINGS_ACROSS * spacing_m;
-        text = format!(
-            "{text}; those below {cm:.0} cm across (square root of the area) are found less often at this spacing"
-        );
-    }
+/// An epoch without photos.
+pub(super) fn none(epoch: &Epoch) -> Finding {
+    let text = "none: stones are looked for in views of the clouds";
     Finding::new(&epoch.name, &PHOTOS, Verdict::Fine, text)
 }
 

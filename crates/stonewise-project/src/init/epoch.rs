@@ -167,7 +167,8 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
     let is_masks = name(dir).contains("mask");
     if is_colmap {
         found.cameras.push(dir.to_path_buf());
-    } else if files.iter().any(|f| has_extension(f, &PHOTOS)) {
+    }
+    if files.iter().any(|f| has_extension(f, &PHOTOS)) {
         let list = if is_masks {
             &mut found.masks
         } else {

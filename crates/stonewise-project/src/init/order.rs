@@ -1,6 +1,11 @@
 //! Which epoch comes first.
 
 use super::epoch::Found;
+use crate::day::day_of;
+use std::path::Path;
+use stonewise_io::cloud::{Created, cloud_date};
+use stonewise_io::exif::read_exif;
+use stonewise_io::image_io::photos_in;
 
 /// Words in names of epochs, in order of time.
 const WORDS: [&[&str]; 7] = [
@@ -13,8 +18,27 @@ const WORDS: [&[&str]; 7] = [
     &["alt", "neu"],
 ];
 
-/// Brings epochs in order of time as far as their names tell it; says what told it.
-pub(super) fn order(epochs: &mut [Found]) -> &'static str {
+/// The time of an epoch whose files lie below a folder, seconds from 1970; `None` where they do not say it.
+type TimeOf = fn(&Path, &Found) -> Option<i64>;
+
+/// What tells the order where names do not, the surest first.
+const TIMES: [(TimeOf, &str); 2] = [
+    (photo_time, "by the dates of their photos"),
+    (
+        cloud_time,
+        "by the dates in their clouds, of the scan or else of the file: if that is wrong, change the order in the project file",
+    ),
+];
+
+/// Photos of an epoch that are asked for their date.
+const DATED_PHOTOS: usize = 5;
+/// Day on which GPS time began, counted from 1970.
+const GPS_DAY: f64 = 3657.0;
+const DAY_S: f64 = 86_400.0;
+
+/// Brings epochs in order of time as far as their names or their files tell it; says what told it. `root`: the folder
+/// that their paths are relative to.
+pub(super) fn order(root: &Path, epochs: &mut [Found]) -> &'static str {
     let names: Vec<String> = epochs.iter().map(|e| e.name.to_lowercase()).collect();
     if names.iter().all(|n| n.bytes().any(|b| b.is_ascii_digit())) {
         epochs.sort_by_cached_key(|e| pieces(&e.name));
@@ -29,7 +53,36 @@ pub(super) fn order(epochs: &mut [Found]) -> &'static str {
         epochs.sort_by_cached_key(|e| place(&e.name.to_lowercase(), words));
         return "by their names";
     }
+    for (time_of, why) in TIMES {
+        let mut times: Vec<Option<i64>> = epochs.iter().map(|epoch| time_of(root, epoch)).collect();
+        times.sort();
+        if times.first() != Some(&None) && times.windows(2).all(|pair| pair[0] != pair[1]) {
+            epochs.sort_by_cached_key(|epoch| time_of(root, epoch));
+            return why;
+        }
+    }
     "in alphabetical order, as their names do not tell: if that is wrong, change the order in the project file"
+}
+
+/// When the photos of an epoch were taken, by the clock of their camera.
+fn photo_time(root: &Path, epoch: &Found) -> Option<i64> {
+    let photos = photos_in(&root.join(epoch.images.as_ref()?)).ok()?;
+    let dated = photos.iter().take(DATED_PHOTOS);
+    let days = dated.filter_map(|photo| day_of(&read_exif(photo)?.taken?));
+    days.map(|day| (DAY_S * day) as i64).min()
+}
+
+/// When the first of the clouds of an epoch was scanned or written.
+fn cloud_time(root: &Path, epoch: &Found) -> Option<i64> {
+    let dates = epoch
+        .clouds
+        .iter()
+        .filter_map(|cloud| cloud_date(&root.join(cloud)).ok()?);
+    let days = dates.filter_map(|date| match date {
+        Created::Day(day) => day_of(&day),
+        Created::Gps(seconds) => Some(GPS_DAY + seconds / DAY_S),
+    });
+    days.map(|day| (DAY_S * day) as i64).min()
 }
 
 /// Which of the words a name holds.
@@ -68,7 +121,7 @@ mod tests {
             ..Found::default()
         };
         let mut epochs: Vec<Found> = names.iter().map(named).collect();
-        let why = order(&mut epochs);
+        let why = order(Path::new(""), &mut epochs);
         (epochs.into_iter().map(|e| e.name).collect(), why)
     }
 
@@ -84,5 +137,55 @@ mod tests {
         let (names, why) = ordered(&["company a", "company b"]);
         assert_eq!(names, ["company a", "company b"]);
         assert!(why.contains("change the order"));
+    }
+
+    /// A JPEG without a picture that was taken then.
+    fn photo(date: &str) -> Vec<u8> {
+        // One entry, `DateTime`, whose text follows the directory.
+        let mut tiff = b"II*\0\x08\0\0\0\x01\0\x32\x01\x02\0\x14\0\0\0\x1a\0\0\0\0\0\0\0".to_vec();
+        tiff.extend(date.bytes().chain([0]));
+        let mut bytes = b"\xff\xd8\xff\xe1".to_vec();
+        bytes.extend((tiff.len() as u16 + 8).to_be_bytes());
+        bytes.extend(b"Exif\0\0");
+        bytes.extend(tiff);
+        bytes
+    }
+
+    #[test]
+    fn dates_of_files_tell_the_order_where_names_do_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let found = |(name, date): (&str, &str)| {
+            let images = dir.path().join(name);
+            std::fs::create_dir(&images).unwrap();
+            std::fs::write(images.join("1.jpg"), photo(date)).unwrap();
+            Found {
+                name: name.to_owned(),
+                images: Some(name.into()),
+                ..Found::default()
+            }
+        };
+        let taken = [("north", "2025:04:12 09:31:02"), ("south", "2024:11:02 10:00:00")];
+        let mut epochs = taken.map(found);
+        assert_eq!(order(dir.path(), &mut epochs), "by the dates of their photos");
+        assert_eq!(epochs.map(|e| e.name), ["south", "north"]);
+
+        // The day of the year and the year are bytes 90 to 93 of the header of a LAS file.
+        let cloud = |(name, year): (&str, u16)| {
+            let file = format!("{name}.las");
+            let path = dir.path().join(&file);
+            stonewise_io::cloud::write_points_laz(&path, None, &[nalgebra::Point3::origin()], &[]).unwrap();
+            let mut bytes = std::fs::read(&path).unwrap();
+            bytes[90..92].copy_from_slice(&100u16.to_le_bytes());
+            bytes[92..94].copy_from_slice(&year.to_le_bytes());
+            std::fs::write(&path, bytes).unwrap();
+            Found {
+                name: name.to_owned(),
+                clouds: vec![file.into()],
+                ..Found::default()
+            }
+        };
+        let mut epochs = [("company a", 2025), ("company b", 2023)].map(cloud);
+        assert!(order(dir.path(), &mut epochs).starts_with("by the dates in their clouds"));
+        assert_eq!(epochs.map(|e| e.name), ["company b", "company a"]);
     }
 }
