@@ -40,7 +40,7 @@ impl Model {
 
     /// With the error of the whole epoch as large as stable areas show it, along the directions in which that is
     /// far more than is assumed: an assumption that does not hold would pull the error towards none. Along what
-    /// the areas hardly show, the assumption holds: an error that is left open is no error that is seen.
+    /// the areas show worse than it is assumed, the assumption holds: no area makes the expected error larger.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
         let (prior, components) = self.opened();
         let Some(solution) = Problem::new(unknowns, observations).solve(&prior, &components) else {
@@ -62,7 +62,8 @@ impl Model {
             let along = |m: &Matrix3<f64>| direction.dot(&(m * direction));
             let (assumed, open) = (along(&self.whole), along(&self.open));
             let square = direction.dot(shown).powi(2);
-            if assumed > 0.0 && square > SURPRISING * SURPRISING * (assumed + variance) {
+            let is_seen = *variance < assumed;
+            if is_seen && square > SURPRISING * SURPRISING * (assumed + variance) {
                 let outer = direction * direction.transpose();
                 wider.whole += outer * (square.max(open) - assumed);
                 wider.open += outer * (square.max(open) - open);
@@ -115,6 +116,8 @@ mod tests {
         let beside = Vector3::new(-0.8, 0.6, 0.0) * 0.013;
         let near = model.widened_to(&(axis * 0.005 + beside), &covariance);
         assert_eq!([near.whole, near.open], [model.whole, model.open]);
+        let far_beside = model.widened_to(&(axis * 0.005 + beside * 10.0), &covariance);
+        assert_eq!([far_beside.whole, far_beside.open], [model.whole, model.open]);
         let far = model.widened_to(&(axis * 0.02 + beside), &covariance);
         let expected = model.whole + axis * axis.transpose() * (400e-6 - 9e-6);
         assert!((far.whole - expected).norm() < 1e-9);
