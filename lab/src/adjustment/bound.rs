@@ -20,6 +20,8 @@ const WINDOW_M: f64 = 0.75;
 pub struct Exact {
     pub points: Vec<(u32, Point3<f64>, f64)>,
     pub weight: f64,
+    /// Noise along the normal beside that of the ranges, metres.
+    pub noise_m: f64,
 }
 
 /// By stone: places, normals and weights of an epoch's points.
@@ -52,7 +54,7 @@ pub fn bounds(world: &World, epochs: &[Exact; 2], sigma_m: f64) -> BTreeMap<u32,
                     *stone,
                     *p,
                     hit.normal,
-                    exact.weight / (sigma_m * sigma_m * cos),
+                    exact.weight / (sigma_m * sigma_m * cos + exact.noise_m * exact.noise_m),
                 ))
             })
             .collect();

@@ -16,7 +16,7 @@ const OUTLIER_M: f64 = 0.01;
 const NEAR_CRACK_M: f64 = 0.4;
 
 /// The columns of the table.
-pub const COLUMNS: [Figure<Figures>; 29] = [
+pub const COLUMNS: [Figure<Figures>; 30] = [
     ("share", 3, |f| f.measured),
     ("in 2D", 3, |f| f.in_plane),
     ("out", 3, |f| f.out),
@@ -31,6 +31,7 @@ pub const COLUMNS: [Figure<Figures>; 29] = [
     ("out", 2, |f| f.coverage[2]),
     ("chi-square: mean", 2, |f| f.normalised[0]),
     ("median", 2, |f| f.normalised[1]),
+    ("interval / error", 2, |f| f.width),
     ("alarms", 3, |f| f.alarms[0]),
     ("called loose", 3, |f| f.alarms[1]),
     ("against neighbours", 2, |f| f.against[0]),
@@ -68,6 +69,8 @@ pub struct Figures {
     pub coverage: [f64; 3],
     /// Normalised squared errors over their expectation, datum removed: mean, median.
     pub normalised: [f64; 2],
+    /// Root mean square of the standard deviations over that of the errors, datum removed: median of the axes.
+    pub width: f64,
     /// Tests of stones that are not loose with p below 0.05, and stones of these called loose.
     pub alarms: [f64; 2],
     /// Motion against the neighbours of stones that are not loose, in units of its covariance: mean square
@@ -141,6 +144,10 @@ pub fn figures(trial: &Trial, results: &[PairResult], breaks: &[Break], seconds:
         possible: possible_recall(trial),
         coverage,
         normalised,
+        width: median((0..3).map(|a| {
+            let claimed = rms(covariance.iter().map(|c| c[(a, a)].max(0.0).sqrt()));
+            claimed / rms(free.iter().map(|e| e[a]))
+        })),
         alarms: [
             share(still.len(), |i| still[i].p < 0.05),
             share(still.len(), |i| still[i].called),

@@ -10,11 +10,15 @@
 //! estimator and M3C2 beside it), `each` (a line for every seed), `width=M height=M` (of the wall, default 4
 //! by 3), `coarse=F` (point spacing times F), `border=F` (width of the border, in noise levels, where a
 //! point's place decides and not its label, as in a run; default 3), `set:KEY=F` (a parameter of the
-//! adjustment), `scale=N` (time for about N stones). A row holds medians over the seeds. Millimetres.
+//! adjustment), `scale=N` (time for about N stones), `mixes` (noise of 1, 3, 6, 11 and 20 mm and 100, 28 and 10 % of
+//! the points in the first, the second and both epochs of simulated walls; `noise=MM,... share=PERCENT,...` for
+//! others).
+//! A row holds medians over the seeds. Millimetres.
 
 mod bound;
 mod dam;
 mod figures;
+mod mix;
 mod paper;
 mod scale;
 mod simulated;
@@ -25,6 +29,7 @@ use crate::figures::median;
 use crate::table::{Figure, Table};
 use crate::words::Words;
 use figures::{COLUMNS, Figures, figures};
+use mix::Mix;
 use stonewise_core::progress::Silent;
 use stonewise_core::registration::{AdjustmentParams, MemoryPairs, adjust};
 use trial::Trial;
@@ -73,6 +78,8 @@ pub struct Options {
     pub height_m: f64,
     coarse: f64,
     pub border_noises: f64,
+    /// What is done to the points of an epoch.
+    pub mix: Option<Mix>,
 }
 
 impl Options {
@@ -84,6 +91,7 @@ impl Options {
             height_m: number("height=", 3.0),
             coarse: number("coarse=", 1.0),
             border_noises: number("border=", 3.0),
+            mix: None,
             words: words.clone(),
         }
     }
@@ -123,6 +131,16 @@ pub fn run(words: &Words) -> Outcome {
         return Ok(());
     }
     let table = Table::begin(["case", "sensor"].into_iter().chain(COLUMNS.map(|c| c.0)));
+    if words.has("mixes") {
+        for mix in Mix::chosen(words) {
+            let options = Options {
+                mix: Some(mix),
+                ..options.clone()
+            };
+            measure(Case::Combo, "tls", &seeds, &options, &table);
+        }
+        return Ok(());
+    }
     for name in words.chosen(&Case::ALL.map(|c| c.0)) {
         for (_, case) in Case::ALL.iter().filter(|c| c.0 == name) {
             for sensor in &sensors {
@@ -172,7 +190,11 @@ fn measure(case: Case, sensor: &str, seeds: &[u64], options: &Options, table: &T
     if adjusted.is_empty() {
         return;
     }
-    table.row(cells(&format!("{case:?}"), sensor, &adjusted));
+    let name = options
+        .mix
+        .as_ref()
+        .map_or_else(|| format!("{case:?}"), Mix::name);
+    table.row(cells(&name, sensor, &adjusted));
     if !paper.is_empty() {
         table.row(cells("its gicp", sensor, &paper));
         let [inside, out] = m3c2.map(|list| format!("{:.2}", median(list)));

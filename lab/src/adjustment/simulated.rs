@@ -56,8 +56,20 @@ pub fn build(case: Case, sensor: &str, seed: u64, options: &Options) -> Trial {
         for (a, b) in seen.iter_mut().zip(shares(&second, 1)) {
             *a = a.min(b);
         }
-        let exact = [exact(&world, &first, 0, 1), exact(&world, &second, 1, 1)];
-        ([by_stone(&first), by_stone(&second)], exact)
+        let mut exact = [exact(&world, &first, 0, 1), exact(&world, &second, 1, 1)];
+        if let Some(mix) = &options.mix {
+            for (epoch, exact) in exact.iter_mut().enumerate() {
+                exact.weight *= mix.share(epoch);
+                exact.noise_m = mix.noise_m(epoch);
+            }
+        }
+        let mut epochs = [by_stone(&first), by_stone(&second)];
+        if let Some(mix) = &options.mix {
+            for (epoch, places) in epochs.iter_mut().enumerate() {
+                mix.apply(epoch, seed, places);
+            }
+        }
+        (epochs, exact)
     };
     let field = prescribed(case);
     let mut truth = BTreeMap::new();
@@ -212,5 +224,6 @@ fn exact(world: &World, scan: &Scan, epoch: usize, share: usize) -> bound::Exact
     bound::Exact {
         points,
         weight: step as f64 / share as f64,
+        noise_m: 0.0,
     }
 }

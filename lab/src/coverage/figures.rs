@@ -26,10 +26,13 @@ pub struct Wall {
     /// Whether a stone of the wall, which stands still, is called moved: stone by stone, and with the false
     /// discovery rate controlled.
     called: [bool; 2],
+    /// Whether stable areas made the common error larger along an axis, by more than is claimed of it.
+    is_worse: bool,
 }
 
 impl Wall {
-    pub fn new(survey: &Survey, found: &EpochErrors) -> Self {
+    /// `without`: the same without stable areas.
+    pub fn new(survey: &Survey, found: &EpochErrors, without: Option<&EpochErrors>) -> Self {
         let is_known = found.datum != Datum::Unknown;
         let stones = || survey.stones.iter().zip(&survey.measured).enumerate();
         let samples: Vec<DisplacementSample> = stones()
@@ -79,7 +82,12 @@ impl Wall {
         };
         let mean = survey.seeming.iter().sum::<Vector3<f64>>() / n;
         let claimed = found.rigid.covariance.fixed_view::<3, 3>(0, 0).into_owned();
-        let off = mean - found.rigid.error.fixed_rows::<3>(0);
+        let off_by = |of: &EpochErrors| mean - of.rigid.error.fixed_rows::<3>(0);
+        let off = off_by(found);
+        wall.is_worse = without.is_some_and(|without| {
+            let before = off_by(without);
+            (0..3).any(|a| off[a].abs() > before[a].abs() + claimed[(a, a)].sqrt())
+        });
         wall.common = (0..3).map(|a| off[a].powi(2) / claimed[(a, a)]).sum::<f64>() / 3.0;
         wall
     }
@@ -139,7 +147,7 @@ impl Row {
     }
 }
 
-const COLUMNS: [Figure<Row>; 18] = [
+const COLUMNS: [Figure<Row>; 19] = [
     ("unknown", 2, |r| r.share(|w| w.datum == Some(Datum::Unknown))),
     ("along", 3, |r| r.mean(|w| w.inside[0])),
     ("up", 3, |r| r.mean(|w| w.inside[1])),
@@ -159,6 +167,7 @@ const COLUMNS: [Figure<Row>; 18] = [
     ("out", 3, |r| r.mean(|w| w.inside_relative[2])),
     ("called stone by stone", 3, |r| r.share(|w| w.called[0])),
     ("FDR", 3, |r| r.share(|w| w.called[1])),
+    ("made worse by stable areas", 3, |r| r.share(|w| w.is_worse)),
     ("s", 0, |r| r.seconds),
 ];
 

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p stonewise-lab -- coverage [WORD ...]`. Words: sensors `tls uav`
 //! (default both), kinds of error by their names (`usual walk jump ...`, see [`errors::Kind`]; default all),
-//! `sources=2,3` (numbers of stations or strips of an epoch), `stable=none,ground,building,moved` (default
+//! `sources=2,3` (numbers of stations or strips of an epoch), `stable=none,ground,building,moved,buildings` (default
 //! none), `without=times,sources` (what the files leave out), `walls=N` (of a row, default 200), `first=N`
 //! (seed of the first wall), `full` (walls of 3 x 2 m with a bulge, scanned and adjusted; minutes for a few
 //! walls; no stable areas).
@@ -72,6 +72,7 @@ fn stable_of(word: &str) -> Stable {
         "ground" => Stable::Ground,
         "building" => Stable::Building,
         "moved" => Stable::Moved,
+        "buildings" => Stable::Buildings,
         _ => Stable::None,
     }
 }
@@ -82,13 +83,21 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
         false => simulate(case, seed),
     };
     let survey = kept.apply(survey);
-    let pair = EpochPair {
-        sources: &survey.sources,
-        stones: &survey.stones,
-        neighbours: &[],
-        stable: &survey.stable,
-        offered: &[],
-        sigma_m: survey.sigma_m,
+    let with = |stable| {
+        let pair = EpochPair {
+            sources: &survey.sources,
+            stones: &survey.stones,
+            neighbours: &[],
+            stable,
+            offered: &[],
+            sigma_m: survey.sigma_m,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default())
     };
-    Wall::new(&survey, &epoch_errors(&pair, &EpochErrorParams::default()))
+    let found = with(&survey.stable);
+    let without = match survey.stable.is_empty() {
+        true => None,
+        false => Some(with(&[])),
+    };
+    Wall::new(&survey, &found, without.as_ref())
 }

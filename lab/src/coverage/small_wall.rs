@@ -6,6 +6,7 @@ use crate::survey::sources;
 use nalgebra::{Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
 use stonewise_core::cloud::Cloud;
 use stonewise_core::registration::observers::{SeenStone, Source, SourcePoints, StablePoints};
 use stonewise_simulate::normal;
@@ -20,6 +21,8 @@ pub enum Stable {
     Building,
     /// The same with an area that moved.
     Moved,
+    /// Ground and one to three buildings of any size and direction, scanned with a beam of finite width.
+    Buildings,
 }
 
 pub struct Case {
@@ -65,6 +68,8 @@ struct Instrument {
     nugget_m: [f64; 2],
     /// Points of a source per square metre of a plane that faces it.
     density: f64,
+    /// Diameter of the beam, metres.
+    footprint_m: f64,
 }
 
 fn instrument(sensor: Sensor) -> Instrument {
@@ -75,6 +80,7 @@ fn instrument(sensor: Sensor) -> Instrument {
             stone_m: [0.08e-3, 0.03e-3],
             nugget_m: [0.05e-3, 0.02e-3],
             density: 2000.0,
+            footprint_m: 0.006,
         },
         Sensor::Uav => Instrument {
             sigma_m: 0.011,
@@ -82,6 +88,7 @@ fn instrument(sensor: Sensor) -> Instrument {
             stone_m: [0.5e-3, 0.2e-3],
             nugget_m: [0.5e-3, 0.2e-3],
             density: 2000.0,
+            footprint_m: 0.03,
         },
     }
 }
@@ -219,27 +226,63 @@ struct Patch {
     edges: [Vector3<f64>; 2],
     wave_m: f64,
     moved: Vector3<f64>,
+    /// Side that shows something; `None`: either.
+    outward: Option<Vector3<f64>>,
+    /// Whether beams at its edges see past it.
+    has_edges: bool,
 }
 
-fn patches(stable: Stable) -> Vec<Patch> {
+/// A box that stands on the ground: its walls and its roof.
+fn building(area: usize, rng: &mut ChaCha8Rng) -> Vec<Patch> {
+    let (sin, cos) = rng.random_range(0.0..TAU).sin_cos();
+    let up = Vector3::z() * rng.random_range(0.5..2.5);
+    let sides = [Vector3::new(cos, sin, 0.0), Vector3::new(-sin, cos, 0.0)];
+    let [a, b] = sides.map(|side| side * rng.random_range(0.4..2.5));
+    let middle = Point3::new(rng.random_range(2.0..5.0), rng.random_range(-4.0..4.0), 0.0);
+    let corner = middle - 0.5 * (a + b);
+    let patch = |corner: Point3<f64>, edges: [Vector3<f64>; 2], outward: Vector3<f64>| Patch {
+        area,
+        corner,
+        edges,
+        wave_m: 0.0,
+        moved: Vector3::zeros(),
+        outward: Some(outward),
+        has_edges: true,
+    };
+    vec![
+        patch(corner, [a, up], -b),
+        patch(corner + b, [a, up], b),
+        patch(corner, [b, up], -a),
+        patch(corner + a, [b, up], a),
+        patch(corner + up, [a, b], up),
+    ]
+}
+
+fn patches(stable: Stable, rng: &mut ChaCha8Rng) -> Vec<Patch> {
     let patch = |area, corner: [f64; 3], a: [f64; 3], b: [f64; 3], wave_m| Patch {
         area,
         corner: corner.into(),
         edges: [a.into(), b.into()],
         wave_m,
         moved: Vector3::zeros(),
+        outward: None,
+        has_edges: false,
+    };
+    let side = |y: f64| Patch {
+        outward: Some(Vector3::y() * y.signum()),
+        ..patch(1, [0.7, y, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 1.2], 0.0)
     };
     let ground = || patch(0, [0.6, -2.5, 0.0], [0.0, 5.0, 0.0], [1.5, 0.0, 0.0], 0.02);
-    let building = || {
+    let small_building = || {
         vec![
             patch(1, [1.5, -0.6, 0.0], [0.0, 1.2, 0.0], [0.0, 0.0, 1.2], 0.0),
             patch(1, [0.7, -0.6, 1.2], [0.0, 1.2, 0.0], [0.8, 0.0, 0.0], 0.0),
-            patch(1, [0.7, -0.6, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 1.2], 0.0),
-            patch(1, [0.7, 0.6, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 1.2], 0.0),
+            side(-0.6),
+            side(0.6),
         ]
     };
     let with_building = || {
-        let mut list = building();
+        let mut list = small_building();
         list.push(ground());
         list
     };
@@ -254,6 +297,12 @@ fn patches(stable: Stable) -> Vec<Patch> {
             list.push(moved);
             list
         }
+        Stable::Buildings => {
+            let count = rng.random_range(1..=3);
+            let mut list: Vec<Patch> = (1..=count).flat_map(|area| building(area, rng)).collect();
+            list.push(ground());
+            list
+        }
     }
 }
 
@@ -264,7 +313,7 @@ fn stable(
     rng: &mut ChaCha8Rng,
 ) -> Vec<StablePoints> {
     let half = errors.len() / 2;
-    let patches = patches(kind);
+    let patches = patches(kind, rng);
     let mut list = Vec::new();
     for patch in &patches {
         for (s, error) in errors.iter().enumerate() {
@@ -293,14 +342,14 @@ fn on_patch(
     let middle = patch.corner + 0.5 * (a + b);
     let view = error.sensor_for(&middle) - middle;
     let cosine = (normal_of_patch.dot(&view) / view.norm()).abs();
-    // Faces turned away show nothing: the one of the two sides of the building that looks at the sensor.
-    let outward = (middle - Point3::new(1.1, 0.0, 0.6))
-        .dot(&normal_of_patch)
-        .signum();
-    let is_side = patch.area == 1 && normal_of_patch.y.abs() > 0.5;
-    if is_side && outward * normal_of_patch.dot(&view) <= 0.0 {
+    // Faces turned away show nothing.
+    if patch.outward.is_some_and(|outward| outward.dot(&view) <= 0.0) {
         return Vec::new();
     }
+    let reach_m = match patch.has_edges {
+        true => 0.5 * what.footprint_m / cosine,
+        false => 0.0,
+    };
     let count = (what.density * cross.norm() * cosine) as usize;
     (0..count)
         .map(|_| {
@@ -315,7 +364,19 @@ fn on_patch(
             };
             let beam = (place - error.sensor_for(&place)).normalize();
             let moved = if is_later { patch.moved } else { Vector3::zeros() };
-            place + beam * (what.sigma_m * normal(rng)) + error.at(&target) + moved
+            let mixed = beam * beam.dot(&off_edge(patch, [u, v], reach_m));
+            place + beam * (what.sigma_m * normal(rng)) + mixed + error.at(&target) + moved
         })
         .collect()
+}
+
+/// Where the middle of the part of the beam lies that still hits the patch, against the middle of the beam, which
+/// hits it at these shares of its edges and reaches `reach_m` along it.
+fn off_edge(patch: &Patch, at: [f64; 2], reach_m: f64) -> Vector3<f64> {
+    let along = |(edge, at): (&Vector3<f64>, f64)| {
+        let length = edge.norm();
+        let [low, high] = [at, 1.0 - at].map(|share| (reach_m - share * length).max(0.0));
+        edge / length * (0.5 * (low - high))
+    };
+    patch.edges.iter().zip(at).map(along).sum()
 }
