@@ -65,5 +65,6 @@ impl Mix {
             points.retain(|_| rng.random_range(0.0..1.0) < share);
             points.iter_mut().for_each(|p| p.x += noise_m * normal(&mut rng));
         }
+        places.retain(|_, points| !points.is_empty());
     }
 }
