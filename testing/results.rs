@@ -60,6 +60,7 @@ pub fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
         part: None,
         edits: None,
         conditions: None,
+        instruments: Vec::new(),
         parameters: Settings::default(),
         steps: Vec::new(),
         warnings: Vec::new(),

@@ -22,11 +22,12 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 16] = [
+const PROGRAMS: [Program; 17] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("deformation", deformation::run),
     ("series", series::run),
+    ("series-time", speed::series_time::run),
     ("epoch-errors", epoch_errors::run),
     ("photo-curves", photo_curves::run),
     ("kept-walls", detector::kept_walls::run),

@@ -397,6 +397,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         part: None,
         edits: None,
         conditions: None,
+        instruments: Vec::new(),
         parameters: settings(case, language)?,
         steps: vec![StepTime {
             step: "ingest-1".to_owned(),

@@ -482,6 +482,9 @@ pub struct ReportArgs {
     /// Leave parameters, digests and decisions about masks out of the PDF.
     #[arg(long, requires = "pdf")]
     pub no_appendix: bool,
+    /// Print the part of the yearly safety report on measurements instead; of more than two epochs.
+    #[arg(long, requires = "pdf", conflicts_with = "no_appendix")]
+    pub yearly: bool,
 }
 
 /// Arguments of `verify`.

@@ -50,7 +50,7 @@ fn hide(survey: &Path, cloud: &Path) -> Point3<f64> {
 fn project(dir: &Path) -> Point3<f64> {
     let mut text =
         "[project]\nname = \"Series wall\"\nreference = \"2020-04\"\n[conditions]\nfile = \"levels.csv\"\n\
-                    [registration.photos]\nenabled = false\n"
+                    [[instruments]]\nfile = \"targets.csv\"\nuse = true\n[registration.photos]\nenabled = false\n"
             .to_owned();
     let dates = ["2019-10-01", "2020-04-01", "2020-10-01", "2021-04-01"];
     for (survey, seed) in [3, 4].into_iter().enumerate() {
@@ -69,6 +69,15 @@ fn project(dir: &Path) -> Point3<f64> {
     fs::write(dir.join("stonewise.toml"), text).unwrap();
     let levels = "date,level_m\n2019-09-30,10\n2019-10-02,12\n2020-04-01,8\n2020-10-01,14\n2021-04-01,9\n";
     fs::write(dir.join("levels.csv"), levels).unwrap();
+    // Five targets that stand still; the last has no reading of the newest epoch.
+    let mut targets = "name,x,y,z,date,dx,dy,dz,sd_x,sd_y,sd_z\n".to_owned();
+    let places = [[-0.6, 0.2], [0.6, 0.2], [0.0, 0.8], [-0.5, 0.7], [0.5, 0.7]];
+    for (i, [y, z]) in places.iter().enumerate() {
+        for date in &dates[..if i == 4 { 3 } else { 4 }] {
+            targets += &format!("T{i},0,{y},{z},{date},0,0,0,0.0003,0.0003,0.0003\n");
+        }
+    }
+    fs::write(dir.join("targets.csv"), targets).unwrap();
     hide(&dir.join("s0"), &dir.join("s0/epoch2/cloud_tls.laz"))
 }
 
@@ -167,6 +176,7 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     for answer in ["trend", "anomaly"] {
         assert_eq!(verdict["series"][answer]["answer"], "no", "{verdict}");
     }
+    check_instruments(&json("instruments.json"), &record);
     let levels: Vec<&Value> = record["epochs"]
         .as_array()
         .unwrap()
@@ -179,6 +189,40 @@ fn a_series_has_its_tables_its_answers_and_its_section() {
     let page = fs::read_to_string(out.path().join("report/index.html")).unwrap();
     let page = page.replace('\u{a0}', " ");
     assert!(page.contains("<section id=\"series\">") && page.contains(sentence) && page.contains(text));
+    assert!(page.contains("<section id=\"instruments\">"));
+    let yearly = fs::read_to_string(out.path().join("report/yearly.html")).unwrap();
+    assert!(
+        yearly.contains("4 Comparison with prediction") && yearly.contains("T4 ("),
+        "{yearly}"
+    );
+    let rows = |name: &str| {
+        fs::read_to_string(out.path().join("report").join(name))
+            .unwrap()
+            .lines()
+            .count()
+    };
+    assert_eq!((rows("epochs.csv"), rows("answers.csv")), (5, 5));
+}
+
+/// Targets that stand still, as the wall does, agree with it and fix the datum, which is unknown without them.
+fn check_instruments(found: &Value, record: &Value) {
+    let epochs = found["epochs"].as_array().unwrap();
+    assert_eq!(epochs.len(), 3);
+    for epoch in epochs {
+        let compared = epoch["compared"].as_array().unwrap();
+        let is_newest = epoch["epoch"] == "2021-04";
+        assert_eq!(compared.len(), if is_newest { 4 } else { 5 });
+        assert!(
+            compared
+                .iter()
+                .all(|c| c["agrees"] == true && c["stones"][0].is_u64()),
+            "{epoch}"
+        );
+        assert_eq!(epoch["datum"], "observed");
+        assert_eq!(record["datum"][epoch["epoch"].as_str().unwrap()], "instruments");
+    }
+    assert_eq!(epochs[2]["left_out"][0]["name"], "T4");
+    assert_eq!(epochs[2]["left_out"][0]["code"], "after_readings");
 }
 
 #[test]

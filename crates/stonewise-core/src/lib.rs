@@ -64,7 +64,7 @@
 //!
 //! ```text
 //! id < epoch < statistics < linalg < components < progress < parallel < params < geometry < raster < cloud
-//!    < stone < surface < {transfer | matching | registration | change | views | series} < evaluate
+//!    < stone < surface < {transfer | matching | registration | change | views | series | instruments} < evaluate
 //! ```
 
 pub use nalgebra;
@@ -76,6 +76,7 @@ pub mod epoch;
 pub mod evaluate;
 pub mod geometry;
 pub mod id;
+pub mod instruments;
 pub mod linalg;
 pub mod matching;
 pub mod parallel;

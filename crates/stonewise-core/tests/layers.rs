@@ -25,6 +25,7 @@ const LAYERS: [&[&str]; 8] = [
         "change",
         "views",
         "series",
+        "instruments",
     ],
     &["evaluate"],
 ];

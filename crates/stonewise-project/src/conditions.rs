@@ -1,9 +1,10 @@
 //! The file of conditions: dates with levels, temperatures and what else was read.
 
+use crate::dated_csv::DatedCsv;
 use crate::day::day_of;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stonewise_base::error::{Error, Result};
+use stonewise_base::error::Result;
 
 /// Readings by the name of their column.
 #[derive(Clone, Debug)]
@@ -32,81 +33,23 @@ impl ConditionsFile {
     /// # Errors
     /// With the line: no dates, a cell that is no number, dates that go back.
     pub fn read(path: &Path, longest_gap_days: f64) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(Error::io("reading the file of conditions", path))?;
-        let error = |line: usize, message: String| Error::Project {
-            path: path.to_path_buf(),
-            line,
-            message,
-        };
-        let text = String::from_utf8(bytes).map_err(|_| {
-            error(
-                1,
-                "a character that is not in UTF-8: save the file as UTF-8".to_owned(),
-            )
-        })?;
-        let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
-        let head: Vec<String> = lines.next().map_or_else(Vec::new, |(_, head)| {
-            head.split(',')
-                .map(|c| c.trim().trim_matches('"').to_owned())
-                .collect()
-        });
-        let Some(of_date) = head.iter().position(|c| c == "date") else {
-            let message = "the first line must name the columns, separated by commas, one of them `date`";
-            return Err(error(1, message.to_owned()));
-        };
-        if let Some(twin) = (1..head.len()).find(|&i| head[..i].contains(&head[i])) {
-            return Err(error(
-                1,
-                format!("two columns are named {:?}: rename one", head[twin]),
-            ));
-        }
+        let file = DatedCsv::read(path, "reading the file of conditions")?;
         let mut columns: BTreeMap<String, Vec<(f64, f64)>> = BTreeMap::new();
         let mut before = f64::NEG_INFINITY;
-        for (number, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-            let cells: Vec<&str> = line.split(',').map(|c| c.trim().trim_matches('"')).collect();
-            if cells.len() != head.len() {
-                let message = format!(
-                    "{} cells, but the first line names {} columns: write decimals with a point, and leave a cell empty where \
-                     there is no reading",
-                    cells.len(),
-                    head.len()
-                );
-                return Err(error(number, message));
+        for row in &file.rows {
+            if row.day < before {
+                let message = format!("{} stands after a later date: sort the lines by date", row.date);
+                return Err(file.error(row.line, message));
             }
-            let date = cells[of_date];
-            let Some(day) = day_of(date) else {
-                return Err(error(
-                    number,
-                    format!("{date:?} is no date: write it as 2026-04-10"),
-                ));
-            };
-            if day < before {
-                return Err(error(
-                    number,
-                    format!("{date} stands after a later date: sort the lines by date"),
-                ));
-            }
-            before = day;
-            for (name, cell) in head
-                .iter()
-                .zip(&cells)
-                .filter(|(name, cell)| *name != "date" && !cell.is_empty())
-            {
-                let value = cell.parse::<f64>().ok().filter(|v| v.is_finite());
-                let Some(value) = value else {
-                    let message = format!(
-                        "{name}: {cell:?} is no number: leave the cell empty where there is no reading"
-                    );
-                    return Err(error(number, message));
-                };
-                columns.entry(name.clone()).or_default().push((day, value));
+            before = row.day;
+            for (column, name) in file.head.iter().enumerate().filter(|(_, name)| *name != "date") {
+                if let Some(value) = file.number(row, column)? {
+                    columns.entry(name.clone()).or_default().push((row.day, value));
+                }
             }
         }
         if columns.is_empty() {
-            return Err(error(
-                1,
-                "no readings: add a column, such as reservoir_level_m".to_owned(),
-            ));
+            return Err(file.error(1, "no readings: add a column, such as reservoir_level_m"));
         }
         Ok(Self {
             path: path.to_path_buf(),

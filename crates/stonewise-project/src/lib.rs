@@ -16,9 +16,11 @@
 
 pub mod check;
 mod conditions;
+mod dated_csv;
 mod day;
 pub mod edits;
 mod init;
+mod instruments;
 mod project_file;
 mod project_parameters;
 mod project_type;
@@ -30,6 +32,7 @@ mod split;
 pub use conditions::{ConditionsAt, ConditionsFile};
 pub use day::{DAYS_A_YEAR, day_of};
 pub use init::{Initialised, Proposal, init, propose};
+pub use instruments::{AxisMotion, Instrument, InstrumentFile, ReadingGap};
 pub use project_type::{Epoch, PhotoFiles, Project};
 pub use scans::{ScansProject, is_scan};
 pub use schema::project_schema;

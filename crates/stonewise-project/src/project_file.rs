@@ -3,6 +3,7 @@
 use super::{Epoch, PhotoFiles, Project};
 use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
+use crate::instruments::InstrumentFile;
 use crate::sources::SourceRule;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -68,6 +69,37 @@ pub(super) struct RawProject {
     edits: Option<RawEdits>,
     /// Levels, temperatures and other readings over time.
     conditions: Option<RawConditions>,
+    /// Other instruments: pendulums, targets, levelling.
+    #[serde(default)]
+    instruments: Vec<RawInstruments>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct RawInstruments {
+    /// A CSV file with the columns name, x, y, z, date, dx, dy, dz, sd_x, sd_y, sd_z, metres; a cell is empty where
+    /// nothing was measured.
+    #[schemars(with = "PathBuf")]
+    file: Spanned<PathBuf>,
+    /// Whether the instruments are observations of the datum of each later epoch.
+    #[serde(default, rename = "use")]
+    is_used: bool,
+    /// Longest time between two readings that is interpolated, days. Nothing is extrapolated.
+    #[serde(default = "longest_gap_of_instruments_days")]
+    #[schemars(with = "f64", range(min = 0))]
+    longest_gap_days: Spanned<f64>,
+    /// How far from an instrument the stones lie at most that are compared with it, metres.
+    #[serde(default = "reach_m")]
+    #[schemars(with = "f64", range(min = 0))]
+    reach_m: Spanned<f64>,
+}
+
+fn longest_gap_of_instruments_days() -> Spanned<f64> {
+    Spanned::new(0..0, 31.0)
+}
+
+fn reach_m() -> Spanned<f64> {
+    Spanned::new(0..0, 2.0)
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -247,6 +279,8 @@ impl Project {
         if let Some(file) = &conditions {
             notes.extend(add_conditions(file, &mut epochs));
         }
+        let instruments = raw.instruments.into_iter().map(|i| source.instruments(i));
+        let instruments = instruments.collect::<Result<_>>()?;
         if let Some(name) = &raw.project.reference {
             notes.extend(source.put_reference_first(name, &mut epochs)?);
         }
@@ -259,6 +293,7 @@ impl Project {
             notes,
             edits,
             conditions,
+            instruments,
             part: None,
         })
     }
@@ -467,12 +502,23 @@ impl Source<'_> {
 
     /// The readings, whose file is read at once: a mistake in it is one of the project.
     fn conditions(&self, raw: RawConditions) -> Result<ConditionsFile> {
-        let days = *raw.longest_gap_days.get_ref();
-        if !(days.is_finite() && days >= 0.0) {
-            let message = "conditions.longest_gap_days must be a number of days, 0 or more";
-            return Err(self.error(raw.longest_gap_days.span(), message));
-        }
+        let days = self.not_negative(&raw.longest_gap_days, "conditions.longest_gap_days")?;
         ConditionsFile::read(&self.existing(raw.file)?, days)
+    }
+
+    /// Other instruments, whose file is likewise read at once.
+    fn instruments(&self, raw: RawInstruments) -> Result<InstrumentFile> {
+        let days = self.not_negative(&raw.longest_gap_days, "instruments.longest_gap_days")?;
+        let reach_m = self.not_negative(&raw.reach_m, "instruments.reach_m")?;
+        InstrumentFile::read(&self.existing(raw.file)?, raw.is_used, days, reach_m)
+    }
+
+    fn not_negative(&self, value: &Spanned<f64>, key: &str) -> Result<f64> {
+        let number = *value.get_ref();
+        match number.is_finite() && number >= 0.0 {
+            true => Ok(number),
+            false => Err(self.error(value.span(), format!("{key} must be a number, 0 or more"))),
+        }
     }
 
     /// The logo, like all paths, is relative to the project file.
@@ -638,6 +684,60 @@ mod tests {
             ),
         ] {
             let found = read(table).unwrap_err().to_string();
+            assert!(found.contains(message), "{found}");
+        }
+    }
+
+    #[test]
+    fn instruments_are_read_with_the_project() {
+        let dir = tempfile::tempdir().unwrap();
+        for file in ["a.laz", "b.laz"] {
+            fs::write(dir.path().join(file), "").unwrap();
+        }
+        let targets = "name,x,y,z,date,dx,sd_x\nT1,1,2,3,2025-04-02,0,0.001\n";
+        fs::write(dir.path().join("targets.csv"), targets).unwrap();
+        fs::write(dir.path().join("wrong.csv"), "name,x,y,z,date\n").unwrap();
+        let file = dir.path().join("stonewise.toml");
+        let read = |tables: &str| {
+            let text = format!(
+                "[project]\nname = \"wall\"\n[[epochs]]\nname = \"a\"\nclouds = [\"a.laz\"]\n\
+                 [[epochs]]\nname = \"b\"\nclouds = [\"b.laz\"]\n{tables}"
+            );
+            fs::write(&file, text).unwrap();
+            Project::read(&file)
+        };
+        let table = "[[instruments]]\nfile = \"targets.csv\"\n";
+        let project = read(&format!("{table}use = true\n{table}reach_m = 0\n")).unwrap();
+        let used: Vec<bool> = project.instruments.iter().map(|f| f.is_used).collect();
+        assert_eq!(used, [true, false]);
+        assert_eq!(project.instruments[0].reach_m, 2.0);
+        assert_eq!(
+            project
+                .inputs()
+                .iter()
+                .filter(|p| p.ends_with("targets.csv"))
+                .count(),
+            2
+        );
+        for (tables, message) in [
+            (
+                "[[instruments]]\nfile = \"none.csv\"\n",
+                "stonewise.toml:10: no such file",
+            ),
+            (
+                "[[instruments]]\nfile = \"wrong.csv\"\n",
+                "wrong.csv:1: nothing is measured",
+            ),
+            (
+                &*format!("{table}reach_m = -1\n"),
+                "stonewise.toml:11: instruments.reach_m must be",
+            ),
+            (
+                &*format!("{table}longest_gap_days = nan\n"),
+                "stonewise.toml:11: instruments.longest_gap_days",
+            ),
+        ] {
+            let found = read(tables).unwrap_err().to_string();
             assert!(found.contains(message), "{found}");
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::conditions::ConditionsFile;
 use crate::edits::EditsFile;
+use crate::instruments::InstrumentFile;
 use crate::sources::SourceRule;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,8 @@ pub struct Project {
     pub edits: Option<EditsFile>,
     /// The file of readings; absent where the project names none.
     pub conditions: Option<ConditionsFile>,
+    /// Files of other instruments.
+    pub instruments: Vec<InstrumentFile>,
     /// Which points take part; all where absent. No key of the file: commands set it.
     pub part: Option<Part>,
 }
@@ -111,6 +114,7 @@ impl Project {
         inputs.extend(self.settings.report.logo.clone());
         inputs.extend(self.edits.as_ref().map(|edits| edits.path.clone()));
         inputs.extend(self.conditions.as_ref().map(|file| file.path.clone()));
+        inputs.extend(self.instruments.iter().map(|file| file.path.clone()));
         inputs
     }
 
@@ -139,6 +143,7 @@ impl Project {
             notes: Vec::new(),
             edits: None,
             conditions: None,
+            instruments: Vec::new(),
             part: None,
         }
     }

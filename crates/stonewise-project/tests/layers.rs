@@ -2,9 +2,10 @@
 //! other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 5] = [
+const LAYERS: [&[&str]; 6] = [
     &["day"],
-    &["conditions", "edits", "init", "sources"],
+    &["dated_csv"],
+    &["conditions", "edits", "init", "instruments", "sources"],
     &["project_type"],
     &["check", "project_file", "project_parameters", "split"],
     &["scans", "schema"],

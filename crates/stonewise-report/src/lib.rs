@@ -13,6 +13,7 @@ mod page;
 mod pdf;
 mod report_file;
 mod summary;
+mod tables;
 #[cfg(test)]
 #[path = "../../../testing/results.rs"]
 mod testing;

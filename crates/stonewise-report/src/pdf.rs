@@ -1,7 +1,7 @@
 //! The report as PDF.
 
 use super::browser::Browser;
-use super::page::printed;
+use super::page::{printed, yearly};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -70,10 +70,25 @@ impl Pdf {
             .map(|pair| ResultSet::read_pair(dir, pair))
             .collect::<Result<_, _>>()?;
         let all: Vec<&ResultSet> = std::iter::once(&first).chain(&later).collect();
-        let page = printed(&all, appendix);
+        self.print(&printed(&all, appendix), progress)
+    }
+
+    /// Prints the part of the yearly safety report on measurements, A4.
+    ///
+    /// # Errors
+    /// As [`Self::write`]; there are only two epochs.
+    pub fn write_yearly(&self, dir: &Path, progress: &dyn Progress) -> Result<(), Error> {
+        let pairs = ResultSet::read(dir)?.pairs;
+        let page = yearly(&ResultSet::read_pair(dir, pairs)?);
+        let page = page
+            .ok_or_else(|| Error::Parameters("--yearly needs results of more than two epochs".to_owned()))?;
+        self.print(&page, progress)
+    }
+
+    fn print(&self, page: &str, progress: &dyn Progress) -> Result<(), Error> {
         let mut failure = None;
         let written = write_atomically(&self.path, |partial| {
-            print_page(&self.browser, &page, partial, progress).map_err(|error| {
+            print_page(&self.browser, page, partial, progress).map_err(|error| {
                 failure = Some(error);
                 std::io::Error::other("the browser failed")
             })

@@ -1,16 +1,18 @@
 //! The report file.
 
-use super::page::page;
+use super::page::{page, yearly};
+use super::tables::write_tables;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Error;
 use stonewise_io::atomic::write_atomically;
 use stonewise_results::ResultSet;
-use stonewise_results::names::{PairFile, REPORT_DIR};
+use stonewise_results::names::{PairFile, REPORT_DIR, YEARLY};
 
 /// Makes `report/index.html` from the result files in `dir` alone and returns its path.
 ///
 /// One self-contained file: no network, light and dark, printable. With more than two epochs, the report of
-/// the third against the first is `report/index_2.html`, and so on; each links to the others. The same
+/// the third against the first is `report/index_2.html`, and so on; each links to the others; `report/yearly.html` is
+/// the part of the yearly safety report on measurements, with its tables as CSV beside it. The same
 /// results give the same bytes.
 ///
 /// # Errors
@@ -19,17 +21,28 @@ pub fn write_report(dir: &Path) -> Result<PathBuf, Error> {
     let results = ResultSet::read(dir)?;
     let folder = dir.join(REPORT_DIR);
     std::fs::create_dir_all(&folder).map_err(Error::io("making the folder", &folder))?;
-    let write = |results: &ResultSet| {
+    let write = |results: &ResultSet| -> Result<PathBuf, Error> {
         let path = folder.join(PairFile::ReportPage.name(results.pair));
         let page = page(results)?;
         write_atomically(&path, |partial| std::fs::write(partial, page))
             .map_err(Error::io("writing the report", &path))?;
         Ok(path)
     };
-    for pair in 2..=results.pairs {
-        write(&ResultSet::read_pair(dir, pair)?)?;
+    let path = write(&results)?;
+    let mut all = vec![results];
+    for pair in 2..=all[0].pairs {
+        all.push(ResultSet::read_pair(dir, pair)?);
+        write(&all[pair - 1])?;
     }
-    write(&results)
+    if all.len() > 1 {
+        write_tables(&folder, &all)?;
+        if let Some(page) = all.last().and_then(yearly) {
+            let path = folder.join(YEARLY);
+            write_atomically(&path, |partial| std::fs::write(partial, page))
+                .map_err(Error::io("writing the report", &path))?;
+        }
+    }
+    Ok(path)
 }
 
 #[cfg(test)]
@@ -38,10 +51,15 @@ mod tests {
     use crate::testing::{folder, outlines, registration_record, rows, run_record};
     use stonewise_base::files::write_json;
     use stonewise_base::report_params::Language;
+    use stonewise_base::thresholds::Thresholds;
     use stonewise_base::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
-    use stonewise_results::names::RUN;
-    use stonewise_results::records::{Datum, EstimatorRecord, RegistrationRecord, RunRecord, StepTime};
+    use stonewise_core::series::SeriesAnswers;
+    use stonewise_results::names::{RUN, TRENDS, VERDICT};
+    use stonewise_results::records::{
+        Datum, EpochVerdict, EstimateRecord, EstimatorRecord, PathPoint, RegistrationRecord, RunRecord,
+        SeriesVerdict, StepTime, TRENDS_VERSION, TrendsRecord, Verdict, ZoneTrend,
+    };
     use stonewise_results::{Status, StoneRow, write_logo, write_outlines, write_stones};
 
     /// Result files with these rows and this run.json, and the report made of them.
@@ -247,6 +265,108 @@ mod tests {
         assert!(page("index.html").contains("of 24 stones") && page("index_2.html").contains("of 20 stones"));
         assert!(page("index.html").contains("<a href=\"index_2.html\">A \u{2192} &lt;C&gt;</a>"));
         assert!(page("index_2.html").contains("<a href=\"index.html\">A \u{2192} B</a>"));
+    }
+
+    /// A series of three epochs with one zone, which moved out by 1 and 2 mm.
+    fn series(language: Language) -> tempfile::TempDir {
+        let folder = folder(&rows());
+        write_stones(folder.path(), 2, &rows()).unwrap();
+        let mut run = run_record("Wall", &["A", "B", "C <3>"]);
+        run.parameters.report.language = language;
+        write_json(&folder.path().join(RUN), &run).unwrap();
+        let on = |epoch: &str| EpochVerdict {
+            epoch: epoch.to_owned(),
+            sentence: format!("Fine: {epoch}."),
+            ..EpochVerdict::default()
+        };
+        let answers = SeriesVerdict {
+            sentence: "Series of 3 epochs: it takes 4.".to_owned(),
+            ..SeriesVerdict::default()
+        };
+        let verdict = Verdict::new(&Thresholds::default(), vec![on("B"), on("C <3>")]);
+        write_json(&folder.path().join(VERDICT), &verdict.with_series(Some(answers))).unwrap();
+        let estimate = |out: f64| EstimateRecord {
+            value: [0.0, 0.0, out],
+            sd: [1e-4, 1e-4, 2e-4],
+        };
+        let point = |(epoch, date, out): (&str, &str, f64)| PathPoint {
+            epoch: epoch.to_owned(),
+            date: date.to_owned(),
+            measured: Some(estimate(out)),
+            model: estimate(out),
+        };
+        let path = [("B", "2025-04-01", 0.001), ("C <3>", "2026-04-01", 0.002)].map(point);
+        let group = |zone_id| ZoneTrend {
+            epoch: "C <3>".to_owned(),
+            zone_id,
+            stones: 5,
+            velocity: [0.0, 0.0, 0.001],
+            sd: [1e-4; 3],
+            level: None,
+            temperature: None,
+            season: None,
+            path: path.to_vec(),
+            curve: Vec::new(),
+            departure: None,
+        };
+        let trends = TrendsRecord {
+            version: TRENDS_VERSION,
+            epochs: vec!["A".to_owned(), "B".to_owned(), "C <3>".to_owned()],
+            undated: Vec::new(),
+            terms: Vec::new(),
+            basis: None,
+            not_separable: Vec::new(),
+            conditions: Vec::new(),
+            variance_factors: None,
+            wall: Some(group(0)),
+            zones: vec![group(1)],
+            answers: SeriesAnswers::default(),
+        };
+        write_json(&folder.path().join(TRENDS), &trends).unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_series_has_a_yearly_report_in_the_order_of_authorities_and_its_tables() {
+        let folder = series(Language::English);
+        write_report(folder.path()).unwrap();
+        let file = |name: &str| std::fs::read_to_string(folder.path().join("report").join(name)).unwrap();
+        let page = file("yearly.html");
+        check_nesting(&page);
+        let headings = [
+            "What was measured",
+            "Conditions</h2>",
+            "Results</h2>",
+            "Comparison with prediction",
+            "Interpretation",
+            "Conclusion",
+            "Signature</h2>",
+        ];
+        let places: Vec<usize> = headings.iter().map(|h| page.find(h).unwrap()).collect();
+        assert!(places.is_sorted(), "{places:?}");
+        assert!(page.contains("C &lt;3&gt;") && !page.contains("<3>") && !page.contains("<script"));
+        assert!(page.contains("temperature 9.5") && page.contains("it takes 4."));
+        assert!(file("index_2.html").contains("href=\"yearly.html\""));
+
+        let paths = file("paths.csv");
+        assert_eq!(paths.lines().count(), 1 + 2 * 2);
+        let head: Vec<&str> = paths.lines().next().unwrap().split(',').collect();
+        let out = head.iter().position(|c| *c == "out_m").unwrap();
+        let cell = paths.lines().nth(4).unwrap().split(',').nth(out).unwrap();
+        assert_eq!(cell.parse::<f64>().unwrap(), 0.002);
+        assert_eq!(file("epochs.csv").lines().count(), 4);
+        assert_eq!(file("answers.csv").lines().count(), 5);
+        assert!(file("joints.csv").lines().count() > 10);
+        let things: serde_json::Value = serde_json::from_str(&file("observations.json")).unwrap();
+        let out = &things["Things"][1]["Datastreams"][2]["Observations"];
+        assert_eq!(out[1]["result"], 0.002);
+        assert_eq!(out[1]["resultQuality"][0]["value"], 2e-4);
+        assert_eq!(out[1]["phenomenonTime"], "2026-04-01T00:00:00Z");
+
+        let german = series(Language::German);
+        write_report(german.path()).unwrap();
+        let page = std::fs::read_to_string(german.path().join("report/yearly.html")).unwrap();
+        assert!(page.contains("lang=\"de\"") && page.contains("6 Schlussfolgerung"));
     }
 
     #[test]

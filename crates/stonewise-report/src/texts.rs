@@ -1,8 +1,11 @@
 //! The texts of the verdict and of the report, in each language.
 
+mod instruments;
 mod report;
 mod series;
+mod yearly;
 
+pub(crate) use instruments::InstrumentTexts;
 pub(crate) use report::{
     AuditTexts, ChartTexts, MapTexts, MethodTexts, ScoreTexts, SectionTexts, StoneTexts,
 };
@@ -12,6 +15,7 @@ use stonewise_base::report_params::Language;
 use stonewise_figure::{Axis, count, mm, number, percent};
 use stonewise_results::Status;
 use stonewise_results::records::State;
+pub(crate) use yearly::YearlyTexts;
 
 /// A text for one and a text for several.
 type Number = [&'static str; 2];
@@ -34,6 +38,8 @@ pub(crate) struct Texts {
     pub method: MethodTexts,
     pub audit: AuditTexts,
     pub series: &'static SeriesTexts,
+    pub instruments: &'static InstrumentTexts,
+    pub yearly: &'static YearlyTexts,
     /// What became of stones, in the order of [`Status::ALL`].
     pub statuses: [&'static str; 10],
 }
@@ -355,6 +361,8 @@ static ENGLISH: Texts = Texts {
     method: MethodTexts::ENGLISH,
     audit: AuditTexts::ENGLISH,
     series: &series::ENGLISH,
+    instruments: &instruments::ENGLISH,
+    yearly: &yearly::ENGLISH,
     statuses: [
         "measured",
         "the later epoch has no points, or no photo of them, at this place",
@@ -567,6 +575,8 @@ static GERMAN: Texts = Texts {
     method: MethodTexts::GERMAN,
     audit: AuditTexts::GERMAN,
     series: &series::GERMAN,
+    instruments: &instruments::GERMAN,
+    yearly: &yearly::GERMAN,
     statuses: [
         "gemessen",
         "die sp\u{e4}tere Epoche hat an dieser Stelle keine Punkte oder kein Foto von ihnen",

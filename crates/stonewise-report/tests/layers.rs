@@ -6,7 +6,7 @@ const LAYERS: [&[&str]; 5] = [
     &["browser", "texts"],
     &["draw", "verdict"],
     &["summary"],
-    &["page"],
+    &["page", "tables"],
     &["pdf", "report_file"],
 ];
 

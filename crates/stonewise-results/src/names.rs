@@ -20,6 +20,8 @@ pub const SERIES: &str = "series.parquet";
 pub const TRENDS_TABLE: &str = "trends.parquet";
 /// What the path over all epochs means.
 pub const TRENDS: &str = "trends.json";
+/// Other instruments beside the stones around them.
+pub const INSTRUMENTS: &str = "instruments.json";
 /// Zones of deformation of all later epochs.
 pub const ZONES: &str = "zones.parquet";
 /// Scores against a table of true stones.
@@ -40,6 +42,8 @@ pub const FACE_CLOUD: &str = "stones.laz";
 pub const DIGESTS: &str = "digests.b3";
 /// Folder of the report.
 pub const REPORT_DIR: &str = "report";
+/// The part of the yearly safety report on measurements, in the folder of the report.
+pub const YEARLY: &str = "yearly.html";
 /// Folder of the excerpts that the report shows.
 pub const EVIDENCE_DIR: &str = "evidence";
 /// Folder of the steps' files.

@@ -1,9 +1,9 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, PairFile, RUN, TRENDS, VERDICT, audit};
+use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
-use super::records::{Datum, RegistrationRecord, RunRecord, TrendsRecord, Verdict};
+use super::records::{Datum, InstrumentsRecord, RegistrationRecord, RunRecord, TrendsRecord, Verdict};
 use super::stone_table::read_stones;
 use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -50,6 +50,8 @@ pub struct ResultSet {
     pub trends: Option<TrendsRecord>,
     /// Velocities by stone, along the wall, up and out, from `trends.parquet`; metres a year.
     pub velocities: BTreeMap<u32, Vector3<f64>>,
+    /// `instruments.json`, where the project names instruments.
+    pub instruments: Option<InstrumentsRecord>,
     /// Decisions about mask instances by epoch, from `audit_epochN.csv`: rows of event, photo, instance,
     /// stones, share, points.
     pub decisions: Vec<Vec<Vec<String>>>,
@@ -83,6 +85,7 @@ impl ResultSet {
             verdict: read_json(&dir.join(VERDICT))?,
             trends: read_json(&dir.join(TRENDS))?,
             velocities: read_velocities(dir)?,
+            instruments: read_json(&dir.join(INSTRUMENTS))?,
             decisions: read_decisions(dir)?,
             edits: read_rows(&dir.join(EDITS_AUDIT))?.unwrap_or_default(),
             carried: read_rows(&dir.join(CARRY_AUDIT))?.unwrap_or_default(),
@@ -121,6 +124,7 @@ impl ResultSet {
             verdict: None,
             trends: None,
             velocities: BTreeMap::new(),
+            instruments: None,
             decisions: Vec::new(),
             edits: Vec::new(),
             carried: Vec::new(),

@@ -286,9 +286,26 @@ impl RowMotion {
     }
 
     fn new(motion: &StoneMotion, normal: &Vector3<f64>, reference: &Reference) -> Self {
-        let covariance = motion.covariance.fixed_view::<3, 3>(0, 0) + reference.covariance;
-        let rotation_covariance = motion.covariance.fixed_view::<3, 3>(3, 3) + reference.rotation_covariance;
-        let displacement = motion.displacement - reference.error;
+        let measured = Self {
+            displacement: motion.displacement,
+            rotation: motion.rotation,
+            covariance: motion.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
+            rotation_covariance: motion.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
+            relative: motion.relative,
+            relative_covariance: symmetric(&motion.relative_covariance),
+            loose: motion.loose,
+            p_loose: motion.p_loose,
+            observability: motion.observability,
+            ..Self::default()
+        };
+        measured.against(normal, reference)
+    }
+
+    /// The motion with the error of a reference taken off, whose covariance is added.
+    #[must_use]
+    pub fn against(&self, normal: &Vector3<f64>, reference: &Reference) -> Self {
+        let covariance = self.covariance + reference.covariance;
+        let displacement = self.displacement - reference.error;
         let tested = displacement - reference.motion;
         let detection_limit_m = detection_limit_m(&tested, &covariance);
         let face_from_world = FaceFrame::from_normal(normal).face_from_world();
@@ -296,19 +313,13 @@ impl RowMotion {
         Self {
             displacement,
             face: face_from_world * displacement,
-            rotation: motion.rotation - reference.turn,
+            rotation: self.rotation - reference.turn,
             covariance: symmetric(&covariance),
             face_sd: in_face.diagonal().map(|v| v.max(0.0).sqrt()),
-            rotation_covariance: symmetric(&rotation_covariance),
-            relative: motion.relative,
-            relative_covariance: symmetric(&motion.relative_covariance),
+            rotation_covariance: symmetric(&(self.rotation_covariance + reference.rotation_covariance)),
             detection_limit_m,
             significant: tested.norm() > detection_limit_m,
-            loose: motion.loose,
-            p_loose: motion.p_loose,
-            deformation: [None; 3],
-            deformation_sd: [None; 3],
-            observability: motion.observability,
+            ..self.clone()
         }
     }
 }

@@ -3,5 +3,6 @@
 pub mod clouds;
 pub mod comparisons;
 mod photos;
+pub mod series_time;
 mod survey;
 pub mod tiles;

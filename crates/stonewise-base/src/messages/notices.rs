@@ -116,6 +116,32 @@ messages! {
             "der Registrierungsfehler folgt daraus, wie sich Standpunkte und Streifen jeder Epoche unterscheiden, und aus einem angenommenen \
             Fehler von {error_mm} mm je Achse, den alle Quellen einer Epoche teilen; Grenzen und Intervalle enthalten beides";
 
+        DATUM_INSTRUMENTS:
+            "{n} instruments in use show a registration error of {error_mm} mm at the middle of the wall besides what else is known of it: \
+            it is taken off the motions, and what stays uncertain of it is in limits and intervals",
+            "{n} verwendete Instrumente zeigen in der Mitte der Mauer einen Registrierungsfehler von {error_mm} mm über das hinaus, was \
+            sonst von ihm bekannt ist: er ist von den Bewegungen abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
+
+        INSTRUMENTS_LEFT_OUT:
+            "instruments that are not compared with the stones: {names}; instruments.json says why",
+            "Instrumente, die nicht mit den Steinen verglichen sind: {names}; instruments.json nennt die Gründe";
+
+        INSTRUMENTS_DISAGREE:
+            "instruments that disagree with the stones around them: {names}",
+            "Instrumente, die mit den Steinen um sie nicht übereinstimmen: {names}";
+
+        INSTRUMENTS_CONTRADICTED:
+            "instruments with use = true contradict each other or what else is known of the datum, and are not used: look at their differences \
+            in instruments.json, and correct or remove the wrong ones",
+            "Instrumente mit use = true widersprechen einander oder dem, was sonst vom Datum bekannt ist, und sind nicht verwendet: ihre \
+            Differenzen in instruments.json ansehen, und falsche berichtigen oder entfernen";
+
+        INSTRUMENTS_UNDETERMINED:
+            "instruments with use = true do not determine how the epoch lies, and nothing else is known of it: they are not used; three \
+            instruments with readings along x, y and z that are not on one line determine it",
+            "Instrumente mit use = true bestimmen nicht, wie die Epoche liegt, und sonst ist nichts davon bekannt: sie sind nicht verwendet; \
+            drei Instrumente mit Messungen längs x, y und z, die nicht auf einer Geraden liegen, bestimmen es";
+
         NO_MASKS:
             "no masks for this photo in {file}",
             "keine Masken für dieses Foto in {file}";

@@ -19,7 +19,10 @@ pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outco
         "wrote {results}/report/index.html, stones.gpkg, stones.geojson, stones.vtp and stones.ply"
     ));
     if let Some(pdf) = &pdf {
-        pdf.write(&args.results, !args.no_appendix, printer)?;
+        match args.yearly {
+            true => pdf.write_yearly(&args.results, printer)?,
+            false => pdf.write(&args.results, !args.no_appendix, printer)?,
+        }
         printer.log(&format!("wrote {}", pdf.path().display()));
     }
     Ok(Outcome::Done)

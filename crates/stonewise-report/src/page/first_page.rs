@@ -8,14 +8,13 @@ use crate::summary::Summary;
 use crate::texts::{Texts, counted, fill};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use std::fmt::Write;
 use stonewise_base::report_params::Language;
 use stonewise_figure::{count, escape};
 use stonewise_results::records::{Datum, DatumState, EpochRecord, State};
 use stonewise_results::{ResultSet, Status};
 
 /// Logo and kind of the document.
-pub(super) fn letterhead(results: &ResultSet, texts: &Texts) -> String {
+pub(super) fn letterhead(results: &ResultSet, kind: &str) -> String {
     let logo = results.evidence.logo.as_ref().map_or(String::new(), |logo| {
         let data = STANDARD.encode(&logo.bytes);
         format!(
@@ -23,7 +22,7 @@ pub(super) fn letterhead(results: &ResultSet, texts: &Texts) -> String {
             logo.media_type
         )
     });
-    format!("{logo}<p class=\"kind\">{}</p>", texts.page.kind)
+    format!("{logo}<p class=\"kind\">{kind}</p>")
 }
 
 /// The verdict in one sentence with its traffic light.
@@ -46,8 +45,8 @@ pub(super) fn verdict(facts: &Summary) -> String {
     )
 }
 
-/// Who measured, and the epochs with their dates and conditions.
-pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
+/// Who measured, with what, and the number of the report.
+pub(super) fn letter(facts: &Summary) -> String {
     let page = &facts.texts().page;
     let given = [
         (page.reference_number, &facts.cover.reference_number),
@@ -63,10 +62,16 @@ pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
             ))
         })
         .collect();
-    let mut out = String::new();
-    if !items.is_empty() {
-        let _ = write!(out, "<dl class=\"letter\">{items}</dl>");
+    match items.is_empty() {
+        true => items,
+        false => format!("<dl class=\"letter\">{items}</dl>"),
     }
+}
+
+/// Who measured, and the epochs with their dates and conditions.
+pub(super) fn cover(results: &ResultSet, facts: &Summary) -> String {
+    let page = &facts.texts().page;
+    let mut out = letter(facts);
     if let Some(run) = &results.run {
         let dash = || "\u{2013}".to_owned();
         let row = |(i, epoch): (usize, &EpochRecord)| {

@@ -9,6 +9,7 @@ mod excerpts;
 mod explorer;
 mod first_page;
 mod html;
+mod instruments;
 mod look_first;
 mod maps;
 mod method;
@@ -17,6 +18,9 @@ mod pair;
 mod series;
 mod survey;
 mod tracked;
+mod yearly;
+
+pub(super) use yearly::yearly;
 
 use super::summary::Summary;
 use crate::texts::{Texts, fill};
@@ -25,7 +29,7 @@ use std::fmt::Write;
 use stonewise_base::error::Error;
 use stonewise_base::report_params::Language;
 use stonewise_figure::escape;
-use stonewise_results::names::PairFile;
+use stonewise_results::names::{PairFile, YEARLY};
 use stonewise_results::records::RunRecord;
 use stonewise_results::{Comparison, Joint, ResultSet, compare, joints};
 
@@ -35,7 +39,7 @@ pub(super) use explorer::{SCRIPT, STYLE};
 const PAGE_STYLE: &str = include_str!("style.css");
 
 /// Sections in the order of the page.
-fn sections(texts: &Texts) -> [(&'static str, &'static str); 9] {
+fn sections(texts: &Texts) -> [(&'static str, &'static str); 10] {
     let names = &texts.sections;
     [
         ("summary", texts.page.summary),
@@ -44,6 +48,7 @@ fn sections(texts: &Texts) -> [(&'static str, &'static str); 9] {
         ("tables", names.tables),
         ("distributions", names.distributions),
         ("datum", names.datum),
+        ("instruments", texts.instruments.heading),
         ("evaluation", names.evaluation),
         ("method", names.method),
         ("audit", names.audit),
@@ -138,6 +143,7 @@ fn content(
         ));
         body.push_str(&distributions::datum(results, facts));
     }
+    body.push_str(&instruments::instruments(results, facts.texts()));
     if let Some(evaluation) = &results.evaluation {
         body.push_str(&evaluation::evaluation(evaluation, facts.texts()));
     }
@@ -163,7 +169,7 @@ fn header(results: &ResultSet, facts: &Summary) -> String {
         .map_or(&[][..], |run| run.warnings.as_slice());
     format!(
         "<header>{}<h1>{}</h1>{}{}{}{}{}</header>\n",
-        first_page::letterhead(results, texts),
+        first_page::letterhead(results, texts.page.kind),
         title(results, texts),
         first_page::verdict(facts),
         doubts::doubts(warnings, texts),
@@ -238,6 +244,9 @@ fn cover(results: &ResultSet, texts: &Texts) -> String {
             line(pair).unwrap_or_else(|| fill(texts.sections.epoch, &[("n", &(pair + 1).to_string())]));
         format!("<a href=\"{}\">{name}</a>", PairFile::ReportPage.name(pair))
     }));
+    if results.verdict.as_ref().is_some_and(|v| v.series.is_some()) {
+        facts.push(format!("<a href=\"{YEARLY}\">{}</a>", texts.yearly.kind));
+    }
     let line = if facts.is_empty() {
         String::new()
     } else {

@@ -8,17 +8,29 @@ use crate::verdict::term_name;
 use std::fmt::Write;
 use stonewise_core::series::Word;
 use stonewise_figure::{Scale, escape};
-use stonewise_results::records::{AnswerVerdict, EstimateRecord, TrendsRecord, ZoneTrend};
+use stonewise_results::records::{AnswerVerdict, EstimateRecord, SeriesVerdict, ZoneTrend};
 use stonewise_results::{ResultSet, StoneRow, nice_scale_m};
 
 /// The four answers, the model and the map of velocity; empty where there are only two epochs.
 pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
     let texts = facts.texts();
-    let names = texts.series;
-    let found = results.verdict.as_ref().and_then(|v| v.series.as_ref());
-    let (Some(answers), Some(trends)) = (found, &results.trends) else {
+    let Some(found) = results.verdict.as_ref().and_then(|v| v.series.as_ref()) else {
         return String::new();
     };
+    let body = format!(
+        "<p>{}</p>{}{}{}{}",
+        with_units(&escape(&found.sentence)),
+        answers(found, texts),
+        terms(results, texts),
+        paths(results, texts),
+        map(results, facts)
+    );
+    section("series", texts.series.heading, &body)
+}
+
+/// The four answers.
+pub(super) fn answers(answers: &SeriesVerdict, texts: &Texts) -> String {
+    let names = texts.series;
     let all = [
         &answers.as_predicted,
         &answers.as_in_the_past,
@@ -33,12 +45,7 @@ pub(super) fn series(results: &ResultSet, facts: &Summary) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = names.questions.iter().zip(all).map(row).collect();
-    let mut body = format!("<p>{}</p>", with_units(&escape(&answers.sentence)));
-    body.push_str(&table(&[names.question, names.answer, ""], &rows, 3));
-    body.push_str(&model(trends, texts));
-    body.push_str(&paths(trends, results, texts));
-    body.push_str(&map(results, facts));
-    section("series", names.heading, &body)
+    table(&[names.question, names.answer, ""], &rows, 3)
 }
 
 fn word(answer: Word, names: &SeriesTexts) -> &'static str {
@@ -50,8 +57,11 @@ fn word(answer: Word, names: &SeriesTexts) -> &'static str {
 }
 
 /// The terms of the model, and what the epochs cannot carry.
-fn model(trends: &TrendsRecord, texts: &Texts) -> String {
+pub(super) fn terms(results: &ResultSet, texts: &Texts) -> String {
     let names = texts.series;
+    let Some(trends) = &results.trends else {
+        return String::new();
+    };
     let mut out = String::new();
     if !trends.terms.is_empty() {
         let terms: Vec<&str> = trends.terms.iter().map(|t| term_name(*t, texts)).collect();
@@ -75,8 +85,11 @@ fn model(trends: &TrendsRecord, texts: &Texts) -> String {
 }
 
 /// The path of every zone with its model, and the conditions beneath.
-fn paths(trends: &TrendsRecord, results: &ResultSet, texts: &Texts) -> String {
+pub(super) fn paths(results: &ResultSet, texts: &Texts) -> String {
     let names = texts.series;
+    let Some(trends) = &results.trends else {
+        return String::new();
+    };
     let thresholds = results.run.as_ref().map(|run| &run.parameters.thresholds);
     let levels = thresholds.map(|t| match t.deformation.is_empty() {
         true => t.wall.length,
@@ -147,7 +160,7 @@ fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
 }
 
 /// How fast every stone moves.
-fn map(results: &ResultSet, facts: &Summary) -> String {
+pub(super) fn map(results: &ResultSet, facts: &Summary) -> String {
     if results.velocities.is_empty() {
         return String::new();
     }

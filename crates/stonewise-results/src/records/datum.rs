@@ -17,6 +17,8 @@ pub enum DatumState {
     Stated,
     /// From how stations and strips of one epoch differ.
     Sources,
+    /// From other instruments, together with what else is known.
+    Instruments,
     /// Nothing is known: uncertainties hold for motions against the common rigid motion of the measured
     /// stones.
     Unknown,
@@ -29,6 +31,7 @@ impl DatumState {
             Self::Stable => "stable",
             Self::Stated => "stated",
             Self::Sources => "sources",
+            Self::Instruments => "instruments",
             Self::Unknown => "unknown",
         }
     }
@@ -54,6 +57,10 @@ pub struct Datum {
     /// against, as (shift at the centre x, y, z; rotation vector x, y, z), m, rad.
     #[serde(default)]
     pub common_motion: Option<[f64; 6]>,
+    /// The registration error, likewise about the centre, that was taken off the motions because instruments show it;
+    /// what sources and stable areas show is part of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken_off: Option<[f64; 6]>,
     /// Errors of single stations and strips, where they were estimated.
     pub sources: Vec<SourceError>,
     /// What is known about the datum, in one sentence.
@@ -85,6 +92,7 @@ impl Datum {
             centre: centre.coords.into(),
             covariance_6x6: None,
             common_motion: None,
+            taken_off: None,
             sources: Vec::new(),
             note: note.english,
             german: note.german,
@@ -106,6 +114,7 @@ impl Datum {
                 std::array::from_fn(|j| covariance[(i, j)])
             })),
             common_motion: None,
+            taken_off: None,
             sources: Vec::new(),
             note: note.english,
             german: note.german,
@@ -142,17 +151,28 @@ impl Datum {
         }
     }
 
-    /// Whether the error was estimated, so that it can be taken off the motions.
+    /// Whether sources or stable areas show the error, so that it can be taken off the motions.
     pub fn is_estimated(&self) -> bool {
         matches!(self.state, DatumState::Stable | DatumState::Sources)
     }
 
+    /// Covariance of the registration error at the centre, see [`Self::covariance_6x6`].
+    pub fn covariance(&self) -> Option<Matrix6<f64>> {
+        let rows = self.covariance_6x6.as_ref()?;
+        Some(Matrix6::from_fn(|i, j| rows[i][j]))
+    }
+
     /// Covariance of the registration error at a place, m^2, world; `None` where nothing is known.
     pub fn covariance_at(&self, place: &Point3<f64>) -> Option<Matrix3<f64>> {
-        let rows = self.covariance_6x6.as_ref()?;
-        let covariance = Matrix6::from_fn(|i, j| rows[i][j]);
+        let covariance = self.covariance()?;
         let lever = lever(&(place - Point3::from(self.centre)));
         Some(lever * covariance * lever.transpose())
+    }
+
+    /// The error at a place that was taken off because instruments show it, metres, world.
+    pub fn taken_off_at(&self, place: &Point3<f64>) -> Option<Vector3<f64>> {
+        let error = Vector6::from(self.taken_off?);
+        Some(lever(&(place - Point3::from(self.centre))) * error)
     }
 
     /// Covariance of the rotation vector of the registration error, rad^2; `None` where the state is unknown.

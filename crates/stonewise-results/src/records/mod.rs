@@ -1,6 +1,7 @@
 //! Result files of one value each, written and read by the same type.
 
 mod datum;
+mod instruments;
 mod registration;
 mod run;
 mod timestamp;
@@ -8,6 +9,10 @@ mod trends;
 mod verdict;
 
 pub use datum::{Datum, DatumState, SourceError};
+pub use instruments::{
+    ComparedInstrument, DatumUse, INSTRUMENTS_VERSION, InstrumentsEpoch, InstrumentsRecord,
+    LeftOutInstrument, WhyLeftOut,
+};
 pub use registration::{
     AdjustmentRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord,
     RegistrationRecord,

@@ -41,6 +41,9 @@ pub struct RunRecord {
     /// The file of conditions; absent where the project names none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub conditions: Option<InputRecord>,
+    /// Files of other instruments.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub instruments: Vec<InputRecord>,
     /// Every parameter as it was used.
     pub parameters: Settings,
     /// The steps, in order.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// Where the results of the last finished run lie until the next one has finished.
 pub const PREVIOUS_DIR: &str = "previous";
 /// Result files at the top of the folder, without `_2`, `_3` (of later epochs) and extension.
-const STEMS: [&str; 21] = [
+const STEMS: [&str; 22] = [
     "stones",
     "matches",
     "registration",
@@ -24,6 +24,7 @@ const STEMS: [&str; 21] = [
     "series",
     "trends",
     "zones",
+    "instruments",
     "verdict",
     "audit_epoch",
     "audit_edits",
@@ -32,6 +33,17 @@ const STEMS: [&str; 21] = [
     "c2c",
     "c2m",
     "digests",
+];
+/// Files in the folder of the report, likewise.
+const REPORT: [&str; 8] = [
+    "index",
+    "yearly",
+    "epochs",
+    "answers",
+    "zones",
+    "paths",
+    "joints",
+    "observations",
 ];
 /// Their extensions; `csv-metadata.json` is `json`.
 const EXTENSIONS: [&str; 12] = [
@@ -77,7 +89,7 @@ pub(super) fn is_result(file: &Path) -> bool {
         // `m3c2` ends with a digit of its own, as do `c2c` and `c2m` not.
         Some("") => STEMS.contains(&stem) || name.starts_with("m3c2.") || name.starts_with("m3c2_"),
         Some(EVIDENCE_DIR) => EVIDENCE.contains(&stem),
-        Some(REPORT_DIR) => stem == "index",
+        Some(REPORT_DIR) => REPORT.contains(&stem),
         _ => false,
     }
 }

@@ -33,6 +33,7 @@ pub static STEPS: &[&Step] = &[
     &steps::change::CHANGE,
     &steps::evaluate::EVALUATE,
     &outputs::zones::ZONES,
+    &outputs::instruments::INSTRUMENTS,
     &steps::tracks::TRACKS,
     &outputs::trends::TRENDS,
     &outputs::verdict::VERDICT,

@@ -10,7 +10,7 @@ use std::path::Path;
 
 const KIND: &str = "inputs";
 
-/// Epochs, parameters, and the digests of clouds, cameras, masks, edits and conditions. Photos have no digest in
+/// Epochs, parameters, and the digests of clouds, cameras, masks, edits, conditions and instruments. Photos have no digest in
 /// `run.json`: the run again shows whether they are the same.
 pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>> {
     let mut findings = Vec::new();
@@ -67,6 +67,10 @@ pub(super) fn inputs(run: &RunRecord, project: &Project) -> Result<Vec<Finding>>
     compare("edits", run.edits.as_ref(), edits)?;
     let conditions = project.conditions.as_ref().map(|c| c.path.as_path());
     compare("conditions", run.conditions.as_ref(), conditions)?;
+    for i in 0..run.instruments.len().max(project.instruments.len()) {
+        let path = project.instruments.get(i).map(|file| file.path.as_path());
+        compare("instruments", run.instruments.get(i), path)?;
+    }
     let message = format!("{agree} inputs are those of the run");
     findings.push(Finding::new(KIND, "digests", Answer::Holds, message));
     Ok(findings)

@@ -4,6 +4,7 @@ use super::clouds::CLOUDS;
 use super::edits::tell_steps;
 use super::evidence::EVIDENCE;
 use super::face_cloud::FACE_CLOUD;
+use super::instruments::INSTRUMENTS;
 use super::run_record::RECORD;
 use super::series::SERIES;
 use crate::export::write_layers;
@@ -23,6 +24,7 @@ pub static REPORT: Step = Step {
         Need::same(&EVIDENCE),
         Need::same(&FACE_CLOUD),
         Need::same(&SERIES),
+        Need::same(&INSTRUMENTS),
         Need::all(&CLOUDS),
         Need::all(&EVALUATE),
     ],

@@ -62,6 +62,11 @@ fn write_run_record(run: &Run) -> Result<()> {
             .as_ref()
             .map(|file| input(context, &file.path))
             .transpose()?,
+        instruments: project
+            .instruments
+            .iter()
+            .map(|file| input(context, &file.path))
+            .collect::<Result<_>>()?,
         parameters: project.settings.clone(),
         steps: context.times(),
         warnings: context.warnings.recorded(project.settings.report.language),

@@ -110,7 +110,10 @@ pub fn with_datum(
         let covariance = datum
             .covariance_at(&point.position)
             .unwrap_or_else(Matrix3::zeros);
-        let error = rigid.map_or_else(Vector3::zeros, |r| r.at(&point.position));
+        let error = datum.taken_off_at(&point.position);
+        let error = error
+            .or_else(|| Some(rigid?.at(&point.position)))
+            .unwrap_or_default();
         let variance = point.normal.dot(&(covariance * point.normal)).max(0.0);
         variance.sqrt().hypot(point.normal.dot(&error))
     })

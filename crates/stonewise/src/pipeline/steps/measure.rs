@@ -1,13 +1,15 @@
 //! The rows of the stones of a later epoch.
 
+use super::instruments::compare;
 use crate::error::Result;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
 use crate::pipeline::outputs::stone_rows::{motion_in_common, stone_rows};
-use crate::pipeline::steps::register::{REGISTER, datum, since_reference};
+use crate::pipeline::steps::register::{REGISTER, Registered, datum, since_reference};
 use crate::pipeline::until::Until;
 use crate::results::StoneRow;
-use crate::results::records::Datum;
+use crate::results::records::{Datum, InstrumentsEpoch};
+use nalgebra::Vector6;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 
@@ -27,6 +29,16 @@ pub struct Measured {
     pub datum: Datum,
     /// One row for each stone of the reference.
     pub rows: Vec<StoneRow>,
+    /// The rigid part of the registration error that sources or stable areas show, which was taken off, about the
+    /// centre of the datum; zero where they show none.
+    pub taken_off: Vector6<f64>,
+    /// Other instruments beside the stones; `None` where the project names none.
+    pub instruments: Option<InstrumentsEpoch>,
+}
+
+fn taken_off(datum: &Datum, registered: &Registered) -> Vector6<f64> {
+    let errors = registered.epoch_errors.as_ref().filter(|_| datum.is_estimated());
+    errors.map_or_else(Vector6::zeros, |e| e.rigid.error)
 }
 
 impl Run<'_> {
@@ -45,7 +57,15 @@ impl Run<'_> {
             let labelled = labelled.each_ref().map(|l| &**l);
             let facade = &self.outlined()?.facade;
             let rows = stone_rows(labelled, &*self.matched(later)?, &registered, &datum, facade);
-            Ok(Measured { datum, rows })
+            let mut measured = Measured {
+                taken_off: taken_off(&datum, &registered),
+                datum,
+                rows,
+                instruments: None,
+            };
+            let normals = first.stones.iter().map(|s| (s.id, s.normal)).collect();
+            compare(self.context.project, later, &mut measured, &normals);
+            Ok(measured)
         })
     }
 }

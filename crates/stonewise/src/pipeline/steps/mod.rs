@@ -7,6 +7,7 @@ pub mod check;
 pub mod edit;
 pub mod evaluate;
 pub mod ingest;
+pub mod instruments;
 pub mod join;
 pub mod known_motion;
 pub mod label;

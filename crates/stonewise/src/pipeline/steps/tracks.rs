@@ -19,7 +19,7 @@ use crate::results::{RowMotion, StoneRow};
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use stonewise_core::cloud::TileSource;
+use stonewise_core::cloud::{GridIndex, TileSource};
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::geometry::{Bounds, DisplacementSample, SmallMotion};
 use stonewise_core::id::StoneId;
@@ -287,14 +287,12 @@ fn neighbours(
     known: &BTreeMap<StoneId, (StoneId, StoneId)>,
     partners: &BTreeMap<StoneId, (&TrackedStone, StoneId)>,
 ) -> BTreeSet<StoneId> {
-    let mut chosen = BTreeSet::new();
-    for stone in stones.iter().filter(|s| partners.contains_key(&s.id)) {
-        let candidates = stones.iter().filter(|s| known.contains_key(&s.id));
-        let mut near: Vec<(f64, StoneId)> = candidates
-            .map(|s| ((s.centroid - stone.centroid).norm_squared(), s.id))
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0));
-        chosen.extend(near.iter().take(NEIGHBOURS).map(|n| n.1));
-    }
-    chosen
+    let candidates: Vec<&Stone> = stones.iter().filter(|s| known.contains_key(&s.id)).collect();
+    let places: Vec<Point3<f64>> = candidates.iter().map(|s| s.centroid).collect();
+    let index = GridIndex::for_nearest(&places);
+    let measured = stones.iter().filter(|s| partners.contains_key(&s.id));
+    measured
+        .flat_map(|stone| index.nearest_k(&stone.centroid, NEIGHBOURS.min(places.len()), f64::INFINITY))
+        .map(|(i, _)| candidates[i].id)
+        .collect()
 }

@@ -26,22 +26,25 @@ pub fn write_tracked_stones(
     let Some(mut tracks) = registered.tracks()? else {
         return Ok(());
     };
-    if measured.datum.is_estimated() {
-        take_errors_off(&mut tracks, first, registered);
-    }
+    take_errors_off(&mut tracks, first, registered, measured);
     keep_pictures(&mut tracks, &measured.rows);
     write_tracks(&context.out, later.number(), &tracks)
 }
 
-fn take_errors_off(tracks: &mut Tracks, first: &Labelled, registered: &Registered) {
-    let errors = registered.errors();
+fn take_errors_off(tracks: &mut Tracks, first: &Labelled, registered: &Registered, measured: &Measured) {
+    let datum = &measured.datum;
+    let errors = match datum.is_estimated() {
+        true => registered.errors(),
+        false => BTreeMap::new(),
+    };
     let stones: BTreeMap<u32, _> = first.stones.iter().map(|s| (s.id.0, s)).collect();
     for (id, evidence) in &mut tracks.stones {
         let Some(stone) = stones.get(id) else { continue };
-        let Some(error) = errors.get(&stone.id) else {
+        let by_instruments = datum.taken_off_at(&stone.centroid);
+        let Some(error) = by_instruments.or_else(|| Some(errors.get(&stone.id)?.mean)) else {
             continue;
         };
-        let error = FaceFrame::from_normal(&stone.normal).face_from_world() * error.mean;
+        let error = FaceFrame::from_normal(&stone.normal).face_from_world() * error;
         let of_photos = evidence
             .shifts
             .iter_mut()

@@ -1,0 +1,138 @@
+//! Texts of the yearly report.
+
+/// What the part of the yearly safety report on measurements is made of.
+#[derive(Debug)]
+pub(crate) struct YearlyTexts {
+    pub kind: &'static str,
+    /// Headings in the order that authorities ask for.
+    pub headings: [&'static str; 7],
+    pub method: &'static str,
+    /// Epoch, date, clouds, photos, points, stones, registration.
+    pub survey: [&'static str; 7],
+    /// Stable areas, stated, sources, other instruments, unknown.
+    pub datums: [&'static str; 5],
+    pub condition: &'static str,
+    /// Epoch, state, measured, moved, loose, lost, largest motion, largest deformation, detection limit.
+    pub results: [&'static str; 9],
+    pub results_note: &'static str,
+    pub of: &'static str,
+    pub interval: &'static str,
+    pub no_zones: &'static str,
+    pub not_separable: &'static str,
+    pub to_write: &'static str,
+    pub prepared: &'static str,
+    pub conclusions: [&'static str; 4],
+    pub files: &'static str,
+}
+
+pub(super) static ENGLISH: YearlyTexts = YearlyTexts {
+    kind: "Yearly safety report: measurements",
+    headings: [
+        "1 What was measured and how",
+        "2 Conditions",
+        "3 Results",
+        "4 Comparison with prediction",
+        "5 Interpretation",
+        "6 Conclusion",
+        "7 Signature",
+    ],
+    method: "Every stone of the wall is followed through point clouds and photos of all epochs and measured as one rigid body, with its covariance; motions count from the reference. Deformation is motion less the rigid motion of the part of the wall that kept its shape, and needs no datum. Intervals hold 95 %. Program: stonewise {version}.",
+    survey: [
+        "Epoch",
+        "Date",
+        "Clouds",
+        "Photos",
+        "Points",
+        "Stones",
+        "Registration known from",
+    ],
+    datums: [
+        "stable areas",
+        "statement",
+        "stations and strips",
+        "other instruments",
+        "unknown",
+    ],
+    condition: "Condition",
+    results: [
+        "Epoch",
+        "State",
+        "Measured",
+        "Moved",
+        "Loose",
+        "Lost",
+        "Largest motion, mm",
+        "Largest deformation, mm",
+        "Detection limit, mm",
+    ],
+    results_note: "Motion and deformation of a stone since the reference, with the 95 % interval; detection limit: median over the stones.",
+    of: "{n} of {m}",
+    interval: "{value} ({low} to {high})",
+    no_zones: "No zone of deformation is shown in any epoch.",
+    not_separable: "Not separable:",
+    to_write: "To be written by the engineer in charge.",
+    prepared: "What the measurements say:",
+    conclusions: [
+        "The wall behaves as expected.",
+        "The wall does not behave as expected; no measures are necessary.",
+        "Measures or further investigations are necessary:",
+        "The measurements do not allow a conclusion:",
+    ],
+    files: "The tables are beside this page: epochs.csv, answers.csv, zones.csv, paths.csv, joints.csv.",
+};
+
+pub(super) static GERMAN: YearlyTexts = YearlyTexts {
+    kind: "J\u{e4}hrlicher Sicherheitsbericht: Messungen",
+    headings: [
+        "1 Umfang und Verfahren der Messungen",
+        "2 Bedingungen",
+        "3 Ergebnisse",
+        "4 Vergleich mit der Vorhersage",
+        "5 Interpretation",
+        "6 Schlussfolgerung",
+        "7 Unterschrift",
+    ],
+    method: "Jeder Stein der Mauer wird durch Punktwolken und Fotos aller Epochen verfolgt und als ein starrer K\u{f6}rper mit seiner Kovarianz gemessen; Bewegungen z\u{e4}hlen ab der Bezugsepoche. Verformung ist Bewegung abz\u{fc}glich der starren Bewegung des Teils der Mauer, der seine Form behielt, und braucht kein Datum. Intervalle enthalten 95 %. Programm: stonewise {version}.",
+    survey: [
+        "Epoche",
+        "Datum",
+        "Punktwolken",
+        "Fotos",
+        "Punkte",
+        "Steine",
+        "Registrierung bekannt aus",
+    ],
+    datums: [
+        "stabilen Fl\u{e4}chen",
+        "Angabe",
+        "Standpunkten und Streifen",
+        "anderen Messeinrichtungen",
+        "unbekannt",
+    ],
+    condition: "Bedingung",
+    results: [
+        "Epoche",
+        "Zustand",
+        "Gemessen",
+        "Bewegt",
+        "Lose",
+        "Verloren",
+        "Gr\u{f6}\u{df}te Bewegung, mm",
+        "Gr\u{f6}\u{df}te Verformung, mm",
+        "Nachweisgrenze, mm",
+    ],
+    results_note: "Bewegung und Verformung eines Steins seit der Bezugsepoche mit dem 95-%-Intervall; Nachweisgrenze: Median \u{fc}ber die Steine.",
+    of: "{n} von {m}",
+    interval: "{value} ({low} bis {high})",
+    no_zones: "In keiner Epoche ist eine Zone mit Verformung nachweisbar.",
+    not_separable: "Nicht zu trennen:",
+    to_write: "Von der verantwortlichen Fachperson zu verfassen.",
+    prepared: "Was die Messungen aussagen:",
+    conclusions: [
+        "Die Mauer verh\u{e4}lt sich wie erwartet.",
+        "Die Mauer verh\u{e4}lt sich nicht wie erwartet; Ma\u{df}nahmen sind nicht n\u{f6}tig.",
+        "Ma\u{df}nahmen oder weitere Untersuchungen sind n\u{f6}tig:",
+        "Die Messungen lassen keinen Schluss zu:",
+    ],
+    files: "Die Tabellen liegen neben dieser Seite: epochs.csv, answers.csv, zones.csv, paths.csv, joints.csv.",
+};

@@ -1,0 +1,278 @@
+//! Other instruments beside the stones around them, and what those in use say of the datum.
+
+use super::measure::Measured;
+use crate::pipeline::context::Context;
+use crate::project::{Instrument, InstrumentFile, Project, ReadingGap};
+use crate::report_params::Language;
+use crate::results::records::{
+    ComparedInstrument, Datum, DatumState, DatumUse, InstrumentsEpoch, LeftOutInstrument, WhyLeftOut,
+};
+use crate::results::{Reference, RowMotion, StoneRow};
+use crate::texts::Said;
+use crate::texts::notices::{
+    DATUM_INSTRUMENTS, INSTRUMENTS_CONTRADICTED, INSTRUMENTS_DISAGREE, INSTRUMENTS_LEFT_OUT,
+    INSTRUMENTS_UNDETERMINED,
+};
+use nalgebra::{Matrix3, Point3, Vector3};
+use std::collections::BTreeMap;
+use stonewise_core::epoch::EpochId;
+use stonewise_core::id::StoneId;
+use stonewise_core::instruments::{Agreement, Difference, RegistrationError, Tested, agreement};
+
+/// Name of the step in warnings.
+const STEP: &str = "instruments";
+/// Stones around an instrument whose mean motion is compared with it.
+const STONES: usize = 3;
+/// Probability below which instruments and stones, or one of them, disagree.
+const LEVEL: f64 = 0.05;
+/// The same for all that are in use together, below which they are not used.
+const CONTRADICTED: f64 = 0.001;
+
+/// An instrument with the stones around it.
+struct Beside<'a> {
+    instrument: &'a Instrument,
+    file: &'a InstrumentFile,
+    motion: [Option<(f64, f64)>; 3],
+    stones: Vec<&'a StoneRow>,
+    difference: Difference,
+}
+
+/// Compares instruments with the stones of a later epoch; those in use change the datum and the rows. Nothing without
+/// instruments.
+pub(super) fn compare(project: &Project, later: EpochId, measured: &mut Measured, normals: &Normals) {
+    if project.instruments.is_empty() {
+        return;
+    }
+    let name = &project.epochs[later].name;
+    let mut record = InstrumentsEpoch {
+        epoch: name.clone(),
+        ..InstrumentsEpoch::default()
+    };
+    let beside = beside(
+        project,
+        later,
+        &measured.rows,
+        &measured.datum,
+        &mut record.left_out,
+    );
+    let centre = Point3::from(measured.datum.centre);
+    let known = measured.datum.covariance();
+    let with = |which: &dyn Fn(&Beside) -> bool| {
+        let differences = beside.iter().filter(|b| which(b)).map(|b| b.difference.clone());
+        agreement(&differences.collect::<Vec<_>>(), &centre, known.as_ref())
+    };
+    if let Some(all) = with(&|_| true) {
+        record.p = all.p;
+        record.compared = compared(&beside, &all);
+    }
+    let in_use = with(&|b| b.file.is_used);
+    let found = in_use.map(|found| (use_of(&found), found));
+    record.datum = found.as_ref().map(|f| f.0);
+    drop(beside);
+    if let Some((DatumUse::Observed, found)) = found {
+        let count = record.compared.iter().filter(|c| c.is_used).count();
+        let language = project.settings.report.language;
+        update(measured, &found.error, normals, count, language);
+    }
+    measured.instruments = Some(record);
+}
+
+/// Outward normals of stones.
+pub(super) type Normals = BTreeMap<StoneId, Vector3<f64>>;
+
+fn beside<'a>(
+    project: &'a Project,
+    later: EpochId,
+    rows: &'a [StoneRow],
+    datum: &Datum,
+    left_out: &mut Vec<LeftOutInstrument>,
+) -> Vec<Beside<'a>> {
+    let dates = [EpochId::REFERENCE, later].map(|id| project.epochs[id].date.as_deref());
+    let mut all = Vec::new();
+    for file in &project.instruments {
+        for instrument in &file.instruments {
+            let around = around(instrument, file.reach_m, rows);
+            let motion = file.motion(instrument, dates).map_err(why);
+            let (motion, stones) = match (motion, around.is_empty()) {
+                (Ok(motion), false) => (motion, around),
+                (found, _) => {
+                    let reach_m = file.reach_m;
+                    left_out.push(LeftOutInstrument {
+                        name: instrument.name.clone(),
+                        file: file_name(file),
+                        why: found.err().unwrap_or(WhyLeftOut::NoStones { reach_m }),
+                    });
+                    continue;
+                }
+            };
+            let (mean, covariance) = of_stones(&stones, datum);
+            let variances = Vector3::from(motion.map(|m| m.map_or(0.0, |m| m.variance_m2)));
+            let difference = Difference {
+                place: instrument.place,
+                value: [0, 1, 2].map(|axis| Some(mean[axis] - motion[axis]?.value_m)),
+                covariance: covariance + Matrix3::from_diagonal(&variances),
+            };
+            all.push(Beside {
+                instrument,
+                file,
+                motion: motion.map(|m| m.map(|m| (m.value_m, m.variance_m2.sqrt()))),
+                stones,
+                difference,
+            });
+        }
+    }
+    all
+}
+
+fn why(gap: ReadingGap) -> WhyLeftOut {
+    match gap {
+        ReadingGap::NoDate => WhyLeftOut::NoDate,
+        ReadingGap::Before => WhyLeftOut::BeforeReadings,
+        ReadingGap::After => WhyLeftOut::AfterReadings,
+        ReadingGap::Apart(days) => WhyLeftOut::Gap { days },
+    }
+}
+
+fn file_name(file: &InstrumentFile) -> String {
+    file.path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned()
+}
+
+/// The nearest measured stones that are not loose.
+fn around<'a>(instrument: &Instrument, reach_m: f64, rows: &'a [StoneRow]) -> Vec<&'a StoneRow> {
+    let near = rows.iter().filter_map(|row| {
+        let distance = (row.centroid - instrument.place).norm();
+        let is_firm = row.motion.as_ref().is_some_and(|m| !m.loose);
+        (is_firm && distance <= reach_m).then_some((distance, row))
+    });
+    let mut near: Vec<(f64, &StoneRow)> = near.collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    near.into_iter().take(STONES).map(|(_, row)| row).collect()
+}
+
+/// The mean motion of stones, and its covariance without the registration error: the mean of theirs, as of errors that
+/// neighbours share, which that of the mean never exceeds.
+fn of_stones(stones: &[&StoneRow], datum: &Datum) -> (Vector3<f64>, Matrix3<f64>) {
+    let motions = || stones.iter().filter_map(|row| Some((row, row.motion.as_ref()?)));
+    let count = motions().count().max(1) as f64;
+    let mean = motions().map(|(_, m)| m.displacement).sum::<Vector3<f64>>() / count;
+    let own = |(row, motion): (&&StoneRow, &RowMotion)| {
+        let shared = datum.covariance_at(&row.centroid).unwrap_or_else(Matrix3::zeros);
+        without(&motion.covariance, &shared)
+    };
+    (mean, motions().map(own).sum::<Matrix3<f64>>() / count)
+}
+
+/// A covariance without a part of it; never negative.
+fn without(whole: &Matrix3<f64>, part: &Matrix3<f64>) -> Matrix3<f64> {
+    let eigen = (whole - part).symmetric_eigen();
+    let values = eigen.eigenvalues.map(|v| v.max(0.0));
+    eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose()
+}
+
+fn compared(beside: &[Beside], found: &Agreement) -> Vec<ComparedInstrument> {
+    let count = found.instruments.iter().filter(|t| t.p.is_some()).count() as f64;
+    let one = |(b, tested): (&Beside, &Tested)| {
+        let middle = b.stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / b.stones.len() as f64;
+        let motions = b.stones.iter().filter_map(|s| s.motion.as_ref());
+        let stones = motions.map(|m| m.displacement).sum::<Vector3<f64>>() / b.stones.len() as f64;
+        ComparedInstrument {
+            name: b.instrument.name.clone(),
+            file: file_name(b.file),
+            place: b.instrument.place.coords.into(),
+            motion_m: b.motion.map(|m| m.map(|m| m.0)),
+            sd_m: b.motion.map(|m| m.map(|m| m.1)),
+            stones: b.stones.iter().map(|s| s.stone_id).collect(),
+            distance_m: (middle - b.instrument.place.coords).norm(),
+            stones_m: stones.into(),
+            difference_m: tested.difference,
+            difference_sd_m: tested.sd,
+            p: tested.p,
+            agrees: tested.p.map(|p| p * count > LEVEL),
+            is_used: b.file.is_used,
+        }
+    };
+    beside.iter().zip(&found.instruments).map(one).collect()
+}
+
+fn use_of(found: &Agreement) -> DatumUse {
+    match found.p {
+        Some(p) if p < CONTRADICTED => DatumUse::Contradicted,
+        _ if found.is_determined => DatumUse::Observed,
+        _ => DatumUse::Undetermined,
+    }
+}
+
+/// Says who disagrees, who is left out, and what becomes of those in use.
+pub fn note_instruments(context: &Context, record: &InstrumentsEpoch) {
+    let names = |names: Vec<&str>| Said::from(names.join(", "));
+    let left_out: Vec<&str> = record.left_out.iter().map(|l| l.name.as_str()).collect();
+    if !left_out.is_empty() {
+        let message = INSTRUMENTS_LEFT_OUT.say(&[("names", names(left_out))]);
+        context.warnings.notice(STEP, &record.epoch, message);
+    }
+    let apart = record.compared.iter().filter(|c| c.agrees == Some(false));
+    let apart: Vec<&str> = apart.map(|c| c.name.as_str()).collect();
+    if !apart.is_empty() {
+        let message = INSTRUMENTS_DISAGREE.say(&[("names", names(apart))]);
+        context.warnings.notice(STEP, &record.epoch, message);
+    }
+    match record.datum {
+        Some(DatumUse::Contradicted) => {
+            let message = Said::from(&INSTRUMENTS_CONTRADICTED);
+            context.warnings.skipped(STEP, &record.epoch, message);
+        }
+        Some(DatumUse::Undetermined) => {
+            let message = Said::from(&INSTRUMENTS_UNDETERMINED);
+            context.warnings.skipped(STEP, &record.epoch, message);
+        }
+        Some(DatumUse::Observed) | None => {}
+    }
+}
+
+/// Takes the error that instruments show off the motions, and replaces the covariance of the registration by what is
+/// left of it.
+fn update(
+    measured: &mut Measured,
+    error: &RegistrationError,
+    normals: &Normals,
+    count: usize,
+    language: Language,
+) {
+    let before = measured.datum.clone();
+    let error_mm = 1e3 * error.mean.fixed_rows::<3>(0).norm();
+    let note = DATUM_INSTRUMENTS.say(&[
+        ("n", count.to_string().into()),
+        ("error_mm", Said::numbers(format!("{error_mm:.2}"))),
+    ]);
+    let mut datum = Datum {
+        sources: before.sources.clone(),
+        ..Datum::known(DatumState::Instruments, &error.centre, &error.covariance, note).recorded(language)
+    };
+    datum.taken_off = Some((measured.taken_off + error.mean).into());
+    let rotation_before = before.rotation_covariance().unwrap_or_else(Matrix3::zeros);
+    let rotation_after = datum.rotation_covariance().unwrap_or_else(Matrix3::zeros);
+    for row in &mut measured.rows {
+        let (Some(motion), Some(normal)) = (&row.motion, normals.get(&StoneId(row.stone_id))) else {
+            continue;
+        };
+        let shared = |datum: &Datum| datum.covariance_at(&row.centroid).unwrap_or_else(Matrix3::zeros);
+        let alone = RowMotion {
+            covariance: without(&motion.covariance, &shared(&before)),
+            rotation_covariance: without(&motion.rotation_covariance, &rotation_before),
+            ..motion.clone()
+        };
+        let reference = Reference {
+            error: error.at(&row.centroid),
+            turn: error.turn(),
+            motion: Vector3::zeros(),
+            covariance: shared(&datum),
+            rotation_covariance: rotation_after,
+        };
+        row.motion = Some(alone.against(normal, &reference));
+    }
+    measured.datum = datum;
+}
