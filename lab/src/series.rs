@@ -14,7 +14,9 @@
 //! and the walls whose model has the terms; coverage of the differences from the epoch before (of deformations, all
 //! three components together); walls of which a trend, an anomaly, either of them, a newest epoch that is not as predicted
 //! or not as in the past is claimed; share of stones that creep by more than half of the bulge and are named; share of
-//! stones that stepped by more than half and are named with the right epoch.
+//! stones that stepped by more than half and are named with the right epoch; the share of the true motions that the
+//! deformations of each later epoch show; deformations within their 95 % ellipsoid, of stones that stood still and of
+//! those that moved.
 
 use crate::Outcome;
 use crate::figures::{CHI2_3_95, chi_square, coverage, rms_of_axes};
@@ -67,6 +69,8 @@ pub fn run(words: &Words) -> Outcome {
         "not past",
         "named",
         "steps named",
+        "shown of motion",
+        "held still / moved",
         "s",
     ]);
     for creep in words.list("creep=", "0,2") {
@@ -111,6 +115,11 @@ struct Wall {
     creeping: [usize; 2],
     /// The same of stones that stepped.
     stepped: [usize; 2],
+    /// Of each later epoch, sums over the stones of deformation times true motion and of the latter squared.
+    shown: Vec<[f64; 2]>,
+    /// Deformations within their 95 % ellipsoid, and all: of stones that moved by less than a tenth of a millimetre, and
+    /// of the others.
+    held: [[usize; 2]; 2],
 }
 
 impl Case {
@@ -299,6 +308,8 @@ impl Case {
             answers: found.answers,
             creeping: [0; 2],
             stepped: [0; 2],
+            shown: shown(&stones, &truths),
+            held: held(&stones, &truths),
         };
         for stone in &found.stones {
             let Some(truth) = &truth[place_of[&stone.stone]] else {
@@ -333,6 +344,38 @@ impl Case {
     }
 }
 
+/// How much of the true motions the deformations show, of each later epoch.
+fn shown(stones: &[SeriesPlace], truths: &[Vec<Vector3<f64>>]) -> Vec<[f64; 2]> {
+    let epochs = truths.first().map_or(0, Vec::len);
+    let of_epoch = |k: usize| {
+        let mut sums = [0.0; 2];
+        for (stone, truth) in stones.iter().zip(truths) {
+            if let Some((found, _)) = &stone.deformations[k] {
+                sums[0] += found.dot(&truth[k]);
+                sums[1] += truth[k].norm_squared();
+            }
+        }
+        sums
+    };
+    (1..epochs).map(of_epoch).collect()
+}
+
+/// Deformations within their 95 % ellipsoid, and all, of still stones and of others.
+fn held(stones: &[SeriesPlace], truths: &[Vec<Vector3<f64>>]) -> [[usize; 2]; 2] {
+    let mut counted = [[0; 2]; 2];
+    for (stone, truth) in stones.iter().zip(truths) {
+        for (k, found) in stone.deformations.iter().enumerate() {
+            let Some((found, covariance)) = found else {
+                continue;
+            };
+            let counted = &mut counted[usize::from(truth[k].norm() > 1e-4)];
+            counted[0] += usize::from(chi_square(&(found - truth[k]), covariance) <= CHI2_3_95);
+            counted[1] += 1;
+        }
+    }
+    counted
+}
+
 /// Differences of deformations from the epoch before within their 95 % ellipsoid, and all.
 fn differences(stones: &[SeriesPlace], truths: &[Vec<Vector3<f64>>]) -> [usize; 2] {
     let mut counted = [0; 2];
@@ -348,6 +391,23 @@ fn differences(stones: &[SeriesPlace], truths: &[Vec<Vector3<f64>>]) -> [usize; 
         }
     }
     counted
+}
+
+fn swapped([n, of]: [usize; 2]) -> [usize; 2] {
+    [of, n]
+}
+
+/// The share of the motions that each epoch shows.
+fn shares(walls: &[Wall]) -> String {
+    let epochs = walls.first().map_or(0, |w| w.shown.len());
+    let of_epoch = |k: usize| {
+        let sum = |i: usize| walls.iter().map(|w| w.shown[k][i]).sum::<f64>();
+        match sum(1) > 0.0 {
+            true => format!("{:.2}", sum(0) / sum(1)),
+            false => "\u{2013}".to_owned(),
+        }
+    };
+    (0..epochs).map(of_epoch).collect::<Vec<_>>().join(" ")
 }
 
 fn cells(creep: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
@@ -388,6 +448,10 @@ fn cells(creep: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
         claimed(&|a| a.as_in_the_past.answer == Word::No),
         share(sum(&|w| w.creeping)),
         share(sum(&|w| w.stepped)),
+        shares(walls),
+        [0, 1]
+            .map(|moved| share(swapped(sum(&|w| w.held[moved]))))
+            .join(" / "),
         format!("{seconds:.0}"),
     ]
 }

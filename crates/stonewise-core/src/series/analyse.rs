@@ -6,7 +6,8 @@ use super::fit::Fit;
 use super::look::StoneSeries;
 use super::moderated::VarianceFactor;
 use super::stone_model::{
-    AxisModel, Coefficient, Seen, Step, Wave, coefficient, likeliest_step, of_term, scale_of, wave, with_step,
+    AxisModel, Coefficient, Seen, Step, Wave, coefficient, likeliest_step, of_term, scale_of, wave,
+    with_step, without_trend,
 };
 use super::terms::{Inseparable, Model, WhyInseparable, models};
 use crate::id::StoneId;
@@ -21,6 +22,8 @@ const LEAST_EPOCHS: usize = 4;
 const LEAST_OF_A_LINE: usize = 3;
 /// Rounds of steps and variance factors, each of which the other changes.
 const ROUNDS: usize = 3;
+/// Rounds in which steps and trends of all stones, and how many there are of each, follow each other.
+const MIXTURE_ROUNDS: usize = 5;
 /// Factor on variances beyond which a stone loses weight in the choice of terms.
 const OUTLYING_FACTOR: f64 = 9.0;
 /// Part of a year within which epochs lie in one season: two months.
@@ -89,6 +92,22 @@ struct Fitted {
     fits: [Fit; 3],
     /// Which is in the fits.
     step: Option<Step>,
+    /// Where the step takes the place of a trend: what would be left of the trend beside it.
+    instead: Option<Coefficient>,
+}
+
+impl Fitted {
+    /// The design of its model, of the terms of `model` and its step but for one at `but`.
+    fn design(&self, model: &Model, but: Option<usize>) -> DMatrix<f64> {
+        let base = match self.instead {
+            Some(_) => without_trend(&model.design),
+            None => model.design.clone(),
+        };
+        match self.step.filter(|s| Some(s.epoch) != but) {
+            Some(step) => with_step(&base, step.epoch),
+            None => base,
+        }
+    }
 }
 
 /// Fits the model in time. `epochs`: all of them; `stones`: with a look for each.
@@ -209,6 +228,7 @@ fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFacto
             seen,
             fits,
             step: None,
+            instead: None,
         })
     };
     let mut fitted: Vec<Fitted> = stones.par_iter().filter_map(start).collect();
@@ -220,17 +240,109 @@ fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFacto
         let shown = q_values(&p);
         for ((stone, step), q) in fitted.iter_mut().zip(&steps).zip(shown) {
             stone.step = step.filter(|_| q <= CLAIM_LEVEL).map(|s| s.0);
-            let design = match &stone.step {
-                Some(step) => with_step(&model.design, step.epoch),
-                None => model.design.clone(),
-            };
-            if let Some(fits) = stone.seen.fit(&design) {
+            if let Some(fits) = stone.seen.fit(&stone.design(model, None)) {
                 stone.fits = fits;
             }
         }
         factors = factors_of(fitted.iter().map(|f| &f.fits));
     }
+    steps_for_trends(&mut fitted, model, &factors);
     (fitted, factors)
+}
+
+/// What a stone with a trend shows of a step instead of it: twice the log likelihoods of the trend and of a step before
+/// each epoch, less a constant.
+struct Rival {
+    stone: usize,
+    trend: f64,
+    steps: Vec<Option<f64>>,
+}
+
+/// Gives stones whose trend is shown a step instead, where that is more probable.
+///
+/// Both have one coefficient a component, so that their likelihoods compare. How probable a trend and a step before each
+/// epoch are beforehand is estimated over all these stones (expectation maximisation), so that stones that stepped
+/// together support each other.
+fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFactor; 3]) {
+    let Some(column) = model.place(Term::Trend) else {
+        return;
+    };
+    let trends: Vec<Coefficient> = fitted
+        .iter()
+        .map(|f| coefficient(&f.fits, factors, column))
+        .collect();
+    let q = q_values(&trends.iter().map(|t| t.p).collect::<Vec<f64>>());
+    let epochs = model.design.nrows();
+    let fit = |fits: &[Fit; 3]| -> f64 {
+        let squares = fits
+            .iter()
+            .zip(factors)
+            .map(|(fit, factor)| fit.residuals / factor.factor);
+        -squares.sum::<f64>()
+    };
+    let plain = without_trend(&model.design);
+    let rival = |stone: usize| {
+        let of = &fitted[stone];
+        let step = |epoch: usize| {
+            let is_seen = of.seen.epochs.first().is_some_and(|first| *first < epoch);
+            let fits = of.seen.fit(&with_step(&plain, epoch)).filter(|_| is_seen)?;
+            Some(fit(&fits))
+        };
+        (of.step.is_none() && q[stone] <= CLAIM_LEVEL).then(|| Rival {
+            stone,
+            trend: fit(&of.fits),
+            steps: (1..epochs).map(step).collect(),
+        })
+    };
+    let rivals: Vec<Rival> = (0..fitted.len()).into_par_iter().filter_map(rival).collect();
+    // The trend first, then a step before each epoch.
+    let mut shares = vec![0.5 / (epochs - 1) as f64; epochs];
+    shares[0] = 0.5;
+    let mut likeliest = Vec::new();
+    for _ in 0..MIXTURE_ROUNDS {
+        let mut sums = vec![1.0 / epochs as f64; epochs];
+        likeliest.clear();
+        for rival in &rivals {
+            let of_class = |c: usize| match c {
+                0 => Some(rival.trend),
+                _ => rival.steps[c - 1],
+            };
+            let logs =
+                (0..epochs).map(|c| of_class(c).map_or(f64::NEG_INFINITY, |l| 0.5 * l + shares[c].ln()));
+            let logs: Vec<f64> = logs.collect();
+            let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let odds: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
+            let total: f64 = odds.iter().sum();
+            sums.iter_mut()
+                .zip(&odds)
+                .for_each(|(sum, odds)| *sum += odds / total);
+            likeliest.push(logs.iter().position(|l| *l == largest).unwrap_or(0));
+        }
+        let total: f64 = sums.iter().sum();
+        shares = sums.into_iter().map(|sum| sum / total).collect();
+    }
+    for (rival, epoch) in rivals.iter().zip(likeliest).filter(|(_, class)| *class > 0) {
+        let stone = &mut fitted[rival.stone];
+        let both = stone.seen.fit(&with_step(&model.design, epoch));
+        let Some(fits) = stone.seen.fit(&with_step(&plain, epoch)) else {
+            continue;
+        };
+        let fits = fits.map(|fit| fit.with_zero(column));
+        let found = coefficient(&fits, factors, model.unknowns());
+        stone.step = Some(Step {
+            epoch,
+            value: found.value,
+            sd: found.sd,
+        });
+        // Where trend and step cannot both be told, the trend alone says how well it is known.
+        let left = both.map_or(trends[rival.stone], |fits| coefficient(&fits, factors, column));
+        stone.instead = Some(Coefficient {
+            value: Vector3::zeros(),
+            sd: left.sd,
+            p: trends[rival.stone].p,
+        });
+        stone.fits = fits;
+    }
 }
 
 fn factors_of<'a>(fits: impl Iterator<Item = &'a [Fit; 3]> + Clone) -> [VarianceFactor; 3] {
@@ -258,7 +370,10 @@ fn described(
         Some(StoneTrend {
             stone: f.stone,
             epochs: f.seen.epochs.len(),
-            velocity: term(Term::Trend)?,
+            velocity: match f.instead {
+                Some(left) => Coefficient { p: 1.0, ..left },
+                None => term(Term::Trend)?,
+            },
             velocity_q: 1.0,
             level: term(Term::Level),
             temperature: term(Term::Temperature),
@@ -287,11 +402,7 @@ fn departures(fitted: &[Fitted], model: &Model) -> Vec<(StoneId, Trend)> {
         if f.seen.epochs.last() != Some(&newest) {
             return None;
         }
-        let earlier = f.step.filter(|s| s.epoch != newest);
-        let base: DMatrix<f64> = match earlier {
-            Some(step) => with_step(&model.design, step.epoch),
-            None => model.design.clone(),
-        };
+        let base = f.design(model, Some(newest));
         let column = base.ncols();
         let fits = f
             .seen
@@ -367,7 +478,11 @@ fn anomaly(
     epochs: &[&SeriesEpoch],
 ) -> Answer {
     let step = |f: &Fitted| {
-        let (step, p) = likeliest_step(&f.seen, model, factors)?;
+        let (step, p) = match f.step.zip(f.instead) {
+            // As probable by chance as the trend in whose place it stands.
+            Some((step, instead)) => (step, instead.p),
+            None => likeliest_step(&f.seen, model, factors)?,
+        };
         let found = Coefficient {
             value: step.value,
             sd: step.sd,

@@ -14,6 +14,17 @@ pub(super) struct Fit {
     pub freedom: usize,
 }
 
+impl Fit {
+    /// The fit with a coefficient that is zero at a place of its own.
+    pub fn with_zero(self, column: usize) -> Self {
+        Self {
+            coefficients: self.coefficients.insert_row(column, 0.0),
+            covariance: self.covariance.insert_row(column, 0.0).insert_column(column, 0.0),
+            ..self
+        }
+    }
+}
+
 /// Fits `values` with independent `variances` by the rows of `design`. `None` where the rows do not determine the
 /// unknowns.
 pub(super) fn fit(design: &DMatrix<f64>, values: &[f64], variances: &[f64]) -> Option<Fit> {

@@ -184,6 +184,11 @@ pub(super) fn with_step(design: &DMatrix<f64>, epoch: usize) -> DMatrix<f64> {
     with
 }
 
+/// The design without the column of the trend, the second.
+pub(super) fn without_trend(design: &DMatrix<f64>) -> DMatrix<f64> {
+    design.clone().remove_column(1)
+}
+
 /// The most probable step of a stone and its probability by chance, over all places and components. `None` where no
 /// step leaves an observation over.
 pub(super) fn likeliest_step(
