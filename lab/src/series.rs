@@ -10,7 +10,8 @@
 //! stations and errors of its own in each epoch; each later epoch is adjusted against the first with true labels.
 //!
 //! Columns: coverage of the 95 % intervals of velocities along, up and out; root mean square of their errors and
-//! standard deviations, mm a year; coverage of the coefficients of level and season in the three directions together,
+//! standard deviations, mm a year, and of the errors of straight lines through the motions of pairs; the same of the mean
+//! of the creeping zone, by the model and by pairs; coverage of the coefficients of level and season in the three directions together,
 //! and the walls whose model has the terms; coverage of the differences from the epoch before (of deformations, all
 //! three components together); walls of which a trend, an anomaly, either of them, a newest epoch that is not as predicted
 //! or not as in the past is claimed; share of stones that creep by more than half of the bulge and are named; share of
@@ -57,6 +58,9 @@ pub fn run(words: &Words) -> Outcome {
         "out",
         "error mm/a",
         "sd mm/a",
+        "by pairs mm/a",
+        "zone mm/a",
+        "by pairs mm/a",
         "level held",
         "entered",
         "season held",
@@ -97,13 +101,17 @@ struct Case {
 /// Errors and their standard deviations, along, up and out.
 type Errors = Vec<[Vector3<f64>; 2]>;
 
-/// A stone with its normal, and its true displacement in each epoch.
-type Shown = (SeriesPlace, Vector3<f64>, Vec<Vector3<f64>>);
+/// A stone with its normal, its true displacement in each epoch, and that which the pair measured.
+type Shown = (SeriesPlace, Vector3<f64>, [Vec<Vector3<f64>>; 2]);
 
 /// What was found of a wall.
 struct Wall {
     /// Of velocities, metres a year.
     velocities: Errors,
+    /// Errors of the straight line through the motions of pairs, each by itself.
+    by_pairs: Vec<Vector3<f64>>,
+    /// Mean errors of the creeping zone, of both.
+    zone: [Vec<Vector3<f64>>; 2],
     /// Of what the level does, and what the season does; empty where the term did not enter.
     level: Errors,
     season: Errors,
@@ -252,6 +260,13 @@ impl Case {
         for epoch in 1..count {
             let wall = ScannedWall::later(&self.params(seed, epoch), STATIONS, epoch);
             let (found, seen) = wall.deformation();
+            let motions = wall
+                .report
+                .results
+                .iter()
+                .filter_map(|r| Some((r.first, r.motion.as_ref().ok()?)));
+            let motions: BTreeMap<StoneId, Vector3<f64>> =
+                motions.map(|(id, m)| (id, m.displacement)).collect();
             for stone in &found.stones {
                 let shown = &seen[&stone.stone];
                 let new = || {
@@ -260,19 +275,23 @@ impl Case {
                         body: 1,
                         deformations: vec![None; count],
                     };
-                    (place, shown.normal, vec![Vector3::zeros(); count])
+                    let none = || vec![Vector3::zeros(); count];
+                    (place, shown.normal, [none(), none()])
                 };
-                let (series, _, truth) = places.entry(stone.stone).or_insert_with(new);
+                let (series, _, [truth, pair]) = places.entry(stone.stone).or_insert_with(new);
                 series.deformations[epoch] = Some((stone.deformation, stone.covariance));
                 truth[epoch] = wall.truth(stone.stone, shown.centroid);
+                pair[epoch] = motions[&stone.stone];
             }
         }
         let ids: Vec<StoneId> = places.keys().copied().collect();
-        let (mut stones, mut normals, mut truths) = (Vec::new(), Vec::new(), Vec::new());
-        for (place, normal, truth) in places.into_values() {
+        let (mut stones, mut normals) = (Vec::new(), Vec::new());
+        let (mut truths, mut pairs) = (Vec::new(), Vec::new());
+        for (place, normal, [truth, pair]) in places.into_values() {
             stones.push(place);
             normals.push(normal);
             truths.push(truth);
+            pairs.push(pair);
         }
         keep_congruent(&mut stones);
         let faces: Vec<Matrix3<f64>> = normals
@@ -301,6 +320,8 @@ impl Case {
             .collect();
         let mut wall = Wall {
             velocities: Vec::new(),
+            by_pairs: Vec::new(),
+            zone: [Vec::new(), Vec::new()],
             level: Vec::new(),
             season: Vec::new(),
             differences: differences(&stones, &truths),
@@ -311,13 +332,33 @@ impl Case {
             shown: shown(&stones, &truths),
             held: held(&stones, &truths),
         };
+        let mut of_zone = Vec::new();
         for stone in &found.stones {
-            let Some(truth) = &truth[place_of[&stone.stone]] else {
+            let i = place_of[&stone.stone];
+            let Some(truth) = &truth[i] else {
                 continue;
             };
             self.score(stone, truth, &mut wall);
+            let by_pairs = faces[i] * self.slope(&pairs[i]) - truth[0];
+            wall.by_pairs.push(by_pairs);
+            if self.creep_m > 0.0 && truth[0].norm() > 0.5 * self.creep_m {
+                of_zone.push([stone.velocity.value - truth[0], by_pairs]);
+            }
+        }
+        if !of_zone.is_empty() {
+            let mean = |k: usize| of_zone.iter().map(|e| e[k]).sum::<Vector3<f64>>() / of_zone.len() as f64;
+            [0, 1].iter().for_each(|&k| wall.zone[k].push(mean(k)));
         }
         wall
+    }
+
+    /// The slope of the straight line through the motions of all pairs, which count as independent and alike.
+    fn slope(&self, motions: &[Vector3<f64>]) -> Vector3<f64> {
+        let years: Vec<f64> = (1..motions.len()).map(|k| self.years(k)).collect();
+        let mean = years.iter().sum::<f64>() / years.len() as f64;
+        let square: f64 = years.iter().map(|y| (y - mean).powi(2)).sum();
+        let sum = years.iter().zip(&motions[1..]).map(|(y, d)| d * (y - mean));
+        sum.sum::<Vector3<f64>>() / square
     }
 
     fn score(&self, stone: &StoneTrend, truth: &[Vector3<f64>; 5], wall: &mut Wall) {
@@ -393,6 +434,15 @@ fn differences(stones: &[SeriesPlace], truths: &[Vec<Vector3<f64>>]) -> [usize; 
     counted
 }
 
+/// Root mean squares along, up and out, millimetres.
+fn rms<'a>(errors: impl Iterator<Item = &'a Vector3<f64>>) -> String {
+    let pairs: Vec<[Vector3<f64>; 2]> = errors.map(|e| [*e, Vector3::zeros()]).collect();
+    match pairs.is_empty() {
+        true => "\u{2013}".to_owned(),
+        false => rms_of_axes(&pairs.iter().collect::<Vec<_>>(), 0),
+    }
+}
+
 fn swapped([n, of]: [usize; 2]) -> [usize; 2] {
     [of, n]
 }
@@ -436,6 +486,9 @@ fn cells(creep: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
         coverage(&velocities, 2),
         rms_of_axes(&velocities, 0),
         rms_of_axes(&velocities, 1),
+        rms(walls.iter().flat_map(|w| &w.by_pairs)),
+        rms(walls.iter().flat_map(|w| &w.zone[0])),
+        rms(walls.iter().flat_map(|w| &w.zone[1])),
         held(walls.iter().flat_map(|w| &w.level).collect()),
         of_walls(&|w| w.terms.contains(&Term::Level)),
         held(walls.iter().flat_map(|w| &w.season).collect()),
