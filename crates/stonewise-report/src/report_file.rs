@@ -300,6 +300,7 @@ mod tests {
             epoch: "C <3>".to_owned(),
             zone_id,
             stones: 5,
+            confirmed_by: Vec::new(),
             velocity: [0.0, 0.0, 0.001],
             sd: [1e-4; 3],
             level: None,

@@ -249,6 +249,7 @@ mod tests {
             epoch: "c".into(),
             zone_id: 1,
             stones: 4,
+            confirmed_by: Vec::new(),
             velocity: [0.0; 3],
             sd: [0.0; 3],
             level: None,

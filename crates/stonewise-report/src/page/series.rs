@@ -156,6 +156,10 @@ fn path_in_words(zone: &ZoneTrend, texts: &Texts) -> String {
             .iter()
             .map(|c| said(c, 1.0, &|v| fill(names.departs, v))),
     );
+    all.push(match zone.confirmed_by.is_empty() {
+        true => names.unconfirmed.to_owned(),
+        false => fill(names.confirmed, &[("epochs", &*zone.confirmed_by.join(", "))]),
+    });
     all.join(" ")
 }
 

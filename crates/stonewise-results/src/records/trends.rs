@@ -44,6 +44,9 @@ pub struct ZoneTrend {
     pub zone_id: u32,
     /// Its stones that have a model.
     pub stones: usize,
+    /// Other epochs of whose zones of deformation at least half of its stones are: they confirm it. Empty for the wall.
+    #[serde(default)]
+    pub confirmed_by: Vec<String>,
     /// Along the wall, up and out, metres a year.
     pub velocity: [f64; 3],
     /// Standard deviations.

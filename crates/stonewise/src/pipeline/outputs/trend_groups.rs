@@ -74,6 +74,7 @@ impl TimedSeries<'_> {
             epoch: epoch.to_owned(),
             zone_id,
             stones: group.len(),
+            confirmed_by: Vec::new(),
             velocity: velocity.value.into(),
             sd: velocity.sd.into(),
             level: group.mean(|s| s.level.as_ref().map(of_trend)).map(Into::into),

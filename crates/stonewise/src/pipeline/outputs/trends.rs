@@ -83,10 +83,10 @@ fn write_trends(run: &Run) -> Result<()> {
     write_readable_json(&context.out.join(FILE), &record)
 }
 
-/// The zones of deformation of the newest epoch that shows any.
+/// The zones of deformation of the newest epoch that shows any, with the other epochs that confirm them.
 fn zones(run: &Run, timed: &TimedSeries) -> Result<Vec<ZoneTrend>> {
-    let later = timed.order.iter().rev().filter(|id| **id != EpochId::REFERENCE);
-    for id in later {
+    let mut by_epoch: Vec<(&str, BTreeMap<u32, BTreeSet<StoneId>>)> = Vec::new();
+    for id in timed.order.iter().rev().filter(|id| !id.is_reference()) {
         let mut zones: BTreeMap<u32, BTreeSet<StoneId>> = BTreeMap::new();
         for row in run.measured(*id)?.rows.iter().filter(|r| r.zone_id > 0) {
             zones
@@ -95,14 +95,26 @@ fn zones(run: &Run, timed: &TimedSeries) -> Result<Vec<ZoneTrend>> {
                 .insert(StoneId(row.stone_id));
         }
         if !zones.is_empty() {
-            let name = &timed.project.epochs[*id].name;
-            let zones = zones.iter();
-            return Ok(zones
-                .filter_map(|(zone, stones)| timed.of(stones, name, *zone))
-                .collect());
+            by_epoch.push((&timed.project.epochs[*id].name, zones));
         }
     }
-    Ok(Vec::new())
+    let Some(((newest, zones), others)) = by_epoch.split_first() else {
+        return Ok(Vec::new());
+    };
+    let confirmed = |stones: &BTreeSet<StoneId>| {
+        let others = others.iter().filter(|(_, zones)| {
+            let shown = stones.iter().filter(|s| zones.values().any(|z| z.contains(s)));
+            2 * shown.count() >= stones.len()
+        });
+        others.rev().map(|(name, _)| (*name).to_owned()).collect()
+    };
+    let zone = |(id, stones): (&u32, &BTreeSet<StoneId>)| {
+        Some(ZoneTrend {
+            confirmed_by: confirmed(stones),
+            ..timed.of(stones, newest, *id)?
+        })
+    };
+    Ok(zones.iter().filter_map(zone).collect())
 }
 
 /// Every stone with its deformation in each epoch, in one frame.
