@@ -1,8 +1,9 @@
 //! The part of the yearly safety report on measurements, in the order that authorities ask for.
 
+use super::document::{PATTERNS, footer, head, title};
 use super::first_page::{conditions, letter, letterhead};
 use super::html::{table, with_units};
-use super::{PATTERNS, doubts, footer, head, instruments, series, title};
+use super::{doubts, instruments, series};
 use crate::summary::Summary;
 use crate::texts::{Texts, YearlyTexts, fill};
 use std::fmt::Write;

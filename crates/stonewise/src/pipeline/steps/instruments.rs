@@ -1,6 +1,5 @@
 //! Other instruments beside the stones around them, and what those in use say of the datum.
 
-use super::measure::Measured;
 use crate::pipeline::context::Context;
 use crate::project::{Instrument, InstrumentFile, Project, ReadingGap};
 use crate::report_params::Language;
@@ -13,7 +12,7 @@ use crate::texts::notices::{
     DATUM_INSTRUMENTS, INSTRUMENTS_CONTRADICTED, INSTRUMENTS_DISAGREE, INSTRUMENTS_LEFT_OUT,
     INSTRUMENTS_UNDETERMINED,
 };
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3, Vector6};
 use std::collections::BTreeMap;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
@@ -37,26 +36,34 @@ struct Beside<'a> {
     difference: Difference,
 }
 
-/// Compares instruments with the stones of a later epoch; those in use change the datum and the rows. Nothing without
+/// What is known of a later epoch before instruments say anything.
+pub struct Before<'a> {
+    /// The registration.
+    pub datum: &'a mut Datum,
+    /// The stones of the reference.
+    pub rows: &'a mut [StoneRow],
+    /// The rigid part of the registration error that was taken off the motions, about the centre of the datum.
+    pub taken_off: Vector6<f64>,
+}
+
+/// Compares instruments with the stones of a later epoch; those in use change the datum and the rows. `None` without
 /// instruments.
-pub(super) fn compare(project: &Project, later: EpochId, measured: &mut Measured, normals: &Normals) {
+pub fn compare(
+    project: &Project,
+    later: EpochId,
+    before: Before,
+    normals: &Normals,
+) -> Option<InstrumentsEpoch> {
     if project.instruments.is_empty() {
-        return;
+        return None;
     }
-    let name = &project.epochs[later].name;
     let mut record = InstrumentsEpoch {
-        epoch: name.clone(),
+        epoch: project.epochs[later].name.clone(),
         ..InstrumentsEpoch::default()
     };
-    let beside = beside(
-        project,
-        later,
-        &measured.rows,
-        &measured.datum,
-        &mut record.left_out,
-    );
-    let centre = Point3::from(measured.datum.centre);
-    let known = measured.datum.covariance();
+    let beside = beside(project, later, before.rows, before.datum, &mut record.left_out);
+    let centre = Point3::from(before.datum.centre);
+    let known = before.datum.covariance();
     let with = |which: &dyn Fn(&Beside) -> bool| {
         let differences = beside.iter().filter(|b| which(b)).map(|b| b.difference.clone());
         agreement(&differences.collect::<Vec<_>>(), &centre, known.as_ref())
@@ -66,19 +73,22 @@ pub(super) fn compare(project: &Project, later: EpochId, measured: &mut Measured
         record.compared = compared(&beside, &all);
     }
     let in_use = with(&|b| b.file.is_used);
-    let found = in_use.map(|found| (use_of(&found), found));
-    record.datum = found.as_ref().map(|f| f.0);
-    drop(beside);
-    if let Some((DatumUse::Observed, found)) = found {
+    record.datum = in_use.as_ref().map(use_of);
+    if let Some(found) = in_use.filter(|_| record.datum == Some(DatumUse::Observed)) {
         let count = record.compared.iter().filter(|c| c.is_used).count();
-        let language = project.settings.report.language;
-        update(measured, &found.error, normals, count, language);
+        update(
+            before,
+            &found.error,
+            normals,
+            count,
+            project.settings.report.language,
+        );
     }
-    measured.instruments = Some(record);
+    Some(record)
 }
 
 /// Outward normals of stones.
-pub(super) type Normals = BTreeMap<StoneId, Vector3<f64>>;
+pub type Normals = BTreeMap<StoneId, Vector3<f64>>;
 
 fn beside<'a>(
     project: &'a Project,
@@ -235,14 +245,8 @@ pub fn note_instruments(context: &Context, record: &InstrumentsEpoch) {
 
 /// Takes the error that instruments show off the motions, and replaces the covariance of the registration by what is
 /// left of it.
-fn update(
-    measured: &mut Measured,
-    error: &RegistrationError,
-    normals: &Normals,
-    count: usize,
-    language: Language,
-) {
-    let before = measured.datum.clone();
+fn update(shown: Before, error: &RegistrationError, normals: &Normals, count: usize, language: Language) {
+    let before = shown.datum.clone();
     let error_mm = 1e3 * error.mean.fixed_rows::<3>(0).norm();
     let note = DATUM_INSTRUMENTS.say(&[
         ("n", count.to_string().into()),
@@ -252,10 +256,10 @@ fn update(
         sources: before.sources.clone(),
         ..Datum::known(DatumState::Instruments, &error.centre, &error.covariance, note).recorded(language)
     };
-    datum.taken_off = Some((measured.taken_off + error.mean).into());
+    datum.taken_off = Some((shown.taken_off + error.mean).into());
     let rotation_before = before.rotation_covariance().unwrap_or_else(Matrix3::zeros);
     let rotation_after = datum.rotation_covariance().unwrap_or_else(Matrix3::zeros);
-    for row in &mut measured.rows {
+    for row in shown.rows {
         let (Some(motion), Some(normal)) = (&row.motion, normals.get(&StoneId(row.stone_id))) else {
             continue;
         };
@@ -274,5 +278,5 @@ fn update(
         };
         row.motion = Some(alone.against(normal, &reference));
     }
-    measured.datum = datum;
+    *shown.datum = datum;
 }

@@ -1,6 +1,6 @@
 //! The rows of the stones of a later epoch.
 
-use super::instruments::compare;
+use super::instruments::{Before, compare};
 use crate::error::Result;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::outputs::outlines::OUTLINES;
@@ -29,13 +29,11 @@ pub struct Measured {
     pub datum: Datum,
     /// One row for each stone of the reference.
     pub rows: Vec<StoneRow>,
-    /// The rigid part of the registration error that sources or stable areas show, which was taken off, about the
-    /// centre of the datum; zero where they show none.
-    pub taken_off: Vector6<f64>,
     /// Other instruments beside the stones; `None` where the project names none.
     pub instruments: Option<InstrumentsEpoch>,
 }
 
+/// The rigid part of the registration error that sources or stable areas show; zero where they show none.
 fn taken_off(datum: &Datum, registered: &Registered) -> Vector6<f64> {
     let errors = registered.epoch_errors.as_ref().filter(|_| datum.is_estimated());
     errors.map_or_else(Vector6::zeros, |e| e.rigid.error)
@@ -57,15 +55,19 @@ impl Run<'_> {
             let labelled = labelled.each_ref().map(|l| &**l);
             let facade = &self.outlined()?.facade;
             let rows = stone_rows(labelled, &*self.matched(later)?, &registered, &datum, facade);
-            let mut measured = Measured {
+            let (mut datum, mut rows) = (datum, rows);
+            let before = Before {
                 taken_off: taken_off(&datum, &registered),
-                datum,
-                rows,
-                instruments: None,
+                datum: &mut datum,
+                rows: &mut rows,
             };
             let normals = first.stones.iter().map(|s| (s.id, s.normal)).collect();
-            compare(self.context.project, later, &mut measured, &normals);
-            Ok(measured)
+            let instruments = compare(self.context.project, later, before, &normals);
+            Ok(Measured {
+                datum,
+                rows,
+                instruments,
+            })
         })
     }
 }
