@@ -11,8 +11,17 @@ use stonewise_results::records::{ComparedInstrument, DatumUse, InstrumentsEpoch,
 /// Half the width of a normal 95 % interval in standard deviations.
 const Z: f64 = 1.96;
 
-/// The instruments of this epoch; empty where the project names none.
+/// The section on the instruments of this epoch; empty where the project names none.
 pub(super) fn instruments(results: &ResultSet, texts: &Texts) -> String {
+    let body = compared(results, texts);
+    match body.is_empty() {
+        true => body,
+        false => section("instruments", texts.instruments.heading, &body),
+    }
+}
+
+/// What the section says.
+pub(super) fn compared(results: &ResultSet, texts: &Texts) -> String {
     let names = texts.instruments;
     let later = results
         .run
@@ -42,7 +51,7 @@ pub(super) fn instruments(results: &ResultSet, texts: &Texts) -> String {
     if !notes.is_empty() {
         let _ = write!(body, "<p class=\"note\">{}</p>", notes.join(" "));
     }
-    section("instruments", names.heading, &body)
+    body
 }
 
 fn row(found: &ComparedInstrument, texts: &Texts) -> Vec<String> {

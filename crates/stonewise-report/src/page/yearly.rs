@@ -117,8 +117,17 @@ fn results(newest: &ResultSet, verdict: &Verdict, facts: &Summary) -> String {
             paths
         },
         series::map(newest, facts),
-        instruments::instruments(newest, texts)
+        beside(newest, texts)
     )
+}
+
+/// Other instruments in the newest epoch.
+fn beside(newest: &ResultSet, texts: &Texts) -> String {
+    let found = instruments::compared(newest, texts);
+    match found.is_empty() {
+        true => found,
+        false => format!("<h3>{}</h3>{found}", texts.instruments.heading),
+    }
 }
 
 fn epoch_row(epoch: &EpochVerdict, texts: &Texts) -> Vec<String> {
