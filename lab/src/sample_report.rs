@@ -474,6 +474,7 @@ fn input(path: &str) -> InputRecord {
         path: path.into(),
         bytes: 123_456,
         blake3: String::new(),
+        written: None,
     }
 }
 

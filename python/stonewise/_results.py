@@ -36,6 +36,8 @@ class Warning:  # noqa: A001
     """An input of the project was left out."""
     doubt: bool
     """The results as a whole cannot be relied on."""
+    code: str = ""
+    """Name under which ``stonewise explain`` says more of it."""
 
 
 def open(results: Union[str, os.PathLike[str]]) -> Results:  # noqa: A001
@@ -241,7 +243,7 @@ class Results(Pair):
     def warnings(self) -> list[Warning]:
         """What went wrong without stopping the run."""
         return [
-            Warning(w["step"], w["subject"], w["message"], w["skipped_input"], w.get("doubt", False))
+            Warning(w["step"], w["subject"], w["message"], w["skipped_input"], w.get("doubt", False), w.get("code", ""))
             for w in self.record.get("warnings", [])
         ]
 

@@ -227,6 +227,41 @@ impl Error {
         )
     }
 
+    /// Name under which `docs/src/messages.md` and `stonewise explain` say more of it.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::Project { .. } => "project-file",
+            Self::NoProject { .. } => "no-project",
+            Self::Parameters(_) => "parameters",
+            Self::Io { .. } => "file-access",
+            Self::Input { .. } => "input",
+            Self::Output { .. } => "output-folder",
+            Self::Busy { .. } => "busy",
+            Self::UnitFirst { .. } | Self::Plan { .. } => "plan",
+            Self::Survey(_) => "survey",
+            Self::Check(_) => "check-failed",
+            Self::AddressSpace { .. } => "address-space",
+            Self::NoMatch { .. } => "no-match",
+            Self::Cloud(_) => "cloud-file",
+            Self::Table(_) => "table-file",
+            Self::Cameras(_) => "camera-file",
+            Self::Masks(_) => "mask-file",
+            Self::Weights(_) => "weights",
+            Self::Labelled(_) => "labelled-photos",
+            Self::Training(_) => "training",
+            Self::Image(_) => "image-file",
+            Self::Simulate(_) => "simulation",
+            Self::Transfer(_) => "labels",
+            Self::Registration(_) => "registration",
+            Self::Compare(_) => "comparison",
+            Self::Layers(_) => "layers",
+            Self::Results { .. } => "damaged-results",
+            Self::Pdf(_) => "pdf",
+            Self::NoResults(_) => "no-results",
+            Self::Interrupted => "interrupted",
+        }
+    }
+
     /// Turns a system error into one that names the file.
     pub fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Self + 'a {
         move |source| Self::Io {

@@ -12,6 +12,9 @@ pub struct Warning {
     pub step: String,
     /// The photo, camera, file or stone that it is about.
     pub subject: String,
+    /// Name under which `docs/src/messages.md` and `stonewise explain` say more of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<String>,
     /// What happened, and what to do about it.
     pub message: String,
     /// The message in German; in a record, only where its report is in German and there are German words.
@@ -35,11 +38,18 @@ impl Warning {
         Self {
             step: step.into(),
             subject: subject.into(),
+            code: message.code,
             message: message.english,
             german: message.german,
             skipped_input: false,
             doubt: false,
         }
+    }
+
+    /// Subject, message and code in one line.
+    pub fn line(&self) -> String {
+        let code = self.code.iter().map(|code| format!(" [{code}]"));
+        format!("{}: {}{}", self.subject, self.message, code.collect::<String>())
     }
 }
 

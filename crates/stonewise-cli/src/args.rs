@@ -159,6 +159,11 @@ pub enum Command {
     /// Describe the content of a cloud, photos, a camera file, a mask file or a project.
     #[command(after_help = "Example:\n  stonewise info epoch1/cloud_tls.laz epoch1/cameras.xml")]
     Info(InfoArgs),
+    /// Explain the code of a message: what was seen, what it means, what to do.
+    #[command(
+        after_help = "Examples:\n  stonewise explain not-converged\n  stonewise explain        lists the codes"
+    )]
+    Explain(ExplainArgs),
     /// Say what this machine offers and which parts of stonewise it can run.
     #[command(after_help = "Example:\n  stonewise doctor")]
     Doctor,
@@ -172,6 +177,13 @@ pub enum Command {
     /// Write the man pages, one for each command.
     #[command(after_help = "Example:\n  stonewise man --out ~/.local/share/man/man1")]
     Man(ManArgs),
+}
+
+/// Arguments of `explain`.
+#[derive(Debug, ClapArgs)]
+pub struct ExplainArgs {
+    /// The code in the brackets of a message; without one, all codes are listed.
+    pub code: Option<String>,
 }
 
 /// Arguments of `completions`.

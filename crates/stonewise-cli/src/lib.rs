@@ -53,7 +53,7 @@ pub fn main_with_args(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(commands::Outcome::Verdict) => VERDICT,
         Ok(commands::Outcome::Failed) => FAILED,
         Err(error) => {
-            note::note(&format!("error: {}", explain(&error)));
+            note::note(&format!("error: {}{}", explain(&error), code(&error)));
             if is_wrong_usage(&error) {
                 WRONG_USAGE
             } else {
@@ -73,6 +73,16 @@ fn say_panics_once() {
             note::note("error: this is a defect of stonewise; please report it with the lines above");
         }
     }));
+}
+
+/// Code of the error in brackets, for `stonewise explain`; nothing where it has none.
+fn code(error: &anyhow::Error) -> String {
+    let known =
+        |cause: &(dyn std::error::Error + 'static)| Some(cause.downcast_ref::<stonewise::Error>()?.code());
+    error
+        .chain()
+        .find_map(known)
+        .map_or_else(String::new, |code| format!(" [{code}]"))
 }
 
 /// Whether the command was given something that cannot be.

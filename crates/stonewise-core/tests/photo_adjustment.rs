@@ -338,13 +338,16 @@ fn a_face_that_changed_is_not_called_loose() {
             "{stain}: {error} {:?}",
             both.photos.unwrap().stones[STAINED]
         );
-        // Moss shows in the difference of the face that it grew on, if that was matched, and not in others'.
+        // Moss shows in the difference of the face that it grew on, and not in others'. A face that it covers
+        // altogether may not be matched any more.
         let part = both.photos.unwrap();
         let mut all: Vec<f64> = (0..COLUMNS * ROWS).filter_map(|k| change(&part, k)).collect();
         all.sort_by(f64::total_cmp);
         let of_stained = change(&part, STAINED);
+        let usual = all[all.len() / 2];
+        assert!(stain > 0.5 || of_stained.is_some());
         assert!(
-            stain > 0.5 || of_stained > Some(1.5 * all[all.len() / 2]),
+            of_stained.is_none_or(|change| change > 1.5 * usual),
             "{of_stained:?} {all:?}"
         );
     }

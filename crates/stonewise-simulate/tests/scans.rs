@@ -379,7 +379,7 @@ fn the_number_of_threads_changes_nothing_and_the_seed_does() {
         assert_eq!(a_tls.as_ref().unwrap().stone, b_tls.as_ref().unwrap().stone);
         assert_eq!(a_tls.as_ref().unwrap().time, b_tls.as_ref().unwrap().time);
     }
-    let other = scans(&small(8));
+    let other = scans(&SceneParams { seed: 8, ..params });
     assert_ne!(
         other[0].tls.as_ref().unwrap().cloud,
         one[0].tls.as_ref().unwrap().cloud

@@ -4,7 +4,7 @@ use super::message::{Message, messages};
 
 messages! {
     DOUBTS {
-        NOT_CONVERGED:
+        NOT_CONVERGED = "not-converged":
             "the adjustment did not converge in {iterations} iterations: more than a tenth of the stones still move, so its motions and \
             their intervals must not be relied on. {cause}",
             "die Ausgleichung ist in {iterations} Iterationen nicht konvergiert: mehr als ein Zehntel der Steine bewegt sich noch, auf \
@@ -28,7 +28,7 @@ messages! {
             "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen anderes als \
             Steine: keine Fotos unterscheiden das";
 
-        SIDE_UNSURE:
+        SIDE_UNSURE = "outside-unsure":
             "no camera or scanner position tells which side of the wall is outside, and the cloud alone does not show it clearly \
             enough: out-of-plane motions may have the wrong sign. Look at the views in the report: if the wall is seen from behind, \
             give a point in front of it, `[views] outside = [x, y, z]`, or clouds that include the ground in front of the wall",
@@ -36,7 +36,7 @@ messages! {
             Bewegungen aus der Ebene können das falsche Vorzeichen haben. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu \
             sehen, einen Punkt vor ihr angeben, `[views] outside = [x, y, z]`, oder Punktwolken, die den Boden vor der Mauer zeigen";
 
-        BESIDE_COMPARED:
+        BESIDE_COMPARED = "cloud-off-photos":
             "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, compared with epoch {first}, \
             so stones are cut out of the cloud beside their place, and their motions must not be relied on. Bring cameras and \
             clouds into one frame; `stonewise check` shows the edges of the cloud over a photo",
@@ -44,7 +44,7 @@ messages! {
             die Fotos zeigen; Steine sind also neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. \
             Kameras und Punktwolken in ein System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-        BESIDE:
+        BESIDE = "cloud-off-photos":
             "the cloud lies {length} mm ({along} along, {up} up) off the stones that the photos show, so stones are cut out of the \
             cloud beside their place, and their motions must not be relied on. Bring cameras and clouds into one frame; \
             `stonewise check` shows the edges of the cloud over a photo",
@@ -52,7 +52,7 @@ messages! {
             neben ihrem Platz aus der Wolke geschnitten, auf ihre Bewegungen ist kein Verlass. Kameras und Punktwolken in ein \
             System bringen; `stonewise check` zeigt die Kanten der Wolke über einem Foto";
 
-        TORN:
+        TORN = "votes-disagree":
             "the photos disagree on where the stones are: a typical stone gets only {share} % of the photos' votes on its points, and one \
             that the most photos show {best} %. Stones are therefore cut out of the cloud beside their place, and their motions must not \
             be relied on. {cause}",
@@ -60,7 +60,7 @@ messages! {
             Fotos zu seinen Punkten, einer, den die meisten Fotos zeigen, {best} %. Steine sind also neben ihrem Platz aus der Wolke \
             geschnitten, auf ihre Bewegungen ist kein Verlass. {cause}";
 
-        MISREGISTERED_EPOCH:
+        MISREGISTERED_EPOCH = "misregistered-epoch":
             "{cells} pieces of plane surfaces off the wall appear shifted by ({shown}) mm (x, y, z) against the first epoch. The stations \
             and strips alone give a shift of ({found}) mm with a standard deviation of {sd} mm. If these surfaces did not move, all \
             motions are wrong by the difference: set auto_stable = true to use the surfaces, or name some of them under \
@@ -71,19 +71,19 @@ messages! {
             verwenden oder einige davon unter [[registration.stable]] angeben. Haben sie sich bewegt, den Registrierungsfehler als \
             epoch_error_m angeben";
 
-        FEW_MEASURED:
+        FEW_MEASURED = "few-measured":
             "only {measured} of the {matched} stones found in both epochs could be measured ({reasons}). That no motion is shown for \
             the others does not mean that they did not move. {cause}",
             "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
             anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. {cause}";
 
-        BLIND:
+        BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
             of the points allow: a small motion would not be seen. {cause}",
             "Bewegungen unter etwa {limit} mm sind in der schwächsten Richtung nicht nachweisbar, dem {excess}-Fachen dessen, was \
             Abstand und Rauschen der Punkte erlauben: eine kleine Bewegung wäre nicht zu sehen. {cause}";
 
-        STRETCHED:
+        STRETCHED = "wrong-scale":
             "the wall changed its size by {strain} +- {half_width} mm per metre, and by {lesser} mm per metre in the direction that \
             changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
             has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
@@ -93,7 +93,7 @@ messages! {
             Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
             den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
 
-        TURNED:
+        TURNED = "turned-epoch":
             "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
             are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
             those of the first, with their photos, and run again",

@@ -4,69 +4,69 @@ use super::message::{Message, messages};
 
 messages! {
     FINDINGS {
-        NOT_SEEN: "no photo sees the cloud: are cameras and clouds in one frame, and in metres?",
+        NOT_SEEN = "cloud-not-in-photos": "no photo sees the cloud: are cameras and clouds in one frame, and in metres?",
             "kein Foto sieht die Punktwolke: sind Kameras und Punktwolken in einem System, und in Metern?";
-        NO_POINTS: "the clouds hold no points", "die Punktwolken enthalten keine Punkte";
-        TOO_LONG: "{x} x {y} x {z} m, {points} points: are the coordinates in metres? Cut the cloud to the structure",
+        NO_POINTS = "extent": "the clouds hold no points", "die Punktwolken enthalten keine Punkte";
+        TOO_LONG = "extent": "{x} x {y} x {z} m, {points} points: are the coordinates in metres? Cut the cloud to the structure",
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern? Die Punktwolke auf das Bauwerk zuschneiden";
-        TOO_SMALL: "{x} x {y} x {z} m, {points} points: are the coordinates in metres?",
+        TOO_SMALL = "extent": "{x} x {y} x {z} m, {points} points: are the coordinates in metres?",
             "{x} x {y} x {z} m, {points} Punkte: sind die Koordinaten in Metern?";
-        SPACING_VIEWS: "{spacing} mm: in views of the cloud, nearly all stones at least {size} cm across are found, and some of the smaller ones",
+        SPACING_VIEWS = "spacing": "{spacing} mm: in views of the cloud, nearly all stones at least {size} cm across are found, and some of the smaller ones",
             "{spacing} mm: in Ansichten der Punktwolke werden fast alle Steine ab {size} cm Breite gefunden, kleinere zum Teil";
-        SPACING_WIDE: "{spacing} mm: too wide to show the relief of single stones",
+        SPACING_WIDE = "spacing": "{spacing} mm: too wide to show the relief of single stones",
             "{spacing} mm: zu weit, um das Relief einzelner Steine zu zeigen";
-        SPACING_UNKNOWN: "too few points to tell", "zu wenige Punkte für eine Aussage";
-        SYSTEM_UNIT: "the clouds' coordinate system is in {unit}: transform them to a system in metres",
+        SPACING_UNKNOWN = "spacing": "too few points to tell", "zu wenige Punkte für eine Aussage";
+        SYSTEM_UNIT = "units": "the clouds' coordinate system is in {unit}: transform them to a system in metres",
             "das Koordinatensystem der Punktwolken ist in {unit}: sie in ein System in Metern umrechnen";
-        UNIT_RATIO: "the clouds are {found} times as large as those of the first epoch; {ratio} would mean that {which} is in {unit}: \
+        UNIT_RATIO = "units": "the clouds are {found} times as large as those of the first epoch; {ratio} would mean that {which} is in {unit}: \
                      export its coordinates in metres",
             "die Punktwolken sind {found}-mal so groß wie die der ersten Epoche; {ratio} hieße, dass {which} in {unit} vorliegt: ihre \
              Koordinaten in Metern ausgeben";
-        SYSTEMS: "the clouds are in different systems, {systems}: transform them to one",
+        SYSTEMS = "coordinate-systems": "the clouds are in different systems, {systems}: transform them to one",
             "die Punktwolken liegen in verschiedenen Systemen, {systems}: sie in eines umrechnen";
-        NO_OVERLAP: "the clouds do not overlap those of {first}: they reach from [{low}] to [{high}] m, {first} from [{first_low}] to [{first_high}] m; \
+        NO_OVERLAP = "overlap": "the clouds do not overlap those of {first}: they reach from [{low}] to [{high}] m, {first} from [{first_low}] to [{first_high}] m; \
                      bring both into one frame, or let a run do so by their stones (registration.align = \"stones\")",
             "die Punktwolken überlappen die von {first} nicht: sie reichen von [{low}] bis [{high}] m, {first} von [{first_low}] bis [{first_high}] m; \
              beide in ein System bringen, oder einen Lauf das anhand der Steine tun lassen (registration.align = \"stones\")";
-        LITTLE_OVERLAP: "{share} % of the smaller epoch with {first}: are both in one frame? If not, \
+        LITTLE_OVERLAP = "overlap": "{share} % of the smaller epoch with {first}: are both in one frame? If not, \
                          registration.align = \"stones\" brings them together by their stones",
             "{share} % der kleineren Epoche mit {first}: sind beide in einem System? Wenn nicht, bringt registration.align = \"stones\" \
              sie anhand der Steine zusammen";
-        SAME_FILE: "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
-        SAME_POINTS: "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
+        SAME_FILE = "same-cloud": "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
+        SAME_POINTS = "same-cloud": "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
             "{share} % der Punkte sind die der Epoche {first}: ist die Punktwolke einer Epoche eine Kopie der anderen?";
-        TWICE: "{share} % of the points are there twice and would count twice, so the intervals of motions would be too small: name \
+        TWICE = "points-twice": "{share} % of the points are there twice and would count twice, so the intervals of motions would be too small: name \
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \
              jede Punktwolke nur einmal angeben";
-        ROUGH: "the coordinates are in steps of {step} mm, which adds {noise} mm to the noise of the points: export them with more digits if \
+        ROUGH = "rounded-coordinates": "the coordinates are in steps of {step} mm, which adds {noise} mm to the noise of the points: export them with more digits if \
                 the scanner measures better",
             "die Koordinaten sind in Schritten von {step} mm angegeben, was dem Rauschen der Punkte {noise} mm hinzufügt: sie mit mehr Stellen \
              ausgeben, wenn der Scanner genauer misst";
-        ROUNDED: "the coordinates are in steps of {step} mm, and the points lie {spacing} mm apart: export the coordinates with \
+        ROUNDED = "rounded-coordinates": "the coordinates are in steps of {step} mm, and the points lie {spacing} mm apart: export the coordinates with \
                   more digits",
             "die Koordinaten sind in Schritten von {step} mm angegeben, die Punkte liegen {spacing} mm auseinander: die \
              Koordinaten mit mehr Stellen ausgeben";
-        NO_PHOTOS: "none of the photos that {file} names ({total}) is in {folder}", "keines der Fotos, die {file} nennt ({total}), liegt in {folder}";
-        MISSING_PHOTOS: "missing in {folder}: {photos} ({missing} of {total} posed photos); copy them there, or take their cameras out of the camera file",
+        NO_PHOTOS = "missing-photos": "none of the photos that {file} names ({total}) is in {folder}", "keines der Fotos, die {file} nennt ({total}), liegt in {folder}";
+        MISSING_PHOTOS = "missing-photos": "missing in {folder}: {photos} ({missing} of {total} posed photos); copy them there, or take their cameras out of the camera file",
             "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren oder ihre Kameras aus der Kameradatei nehmen";
-        BROKEN_PHOTOS: "cannot be read or are cut off: {photos}; copy them again",
+        BROKEN_PHOTOS = "broken-photos": "cannot be read or are cut off: {photos}; copy them again",
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
-        PHOTO_SIZES: "the photos are not as large as their cameras say: {photos}; give them as they were posed",
+        PHOTO_SIZES = "photo-size": "the photos are not as large as their cameras say: {photos}; give them as they were posed",
             "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
-        FLAT_PHOTOS: "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
+        FLAT_PHOTOS = "unlike-photos": "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
             "einfarbig: {photos}; sie noch einmal kopieren oder ihre Kameras aus der Kameradatei nehmen";
-        UNLIKE_PHOTOS: "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \
+        UNLIKE_PHOTOS = "unlike-photos": "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \
                         name, or turned?",
             "zeigen etwas anderes als die übrigen Fotos an denselben Punkten: {photos} (Korrelation höchstens {most}); trägt das Foto den Namen eines anderen, oder ist es gedreht?";
-        UNLIKE_ALL: "no two photos show the same where they see the same points: are these the photos of these cameras, and are cameras and \
+        UNLIKE_ALL = "unlike-photos": "no two photos show the same where they see the same points: are these the photos of these cameras, and are cameras and \
                      clouds in one frame?",
             "keine zwei Fotos zeigen dasselbe an denselben Punkten: sind dies die Fotos dieser Kameras, und liegen Kameras und Punktwolken in einem System?";
-        BROKEN_MASKS: "cannot be used for {photos}, and a run leaves these photos out: {reason}",
+        BROKEN_MASKS = "missing-masks": "cannot be used for {photos}, and a run leaves these photos out: {reason}",
             "nicht zu verwenden für {photos}, ein Lauf lässt diese Fotos weg: {reason}";
-        WITHOUT_MASKS: "none in {file} for {photos}; a run leaves these photos out",
+        WITHOUT_MASKS = "missing-masks": "none in {file} for {photos}; a run leaves these photos out",
             "keine in {file} für {photos}; ein Lauf lässt diese Fotos weg";
-        NO_MASK_FITS: "none in {file} for any of the photos: masks are found by the names of the photos",
+        NO_MASK_FITS = "missing-masks": "none in {file} for any of the photos: masks are found by the names of the photos",
             "keine in {file} für irgendein Foto: Masken werden nach den Namen der Fotos gefunden";
         MASKS: "masks", "Masken";
         CAMERAS: "cameras against cloud", "Kameras gegen Punktwolke";

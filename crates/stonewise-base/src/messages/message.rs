@@ -6,6 +6,8 @@ use super::braces::fill;
 /// A sentence in both languages; words in braces are filled in.
 #[derive(Debug)]
 pub struct Message {
+    /// Name under which `docs/src/messages.md` explains it; absent for words that are part of a sentence.
+    pub code: Option<&'static str>,
     /// As a run says it.
     pub english: &'static str,
     /// As a German report says it.
@@ -19,6 +21,7 @@ impl Message {
         let english: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, &*v.english)).collect();
         let german: Vec<(&str, &str)> = values.iter().map(|(name, v)| (*name, v.in_german())).collect();
         Said {
+            code: self.code.map(str::to_owned),
             english: fill(self.english, &english),
             german: Some(fill(self.german, &german)),
         }
@@ -31,17 +34,24 @@ impl From<&Message> for Said {
     }
 }
 
-/// Declares messages and, for tests, the list of all of them: a name, the English and the German text of each.
+/// Declares messages and, for tests, the list of all of them: a name, the code if it is a sentence of its own, the
+/// English and the German text of each.
 macro_rules! messages {
-    ($all:ident { $($name:ident: $english:expr, $german:expr;)* }) => {
+    ($all:ident { $($name:ident $(= $code:literal)?: $english:expr, $german:expr;)* }) => {
         $(
             #[doc = $english]
-            pub static $name: Message = Message { english: $english, german: $german };
+            pub static $name: Message = Message {
+                code: messages!(@code $($code)?),
+                english: $english,
+                german: $german,
+            };
         )*
 
         #[cfg(test)]
         pub(super) static $all: &[&Message] = &[$(&$name),*];
     };
+    (@code) => { None };
+    (@code $code:literal) => { Some($code) };
 }
 pub(super) use messages;
 
@@ -71,13 +81,31 @@ mod tests {
         }
     }
 
+    /// The page explains every message and every error, and nothing else.
+    #[test]
+    fn the_page_of_messages_explains_every_code() {
+        let page = include_str!("../../../../docs/src/messages.md");
+        let explained: BTreeSet<&str> = page
+            .lines()
+            .filter_map(|line| line.strip_prefix("### "))
+            .collect();
+        let of_messages = [DOUBTS, FINDINGS, NOTICES].concat();
+        let of_messages = of_messages.iter().filter_map(|message| message.code);
+        let of_errors = include_str!("../error.rs").lines();
+        let of_errors = of_errors.filter_map(|line| line.split_once("=> \"")?.1.strip_suffix("\","));
+        let said: BTreeSet<&str> = of_messages.chain(of_errors).collect();
+        assert_eq!(explained, said);
+    }
+
     #[test]
     fn numbers_and_sentences_are_those_of_the_language() {
         let message = Message {
+            code: None,
             english: "{share} % of {file} are in {unit} at ({place})",
             german: "{share} % von {file} sind in {unit} bei ({place})",
         };
         let feet = Message {
+            code: None,
             english: "feet",
             german: "Fuß",
         };

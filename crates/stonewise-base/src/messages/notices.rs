@@ -4,27 +4,27 @@ use super::message::{Message, messages};
 
 messages! {
     NOTICES {
-        INVALID_POINTS:
+        INVALID_POINTS = "invalid-points":
             "points without finite coordinates, left out: {n}",
             "Punkte ohne endliche Koordinaten, weggelassen: {n}";
 
-        VIEWS_OF_COLOURS:
+        VIEWS_OF_COLOURS = "views":
             "no photos: stones are looked for in {n} views of the cloud's colours",
             "keine Fotos: Steine werden in {n} Ansichten der Farben der Punktwolke gesucht";
 
-        VIEWS_OF_INTENSITIES:
+        VIEWS_OF_INTENSITIES = "views":
             "no photos: stones are looked for in {n} views of the cloud's intensities",
             "keine Fotos: Steine werden in {n} Ansichten der Intensitäten der Punktwolke gesucht";
 
-        VIEWS_OF_RELIEF:
+        VIEWS_OF_RELIEF = "views":
             "no photos: stones are looked for in {n} views of the cloud's relief, shaded",
             "keine Fotos: Steine werden in {n} Ansichten des schattierten Reliefs der Punktwolke gesucht";
 
-        AUTO_STABLE:
+        AUTO_STABLE = "auto-stable":
             "auto_stable: areas off the wall ({count} found) are taken for stable, as far as they agree with each other",
             "auto_stable: Flächen neben der Mauer ({count} gefunden) gelten als stabil, soweit sie miteinander übereinstimmen";
 
-        STONES_MISSED:
+        STONES_MISSED = "stones-missed":
             "a typical stone gets {share} % of the photos' votes on its points: the detector misses it in some of the photos that show it. Where \
             the most photos show a stone, that is {best} %, and photos find {found} of {sought} stones where clouds and cameras put them, so these \
             fit each other and motions do not suffer",
@@ -32,145 +32,145 @@ messages! {
             nicht. Zeigen die meisten Fotos einen Stein, sind es {best} %, und die Fotos finden {found} von {sought} Steinen dort, wo Punktwolken und \
             Kameras sie vermuten lassen; diese passen also zueinander, und Bewegungen leiden nicht darunter";
 
-        COMPONENT_AT_BOUND:
+        COMPONENT_AT_BOUND = "component-at-bound":
             "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
             masonry. Parts of the wall moved unlike the rest, clouds of the epochs do not fit each other, or masks are no stones",
             "die Varianzkomponente „{name}“ liegt am oberen Ende ihres Bereichs: die Aufnahme zeigt größere Unterschiede, als bei Mauerwerk \
             zu erwarten sind. Teile der Mauer haben sich anders bewegt als der Rest, Punktwolken der Epochen passen nicht zueinander, oder Masken \
             sind keine Steine";
 
-        COULD_BE_STABLE:
+        COULD_BE_STABLE = "could-be-stable":
             "areas off the wall are seen in both epochs and could show their registration ({count} found): auto_stable = true uses them all, \
             [[registration.stable]] those that you know did not move, such as corners = {corners}",
             "Flächen neben der Mauer sind in beiden Epochen zu sehen und könnten deren Registrierung zeigen ({count} gefunden): auto_stable = true \
             verwendet alle, [[registration.stable]] die, von denen Sie wissen, dass sie sich nicht bewegt haben, zum Beispiel \
             corners = {corners}";
 
-        MEAN_MOTION:
+        MEAN_MOTION = "mean-motion":
             "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations with the error of the \
             epochs' registration)",
             "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen mit dem \
             Registrierungsfehler der Epochen)";
 
-        MEAN_MOTION_OF_UNKNOWN_DATUM:
+        MEAN_MOTION_OF_UNKNOWN_DATUM = "mean-motion":
             "mean motion of the measured stones that are not loose, as measured: {mean} (standard deviations without the error of the \
             epochs' registration, which is unknown)",
             "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen ohne den \
             Registrierungsfehler der Epochen, der unbekannt ist)";
 
-        STABLE_MOVED:
+        STABLE_MOVED = "stable-moved":
             "[[registration.stable]] number {n} moved against the other stable areas and is left out",
             "[[registration.stable]] Nummer {n} hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
 
-        OFF_WALL_MOVED:
+        OFF_WALL_MOVED = "stable-moved":
             "auto_stable: the area off the wall around ({place}) moved against the other stable areas and is left out",
             "auto_stable: die Fläche neben der Mauer um ({place}) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
 
-        STABLE_TOO_FEW:
+        STABLE_TOO_FEW = "stable-too-few":
             "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
             taken as unknown. Name areas with points in both epochs and faces in three directions, or state epoch_error_m",
             "[[registration.stable]] zeigt die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in beiden Epochen zu \
             sehen; sie gilt als unbekannt. Flächen mit Punkten in beiden Epochen und mit Seiten in drei Richtungen nennen, oder \
             epoch_error_m angeben";
 
-        OFF_WALL_TOO_FEW:
+        OFF_WALL_TOO_FEW = "stable-too-few":
             "auto_stable: surfaces off the wall do not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs",
             "auto_stable: Flächen neben der Mauer zeigen die Registrierung der Epochen nicht: zu wenige ebene Zellen ({cells}) sind in \
             beiden Epochen zu sehen";
 
-        REGISTRATION_UNKNOWN:
+        REGISTRATION_UNKNOWN = "datum":
             "the registration error of the epochs is unknown: limits, intervals and significance hold for motions against the \
             common rigid motion of the measured stones",
             "der Registrierungsfehler der Epochen ist unbekannt: Grenzen, Intervalle und Signifikanz gelten für Bewegungen gegen die \
             gemeinsame starre Bewegung der gemessenen Steine";
 
-        ALIGNED:
+        ALIGNED = "aligned":
             "aligned by {stones} of {covered} stones: turned by {degrees} degrees and moved by {metres} m at the middle of the wall, \
             centroids agree within {rms_mm} mm; the motion of the wall as a whole is not known, its deformation is",
             "an {stones} von {covered} Steinen ausgerichtet: um {degrees} Grad gedreht und in der Mitte der Mauer um {metres} m bewegt, \
             Schwerpunkte stimmen auf {rms_mm} mm überein; die Bewegung der Mauer als Ganzes ist nicht bekannt, ihre Verformung ist es";
 
-        DATUM_ALIGNED:
+        DATUM_ALIGNED = "datum":
             "the epochs were aligned by their stones: how the wall moved as a whole is not known; limits, intervals and significance hold \
             for motions against the common rigid motion of the measured stones",
             "die Epochen wurden an ihren Steinen ausgerichtet: wie sich die Mauer als Ganzes bewegt hat, ist nicht bekannt; Grenzen, \
             Intervalle und Signifikanz gelten für Bewegungen gegen die gemeinsame starre Bewegung der gemessenen Steine";
 
-        DATUM_STABLE:
+        DATUM_STABLE = "datum":
             "the stable areas show a registration error of {error_mm} mm at the middle of the wall: it is taken off the motions, and what \
             stays uncertain of it is in limits and intervals",
             "die stabilen Flächen zeigen in der Mitte der Mauer einen Registrierungsfehler von {error_mm} mm: er ist von den Bewegungen \
             abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
 
-        DATUM_STATED:
+        DATUM_STATED = "datum":
             "the project states a registration error of {error_mm} mm per axis and epoch; limits and intervals hold it",
             "das Projekt gibt einen Registrierungsfehler von {error_mm} mm je Achse und Epoche an; Grenzen und Intervalle enthalten ihn";
 
-        DATUM_ONE_SURVEY:
+        DATUM_ONE_SURVEY = "datum":
             "both epochs are parts of one survey: there is no registration error between them",
             "beide Epochen sind Teile einer Aufnahme: zwischen ihnen gibt es keinen Registrierungsfehler";
 
-        DATUM_SOURCES:
+        DATUM_SOURCES = "datum":
             "the registration error follows from how the stations and strips of each epoch differ, and from an assumed error of {error_mm} mm \
             per axis that all sources of an epoch share; limits and intervals hold both",
             "der Registrierungsfehler folgt daraus, wie sich Standpunkte und Streifen jeder Epoche unterscheiden, und aus einem angenommenen \
             Fehler von {error_mm} mm je Achse, den alle Quellen einer Epoche teilen; Grenzen und Intervalle enthalten beides";
 
-        DATUM_INSTRUMENTS:
+        DATUM_INSTRUMENTS = "datum":
             "{n} instruments in use show a registration error of {error_mm} mm at the middle of the wall besides what else is known of it: \
             it is taken off the motions, and what stays uncertain of it is in limits and intervals",
             "{n} verwendete Instrumente zeigen in der Mitte der Mauer einen Registrierungsfehler von {error_mm} mm über das hinaus, was \
             sonst von ihm bekannt ist: er ist von den Bewegungen abgezogen, und was an ihm unsicher bleibt, steckt in Grenzen und Intervallen";
 
-        INSTRUMENTS_LEFT_OUT:
+        INSTRUMENTS_LEFT_OUT = "instruments-left-out":
             "instruments that are not compared with the stones: {names}; instruments.json says why",
             "Instrumente, die nicht mit den Steinen verglichen sind: {names}; instruments.json nennt die Gründe";
 
-        INSTRUMENTS_DISAGREE:
+        INSTRUMENTS_DISAGREE = "instruments-disagree":
             "instruments that disagree with the stones around them: {names}",
             "Instrumente, die mit den Steinen um sie nicht übereinstimmen: {names}";
 
-        INSTRUMENTS_CONTRADICTED:
+        INSTRUMENTS_CONTRADICTED = "instruments-not-used":
             "instruments with use = true contradict each other or what else is known of the datum, and are not used: look at their differences \
             in instruments.json, and correct or remove the wrong ones",
             "Instrumente mit use = true widersprechen einander oder dem, was sonst vom Datum bekannt ist, und sind nicht verwendet: ihre \
             Differenzen in instruments.json ansehen, und falsche berichtigen oder entfernen";
 
-        INSTRUMENTS_UNDETERMINED:
+        INSTRUMENTS_UNDETERMINED = "instruments-not-used":
             "instruments with use = true do not determine how the epoch lies, and nothing else is known of it: they are not used; three \
             instruments with readings along x, y and z that are not on one line determine it",
             "Instrumente mit use = true bestimmen nicht, wie die Epoche liegt, und sonst ist nichts davon bekannt: sie sind nicht verwendet; \
             drei Instrumente mit Messungen längs x, y und z, die nicht auf einer Geraden liegen, bestimmen es";
 
-        NO_MASKS:
+        NO_MASKS = "missing-masks":
             "no masks for this photo in {file}",
             "keine Masken für dieses Foto in {file}";
 
-        NO_CAMERA:
+        NO_CAMERA = "photo-without-camera":
             "no camera in {file}; the photo is left out",
             "keine Kamera in {file}; das Foto ist weggelassen";
 
-        UNUSABLE_CAMERA:
+        UNUSABLE_CAMERA = "photo-without-camera":
             "its camera cannot be used ({reason}) in {file}; the photo is left out",
             "seine Kamera in {file} ist nicht zu verwenden ({reason}); das Foto ist weggelassen";
 
-        NO_SUCH_PHOTO:
+        NO_SUCH_PHOTO = "camera-not-used":
             "camera not used: no such photo in {folder}",
             "Kamera nicht verwendet: kein solches Foto in {folder}";
 
-        CAMERA_NOT_USED:
+        CAMERA_NOT_USED = "camera-not-used":
             "camera not used: {reason}",
             "Kamera nicht verwendet: {reason}";
 
-        PHOTO_NOT_TRACKED:
+        PHOTO_NOT_TRACKED = "photo-not-tracked":
             "{error}: it does not help to measure stones",
             "{error}: es hilft nicht, Steine zu messen";
 
-        PHOTO_NOT_SHOWN:
+        PHOTO_NOT_SHOWN = "photo-not-shown":
             "the photo cannot be shown in the report: {error}",
             "das Foto ist im Bericht nicht zu zeigen: {error}";
 
-        PHOTO_SIZE:
+        PHOTO_SIZE = "photo-size":
             "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: give the photo as it was posed",
             "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: das Foto so geben, wie es orientiert wurde";
     }

@@ -6,6 +6,7 @@ use stonewise_io::cameras::Remark;
 impl From<&Remark> for Said {
     fn from(remark: &Remark) -> Self {
         Self {
+            code: None,
             english: remark.to_string(),
             german: german(remark),
         }

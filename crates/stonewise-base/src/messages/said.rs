@@ -7,6 +7,9 @@ use std::fmt;
 /// A sentence, or a value of one, that a run says in English and a report in its own language.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Said {
+    /// Name under which `docs/src/messages.md` explains the sentence; absent for values.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<String>,
     /// As a run says it.
     pub english: String,
     /// As a German report says it; absent where there are no German words.
@@ -18,6 +21,7 @@ impl Said {
     /// Numbers, written with a point before their decimals, which is a comma in German.
     pub fn numbers(english: String) -> Self {
         Self {
+            code: None,
             german: Some(english.replace('.', ",")),
             english,
         }
@@ -26,6 +30,7 @@ impl Said {
     /// Numbers one after the other: German, whose numbers hold commas, has semicolons between them.
     pub fn list(numbers: &[String]) -> Self {
         Self {
+            code: None,
             english: numbers.join(", "),
             german: Some(numbers.join("; ").replace('.', ",")),
         }
@@ -45,6 +50,7 @@ impl Said {
     pub fn about(topic: &Self, text: &Self) -> Self {
         let german = topic.german.as_ref().zip(text.german.as_ref());
         Self {
+            code: text.code.clone(),
             english: format!("{}: {}", topic.english, text.english),
             // Half a translation would be worse than none.
             german: german.map(|(topic, text)| format!("{topic}: {text}")),
@@ -61,6 +67,7 @@ impl fmt::Display for Said {
 impl From<String> for Said {
     fn from(english: String) -> Self {
         Self {
+            code: None,
             english,
             german: None,
         }

@@ -55,7 +55,7 @@ fn compare(
     let warnings = compare_clouds(project, what, &folder, printer)?;
     printer.finish();
     for doubt in warnings.iter().filter(|w| w.doubt) {
-        printer.log(&format!("DOUBT: {}: {}", doubt.subject, doubt.message));
+        printer.log(&format!("DOUBT: {}", doubt.line()));
     }
     printer.log(&format!("results: {}", folder.path().display()));
     Ok(match warnings.iter().any(|w| w.doubt) {

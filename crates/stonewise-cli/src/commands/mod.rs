@@ -10,6 +10,7 @@ mod doctor;
 mod edits;
 mod evaluate;
 mod experiment;
+mod explain;
 mod info;
 mod init;
 mod outcome;
@@ -73,6 +74,7 @@ pub fn dispatch(args: Args, printer: &Printer) -> Result<Outcome> {
         Command::Studio(args) => studio::studio(&args, printer),
         Command::Schema => schema::schema(),
         Command::Info(args) => info::info(&args),
+        Command::Explain(args) => explain::explain(&args),
         Command::Doctor => doctor::doctor(),
         Command::Completions(args) => completions::completions(&args),
         Command::Man(args) => completions::man(&args, force),

@@ -121,11 +121,11 @@ fn unfinished(out: &Path) -> String {
 /// Prints in a few lines what came out; doubts come first, and are printed with `--quiet`, too.
 pub fn tell(project: &Project, summary: &Summary, printer: &Printer) {
     for doubt in summary.doubts() {
-        note(&format!("DOUBT: {}: {}", doubt.subject, doubt.message));
+        note(&format!("DOUBT: {}", doubt.line()));
     }
     for warning in summary.warnings.iter().filter(|w| !w.doubt) {
         let word = if warning.skipped_input { "skipped" } else { "note" };
-        printer.log(&format!("{word}: {}: {}", warning.subject, warning.message));
+        printer.log(&format!("{word}: {}", warning.line()));
     }
     for (epoch, pair) in project.epochs.iter().skip(1).zip(&summary.pairs) {
         if pair.rows.is_empty() {

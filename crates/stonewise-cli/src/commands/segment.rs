@@ -93,7 +93,7 @@ pub fn segment(args: SegmentArgs, force: bool, printer: &Printer) -> Result<Outc
     )?;
     printer.finish();
     for warning in &summary.warnings {
-        printer.log(&format!("skipped: {}: {}", warning.subject, warning.message));
+        printer.log(&format!("skipped: {}", warning.line()));
     }
     printer.log(&format!(
         "{} in {}; look at {}",

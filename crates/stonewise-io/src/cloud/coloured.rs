@@ -130,6 +130,9 @@ mod tests {
         let wrong = write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, None, |p| {
             p.push(at(0), [0; 3], &[])
         });
-        assert!(wrong.is_err());
+        let wrong = wrong.unwrap_err().to_string();
+        assert!(wrong.contains("0 numbers for 1 dimensions"), "{wrong}");
+        // The file of before is kept.
+        assert_eq!(cloud_info(&path).unwrap().records, 1000);
     }
 }

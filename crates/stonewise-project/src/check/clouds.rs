@@ -284,7 +284,14 @@ mod tests {
     #[test]
     fn units_are_told_from_walls_of_other_sizes() {
         let metres = wall(1.0, 0.0);
-        for (name, unit) in UNIT_NAMES.map(|(message, metres)| (message.english, metres)) {
+        // International units: one inch is 25.4 mm (1959), a foot twelve of them.
+        let units = [
+            ("feet", 12.0 * 0.0254),
+            ("inches", 0.0254),
+            ("centimetres", 0.01),
+            ("millimetres", 0.001),
+        ];
+        for (name, unit) in units {
             let other = wall(1.0 / unit, 0.0);
             assert!(
                 unit_ratio(&metres, &other)

@@ -43,6 +43,9 @@ pub struct Finding {
     pub topic: String,
     /// What it means.
     pub verdict: Verdict,
+    /// Name under which `docs/src/messages.md` and `stonewise explain` say more of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub code: Option<String>,
     /// What was seen, and what to do about it.
     pub text: String,
     /// Topic and text in German, where there are German words.
@@ -57,6 +60,7 @@ impl Finding {
             epoch: epoch.to_owned(),
             topic: topic.english,
             verdict,
+            code: text.code,
             text: text.english,
             german,
         }
@@ -65,6 +69,7 @@ impl Finding {
     /// Topic and text in one sentence.
     pub fn said(&self) -> Said {
         Said {
+            code: self.code.clone(),
             english: format!("{}: {}", self.topic, self.text),
             german: self.german.clone(),
         }
@@ -109,13 +114,18 @@ impl Report {
         let mut text = String::new();
         for f in &self.findings {
             let epoch = if f.epoch.is_empty() { "all" } else { &f.epoch };
-            let _ = writeln!(
+            let _ = write!(
                 text,
                 "{epoch:epochs$}  {:topics$}  {:5}  {}",
                 f.topic,
                 f.verdict.word(),
                 f.text
             );
+            // A line that finds nothing wrong needs no explanation.
+            if let Some(code) = f.code.as_ref().filter(|_| f.verdict > Verdict::Fine) {
+                let _ = write!(text, " [{code}]");
+            }
+            text.push('\n');
         }
         text
     }

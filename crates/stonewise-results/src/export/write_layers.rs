@@ -21,8 +21,9 @@ use stonewise_io::mesh_ply::write_coloured_mesh;
 /// polygons and their centroids with the displacements as vectors, for ParaView. The PLY is a mesh of the
 /// stones' faces, coloured by the out-of-plane displacement, with all components as scalars. With more than
 /// two epochs, the GeoPackage has the layers of the third against the first as `stones_2` and so on; the
-/// other files are of the second epoch. Its time stamps are the date of the latest survey, so that the same
-/// inputs give the same bytes; 1 January 1970 where the project states no date.
+/// other files are of the second epoch. Its time stamps are the date of the latest survey, else the day on
+/// which the latest cloud was written, so that the same inputs give the same bytes; 1 January 1970 where
+/// neither is known.
 ///
 /// # Errors
 /// `dir` has no stone table, a result file is damaged, or a file cannot be written.
@@ -49,25 +50,23 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Midnight of the latest date that the project states.
+/// Midnight of the latest date that the project states, else of the latest that a cloud carries.
 fn surveyed(results: &ResultSet) -> Timestamp {
-    let dates = results
-        .run
-        .iter()
-        .flat_map(|run| &run.epochs)
-        .filter_map(|e| e.date.as_deref());
-    let latest = dates
-        .max()
-        .and_then(|day| format!("{day}T00:00:00.000Z").parse().ok());
-    latest.unwrap_or(Timestamp::EPOCH)
+    let epochs = || results.run.iter().flat_map(|run| &run.epochs);
+    let stated = epochs().filter_map(|epoch| epoch.date.as_deref()).max();
+    let clouds = epochs().flat_map(|epoch| &epoch.clouds);
+    let latest = stated.or_else(|| clouds.filter_map(|cloud| cloud.written.as_deref()).max());
+    let midnight = latest.and_then(|day| format!("{day}T00:00:00.000Z").parse().ok());
+    midnight.unwrap_or(Timestamp::EPOCH)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::testing::{folder, rows};
-    use crate::{STONE_COLUMNS, write_stones};
+    use crate::{STONE_COLUMNS, StoneRow, write_stones};
     use serde_json::Value;
+    use stonewise_io::layers::read_polygons;
 
     #[test]
     fn all_layers_are_written_again_with_the_same_bytes() {
@@ -99,16 +98,28 @@ mod tests {
 
     #[test]
     fn a_run_without_stones_or_motions_has_layers_too() {
-        write_layers(folder(&[]).path()).unwrap();
+        let stones = |rows: &[StoneRow]| {
+            let folder = folder(rows);
+            write_layers(folder.path()).unwrap();
+            let json = std::fs::read(folder.path().join(GEOJSON)).unwrap();
+            let json: Value = serde_json::from_slice(&json).unwrap();
+            json["features"].as_array().unwrap().clone()
+        };
+        assert_eq!(stones(&[]), [Value::Null; 0]);
         let mut unmatched = rows();
         unmatched.iter_mut().for_each(|r| r.motion = None);
-        write_layers(folder(&unmatched).path()).unwrap();
+        let stones = stones(&unmatched);
+        assert_eq!(stones.len(), 24);
+        assert!(stones.iter().all(|s| s["properties"]["d_out"] == Value::Null));
     }
 
     #[test]
     fn further_epochs_are_written_too() {
         let folder = folder(&rows());
-        write_stones(folder.path(), 2, &rows()).unwrap();
+        write_stones(folder.path(), 2, &rows()[..5]).unwrap();
         write_layers(folder.path()).unwrap();
+        let package = folder.path().join(GEOPACKAGE);
+        let stones = |layer: &str| read_polygons(&package, layer).unwrap().len();
+        assert_eq!((stones("stones"), stones("stones_2")), (24, 5));
     }
 }

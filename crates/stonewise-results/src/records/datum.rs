@@ -138,6 +138,7 @@ impl Datum {
     /// [`Self::note`] in the languages that there are words of it in.
     pub fn said(&self) -> Said {
         Said {
+            code: Some("datum".to_owned()),
             english: self.note.clone(),
             german: self.german.clone(),
         }

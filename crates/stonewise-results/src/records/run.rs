@@ -108,6 +108,9 @@ pub struct InputRecord {
     pub bytes: u64,
     /// Digest of its content.
     pub blake3: String,
+    /// The day on which it was written, where it says so: `YYYY-MM-DD`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub written: Option<String>,
 }
 
 /// Time and memory of one step.

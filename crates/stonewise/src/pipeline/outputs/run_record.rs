@@ -14,6 +14,7 @@ use crate::storage::step::code_version;
 use std::collections::BTreeMap;
 use std::path::Path;
 use stonewise_core::epoch::EpochId;
+use stonewise_io::cloud::{Created, cloud_date};
 
 /// Writes `run.json`, once everything is known that it tells.
 pub static RECORD: Step = Step {
@@ -82,7 +83,11 @@ fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
         name: epoch.name.clone(),
         date: epoch.date.clone(),
         conditions: epoch.conditions.clone(),
-        clouds: epoch.clouds.iter().map(|c| input(c)).collect::<Result<_>>()?,
+        clouds: epoch
+            .clouds
+            .iter()
+            .map(|c| cloud(context, c))
+            .collect::<Result<_>>()?,
         cameras: epoch.photos.as_ref().map(|p| input(&p.cameras)).transpose()?,
         masks: epoch.masks.as_deref().map(input).transpose()?,
         images: epoch.photos.as_ref().map(|p| p.images.clone()),
@@ -93,10 +98,21 @@ fn epoch_record(run: &Run, id: EpochId) -> Result<EpochRecord> {
     })
 }
 
+fn cloud(context: &Context, path: &Path) -> Result<InputRecord> {
+    Ok(InputRecord {
+        written: match cloud_date(path)? {
+            Some(Created::Day(day)) => Some(day),
+            Some(Created::Gps(_)) | None => None,
+        },
+        ..input(context, path)?
+    })
+}
+
 fn input(context: &Context, path: &Path) -> Result<InputRecord> {
     Ok(InputRecord {
         path: path.to_path_buf(),
         bytes: std::fs::metadata(path).map_err(Error::io("reading", path))?.len(),
         blake3: context.digest(path)?,
+        written: None,
     })
 }
