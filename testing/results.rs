@@ -26,6 +26,7 @@ pub fn run_record(project: &str, epochs: &[&str]) -> RunRecord {
         path: path.into(),
         bytes: 123_456,
         blake3: "0".repeat(64),
+        written: None,
     };
     let epoch = |name: &&str| EpochRecord {
         name: (*name).to_owned(),

@@ -409,6 +409,7 @@ fn write_records(dir: &Path, case: &str, language: &str) -> Result<(), Box<dyn s
         warnings: vec![stonewise::Warning {
             step: "segment".to_owned(),
             subject: "<script>.jpg".to_owned(),
+            code: None,
             message: "cut off: \"'&".to_owned(),
             german: None,
             skipped_input: true,
