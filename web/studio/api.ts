@@ -117,6 +117,34 @@ export interface NewEdits {
   readonly id: string;
 }
 
+/** `POST /remarks`: a remark on a stone, on a zone of deformation, or on the wall. */
+export interface NewRemark {
+  /** Name of the later epoch whose report prints it; empty: every report. */
+  readonly epoch: string;
+  /** The stone. */
+  readonly stone?: number | null;
+  /** What is said. */
+  readonly text: string;
+  /** Who makes it. */
+  readonly who: string;
+  /** The zone; with neither, it is about the wall. */
+  readonly zone?: number | null;
+}
+
+/** `POST /signature`. */
+export interface NewSignature {
+  /** Where; may be empty. */
+  readonly place: string;
+  /** Who signs. */
+  readonly who: string;
+}
+
+/** `DELETE /remarks`: the remark that was made at this time. */
+export interface OldRemark {
+  /** When it was made, as the list has it. */
+  readonly when: string;
+}
+
 /** What the step at work is at. */
 export interface PartShown {
   /** Which unit, such as a photo. */
@@ -158,6 +186,22 @@ export interface ProposalShown {
   readonly text: string;
 }
 
+/** A remark. */
+export interface RemarkShown {
+  /** What it says, and of what. */
+  readonly said: NewRemark;
+  /** When it was made, ISO 8601. */
+  readonly when: string;
+}
+
+/** `GET /remarks`, and the answer to every change of them. */
+export interface RemarksShown {
+  /** In the order in which they were made. */
+  readonly remarks: readonly (RemarkShown)[];
+  /** Who signed. */
+  readonly signature?: SignatureShown | null;
+}
+
 /** A run, as pages show it. */
 export interface RunShown {
   /** Why the results as a whole are in doubt, one sentence each. */
@@ -178,6 +222,18 @@ export interface RunShown {
   readonly skipped: readonly (string)[];
   /** Its steps in order. */
   readonly steps: readonly (StepShown)[];
+}
+
+/** A signature. */
+export interface SignatureShown {
+  /** Whether it is under the results as they are now. */
+  readonly holds: boolean;
+  /** Where. */
+  readonly place: string;
+  /** When, ISO 8601. */
+  readonly when: string;
+  /** Who signed. */
+  readonly who: string;
 }
 
 /** `GET /state`, and every event of `GET /events`. */

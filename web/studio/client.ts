@@ -1,6 +1,6 @@
 // The way to the server: requests, and the state that it keeps telling.
 
-import type { EditsShown, MistakeShown, NewEdits, ProjectChanges, ProjectShown, State } from "./api.ts";
+import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State } from "./api.ts";
 
 /** What the server says of a request that it refuses. */
 export class Refused extends Error {
@@ -12,14 +12,19 @@ export class Refused extends Error {
   }
 }
 
-async function call<T>(method: "GET" | "POST" | "PATCH" | "DELETE", path: string, body?: unknown): Promise<T> {
+type Method = "GET" | "POST" | "PATCH" | "DELETE";
+
+async function call<T>(method: Method, path: string, body?: unknown): Promise<T> {
+  return (await send(method, path, body)).json() as Promise<T>;
+}
+
+async function send(method: Method, path: string, body?: unknown): Promise<Response> {
   const response = await fetch(`/api/v1${path}`, {
     method,
     ...(method === "GET" ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body ?? {}) }),
   });
-  const answer: unknown = await response.json();
-  if (response.ok) return answer as T;
-  const mistake = answer as Partial<MistakeShown>;
+  if (response.ok) return response;
+  const mistake = await response.json() as Partial<MistakeShown>;
   throw new Refused({ message: mistake.message ?? response.statusText, line: mistake.line ?? null, way: mistake.way ?? [] });
 }
 
@@ -34,6 +39,12 @@ export const server = {
   edits: () => call<EditsShown>("GET", "/edits"),
   edit: (edits: NewEdits) => again(() => call<EditsShown>("POST", "/edits", edits)),
   undo: (id: string) => again(() => call<EditsShown>("POST", "/edits/undo", { id })),
+  remarks: () => call<RemarksShown>("GET", "/remarks"),
+  remark: (said: NewRemark) => call<RemarksShown>("POST", "/remarks", said),
+  unremark: (old: OldRemark) => call<RemarksShown>("DELETE", "/remarks", old),
+  sign: (signature: NewSignature) => call<RemarksShown>("POST", "/signature", signature),
+  unsign: () => call<RemarksShown>("DELETE", "/signature"),
+  pdf: async () => (await send("POST", "/pdf")).blob(),
   redo: (id: string) => again(() => call<EditsShown>("POST", "/edits/redo", { id })),
 };
 

@@ -2,6 +2,7 @@
 
 import { el } from "../src/dom.ts";
 import type { Page } from "./page.ts";
+import { remarksPanel } from "./remarks.ts";
 import { tx } from "./texts.ts";
 
 export const resultsPage: Page = (place, live, until) => {
@@ -9,7 +10,8 @@ export const resultsPage: Page = (place, live, until) => {
   const outdated = el("p", { class: "banner soft", hidden: true }, tx("outdated"));
   const link = el("a", { href: "/report/index.html", target: "_blank", rel: "noopener", class: "own-tab" }, tx("ownTab"));
   let frame: HTMLIFrameElement | null = null, version: string | null | undefined;
-  place.append(outdated, note, link);
+  const said = el("div");
+  place.append(outdated, note, link, said);
   live.watch((state) => {
     outdated.hidden = !(state.is_outdated && state.report);
     link.hidden = note.hidden = false;
@@ -18,6 +20,7 @@ export const resultsPage: Page = (place, live, until) => {
     note.textContent = tx("noResults");
     if (state.report === version) return;
     version = state.report;
+    if (version && !said.hasChildNodes()) void remarksPanel(state.view).then((panel) => said.replaceChildren(panel));
     frame?.remove();
     frame = null;
     if (!version) return;

@@ -151,6 +151,23 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   assert.deepEqual(await findings(page), [], "results");
   await shot(page, "6-results");
 
+  // A remark, a signature, the report on paper.
+  await page.click("summary:has-text('Remarks, signature, PDF')");
+  const panel = page.locator(".remarks-panel");
+  await panel.locator("textarea").fill("Looked at from the crest: sound.");
+  await panel.locator(".signed label:first-child input").fill("A. Keller");
+  await panel.locator(".signed label:last-child input").fill("Lower dam");
+  await panel.locator("text=Add remark").click();
+  await panel.locator(".remarks li:has-text('the wall Looked at from the crest')").waitFor();
+  await panel.locator("button:text-is('Sign')").click();
+  await panel.locator("text=/Signed by A. Keller, Lower dam/").waitFor();
+  await report.locator(".sign b:has-text('A. Keller')").waitFor();
+  await report.locator(".remarks li:has-text('sound.')").waitFor();
+  assert.deepEqual(await findings(page), [], "remarks");
+  await shot(page, "6-signed");
+  const [paper] = await Promise.all([page.waitForEvent("download"), panel.locator("text=Make the PDF").click()]);
+  assert.equal(readFileSync(await paper.path()).subarray(0, 5).toString(), "%PDF-");
+
   // Corrections: join two, split one, draw one, take one back.
   await page.click("nav >> text=Stones");
   await page.waitForSelector(".face canvas[data-drawn]");

@@ -55,10 +55,11 @@ mod tests {
     use stonewise_base::warnings::Warning;
     use stonewise_core::evaluate::{Evaluation, EvaluationParams, score_motions};
     use stonewise_core::series::SeriesAnswers;
-    use stonewise_results::names::{RUN, TRENDS, VERDICT};
+    use stonewise_results::names::{REMARKS, RUN, TRENDS, VERDICT};
     use stonewise_results::records::{
-        Datum, EpochVerdict, EstimateRecord, EstimatorRecord, PathPoint, RegistrationRecord, RunRecord,
-        SeriesVerdict, StepTime, TRENDS_VERSION, TrendsRecord, Verdict, ZoneTrend,
+        Datum, EpochVerdict, EstimateRecord, EstimatorRecord, PathPoint, RegistrationRecord, Remark, Remarks,
+        RunRecord, SeriesVerdict, Signature, StepTime, TRENDS_VERSION, Timestamp, TrendsRecord, Verdict,
+        ZoneTrend, signed_digest,
     };
     use stonewise_results::{Status, StoneRow, write_logo, write_outlines, write_stones};
 
@@ -118,6 +119,49 @@ mod tests {
             }
         }
         assert!(open.is_empty(), "{open:?}");
+    }
+
+    #[test]
+    fn remarks_and_a_signature_are_printed_while_it_holds() {
+        let folder = folder(&rows());
+        write_json(&folder.path().join(RUN), &run_record("Wall", &["A", "B"])).unwrap();
+        let page = || std::fs::read_to_string(write_report(folder.path()).unwrap()).unwrap();
+        assert!(page().contains("<p>Assessed by</p>"));
+        let remark = |epoch: &str, text: &str| Remark {
+            stone: Some(8),
+            zone: None,
+            epoch: epoch.to_owned(),
+            who: "A. <Bell>".to_owned(),
+            when: Timestamp::EPOCH,
+            text: text.to_owned(),
+        };
+        let remarks = Remarks {
+            remarks: vec![
+                remark("B", "looked at & found sound"),
+                remark("C", "of another epoch"),
+            ],
+            signature: Some(Signature {
+                who: "A. <Bell>".to_owned(),
+                place: "Lower dam".to_owned(),
+                when: Timestamp::EPOCH,
+                blake3: signed_digest(folder.path()).unwrap(),
+            }),
+        };
+        write_json(&folder.path().join(REMARKS), &remarks).unwrap();
+        let signed = page();
+        check_nesting(&signed);
+        for words in [
+            "<b>A. &lt;Bell&gt;</b><br>Assessed by",
+            "<b>Lower dam, 1970-01-01</b>",
+            "<li><b>Stone 8</b>: looked at &amp; found sound",
+        ] {
+            assert!(signed.contains(words), "{words}");
+        }
+        assert!(!signed.contains("of another epoch"));
+        write_stones(folder.path(), 1, &rows()[..20]).unwrap();
+        let changed = page();
+        assert!(changed.contains("signed other results on 1970-01-01"));
+        assert!(changed.contains("<p>Assessed by</p>"));
     }
 
     #[test]
@@ -203,6 +247,7 @@ mod tests {
         run.warnings = vec![Warning {
             step: "label".to_owned(),
             subject: "<script>.jpg".to_owned(),
+            code: None,
             message: "'&'".to_owned(),
             german: None,
             skipped_input: true,

@@ -1,9 +1,13 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit};
+use super::names::{
+    CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, REMARKS, RUN, TRENDS, VERDICT, audit,
+};
 use super::outlines::{StoneOutline, read_outlines};
-use super::records::{Datum, InstrumentsRecord, RegistrationRecord, RunRecord, TrendsRecord, Verdict};
+use super::records::{
+    Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict, signed_digest,
+};
 use super::stone_table::read_stones;
 use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -61,6 +65,10 @@ pub struct ResultSet {
     /// Stones that were looked for in epochs whose photos do not show them, from `audit_carried.csv`: its head
     /// and one row for each stone and epoch; empty where there are none.
     pub carried: Vec<Vec<String>>,
+    /// `remarks.json`; empty where nobody wrote it.
+    pub remarks: Remarks,
+    /// Whether the signature in it is under these results.
+    pub is_signed: bool,
     /// Excerpts of the survey; empty where the folder is missing.
     pub evidence: Evidence,
     /// The unrolled wall.
@@ -81,7 +89,14 @@ impl ResultSet {
     /// # Errors
     /// There is no stone table of this pair, or a file is damaged.
     pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, Error> {
+        let remarks: Remarks = read_json(&dir.join(REMARKS))?.unwrap_or_default();
+        let is_signed = match &remarks.signature {
+            Some(signature) => signature.blake3 == signed_digest(dir)?,
+            None => false,
+        };
         Ok(Self {
+            remarks,
+            is_signed,
             verdict: read_json(&dir.join(VERDICT))?,
             trends: read_json(&dir.join(TRENDS))?,
             velocities: read_velocities(dir)?,
@@ -128,6 +143,8 @@ impl ResultSet {
             decisions: Vec::new(),
             edits: Vec::new(),
             carried: Vec::new(),
+            remarks: Remarks::default(),
+            is_signed: false,
             evidence: Evidence::default(),
         })
     }

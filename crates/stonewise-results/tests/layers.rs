@@ -3,11 +3,10 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 7] = [
-    &["calendar"],
+    &["calendar", "names"],
     &[
         "change_points",
         "facade",
-        "names",
         "records",
         "squares",
         "statistics",

@@ -19,6 +19,7 @@ mod http;
 mod journal;
 mod place;
 mod project_text;
+mod remarks;
 mod studio;
 mod work;
 

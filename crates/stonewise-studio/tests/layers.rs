@@ -3,7 +3,15 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 4] = [
-    &["elsewhere", "http", "journal", "place", "project_text", "work"],
+    &[
+        "elsewhere",
+        "http",
+        "journal",
+        "place",
+        "project_text",
+        "remarks",
+        "work",
+    ],
     &["assets", "epochs", "guard"],
     &["api"],
     &["studio"],

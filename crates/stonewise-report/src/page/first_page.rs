@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use stonewise_base::report_params::Language;
 use stonewise_figure::{count, escape};
-use stonewise_results::records::{Datum, DatumState, EpochRecord, State};
+use stonewise_results::records::{Datum, DatumState, EpochRecord, Remark, Signature, State};
 use stonewise_results::{ResultSet, Status};
 
 /// Logo and kind of the document.
@@ -130,17 +130,78 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
     format!(
         "<div class=\"statement\"><div class=\"first\"><p class=\"limit\">{}</p><h3>{}</h3>{}</div><div class=\"first rest\"><h3>{}</h3>{}</div>\
          <div class=\"beside\">{map}{}</div></div>\
-         <div class=\"sign\"><p>{}</p><p>{}</p><p>{}</p></div>",
+         {}",
         limit(facts),
         page.look_first,
         look_first(results, facts),
         page.not_measured,
         not_measured(facts),
         zones(facts),
-        page.assessor,
-        page.place_date,
-        page.signature
+        signature(results, facts)
     )
+}
+
+/// The place to sign, or who signed; a signature under other results does not count.
+fn signature(results: &ResultSet, facts: &Summary) -> String {
+    let page = &facts.texts().page;
+    let given = results.remarks.signature.as_ref();
+    let day = |of: &Signature| of.when.to_string()[..10].to_owned();
+    let line = |name: &str, value: String| match value.as_str() {
+        "" => format!("<p>{name}</p>"),
+        value => format!("<p><b>{}</b><br>{name}</p>", escape(value)),
+    };
+    let block = |[who, place, mark]: [String; 3]| {
+        let lines = line(page.assessor, who) + &line(page.place_date, place) + &line(page.signature, mark);
+        format!("<div class=\"sign\">{lines}</div>")
+    };
+    match given {
+        Some(of) if results.is_signed => {
+            let mark = fill(page.signed, &[("digest", &of.blake3[..12.min(of.blake3.len())])]);
+            let place = [of.place.as_str(), &day(of)];
+            let place = place
+                .into_iter()
+                .filter(|part| !part.is_empty())
+                .collect::<Vec<_>>();
+            block([of.who.clone(), place.join(", "), mark])
+        }
+        Some(of) => {
+            let values = [("who", escape(&of.who)), ("day", day(of))];
+            let values = values.each_ref().map(|(name, value)| (*name, value.as_str()));
+            let note = fill(page.signed_others, &values);
+            format!(
+                "<p class=\"datum\">{note}</p>{}",
+                block([const { String::new() }; 3])
+            )
+        }
+        None => block([const { String::new() }; 3]),
+    }
+}
+
+/// What people remarked on this pair of epochs; empty where nobody did.
+pub(super) fn remarks(results: &ResultSet, facts: &Summary) -> String {
+    let page = &facts.texts().page;
+    let epochs = results.run.as_ref().map(|run| &run.epochs);
+    let epoch = epochs.and_then(|epochs| epochs.get(results.pair));
+    let is_here =
+        |remark: &&Remark| remark.epoch.is_empty() || epoch.is_none_or(|epoch| epoch.name == remark.epoch);
+    let one = |remark: &Remark| {
+        let about = match (remark.stone, remark.zone) {
+            (Some(stone), _) => format!("{} {stone}", page.stone),
+            (None, Some(zone)) => format!("{} {zone}", page.zone),
+            (None, None) => page.wall.to_owned(),
+        };
+        format!(
+            "<li><b>{about}</b>: {} <span class=\"note\">({}, {})</span></li>",
+            escape(&remark.text),
+            escape(&remark.who),
+            remark.when.minute()
+        )
+    };
+    let items: String = results.remarks.remarks.iter().filter(is_here).map(one).collect();
+    match items.as_str() {
+        "" => String::new(),
+        items => format!("<h3>{}</h3><ul class=\"remarks\">{items}</ul>", page.remarks),
+    }
 }
 
 /// The detection limit in plain words.

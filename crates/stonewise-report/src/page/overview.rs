@@ -16,6 +16,7 @@ const MAX_ROWS: usize = 25;
 pub(super) fn summary(results: &ResultSet, facts: &Summary) -> String {
     let mut out = tiles(facts);
     out.push_str(&first_page::body(results, facts));
+    out.push_str(&first_page::remarks(results, facts));
     let _ = write!(
         out,
         "<h3 class=\"numbers\">{}</h3>",

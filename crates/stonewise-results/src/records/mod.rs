@@ -3,6 +3,7 @@
 mod datum;
 mod instruments;
 mod registration;
+mod remarks;
 mod run;
 mod timestamp;
 mod trends;
@@ -17,6 +18,7 @@ pub use registration::{
     AdjustmentRecord, DeformationRecord, EstimatorRecord, GicpRecord, ObserversRecord, PhotosRecord,
     RegistrationRecord,
 };
+pub use remarks::{Remark, Remarks, Signature, signed_digest};
 pub use run::{CrsRecord, EpochRecord, InputRecord, ProjectRecord, RunRecord, StepTime};
 pub use timestamp::Timestamp;
 pub use trends::{

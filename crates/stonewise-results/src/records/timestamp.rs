@@ -29,6 +29,12 @@ impl Timestamp {
         }
     }
 
+    /// The moment a millisecond later.
+    #[must_use]
+    pub fn next(self) -> Self {
+        Self { ms: self.ms + 1 }
+    }
+
     /// The minute, for people: `2026-04-30 12:00 UTC`.
     pub fn minute(&self) -> String {
         let text = self.to_string();

@@ -12,6 +12,7 @@ use crate::http::{Body, Head, Method, Request, Response, Site};
 use crate::journal::Journal;
 use crate::place::Place;
 use crate::project_text::{self, Mistake, Step};
+use crate::remarks;
 use crate::work::{Phase, Run};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -192,6 +193,21 @@ impl Api {
             (Post, "/edits") => self.add_edits(body(request)?),
             (Post, "/edits/undo") => self.act(&body(request)?, Journal::undo),
             (Post, "/edits/redo") => self.act(&body(request)?, Journal::redo),
+            (Get, "/remarks") => self.remarks(),
+            (Post, "/remarks") => {
+                let new = body(request)?;
+                self.say(|results| remarks::add(results, new))
+            }
+            (Delete, "/remarks") => {
+                let old = body(request)?;
+                self.say(|results| remarks::remove(results, &old))
+            }
+            (Post, "/signature") => {
+                let new = body(request)?;
+                self.say(|results| remarks::sign(results, new))
+            }
+            (Delete, "/signature") => self.say(remarks::unsign),
+            (Post, "/pdf") => self.pdf(),
             (Get, call) => self.picture(call),
             _ => Err(unknown()),
         }
@@ -237,6 +253,23 @@ impl Api {
         let epoch = project.epochs.get(number).ok_or_else(unknown)?;
         let jpeg = picture(epoch, &self.place).ok_or_else(unknown)?;
         Ok(Response::new(200, "image/jpeg", Body::Bytes(jpeg.into())))
+    }
+
+    fn remarks(&self) -> Answer {
+        let shown = remarks::shown(&self.place.results).map_err(|e| failed(&e))?;
+        Ok(Response::json(200, &shown))
+    }
+
+    /// Changes what is said of the results.
+    fn say(&self, change: impl FnOnce(&Path) -> stonewise::Result<()>) -> Answer {
+        change(&self.place.results).map_err(|e| failed(&e))?;
+        self.run.touch();
+        self.remarks()
+    }
+
+    fn pdf(&self) -> Answer {
+        let bytes = remarks::pdf(&self.place.results).map_err(|e| failed(&e))?;
+        Ok(Response::new(200, "application/pdf", Body::Bytes(bytes.into())))
     }
 
     fn project_path(&self) -> Result<&Path, Response> {

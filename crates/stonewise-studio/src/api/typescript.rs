@@ -1,6 +1,7 @@
 //! The types of the API in TypeScript, from their JSON schema.
 
 use super::types::{Act, EditsShown, NewEdits, ProjectChanges, ProjectShown, State};
+use crate::remarks::{NewSignature, OldRemark, RemarksShown};
 use schemars::SchemaGenerator;
 use serde_json::{Map, Value};
 use std::fmt::Write;
@@ -14,6 +15,9 @@ pub fn typescript() -> String {
     generator.subschema_for::<EditsShown>();
     generator.subschema_for::<NewEdits>();
     generator.subschema_for::<Act>();
+    generator.subschema_for::<RemarksShown>();
+    generator.subschema_for::<OldRemark>();
+    generator.subschema_for::<NewSignature>();
     let mut text =
         "// Made from the types of crates/stonewise-studio; a cargo test writes and compares it.\n"
             .to_owned();
