@@ -37,12 +37,12 @@ export async function remarksPanel(view: boolean): Promise<HTMLElement> {
   };
   const show = ({ remarks, signature: signed }: RemarksShown): void => {
     list.replaceChildren(...remarks.map(({ said, when }) => {
-      const subject = said.stone != null ? tx("stone", { id: said.stone }) : said.zone != null ? tx("zoneNumber", { id: said.zone }) : tx("about_wall");
+      const subject = said.stone != null ? tx("stone", { id: said.stone }) : said.zone != null ? tx("zoneNumber", { id: said.zone }) : tx("wholeWall");
       const remove = button("✕", tx("removeRemark", { subject }), () => void act(() => server.unremark({ when })));
-      return el("li", {}, el("b", {}, subject), ` ${said.text} `, el("small", {}, `${said.who}, ${day(when)}`), view ? null : remove);
+      return el("li", {}, el("b", {}, subject), `: ${said.text} `, el("small", {}, `${said.who}, ${day(when)}`), view ? null : remove);
     }));
     list.hidden = remarks.length === 0;
-    const values = signed ? { who: signed.who, place: signed.place, day: day(signed.when) } : {};
+    const values = signed ? { who: signed.who, day: day(signed.when), at: [signed.place, day(signed.when)].filter((part) => part).join(", ") } : {};
     signature.textContent = tx(signed ? (signed.holds ? "signedBy" : "signedOthers") : "notSigned", values);
     unsign.hidden = view || !signed;
   };

@@ -158,7 +158,7 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   await panel.locator(".signed label:first-child input").fill("A. Keller");
   await panel.locator(".signed label:last-child input").fill("Lower dam");
   await panel.locator("text=Add remark").click();
-  await panel.locator(".remarks li:has-text('the wall Looked at from the crest')").waitFor();
+  await panel.locator(".remarks li:has-text('Wall: Looked at from the crest')").waitFor();
   await panel.locator("button:text-is('Sign')").click();
   await panel.locator("text=/Signed by A. Keller, Lower dam/").waitFor();
   await report.locator(".sign b:has-text('A. Keller')").waitFor();
