@@ -16,6 +16,7 @@ mod bytes;
 mod carry;
 mod depth;
 mod depth_bounds;
+mod drop_stones;
 mod each_tile;
 mod edit;
 mod election;
@@ -46,6 +47,7 @@ pub use carry::{
     CarriedStone, CarryParams, CarryReport, JoinReport, Joined, NotCarried, PlacedShape, Shown, StoneShape,
     Whole, carry_labels, join_parts, photos_facing, stone_shapes,
 };
+pub use drop_stones::drop_stones;
 pub use edit::{EditEffect, EditReport, EditedWall, LabelEdit, NoEffect, edit_labels};
 pub use election::Election;
 pub use error::TransferError;

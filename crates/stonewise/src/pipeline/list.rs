@@ -19,6 +19,7 @@ pub static STEPS: &[&Step] = &[
     &steps::label::STONES,
     &steps::join::JOIN,
     &steps::carry::CARRY,
+    &steps::confirm::CONFIRM,
     &steps::edit::EDIT,
     &outputs::audits::AUDITS,
     &outputs::outlines::OUTLINES,

@@ -4,6 +4,7 @@ mod align;
 pub mod carry;
 pub mod change;
 pub mod check;
+pub mod confirm;
 pub mod edit;
 pub mod evaluate;
 pub mod ingest;

@@ -7,7 +7,7 @@
 mod boxes;
 mod photo_places;
 
-use super::carry::CARRY;
+use super::confirm::CONFIRM;
 use super::label::{DiskLabels, Labelled, Labels, last_number, tabulate};
 use super::stone_outlines::make_outlines;
 use crate::edits::EditsFile;
@@ -33,7 +33,7 @@ use stonewise_core::transfer::{
 pub static EDIT: Step = Step {
     name: "edit",
     words: |_| "edits by hand",
-    needs: &[Need::all(&CARRY)],
+    needs: &[Need::all(&CONFIRM)],
     wanted: |until| until >= Until::Labelled,
     applies: |project, _| project.edits.is_some(),
     cost: Some(|sizes, _| Cost::of(1, 2 * sizes.every_pair_bytes())),
@@ -65,7 +65,7 @@ impl Run<'_> {
     pub fn corrected(&self) -> Result<Arc<Corrected>> {
         self.once(&EDIT, EpochId::REFERENCE, || {
             let epochs = self.context.project.epochs.ids();
-            let labelled = epochs.map(|epoch| Ok(Arc::clone(&self.carried(epoch)?.labelled)));
+            let labelled = epochs.map(|epoch| self.confirmed(epoch));
             edit(self, labelled.collect::<Result<Vec<_>>>()?.into())
         })
     }

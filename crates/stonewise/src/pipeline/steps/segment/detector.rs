@@ -7,6 +7,7 @@ use crate::pipeline::context::Context;
 use crate::pipeline::graph::Run;
 use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::Ingested;
+use crate::pipeline::steps::views::has_no_photos;
 use crate::project::Epoch;
 use crate::storage::step::{Key, StepDir};
 use crate::texts::Said;
@@ -14,10 +15,12 @@ use crate::texts::notices::PHOTO_SIZE;
 use crate::warnings::Warnings;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::View;
+use stonewise_core::raster::RgbImage;
 use stonewise_core::transfer::photo_relief;
 use stonewise_io::image_io::read_rgb;
 use stonewise_io::masks::write_label_png;
@@ -34,6 +37,7 @@ pub struct Detection<'a> {
     context: &'a Context<'a>,
     /// With photos, or with views in their place.
     epoch: Arc<Epoch>,
+    is_of_views: bool,
     name: String,
     key: Key,
     weights: Weights,
@@ -83,6 +87,7 @@ impl<'a> Detection<'a> {
         Ok(Self {
             context,
             epoch,
+            is_of_views: has_no_photos(context.project, id),
             name: format!("{STEP}-{id}"),
             key: Key::new(STEP, &params.tiling, &digests),
             weights,
@@ -199,7 +204,10 @@ impl<'a> Detection<'a> {
             }
             None => None,
         };
-        let stones = segment_photo(self.detector()?, &image, relief.as_ref(), tiling, progress)?;
+        let mut stones = segment_photo(self.detector()?, &image, relief.as_ref(), tiling, progress)?;
+        if self.is_of_views {
+            drop_empty(&mut stones, &image);
+        }
         write_label_png(&part.file(LABELS), &stones.labels)?;
         Ok(Outcome {
             instances: Some(instances(&stones)),
@@ -235,6 +243,24 @@ fn no_masks(context: &Context, epoch: &Epoch, error: &impl std::fmt::Display) ->
     ))
 }
 
+/// Takes away what a view does not show, such as level ground, which is black: the detector sees its relief all the
+/// same. An instance of which most goes is no stone.
+fn drop_empty(stones: &mut Segmentation, view: &RgbImage) {
+    let is_empty = |pixel: &[u8; 3]| *pixel == [0; 3];
+    let mut counts: BTreeMap<u32, [usize; 2]> = BTreeMap::new();
+    for (id, pixel) in stones.labels.data().iter().zip(view.data()) {
+        counts.entry(*id).or_default()[usize::from(is_empty(pixel))] += 1;
+    }
+    stones
+        .scores
+        .retain(|id, _| counts.get(id).is_some_and(|[shown, empty]| shown >= empty));
+    for (id, pixel) in stones.labels.data_mut().iter_mut().zip(view.data()) {
+        if is_empty(pixel) || !stones.scores.contains_key(id) {
+            *id = 0;
+        }
+    }
+}
+
 fn instances(stones: &Segmentation) -> Vec<Instance> {
     let instance = |(&id, &score): (&u32, &f32)| Instance {
         id,
@@ -242,4 +268,23 @@ fn instances(stones: &Segmentation) -> Vec<Instance> {
         stone_ref: None,
     };
     stones.scores.iter().map(instance).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stonewise_core::raster::Raster;
+
+    #[test]
+    fn what_a_view_leaves_black_is_no_stone() {
+        // A stone on the wall, one that reaches over its foot, and one on the ground.
+        let mut stones = Segmentation {
+            labels: Raster::from_vec(4, 3, vec![1, 1, 2, 2, 1, 1, 2, 0, 3, 3, 2, 0]).unwrap(),
+            scores: [1, 2, 3].map(|id| (id, 0.9)).into(),
+        };
+        let view = (0..12).map(|at| if at < 8 { [90; 3] } else { [0; 3] }).collect();
+        drop_empty(&mut stones, &Raster::from_vec(4, 3, view).unwrap());
+        assert_eq!(stones.labels.data(), [1, 1, 2, 2, 1, 1, 2, 0, 0, 0, 0, 0]);
+        assert_eq!(stones.scores.into_keys().collect::<Vec<u32>>(), [1, 2]);
+    }
 }

@@ -1,0 +1,67 @@
+//! Stones that turned out to be none.
+
+use super::{LabelStore, TransferError};
+use crate::cloud::TileSource;
+use crate::progress::Progress;
+use std::collections::BTreeSet;
+
+/// Takes the labels of these stones off all points; labels of tiles that change go to `target`. Which tiles these are.
+///
+/// Cost: one pass over the labels.
+///
+/// # Errors
+/// Labels of a tile cannot be read or written, interruption.
+pub fn drop_stones<T: TileSource, S: LabelStore>(
+    tiles: &T,
+    labels: &S,
+    target: &mut S,
+    stones: &BTreeSet<u32>,
+    progress: &dyn Progress,
+) -> Result<BTreeSet<usize>, TransferError> {
+    let mut changed = BTreeSet::new();
+    progress.each(
+        "stones that are none",
+        0..tiles.tile_count(),
+        |tile| -> Result<(), TransferError> {
+            let mut table = labels.read(tile).map_err(|e| TransferError::labels(tile, e))?;
+            for stone in table.stone.iter_mut().filter(|stone| stones.contains(stone)) {
+                *stone = 0;
+                changed.insert(tile);
+            }
+            if changed.contains(&tile) {
+                target
+                    .write(tile, &table)
+                    .map_err(|e| TransferError::labels(tile, e))?;
+            }
+            Ok(())
+        },
+    )?;
+    Ok(changed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{MemoryLabels, TileLabels};
+    use super::*;
+    use crate::cloud::{Cloud, MemoryTiles};
+    use crate::progress::Silent;
+    use nalgebra::Point3;
+
+    #[test]
+    fn only_tiles_that_hold_a_dropped_stone_are_written() {
+        let cloud = || Cloud::from_world(Point3::origin(), vec![Point3::origin(); 3]);
+        let tiles = MemoryTiles::new(vec![cloud(), cloud()]);
+        let labels = |stone: [u32; 3]| TileLabels {
+            stone: stone.to_vec(),
+            confidence: vec![0.5; 3],
+            seen: vec![true; 3],
+        };
+        let store = MemoryLabels {
+            tiles: vec![labels([4, 0, 5]), labels([5, 7, 4])],
+        };
+        let mut target = MemoryLabels::default();
+        let changed = drop_stones(&tiles, &store, &mut target, &BTreeSet::from([7, 9]), &Silent).unwrap();
+        assert_eq!(changed, BTreeSet::from([1]));
+        assert_eq!(target.tiles, [TileLabels::default(), labels([5, 0, 4])]);
+    }
+}
