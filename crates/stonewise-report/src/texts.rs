@@ -346,8 +346,8 @@ static ENGLISH: Texts = Texts {
             as a whole cannot be told from an error of the registration; stable areas outside the wall would show it.",
         registration_unknown_in_doubt: "Registration error between the surveys is unknown, too: a motion of the wall as a whole cannot be told \
             from it; stable areas outside the wall would show it.",
-        chance: "Stones above their own 95 % limit: {above}; on a still wall chance alone gives about {chance}. Moved is said only of stones \
-            that remain when the false discovery rate over all stones is held at 5 %: {n}.",
+        chance: "Stones above their own 95 % limit: {above}; on a still wall chance alone gives about {chance}. Stones that moved, \
+            at a false discovery rate of 5 %: {n}.",
         doubts: "These results must not be relied on as they stand.",
         in_numbers: "In numbers",
         as_computed: "All numbers below are as computed, and must not be relied on.",
@@ -563,8 +563,8 @@ static GERMAN: Texts = Texts {
             der Mauer als Ganzes ist von einem Registrierungsfehler nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
         registration_unknown_in_doubt: "Auch der Registrierungsfehler zwischen den Aufnahmen ist unbekannt: eine Bewegung der Mauer als Ganzes ist \
             von ihm nicht zu unterscheiden; stabile Fl\u{e4}chen neben der Mauer w\u{fc}rden sie zeigen.",
-        chance: "Steine \u{fc}ber ihrer eigenen 95-%-Grenze: {above}; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Als bewegt \
-            gelten nur Steine, die bei einer Falscherkennungsrate von 5 % \u{fc}ber alle Steine bleiben: {n}.",
+        chance: "Steine \u{fc}ber ihrer eigenen 95-%-Grenze: {above}; bei einer ruhenden Mauer w\u{e4}ren es durch Zufall etwa {chance}. Bewegte Steine, \
+            bei einer Falscherkennungsrate von 5 %: {n}.",
         doubts: "Auf diese Ergebnisse ist so kein Verlass.",
         in_numbers: "In Zahlen",
         as_computed: "Alle Zahlen unten sind wie berechnet; auf sie ist kein Verlass.",

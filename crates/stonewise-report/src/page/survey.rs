@@ -39,7 +39,8 @@ pub(super) fn survey(results: &ResultSet, texts: &Texts) -> String {
         }),
         row(names.photos, &|e| count(e.photos)),
         row(names.masks, &|e| {
-            e.masks.as_ref().map_or_else(dash, |m| file(m, texts))
+            let detector = || names.detector.to_owned();
+            e.masks.as_ref().map_or_else(detector, |m| file(m, texts))
         }),
         row(names.stones, &|e| count(e.stones)),
         row(names.motion, &|e| {

@@ -66,7 +66,7 @@ in_both! {
         d_along: "d along mm", "d längs mm";
         d_up: "d up mm", "d auf mm";
         d_out: "d out mm", "d aus mm";
-        norm: "norm mm", "Betrag mm";
+        norm: "length mm", "Betrag mm";
         limit: "LoD95 mm", "LoD95 mm";
         neighbours: "against neighbours mm", "gegen Nachbarn mm";
         rotation: "rotation mrad", "Drehung mrad";
@@ -224,8 +224,8 @@ in_both! {
         <dt>LoD95</dt><dd>The length beyond which a displacement of the same direction is above its limit.</dd>\
         <dt>Unlike its neighbours</dt><dd>The stone's motion differs from what its neighbours predict by more than noise explains; \
         false discoveries are controlled over all stones.</dd>\
-        <dt>M3C2</dt><dd>Distance between the clouds along the local normal (Lague, Brodu &amp; Leroux 2013). It cannot see motion within \
-        the face.</dd></dl>\
+        <dt>M3C2</dt><dd>Distance between the clouds along the local normal, at core points: those of the first cloud, thinned \
+        (Lague, Brodu &amp; Leroux 2013). It cannot see motion within the face.</dd></dl>\
         <h3>Limitations</h3><p>Displacements refer to the registration of the epochs, so a motion common to many stones \u{2013} \
         a shift, a tilt, a slow drift along the wall \u{2013} may be an error of it, however small the limits of single stones are. A \
         stone is taken as rigid. Masks that merge or split stones spoil single rows; such pairs are reported as failed where they \
@@ -244,8 +244,8 @@ in_both! {
         <dt>LoD95</dt><dd>Die Länge, ab der eine Verschiebung derselben Richtung über der Grenze liegt (Nachweisgrenze).</dd>\
         <dt>Anders als seine Nachbarn</dt><dd>Die Bewegung des Steins weicht von dem, was die Nachbarn erwarten lassen, stärker ab, als das Rauschen \
         erklärt; die Falscherkennungsrate wird über alle Steine gehalten.</dd>\
-        <dt>M3C2</dt><dd>Abstand der Wolken entlang der örtlichen Normalen (Lague, Brodu &amp; Leroux 2013). Bewegungen in der Mauerfläche sieht er \
-        nicht.</dd></dl>\
+        <dt>M3C2</dt><dd>Abstand der Wolken entlang der örtlichen Normalen, an Kernpunkten: den ausgedünnten der ersten Wolke \
+        (Lague, Brodu &amp; Leroux 2013). Bewegungen in der Mauerfläche sieht er nicht.</dd></dl>\
         <h3>Grenzen der Aussage</h3><p>Verschiebungen beziehen sich auf die Registrierung der Epochen; eine Bewegung, die viele Steine teilen \u{2013} ein Versatz, \
         eine Kippung, eine langsame Drift längs der Mauer \u{2013}, kann daher ein Fehler von ihr sein, so klein die Grenzen einzelner Steine auch sind. Ein Stein gilt als \
         starr. Masken, die Steine verschmelzen oder teilen, verderben einzelne Zeilen; solche Paare sind als misslungen gemeldet, wo sie zu erkennen \
@@ -266,6 +266,7 @@ in_both! {
         views: "none: views of the cloud", "keine: Ansichten der Punktwolke";
         photos: "photos used", "verwendete Fotos";
         masks: "masks", "Masken";
+        detector: "none: found by the detector", "keine: vom Detektor gefunden";
         stones: "stones found", "gefundene Steine";
         motion: "known motion put in", "eingebrachte bekannte Bewegung";
         none: "none", "keine";
