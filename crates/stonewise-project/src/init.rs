@@ -195,24 +195,29 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
     );
     for epoch in epochs {
         let _ = writeln!(text, "\n[[epochs]]\nname = {}", quoted(&epoch.name));
+        text.push_str("# date = 2026-04-01   # of the survey: for the report and for series\n");
         let _ = writeln!(text, "clouds = {}", quoted_list(&epoch.clouds));
         let has_photos = epoch.images.is_some() && epoch.cameras.is_some();
         if !has_photos {
             text.push_str("# Without images and cameras, stones are looked for in views of the clouds.\n");
         }
         for (key, found, what) in [
-            ("images", &epoch.images, "folder of the photos"),
+            ("images", &epoch.images, "not found: folder of the photos"),
             (
                 "cameras",
                 &epoch.cameras,
-                "Metashape XML, COLMAP folder or OpenSfM json",
+                "not found: of Metashape, COLMAP, OpenSfM, Pix4D, OpenMVG or nerfstudio",
             ),
-            ("masks", &epoch.masks, "COCO json or folder of 16-bit label PNGs"),
+            (
+                "masks",
+                &epoch.masks,
+                "none: the detector finds the stones; COCO json or folder of 16-bit label PNGs",
+            ),
         ] {
             let _ = match found {
                 Some(path) if has_photos => writeln!(text, "{key} = {}", quoted(&path.to_string_lossy())),
                 Some(path) => writeln!(text, "# {key} = {}", quoted(&path.to_string_lossy())),
-                None => writeln!(text, "# {key} = \"...\"   # not found: {what}"),
+                None => writeln!(text, "# {key} = \"...\"   # {what}"),
             };
         }
     }

@@ -48,17 +48,16 @@ impl Found {
             let all: Vec<String> = paths.iter().map(|p| p.display().to_string()).collect();
             all.join(", ")
         };
-        let one = |path: &Option<PathBuf>| {
-            path.as_ref()
-                .map_or("not found".to_owned(), |p| p.display().to_string())
+        let one = |path: &Option<PathBuf>, none: &str| {
+            path.as_ref().map_or(none.to_owned(), |p| p.display().to_string())
         };
         let mut lines = vec![format!(
             "{}: clouds {}; photos {}; cameras {}; masks {}",
             self.name,
             join(&self.clouds),
-            one(&self.images),
-            one(&self.cameras),
-            one(&self.masks)
+            one(&self.images, "not found"),
+            one(&self.cameras, "not found"),
+            one(&self.masks, "none, the detector finds the stones")
         )];
         let sensors = self.sensors();
         if sensors.len() > 1 {
