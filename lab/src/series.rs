@@ -272,7 +272,6 @@ impl Case {
                 let new = || {
                     let place = SeriesPlace {
                         place: shown.centroid,
-                        body: 1,
                         deformations: vec![None; count],
                     };
                     let none = || vec![Vector3::zeros(); count];

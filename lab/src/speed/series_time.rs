@@ -87,7 +87,6 @@ fn place(stone: u32, epochs: usize) -> SeriesPlace {
     };
     SeriesPlace {
         place: Point3::new(0.0, 0.4 * f64::from(stone % 100), 0.25 * f64::from(stone / 100)),
-        body: 1,
         deformations: (0..epochs).map(deformation).collect(),
     }
 }

@@ -77,6 +77,14 @@ messages! {
             "nur {measured} der {matched} Steine, die in beiden Epochen gefunden wurden, waren zu messen ({reasons}). Dass für die \
             anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. {cause}";
 
+        PART_REFUSED = "part-in-disagreement":
+            "a part of the wall of {stones} stones, around stone {stone}, seems to have moved unlike the rest, and the photos, which find most \
+            other stones, do not find it there: it moved, or its clouds mislead. None of its stones has a motion, so nothing is said of it. \
+            Look at the part, and at the photos and masks that show it",
+            "ein Teil der Mauer aus {stones} Steinen um Stein {stone} scheint sich anders bewegt zu haben als der Rest, und die Fotos, die die \
+            meisten anderen Steine finden, finden ihn dort nicht: er hat sich bewegt, oder seine Punktwolken täuschen. Keiner seiner Steine hat \
+            eine Bewegung, über ihn ist also nichts gesagt. Den Teil und die Fotos und Masken, die ihn zeigen, ansehen";
+
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
             of the points allow: a small motion would not be seen. {cause}",

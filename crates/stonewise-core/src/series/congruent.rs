@@ -3,7 +3,6 @@
 use crate::geometry::lever;
 use crate::statistics::median;
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
-use std::collections::BTreeSet;
 
 /// Median of chi-square with three degrees of freedom.
 const MEDIAN_CHI_SQUARE: f64 = 2.366;
@@ -19,8 +18,6 @@ const LEAST_STONES: usize = 12;
 pub struct SeriesPlace {
     /// Its middle.
     pub place: Point3<f64>,
-    /// The part of the wall that ties join.
-    pub body: u32,
     /// The deformation with its covariance in each epoch; `None`: not measured.
     pub deformations: Vec<Option<(Vector3<f64>, Matrix3<f64>)>>,
 }
@@ -30,45 +27,26 @@ pub struct SeriesPlace {
 /// Each pair of epochs has its own idea of which part of the wall kept its shape. Here every stone has one weight in all
 /// epochs (Tukey's biweight of its mean squared standardised deformation), and of each epoch the rigid motion is taken
 /// off that is the closest to its deformations with these weights. What moves in proportion to time or level then does
-/// so after it too.
+/// so after it too. A part of the wall beyond a crack counts like any other: a frame of its own would take its motion
+/// off.
 pub fn keep_congruent(stones: &mut [SeriesPlace]) {
-    let bodies: BTreeSet<u32> = stones.iter().map(|s| s.body).collect();
-    for body in bodies {
-        let members: Vec<usize> = (0..stones.len()).filter(|&i| stones[i].body == body).collect();
-        if members.len() >= LEAST_STONES {
-            of_body(stones, &members);
-        }
-    }
-}
-
-fn of_body(stones: &mut [SeriesPlace], members: &[usize]) {
-    let count = members.len() as f64;
-    let middle = Point3::from(
-        members
-            .iter()
-            .map(|&i| stones[i].place.coords)
-            .sum::<Vector3<f64>>()
-            / count,
-    );
-    let epochs = members
-        .iter()
-        .map(|&i| stones[i].deformations.len())
-        .max()
-        .unwrap_or(0);
+    let middle = stones.iter().map(|s| s.place.coords).sum::<Vector3<f64>>() / stones.len().max(1) as f64;
+    let middle = Point3::from(middle);
+    let epochs = stones.iter().map(|s| s.deformations.len()).max().unwrap_or(0);
     for _ in 0..ROUNDS {
-        let mut squares: Vec<f64> = members.iter().map(|&i| mean_square(&stones[i])).collect();
+        let mut squares: Vec<f64> = stones.iter().map(mean_square).collect();
         let typical = median(&mut squares.clone()).unwrap_or(0.0) / MEDIAN_CHI_SQUARE;
         let cut = CUT * typical.max(1.0);
         squares
             .iter_mut()
             .for_each(|q| *q = (1.0 - *q / cut).max(0.0).powi(2));
         for epoch in 0..epochs {
-            let Some(rigid) = rigid(stones, members, &squares, &middle, epoch) else {
+            let Some(rigid) = rigid(stones, &squares, &middle, epoch) else {
                 continue;
             };
-            for &i in members {
-                let by: SMatrix<f64, 3, 6> = lever(&(stones[i].place - middle));
-                if let Some((deformation, _)) = &mut stones[i].deformations[epoch] {
+            for stone in stones.iter_mut() {
+                let by: SMatrix<f64, 3, 6> = lever(&(stone.place - middle));
+                if let Some((deformation, _)) = &mut stone.deformations[epoch] {
                     *deformation -= by * rigid;
                 }
             }
@@ -89,20 +67,19 @@ fn mean_square(stone: &SeriesPlace) -> f64 {
 /// The rigid motion about `middle` that is closest to the deformations of an epoch.
 fn rigid(
     stones: &[SeriesPlace],
-    members: &[usize],
     weights: &[f64],
     middle: &Point3<f64>,
     epoch: usize,
 ) -> Option<Vector6<f64>> {
     let (mut normal, mut right, mut used) = (Matrix6::zeros(), Vector6::zeros(), 0);
-    for (&i, weight) in members.iter().zip(weights) {
-        let Some((deformation, covariance)) = stones[i].deformations[epoch].filter(|_| *weight > 0.0) else {
+    for (stone, weight) in stones.iter().zip(weights) {
+        let Some((deformation, covariance)) = stone.deformations[epoch].filter(|_| *weight > 0.0) else {
             continue;
         };
         let Some(information) = covariance.try_inverse() else {
             continue;
         };
-        let by: SMatrix<f64, 3, 6> = lever(&(stones[i].place - middle));
+        let by: SMatrix<f64, 3, 6> = lever(&(stone.place - middle));
         let weighted = by.transpose() * information * *weight;
         normal += weighted * by;
         right += weighted * deformation;

@@ -400,7 +400,6 @@ fn a_rigid_error_of_each_epoch_drops_out_of_one_frame() {
         .collect();
     let stone = |i: usize| SeriesPlace {
         place: place(i),
-        body: 1,
         deformations: (0..4)
             .map(|k| {
                 let by = rigid[k][0] + rigid[k][1].cross(&place(i).coords);

@@ -17,6 +17,8 @@ const DISAGREES: f64 = 1e-6;
 /// Share of the stones of a body that photos must find for its motion to be confirmed, relative to the share
 /// that they find of all.
 const CONFIRMED: f64 = 0.5;
+/// Share of all stones below which photos find so few that a body which they do not find is no worse for it.
+const INFORMATIVE: f64 = 0.5;
 /// Stones of a body whose clouds may confirm each other: fewer have a false optimum alike too easily.
 const CONFIRMING_STONES: usize = 3;
 /// Stones of a body that need no other confirmation where there are no photos: a side of a crack has as many.
@@ -117,22 +119,22 @@ impl Body<'_> {
         is_improbable(square, 3, DISAGREES)
     }
 
-    /// Whether something other than the ties confirms its motion: photos, where they take part, or else that
-    /// its stones are many or agree with each other.
+    /// Whether something other than the ties confirms its motion: photos, where they find most stones, or else
+    /// that its stones are many or agree with each other.
     fn is_confirmed(&self) -> bool {
-        let Some(photos) = &self.adjustment.photos else {
-            return self.stones.len() >= SIDE_STONES || self.agrees_with_itself();
-        };
         let share = |stones: &mut dyn Iterator<Item = usize>| {
+            let photos = self.adjustment.photos.as_ref()?;
             let (mut found, mut all) = (0.0, 0.0);
             for i in stones {
                 found += f64::from(u8::from(photos.stone(i).is_some()));
                 all += 1.0;
             }
-            found / f64::max(all, 1.0)
+            Some(found / f64::max(all, 1.0))
         };
-        let of_body = share(&mut self.stones.iter().copied());
-        of_body > 0.0 && of_body >= CONFIRMED * share(&mut (0..self.results.len()))
+        match share(&mut (0..self.results.len())).filter(|of_all| *of_all >= INFORMATIVE) {
+            Some(of_all) => share(&mut self.stones.iter().copied()) >= Some(CONFIRMED * of_all),
+            None => self.stones.len() >= SIDE_STONES || self.agrees_with_itself(),
+        }
     }
 
     /// Whether the clouds of its stones, each by itself, show one motion.

@@ -1,6 +1,7 @@
-//! A part of the wall that ties join: its stones, and the joint distribution of their motions.
+//! A part of the wall whose shape is judged: its stones, and the joint distribution of their motions.
 
 use super::shared_errors::SharedErrors;
+use crate::components::components;
 use crate::geometry::lever;
 use crate::id::StoneId;
 use crate::linalg::{BlockFactor, BlockPattern};
@@ -41,7 +42,8 @@ pub(super) struct BodyStone<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// All parts of at least this many stones that are not loose.
+    /// All parts of at least this many stones that are not loose. Parts that are neighbours are one: only a crack
+    /// parts them, and what lies on its other side has moved.
     pub fn all(
         motions: &'a JointMotions,
         errors: Option<(&JointErrors, &[StoneId])>,
@@ -51,13 +53,30 @@ impl<'a> Body<'a> {
         let bodies: BTreeSet<u32> = measured().map(|s| s.body).collect();
         let is_large =
             |body: &u32| measured().filter(|s| s.body == *body && !s.is_loose).count() >= least_stones;
-        let bodies = bodies.into_iter().filter(is_large);
-        bodies.map(|body| Self::new(motions, errors, body)).collect()
+        let large: Vec<u32> = bodies.into_iter().filter(is_large).collect();
+        let mut next = vec![Vec::new(); large.len()];
+        let part = |node: usize| large.binary_search(&motions.stones[node].as_ref()?.body).ok();
+        for &(low, high) in &motions.edges {
+            if let (Some(a), Some(b)) = (part(low), part(high)) {
+                next[a].push(b);
+                next[b].push(a);
+            }
+        }
+        let walls = components(&next);
+        let of_wall = |wall: &Vec<usize>| wall.iter().map(|&part| large[part]).collect();
+        walls
+            .iter()
+            .map(|wall| Self::new(motions, errors, &of_wall(wall)))
+            .collect()
     }
 
-    fn new(motions: &'a JointMotions, errors: Option<(&JointErrors, &[StoneId])>, body: u32) -> Self {
+    fn new(
+        motions: &'a JointMotions,
+        errors: Option<(&JointErrors, &[StoneId])>,
+        parts: &BTreeSet<u32>,
+    ) -> Self {
         let of_body = |(node, stone): (usize, &'a Option<JointStone>)| {
-            Some((node, stone.as_ref().filter(|s| s.body == body)?))
+            Some((node, stone.as_ref().filter(|s| parts.contains(&s.body))?))
         };
         let members: Vec<(usize, &JointStone)> =
             motions.stones.iter().enumerate().filter_map(of_body).collect();

@@ -35,8 +35,8 @@ const LEAST_STONES: usize = 12;
 /// How the wall deformed, from the motions of its stones and the error of the later epoch at them.
 ///
 /// `error_stones`: the stones at which the error is given, in its order; stones without one count as free of it.
-/// Every part of the wall that ties join is judged by itself; where there are several, `p` is that of the least
-/// probable, times their number (Bonferroni).
+/// Parts of the wall that are not neighbours are judged by themselves; where there are several, `p` is that of the
+/// least probable, times their number (Bonferroni).
 ///
 /// Cost: about thirty solves of the field, and a thousand simulations of what the stones show of a still wall;
 /// linear in the stones.

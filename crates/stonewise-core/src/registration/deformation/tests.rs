@@ -239,6 +239,28 @@ fn the_larger_part_is_the_one_that_kept_its_shape() {
 }
 
 #[test]
+fn what_lies_beyond_a_crack_has_moved_against_the_larger_part() {
+    let errors = errors(5);
+    let is_beyond = |k: usize| k % COLUMNS >= 6;
+    let settled = Vector3::new(0.0, 0.0, -0.0025);
+    let moved = |k: usize| if is_beyond(k) { settled } else { Vector3::zeros() };
+    let mut wall = wall(moved, |k| errors[k]);
+    for (k, stone) in wall.stones.iter_mut().enumerate() {
+        if let Some(stone) = stone {
+            stone.body = if is_beyond(k) { 2 } else { 1 };
+        }
+    }
+    let found = found(&wall);
+    assert!(found.p < Some(0.001), "{:?}", found.p);
+    for stone in &found.stones {
+        let k = stone.stone.0 as usize - 1;
+        let apart = stone.deformation - moved(k);
+        assert!(apart.norm() < 6.0 * SD_M, "{k}: {apart:?}");
+        assert_eq!(stone.zone > 0, is_beyond(k), "{k}");
+    }
+}
+
+#[test]
 fn a_wall_of_few_stones_is_not_judged() {
     let mut small = wall(bulge, |_| Vector3::zeros());
     small

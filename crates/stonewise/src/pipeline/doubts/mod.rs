@@ -19,7 +19,7 @@ use crate::settings::Align;
 use crate::texts::Said;
 use fit::Fit;
 use labels::{Votes, beside};
-use motions::{blind, few_measured, unsettled};
+use motions::{blind, few_measured, refused, unsettled};
 use scale::stretched;
 use stonewise_core::epoch::EpochId;
 use turn::turned;
@@ -62,6 +62,7 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     let of_motions = [
         unsettled(&registered, fit),
         few_measured(rows, fit),
+        refused(rows),
         blind(&registered, rows, fit),
         turned(rows),
     ];

@@ -4,13 +4,15 @@ use super::fit::Fit;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, Said};
+use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, PART_REFUSED, Said};
 use std::collections::BTreeMap;
 use stonewise_core::stone::StoneMotion;
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
 /// something other than noise hides the motions.
 const LIMIT_EXCESS: f64 = 100.0;
+/// Stones of a part without a motion that is no mistake of single masks.
+const PART_STONES: usize = 10;
 /// Half width of a 95 % interval, in standard deviations.
 const SIGMAS_95: f64 = 1.96;
 
@@ -43,6 +45,22 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
             ("cause", fit.cause()),
         ];
         FEW_MEASURED.say(&values)
+    })
+}
+
+/// A part of the wall that is too large to be a mistake of some masks has no motion because nothing confirms it.
+pub(super) fn refused(rows: &[StoneRow]) -> Option<Said> {
+    let mut parts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
+    for row in rows.iter().filter(|r| r.status == Status::FailedDisagreement) {
+        if let Some(body) = row.body_id.filter(|body| *body > 1) {
+            parts.entry(body).or_default().push(row.stone_id);
+        }
+    }
+    let largest = parts.into_values().max_by_key(Vec::len)?;
+    (largest.len() >= PART_STONES).then(|| {
+        let values = [largest.len(), largest[0] as usize].map(|n| n.to_string().into());
+        let [stones, stone] = values;
+        PART_REFUSED.say(&[("stones", stones), ("stone", stone)])
     })
 }
 
@@ -158,6 +176,25 @@ mod tests {
             assert!(message.english.contains(part), "{part}: {message}");
         }
         assert!(!message.english.contains("unmatched"), "{message}");
+    }
+
+    #[test]
+    fn a_part_of_ten_stones_that_nothing_confirms_is_a_doubt() {
+        let mut rows = rows();
+        for row in &mut rows[..10] {
+            row.status = Status::FailedDisagreement;
+            row.body_id = Some(2);
+        }
+        let message = refused(&rows).unwrap();
+        let first = rows[0].stone_id;
+        assert!(
+            message
+                .english
+                .contains(&format!("of 10 stones, around stone {first},")),
+            "{message}"
+        );
+        rows[0].status = Status::Ok;
+        assert_eq!(refused(&rows), None);
     }
 
     #[test]

@@ -122,7 +122,6 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
     let place_of: BTreeMap<StoneId, usize> = stones.iter().map(|s| s.id).zip(0..).collect();
     let place = |s: &Stone| SeriesPlace {
         place: s.centroid,
-        body: 0,
         deformations: vec![None; order.len()],
     };
     let mut places: Vec<SeriesPlace> = stones.iter().map(place).collect();
@@ -138,7 +137,6 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
             let row = rows.get(&found.stone.0).filter(|row| row.motion.is_some());
             if let (Some(&i), Some(row)) = (place_of.get(&found.stone), row) {
                 places[i].deformations[time] = Some((found.deformation, found.covariance));
-                places[i].body = row.body_id.unwrap_or(0);
                 shares[i][time] = reference_share(&registered.estimator, row);
             }
         }
