@@ -14,9 +14,9 @@ pub fn report(args: &ReportArgs, force: bool, printer: &Printer) -> Result<Outco
     stonewise::report::write_report(&args.results)?;
     stonewise::export::write_layers(&args.results)?;
     folder.note_made_anew()?;
-    let results = args.results.display();
     printer.log(&format!(
-        "wrote {results}/report/index.html, stones.gpkg, stones.geojson, stones.vtp and stones.ply"
+        "wrote {}, stones.gpkg, stones.geojson, stones.vtp and stones.ply",
+        args.results.join("report/index.html").display()
     ));
     if let Some(pdf) = &pdf {
         match args.yearly {

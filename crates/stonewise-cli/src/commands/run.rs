@@ -81,6 +81,7 @@ pub fn run_to(
 pub fn conclude(project: &Project, summary: &Summary, out: &Path, printer: &Printer) -> Outcome {
     tell(project, summary, printer);
     printer.log(&format!("results: {}", out.display()));
+    printer.log(&format!("open {}", out.join("report/index.html").display()));
     outcome_of(summary)
 }
 

@@ -31,7 +31,6 @@ pub fn demo(args: &DemoArgs, force: bool, printer: &Printer) -> Result<Outcome> 
     let (outcome, summary) = run::run_to(&folder, &project, Until::Reported, printer)?;
     super::evaluate::score(&args.out, &survey.join("truth/stones.csv"), printer)?;
     folder.note_made_anew()?;
-    printer.log(&format!("open {}", args.out.join("report/index.html").display()));
     run::say_verdict(&summary, printer);
     Ok(outcome)
 }

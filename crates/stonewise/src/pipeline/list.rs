@@ -130,9 +130,9 @@ mod tests {
                 "clouds of 2024",
                 "clouds of 2025",
                 "clouds of 2026",
-                "stones in the photos of 2024",
-                "stones in the photos of 2025",
-                "stones in the photos of 2026"
+                "stones in the pictures of 2024",
+                "stones in the pictures of 2025",
+                "stones in the pictures of 2026"
             ]
         );
         let all = words(&project, Until::Reported);

@@ -137,7 +137,7 @@ impl<'a> Detection<'a> {
         for (number, (view, path)) in candidates.into_iter().enumerate() {
             self.context
                 .progress
-                .detail(&format!("photo {} of {count}", number + 1));
+                .detail(&format!("picture {} of {count}", number + 1));
             let part = self.part(number, &view, &path)?;
             let outcome: Outcome = read_json(&part.file(PHOTO))?;
             if let Some(reason) = outcome.reason {

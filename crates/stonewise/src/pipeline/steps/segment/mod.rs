@@ -31,7 +31,7 @@ use voting_photo::{PHOTOS, STEP, VotingPhoto, label_path, posed_photos};
 /// them, else from the detector.
 pub static SEGMENT: Step = Step {
     name: STEP,
-    words: |_| "stones in the photos of",
+    words: |_| "stones in the pictures of",
     about: About::Epoch,
     needs: &[
         Need::same(&VIEWS).when(has_no_photos),
