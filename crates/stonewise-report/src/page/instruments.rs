@@ -154,7 +154,7 @@ mod tests {
         let english = instruments(&results, Texts::of(Language::English));
         for part in [
             "T&lt;1&gt;",
-            "1.0 / \u{2013} / -2.0",
+            "1.0 / \u{2013} / \u{2212}2.0",
             "3.5 \u{b1} 1.0 / \u{2013} / 0.0 \u{b1} 1.0",
             "<td class=\"n\">no</td>",
             "0.0002",
