@@ -132,4 +132,4 @@ def test_a_folder_without_results(command, tmp_path):
     with pytest.raises(stonewise.Error) as raised:
         stonewise.open(tmp_path)
     said = command("report", tmp_path, expect=1).stderr.strip()
-    assert said == f"error: {raised.value}"
+    assert said == f"error: {raised.value} [no-results]"

@@ -67,7 +67,7 @@ def test_errors_have_the_words_of_the_command(command, survey, tmp_path):
         said = command("run", project, "--out", out, expect=code).stderr.strip().splitlines()[-1]
         with pytest.raises(stonewise.Error) as raised:
             stonewise.run(project, out=out)
-        assert said == f"error: {raised.value}"
+        assert said == f"error: {raised.value} [project-file]"
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,8 @@ impl InstrumentFile {
         let [Some(first), Some(later)] = dates.map(|d| d.and_then(day_of)) else {
             return Err(ReadingGap::NoDate);
         };
-        let mut gap = ReadingGap::Before;
+        // The reason of the axis with the most readings.
+        let (mut gap, mut most) = (ReadingGap::Before, 0);
         let moved = instrument.axes.each_ref().map(|axis| {
             let both = self.at(axis, first).and_then(|a| Ok([a, self.at(axis, later)?]));
             match both {
@@ -123,8 +124,8 @@ impl InstrumentFile {
                     variance_m2: later.variance_m2 + first.variance_m2,
                 }),
                 Err(why) => {
-                    if !axis.is_empty() {
-                        gap = why;
+                    if axis.len() > most {
+                        (gap, most) = (why, axis.len());
                     }
                     None
                 }
