@@ -60,14 +60,14 @@ def test_errors_have_the_words_of_the_command(command, survey, tmp_path):
     foreign.mkdir()
     (foreign / "thesis.tex").write_text("mine")
     for project, out, code in [
-        (wrong, tmp_path / "a", 2),
-        (survey / "missing.toml", tmp_path / "a", 2),
-        (survey / "stonewise.toml", foreign, 2),
+        (wrong, tmp_path / "a", "project-file"),
+        (survey / "missing.toml", tmp_path / "a", "no-project"),
+        (survey / "stonewise.toml", foreign, "output-folder"),
     ]:
-        said = command("run", project, "--out", out, expect=code).stderr.strip().splitlines()[-1]
+        said = command("run", project, "--out", out, expect=2).stderr.strip().splitlines()[-1]
         with pytest.raises(stonewise.Error) as raised:
             stonewise.run(project, out=out)
-        assert said == f"error: {raised.value} [project-file]"
+        assert said == f"error: {raised.value} [{code}]"
 
 
 @pytest.mark.parametrize(
