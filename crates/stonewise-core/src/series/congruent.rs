@@ -24,7 +24,7 @@ pub struct SeriesPlace {
 
 /// Brings the deformations of all epochs to one frame.
 ///
-/// Each pair of epochs has its own idea of which part of the wall kept its shape. Here every stone has one weight in all
+/// Each pair of epochs has a part of the wall of its own that kept its shape. Here every stone has one weight in all
 /// epochs (Tukey's biweight of its mean squared standardised deformation), and of each epoch the rigid motion is taken
 /// off that is the closest to its deformations with these weights. What moves in proportion to time or level then does
 /// so after it too. A part of the wall beyond a crack counts like any other: a frame of its own would take its motion
