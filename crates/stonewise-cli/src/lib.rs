@@ -77,20 +77,20 @@ fn say_panics_once() {
 
 /// Code of the error in brackets, for `stonewise explain`; nothing where it has none.
 fn code(error: &anyhow::Error) -> String {
-    let known =
-        |cause: &(dyn std::error::Error + 'static)| Some(cause.downcast_ref::<stonewise::Error>()?.code());
-    error
-        .chain()
-        .find_map(known)
-        .map_or_else(String::new, |code| format!(" [{code}]"))
+    let mut known = errors_of_library(error);
+    known
+        .next()
+        .map_or_else(String::new, |e| format!(" [{}]", e.code()))
 }
 
 /// Whether the command was given something that cannot be.
 fn is_wrong_usage(error: &anyhow::Error) -> bool {
-    let known = |cause: &(dyn std::error::Error + 'static)| {
-        cause.downcast_ref().is_some_and(stonewise::Error::is_wrong_usage)
-    };
-    error.chain().any(known)
+    errors_of_library(error).any(stonewise::Error::is_wrong_usage)
+}
+
+/// The library's errors among an error and its causes.
+fn errors_of_library(error: &anyhow::Error) -> impl Iterator<Item = &stonewise::Error> {
+    error.chain().filter_map(|cause| cause.downcast_ref())
 }
 
 /// The error and its causes in one line, as the command prints it; a cause that is part of the text already

@@ -1,12 +1,10 @@
 //! All that a report is made of.
 
 use super::change_points::{DistancePoint, read_distance_points};
-use super::names::{
-    CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, REMARKS, RUN, TRENDS, VERDICT, audit,
-};
+use super::names::{CARRY_AUDIT, EDITS_AUDIT, FACADE, INSTRUMENTS, PairFile, RUN, TRENDS, VERDICT, audit};
 use super::outlines::{StoneOutline, read_outlines};
 use super::records::{
-    Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict, signed_digest,
+    Datum, InstrumentsRecord, RegistrationRecord, Remarks, RunRecord, TrendsRecord, Verdict,
 };
 use super::stone_table::read_stones;
 use super::{Evidence, Facade, RowMotion, StoneRow, read_neighbours, read_velocities};
@@ -89,14 +87,10 @@ impl ResultSet {
     /// # Errors
     /// There is no stone table of this pair, or a file is damaged.
     pub fn read_pair(dir: &Path, pair: usize) -> Result<Self, Error> {
-        let remarks: Remarks = read_json(&dir.join(REMARKS))?.unwrap_or_default();
-        let is_signed = match &remarks.signature {
-            Some(signature) => signature.blake3 == signed_digest(dir)?,
-            None => false,
-        };
+        let remarks = Remarks::read(dir)?;
         Ok(Self {
+            is_signed: remarks.is_signed(dir)?,
             remarks,
-            is_signed,
             verdict: read_json(&dir.join(VERDICT))?,
             trends: read_json(&dir.join(TRENDS))?,
             velocities: read_velocities(dir)?,

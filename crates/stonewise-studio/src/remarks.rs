@@ -8,7 +8,7 @@ use std::{env, fs, process};
 use stonewise::results::names::REMARKS;
 use stonewise::results::records::{Remark, Remarks, Signature, Timestamp, signed_digest};
 use stonewise::{Error, OutputFolder, Result};
-use stonewise_base::files::{is_there, read_json, write_readable_json};
+use stonewise_base::files::write_readable_json;
 use stonewise_core::progress::Silent;
 
 /// Longest text of a remark, name and place, characters.
@@ -84,7 +84,8 @@ pub struct SignatureShown {
 /// # Errors
 /// The file is damaged, or a result file cannot be read.
 pub fn shown(results: &Path) -> Result<RemarksShown> {
-    let all = read(results)?;
+    let all = Remarks::read(results)?;
+    let holds = all.is_signed(results)?;
     let remark = |remark: Remark| RemarkShown {
         when: remark.when.to_string(),
         said: NewRemark {
@@ -95,17 +96,15 @@ pub fn shown(results: &Path) -> Result<RemarksShown> {
             text: remark.text,
         },
     };
-    let signature = |of: Signature| -> Result<SignatureShown> {
-        Ok(SignatureShown {
-            holds: of.blake3 == signed_digest(results)?,
-            who: of.who,
-            place: of.place,
-            when: of.when.to_string(),
-        })
+    let signature = |of: Signature| SignatureShown {
+        who: of.who,
+        place: of.place,
+        when: of.when.to_string(),
+        holds,
     };
     Ok(RemarksShown {
         remarks: all.remarks.into_iter().map(remark).collect(),
-        signature: all.signature.map(signature).transpose()?,
+        signature: all.signature.map(signature),
     })
 }
 
@@ -214,18 +213,10 @@ fn bounded(what: &str, text: &str, longest: usize) -> Result<()> {
     Ok(())
 }
 
-fn read(results: &Path) -> Result<Remarks> {
-    let path = results.join(REMARKS);
-    match is_there(&path)? {
-        true => read_json(&path),
-        false => Ok(Remarks::default()),
-    }
-}
-
 /// Changes the file, whole or not at all, and makes the report again, while no run writes into the folder.
 fn change(results: &Path, change: impl FnOnce(&mut Remarks) -> Result<()>) -> Result<()> {
     let folder = OutputFolder::of_results(results)?;
-    let mut all = read(results)?;
+    let mut all = Remarks::read(results)?;
     change(&mut all)?;
     write_readable_json(&results.join(REMARKS), &all)?;
     stonewise::report::write_report(results)?;

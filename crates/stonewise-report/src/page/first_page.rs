@@ -10,7 +10,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use stonewise_base::report_params::Language;
 use stonewise_figure::{count, escape};
-use stonewise_results::records::{Datum, DatumState, EpochRecord, Remark, Signature, State};
+use stonewise_results::records::{Datum, DatumState, EpochRecord, Remark, State};
 use stonewise_results::{ResultSet, Status};
 
 /// Logo and kind of the document.
@@ -137,44 +137,47 @@ pub(super) fn body(results: &ResultSet, facts: &Summary) -> String {
         page.not_measured,
         not_measured(facts),
         zones(facts),
-        signature(results, facts)
+        signature(results, facts.texts())
     )
 }
 
 /// The place to sign, or who signed; a signature under other results does not count.
-fn signature(results: &ResultSet, facts: &Summary) -> String {
-    let page = &facts.texts().page;
-    let given = results.remarks.signature.as_ref();
-    let day = |of: &Signature| of.when.to_string()[..10].to_owned();
-    let line = |name: &str, value: String| match value.as_str() {
-        "" => format!("<p>{name}</p>"),
-        value => format!("<p><b>{}</b><br>{name}</p>", escape(value)),
+fn signature(results: &ResultSet, texts: &Texts) -> String {
+    let page = &texts.page;
+    let Some(of) = &results.remarks.signature else {
+        return place_to_sign(texts);
     };
-    let block = |[who, place, mark]: [String; 3]| {
-        let lines = line(page.assessor, who) + &line(page.place_date, place) + &line(page.signature, mark);
-        format!("<div class=\"sign\">{lines}</div>")
-    };
-    match given {
-        Some(of) if results.is_signed => {
-            let mark = fill(page.signed, &[("digest", &of.blake3[..12.min(of.blake3.len())])]);
-            let place = [of.place.as_str(), &day(of)];
-            let place = place
-                .into_iter()
-                .filter(|part| !part.is_empty())
-                .collect::<Vec<_>>();
-            block([of.who.clone(), place.join(", "), mark])
-        }
-        Some(of) => {
-            let values = [("who", escape(&of.who)), ("day", day(of))];
-            let values = values.each_ref().map(|(name, value)| (*name, value.as_str()));
-            let note = fill(page.signed_others, &values);
-            format!(
-                "<p class=\"datum\">{note}</p>{}",
-                block([const { String::new() }; 3])
-            )
-        }
-        None => block([const { String::new() }; 3]),
+    let day = &of.when.to_string()[..10];
+    if !results.is_signed {
+        let note = fill(page.signed_others, &[("who", &*escape(&of.who)), ("day", day)]);
+        return format!("<p class=\"datum\">{note}</p>{}", place_to_sign(texts));
     }
+    let place = match of.place.as_str() {
+        "" => day.to_owned(),
+        place => format!("{place}, {day}"),
+    };
+    let mark = fill(
+        page.signed,
+        &[("digest", of.blake3.get(..12).unwrap_or(&of.blake3))],
+    );
+    sign_block(
+        texts,
+        [&of.who, &place, &mark].map(|given| format!("<b>{}</b><br>", escape(given))),
+    )
+}
+
+/// Lines to sign by hand.
+pub(super) fn place_to_sign(texts: &Texts) -> String {
+    sign_block(texts, [const { String::new() }; 3])
+}
+
+/// Assessor, place and date, and signature, with what stands above each name.
+fn sign_block(texts: &Texts, [who, place, mark]: [String; 3]) -> String {
+    let page = &texts.page;
+    format!(
+        "<div class=\"sign\"><p>{who}{}</p><p>{place}{}</p><p>{mark}{}</p></div>",
+        page.assessor, page.place_date, page.signature
+    )
 }
 
 /// What people remarked on this pair of epochs; empty where nobody did.

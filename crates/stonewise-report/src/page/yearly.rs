@@ -1,7 +1,7 @@
 //! The part of the yearly safety report on measurements, in the order that authorities ask for.
 
 use super::document::{PATTERNS, footer, head, title};
-use super::first_page::{conditions, letter, letterhead};
+use super::first_page::{conditions, letter, letterhead, place_to_sign};
 use super::html::{table, with_units};
 use super::{doubts, instruments, series};
 use crate::summary::Summary;
@@ -36,10 +36,7 @@ pub(crate) fn yearly(newest: &ResultSet) -> Option<String> {
         ),
         interpretation(newest, run, verdict, texts),
         conclusion(names),
-        format!(
-            "<div class=\"sign\"><p>{}</p><p>{}</p><p>{}</p></div>",
-            texts.page.assessor, texts.page.place_date, texts.page.signature
-        ),
+        place_to_sign(texts),
     ];
     let body: String = { names.headings.iter().zip(&parts) }
         .map(|(heading, part)| format!("<section><h2>{heading}</h2>\n{part}</section>\n"))

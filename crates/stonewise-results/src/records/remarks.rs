@@ -1,12 +1,12 @@
 //! What people say of results: remarks and a signature.
 
 use super::Timestamp;
-use crate::names::{PairFile, VERDICT};
+use crate::names::{PairFile, REMARKS, VERDICT};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 use stonewise_base::error::Error;
-use stonewise_base::files::is_there;
+use stonewise_base::files::{is_there, read_json};
 
 /// `remarks.json`, which people write beside the results; a run leaves it as it is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -16,6 +16,31 @@ pub struct Remarks {
     /// Who stands for the results.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signature: Option<Signature>,
+}
+
+impl Remarks {
+    /// What was said of the results in `dir`.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is damaged.
+    pub fn read(dir: &Path) -> Result<Self, Error> {
+        let path = dir.join(REMARKS);
+        match is_there(&path)? {
+            true => read_json(&path),
+            false => Ok(Self::default()),
+        }
+    }
+
+    /// Whether there is a signature, and it is under the results in `dir` as they are.
+    ///
+    /// # Errors
+    /// A result file cannot be read.
+    pub fn is_signed(&self, dir: &Path) -> Result<bool, Error> {
+        match &self.signature {
+            Some(signature) => Ok(signature.blake3 == signed_digest(dir)?),
+            None => Ok(false),
+        }
+    }
 }
 
 /// A remark on a stone, on a zone of deformation, or on the wall.

@@ -7,6 +7,7 @@ use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Matrix9;
 use super::tracking::PhotoPart;
+use crate::linalg::without_negative;
 use crate::statistics::{UPPER_95, student_95};
 use crate::stone::{MotionFailure, NeighbourCovariance, PairResult};
 use nalgebra::Matrix3;
@@ -125,13 +126,6 @@ fn of_poses([a, b]: [&Measured; 2]) -> Matrix3<f64> {
     };
     let between = a.face_from_world.transpose() * local * b.face_from_world;
     without_negative(&(a.of_poses + b.of_poses - between - between.transpose()))
-}
-
-/// Symmetric, and without the negative eigenvalues that rounding leaves.
-pub(super) fn without_negative(covariance: &Matrix3<f64>) -> Matrix3<f64> {
-    let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
-    let values = eigen.eigenvalues.map(|v| v.max(0.0));
-    eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose()
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@ use std::collections::BTreeMap;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::id::StoneId;
 use stonewise_core::instruments::{Agreement, Difference, RegistrationError, Tested, agreement};
+use stonewise_core::linalg::without_negative;
 
 /// Name of the step in warnings.
 const STEP: &str = "instruments";
@@ -33,6 +34,8 @@ struct Beside<'a> {
     file: &'a InstrumentFile,
     motion: [Option<(f64, f64)>; 3],
     stones: Vec<&'a StoneRow>,
+    /// Their mean motion, metres.
+    mean: Vector3<f64>,
     difference: Difference,
 }
 
@@ -127,6 +130,7 @@ fn beside<'a>(
                 file,
                 motion: motion.map(|m| m.map(|m| (m.value_m, m.variance_m2.sqrt()))),
                 stones,
+                mean,
                 difference,
             });
         }
@@ -171,24 +175,15 @@ fn of_stones(stones: &[&StoneRow], datum: &Datum) -> (Vector3<f64>, Matrix3<f64>
     let mean = motions().map(|(_, m)| m.displacement).sum::<Vector3<f64>>() / count;
     let own = |(row, motion): (&&StoneRow, &RowMotion)| {
         let shared = datum.covariance_at(&row.centroid).unwrap_or_else(Matrix3::zeros);
-        without(&motion.covariance, &shared)
+        without_negative(&(motion.covariance - shared))
     };
     (mean, motions().map(own).sum::<Matrix3<f64>>() / count)
-}
-
-/// A covariance without a part of it; never negative.
-fn without(whole: &Matrix3<f64>, part: &Matrix3<f64>) -> Matrix3<f64> {
-    let eigen = (whole - part).symmetric_eigen();
-    let values = eigen.eigenvalues.map(|v| v.max(0.0));
-    eigen.eigenvectors * Matrix3::from_diagonal(&values) * eigen.eigenvectors.transpose()
 }
 
 fn compared(beside: &[Beside], found: &Agreement) -> Vec<ComparedInstrument> {
     let count = found.instruments.iter().filter(|t| t.p.is_some()).count() as f64;
     let one = |(b, tested): (&Beside, &Tested)| {
         let middle = b.stones.iter().map(|s| s.centroid.coords).sum::<Vector3<f64>>() / b.stones.len() as f64;
-        let motions = b.stones.iter().filter_map(|s| s.motion.as_ref());
-        let stones = motions.map(|m| m.displacement).sum::<Vector3<f64>>() / b.stones.len() as f64;
         ComparedInstrument {
             name: b.instrument.name.clone(),
             file: file_name(b.file),
@@ -197,7 +192,7 @@ fn compared(beside: &[Beside], found: &Agreement) -> Vec<ComparedInstrument> {
             sd_m: b.motion.map(|m| m.map(|m| m.1)),
             stones: b.stones.iter().map(|s| s.stone_id).collect(),
             distance_m: (middle - b.instrument.place.coords).norm(),
-            stones_m: stones.into(),
+            stones_m: b.mean.into(),
             difference_m: tested.difference,
             difference_sd_m: tested.sd,
             p: tested.p,
@@ -265,8 +260,8 @@ fn update(shown: Before, error: &RegistrationError, normals: &Normals, count: us
         };
         let shared = |datum: &Datum| datum.covariance_at(&row.centroid).unwrap_or_else(Matrix3::zeros);
         let alone = RowMotion {
-            covariance: without(&motion.covariance, &shared(&before)),
-            rotation_covariance: without(&motion.rotation_covariance, &rotation_before),
+            covariance: without_negative(&(motion.covariance - shared(&before))),
+            rotation_covariance: without_negative(&(motion.rotation_covariance - rotation_before)),
             ..motion.clone()
         };
         let reference = Reference {
