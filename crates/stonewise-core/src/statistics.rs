@@ -54,6 +54,32 @@ pub fn quantile(sorted: &[f64], q: f64) -> f64 {
     sorted[low] + (sorted[high] - sorted[low]) * (at - low as f64)
 }
 
+/// Squared standardised length of three components beyond which Tukey's biweight is zero: the 99 % quantile of
+/// chi-square with three degrees of freedom.
+const REJECTED: f64 = 11.34;
+/// Share of all that at least counts as congruent, and that quantile of chi-square with three degrees of freedom.
+const LEAST_PART: f64 = 0.25;
+const LOWER_QUARTILE: f64 = 1.2125;
+
+/// With how much of its weight something of this squared standardised length counts (Tukey's biweight).
+pub(crate) fn biweight(square: f64) -> f64 {
+    (1.0 - square / REJECTED).max(0.0).powi(2)
+}
+
+/// The loss of which [`biweight`] is the weight, from 0 to 1.
+pub(crate) fn biweight_loss(square: f64) -> f64 {
+    1.0 - (1.0 - square / REJECTED).max(0.0).powi(3)
+}
+
+/// By how much squared standardised lengths exceed what is expected, at least 1: that of the most congruent quarter.
+/// `None` without lengths.
+pub(crate) fn congruent_scale(squares: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut squares: Vec<f64> = squares.collect();
+    let rank = ((squares.len() as f64 * LEAST_PART) as usize).min(squares.len().checked_sub(1)?);
+    let (_, quartile, _) = squares.select_nth_unstable_by(rank, f64::total_cmp);
+    Some((*quartile / LOWER_QUARTILE).max(1.0))
+}
+
 /// A well-mixed number from a counter or a key.
 ///
 /// Source: SplitMix64 (Steele, Lea & Flood 2014).

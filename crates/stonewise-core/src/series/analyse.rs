@@ -21,7 +21,7 @@ const LEAST_EPOCHS: usize = 4;
 /// Epochs of a straight line with something left over.
 const LEAST_OF_A_LINE: usize = 3;
 /// Rounds of steps and variance factors, each of which the other changes.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 5;
 /// Rounds in which steps and trends of all stones, and how many there are of each, follow each other.
 const MIXTURE_ROUNDS: usize = 5;
 /// Factor on variances beyond which a stone loses weight in the choice of terms.
@@ -232,7 +232,8 @@ fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFacto
         })
     };
     let mut fitted: Vec<Fitted> = stones.par_iter().filter_map(start).collect();
-    let mut factors = factors_of(fitted.iter().map(|f| &f.fits));
+    // Steps that are not in the models yet must not count as errors that single stones have.
+    let mut factors = factors_of(fitted.iter().map(|f| &f.fits), VarianceFactor::typical);
     for _ in 0..ROUNDS {
         let likeliest = |f: &Fitted| likeliest_step(&f.seen, model, &factors);
         let steps: Vec<Option<(Step, f64)>> = fitted.par_iter().map(likeliest).collect();
@@ -244,7 +245,7 @@ fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFacto
                 stone.fits = fits;
             }
         }
-        factors = factors_of(fitted.iter().map(|f| &f.fits));
+        factors = factors_of(fitted.iter().map(|f| &f.fits), VarianceFactor::of);
     }
     steps_for_trends(&mut fitted, model, &factors);
     (fitted, factors)
@@ -345,13 +346,17 @@ fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFac
     }
 }
 
-fn factors_of<'a>(fits: impl Iterator<Item = &'a [Fit; 3]> + Clone) -> [VarianceFactor; 3] {
+/// The variance factors of three components, from the residuals of all stones.
+fn factors_of<'a>(
+    fits: impl Iterator<Item = &'a [Fit; 3]> + Clone,
+    of: fn(&[(f64, usize)]) -> VarianceFactor,
+) -> [VarianceFactor; 3] {
     [0, 1, 2].map(|axis| {
         let all: Vec<(f64, usize)> = fits
             .clone()
             .map(|f| (f[axis].residuals, f[axis].freedom))
             .collect();
-        VarianceFactor::of(&all)
+        of(&all)
     })
 }
 
@@ -411,7 +416,7 @@ fn departures(fitted: &[Fitted], model: &Model) -> Vec<(StoneId, Trend)> {
         Some((f.stone, fits, column))
     };
     let found: Vec<(StoneId, [Fit; 3], usize)> = fitted.par_iter().filter_map(depart).collect();
-    let factors = factors_of(found.iter().map(|d| &d.1));
+    let factors = factors_of(found.iter().map(|d| &d.1), VarianceFactor::of);
     let found = found.iter();
     found
         .map(|(stone, fits, column)| (*stone, coefficient(fits, &factors, *column)))

@@ -1,13 +1,9 @@
 //! One frame for all epochs: the part of the wall that kept its shape over the whole series.
 
 use crate::geometry::lever;
-use crate::statistics::median;
+use crate::statistics::{biweight, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Point3, SMatrix, Vector3, Vector6};
 
-/// Median of chi-square with three degrees of freedom.
-const MEDIAN_CHI_SQUARE: f64 = 2.366;
-/// Squared standardised deformation at which a stone of a wall that kept its shape no longer counts (Tukey's biweight).
-const CUT: f64 = 21.0;
 /// Rounds of weights.
 const ROUNDS: usize = 8;
 /// Fewest stones that make a frame.
@@ -35,11 +31,10 @@ pub fn keep_congruent(stones: &mut [SeriesPlace]) {
     let epochs = stones.iter().map(|s| s.deformations.len()).max().unwrap_or(0);
     for _ in 0..ROUNDS {
         let mut squares: Vec<f64> = stones.iter().map(mean_square).collect();
-        let typical = median(&mut squares.clone()).unwrap_or(0.0) / MEDIAN_CHI_SQUARE;
-        let cut = CUT * typical.max(1.0);
-        squares
-            .iter_mut()
-            .for_each(|q| *q = (1.0 - *q / cut).max(0.0).powi(2));
+        let Some(scale) = congruent_scale(squares.iter().copied()) else {
+            return;
+        };
+        squares.iter_mut().for_each(|q| *q = biweight(*q / scale));
         for epoch in 0..epochs {
             let Some(rigid) = rigid(stones, &squares, &middle, epoch) else {
                 continue;

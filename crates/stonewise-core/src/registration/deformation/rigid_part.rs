@@ -1,21 +1,18 @@
 //! The rigid motion of the part of the wall that kept its shape, and what stones moved besides.
 
-use super::body::{Body, Matrix3x6};
+use super::body::{Body, BodyStone, Covariance, Matrix3x6};
 use super::random::Random;
-use crate::statistics::upper_median;
+use crate::statistics::{biweight, biweight_loss, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
 
-/// Squared standardised deformation at which a stone no longer counts (Tukey's biweight; a normal one with three
-/// degrees of freedom exceeds it in one of 10,000 cases).
-const REJECTED: f64 = 21.0;
-/// Median of chi-square with three degrees of freedom.
-const MEDIAN: f64 = 2.366;
 /// Rounds in which weights and rigid motion follow each other.
 const ROUNDS: usize = 6;
-/// Triples of stones of which one gives the start, and stones on which each is tried.
+/// Triples of stones that are tried as a start, and those that are followed.
 const TRIALS: usize = 300;
-const TRIED_ON: usize = 300;
+const FOLLOWED: usize = 20;
+/// Share of the size of the largest part from which another part is about as large.
+const AS_LARGE: f64 = 0.9;
 /// Least information of a rigid motion, as a share of the largest: below it the stones do not show it.
 const LEAST: f64 = 1e-9;
 
@@ -27,74 +24,181 @@ pub(super) struct RigidPart {
     pub squares: Vec<f64>,
 }
 
-/// Finds the largest congruent part by iteratively reweighted least squares, from the triple of stones whose rigid
-/// motion most others share (least median of squares, Rousseeuw 1984).
+/// Finds the largest congruent part by iteratively reweighted least squares (Tukey's biweight), from the triple of
+/// stones from which the loss over all stones becomes least.
 ///
 /// Weights are inverse covariances of single stones; the covariance of the result is that of this linear function of
 /// all motions, with all correlations. `None` where the numbers fail.
 pub(super) fn rigid_part(body: &Body) -> Option<RigidPart> {
     let pattern = body.pattern()?;
     let covariance = body.covariance(&pattern)?;
-    let weights: Vec<Matrix3<f64>> = covariance
-        .diagonal
-        .iter()
-        .map(|c| c.cholesky().map_or_else(Matrix3::zeros, |f| f.inverse()))
+    let fit = Fit {
+        body,
+        weights: covariance.diagonal.iter().map(inverse_or_zero).collect(),
+        covariance,
+    };
+    let firm: Vec<usize> = (0..body.stones.len())
+        .filter(|&i| !body.stones[i].joint.is_loose)
         .collect();
-    let start = most_shared(body, &weights)?;
-    let square = |apart: &Vector3<f64>, weight: &Matrix3<f64>| apart.dot(&(weight * apart));
-    let mut squares: Vec<f64> = body
-        .stones
+    // What all stones share, the datum above all, must not hide how they moved against each other.
+    let whole = fit.relative_to(&fit.shares(&firm, |_| 1.0));
+    let precisions: Vec<Matrix3<f64>> = whole
+        .deformations
         .iter()
-        .zip(&weights)
-        .map(|(s, w)| square(&(s.displacement - s.lever * start), w))
+        .map(|(_, c)| inverse_or_zero(c))
         .collect();
-    let mut deformations = Vec::new();
+    let start = fit.most_shared(&firm, &precisions)?;
+    let mut part = RigidPart {
+        squares: fit.squares(&start, &precisions),
+        ..whole
+    };
     for _ in 0..ROUNDS {
-        // Where less than half of the wall kept its shape, its most congruent half counts.
-        let scale = (median_of_firm(body, &squares)? / MEDIAN).max(1.0);
-        let share = |(i, q): (usize, &f64)| match body.stones[i].joint.is_loose {
-            true => 0.0,
-            false => (1.0 - q / (scale * REJECTED)).max(0.0).powi(2),
-        };
-        let shares: Vec<f64> = squares.iter().enumerate().map(share).collect();
-        let mut normal = Matrix6::zeros();
-        for ((stone, weight), share) in body.stones.iter().zip(&weights).zip(&shares) {
-            normal += stone.lever.transpose() * weight * stone.lever * *share;
-        }
-        let inverse = inverse(&normal);
-        let columns: Vec<Matrix3x6> = body
-            .stones
+        let scale = congruent_scale(firm.iter().map(|&i| part.squares[i]))?;
+        part = fit.relative_to(&fit.shares(&firm, |i| biweight(part.squares[i] / scale)));
+    }
+    Some(part)
+}
+
+/// Rigid motions of parts of a body.
+struct Fit<'a> {
+    body: &'a Body<'a>,
+    covariance: Covariance<'a>,
+    /// Inverse covariances of single stones.
+    weights: Vec<Matrix3<f64>>,
+}
+
+impl Fit<'_> {
+    /// With how much of its weight each stone counts.
+    fn shares(&self, firm: &[usize], of: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut shares = vec![0.0; self.body.stones.len()];
+        firm.iter().for_each(|&i| shares[i] = of(i));
+        shares
+    }
+
+    /// The deformation of all stones relative to those that count.
+    fn relative_to(&self, shares: &[f64]) -> RigidPart {
+        let (stones, covariance) = (&self.body.stones, &self.covariance);
+        let inverse = inverse(&self.normal(shares.iter().copied().enumerate()).0);
+        let columns: Vec<Matrix3x6> = stones
             .iter()
-            .zip(&weights)
-            .zip(&shares)
+            .zip(&self.weights)
+            .zip(shares)
             .map(|((stone, weight), share)| weight * stone.lever * inverse * *share)
             .collect();
-        let pairs = body.stones.iter().zip(&columns);
-        let rigid: Vector6<f64> = pairs.clone().map(|(s, a)| a.transpose() * s.displacement).sum();
+        let rigid: Vector6<f64> = stones
+            .iter()
+            .zip(&columns)
+            .map(|(s, a)| a.transpose() * s.displacement)
+            .sum();
         let crossed = covariance.times(&columns);
         let of_rigid: Matrix6<f64> = columns.iter().zip(&crossed).map(|(a, x)| a.transpose() * x).sum();
         let of_stone = |i: usize| {
-            let lever = &body.stones[i].lever;
+            let lever = &stones[i].lever;
             let with_rigid = crossed[i] * lever.transpose();
             let whole = covariance.diagonal[i] - with_rigid - with_rigid.transpose()
                 + lever * of_rigid * lever.transpose();
             (
-                body.stones[i].displacement - lever * rigid,
+                stones[i].displacement - lever * rigid,
                 0.5 * (whole + whole.transpose()),
             )
         };
-        deformations = (0..body.stones.len()).into_par_iter().map(of_stone).collect();
-        squares = deformations.iter().map(|(d, c)| chi_square(d, c)).collect();
+        let deformations: Vec<_> = (0..stones.len()).into_par_iter().map(of_stone).collect();
+        RigidPart {
+            squares: deformations.iter().map(|(d, c)| chi_square(d, c)).collect(),
+            deformations,
+        }
     }
-    Some(RigidPart {
-        deformations,
-        squares,
-    })
+
+    /// Normal equations of a rigid motion: stones with how much of their weight they count.
+    fn normal(&self, shares: impl Iterator<Item = (usize, f64)>) -> (Matrix6<f64>, Vector6<f64>) {
+        let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
+        for (i, share) in shares {
+            let stone = &self.body.stones[i];
+            let part = stone.lever.transpose() * self.weights[i] * share;
+            normal += part * stone.lever;
+            right += part * stone.displacement;
+        }
+        (normal, right)
+    }
+
+    /// Squared distances of the stones from a rigid motion, standardised by these inverse covariances.
+    fn squares(&self, rigid: &Vector6<f64>, precisions: &[Matrix3<f64>]) -> Vec<f64> {
+        let square = |(stone, precision): (&BodyStone, &Matrix3<f64>)| {
+            let apart = stone.displacement - stone.lever * rigid;
+            apart.dot(&(precision * apart))
+        };
+        self.body.stones.iter().zip(precisions).map(square).collect()
+    }
+
+    /// The rigid motion that most stones share: triples of stones are tried as a start, the best ones are followed to
+    /// the part of the wall that moved like them, and that of the least loss is taken.
+    fn most_shared(&self, firm: &[usize], precisions: &[Matrix3<f64>]) -> Option<Vector6<f64>> {
+        let solved = |(normal, right): (Matrix6<f64>, Vector6<f64>)| inverse(&normal) * right;
+        let mut random = Random::new(1);
+        let mut pick = || firm[((random.uniform() * firm.len() as f64) as usize).min(firm.len() - 1)];
+        let triples: Vec<[usize; 3]> = (0..TRIALS).map(|_| [pick(), pick(), pick()]).collect();
+        let of_triple = |triple: &[usize; 3]| solved(self.normal(triple.iter().map(|&i| (i, 1.0))));
+        let of_all = solved(self.normal(firm.iter().map(|&i| (i, 1.0))));
+        let mut trials: Vec<(f64, Vector6<f64>)> = triples
+            .par_iter()
+            .map(of_triple)
+            .chain([of_all])
+            .map(|rigid| (0.0, rigid))
+            .collect();
+        let squares: Vec<Vec<f64>> = trials
+            .par_iter()
+            .map(|(_, rigid)| self.squares(rigid, precisions))
+            .collect();
+        let scales = squares
+            .iter()
+            .filter_map(|squares| congruent_scale(firm.iter().map(|&i| squares[i])));
+        let scale = scales.reduce(f64::min)?;
+        let loss = |squares: &[f64]| {
+            firm.iter()
+                .map(|&i| biweight_loss(squares[i] / scale))
+                .sum::<f64>()
+        };
+        for ((of_trial, _), squares) in trials.iter_mut().zip(&squares) {
+            *of_trial = loss(squares);
+        }
+        trials.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let shares = |rigid: &Vector6<f64>| {
+            let squares = self.squares(rigid, precisions);
+            self.shares(firm, |i| biweight(squares[i] / scale))
+        };
+        let follow = |(_, start): &(f64, Vector6<f64>)| {
+            let mut rigid = *start;
+            for _ in 0..ROUNDS {
+                rigid = solved(self.normal(shares(&rigid).into_iter().enumerate()));
+            }
+            (loss(&self.squares(&rigid, precisions)), rigid)
+        };
+        let mut followed: Vec<_> = trials.par_iter().take(FOLLOWED).map(follow).collect();
+        followed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (least, best) = *followed.first()?;
+        // Of another part that is about as large, the one that moved less counts as the one that stood still.
+        let of_best = shares(&best);
+        let is_other = |rigid: &Vector6<f64>| {
+            let common: f64 = shares(rigid).iter().zip(&of_best).map(|(a, b)| a.min(*b)).sum();
+            common < 0.5 * of_best.iter().sum::<f64>()
+        };
+        let size = |loss: f64| firm.len() as f64 - loss;
+        let moved = |rigid: &Vector6<f64>| {
+            let motion = |&i: &usize| (self.body.stones[i].lever * rigid).norm_squared();
+            firm.iter().map(motion).sum::<f64>()
+        };
+        let rival = followed
+            .iter()
+            .find(|(loss, rigid)| size(*loss) > AS_LARGE * size(least) && is_other(rigid));
+        let of_rival = rival
+            .map(|(_, rigid)| *rigid)
+            .filter(|rigid| moved(rigid) < moved(&best));
+        Some(of_rival.unwrap_or(best))
+    }
 }
 
-fn median_of_firm(body: &Body, squares: &[f64]) -> Option<f64> {
-    let firm = body.stones.iter().zip(squares).filter(|(s, _)| !s.joint.is_loose);
-    upper_median(&mut firm.map(|(_, q)| *q).collect::<Vec<f64>>())
+fn inverse_or_zero(covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    covariance.cholesky().map_or_else(Matrix3::zeros, |f| f.inverse())
 }
 
 /// Squared standardised length; zero where the covariance is none.
@@ -110,40 +214,4 @@ fn inverse(normal: &Matrix6<f64>) -> Matrix6<f64> {
     let least = LEAST * eigen.eigenvalues.max();
     let inverse = eigen.eigenvalues.map(|v| if v > least { 1.0 / v } else { 0.0 });
     eigen.eigenvectors * Matrix6::from_diagonal(&inverse) * eigen.eigenvectors.transpose()
-}
-
-/// The rigid motion of the triple of stones about which the median of the others' squared standardised distances is
-/// least.
-fn most_shared(body: &Body, weights: &[Matrix3<f64>]) -> Option<Vector6<f64>> {
-    let firm: Vec<usize> = (0..body.stones.len())
-        .filter(|&i| !body.stones[i].joint.is_loose)
-        .collect();
-    let stride = firm.len().div_ceil(TRIED_ON).max(1);
-    let tried_on: Vec<usize> = firm.iter().copied().step_by(stride).collect();
-    let mut random = Random::new(1);
-    let mut pick = || firm[((random.uniform() * firm.len() as f64) as usize).min(firm.len() - 1)];
-    let triples: Vec<[usize; 3]> = (0..TRIALS).map(|_| [pick(), pick(), pick()]).collect();
-    let with_median = |triple: &[usize]| {
-        let (mut normal, mut right) = (Matrix6::zeros(), Vector6::zeros());
-        for &i in triple {
-            let part = body.stones[i].lever.transpose() * weights[i];
-            normal += part * body.stones[i].lever;
-            right += part * body.stones[i].displacement;
-        }
-        let rigid = inverse(&normal) * right;
-        let mut squares: Vec<f64> = tried_on
-            .iter()
-            .map(|&i| {
-                let apart = body.stones[i].displacement - body.stones[i].lever * rigid;
-                apart.dot(&(weights[i] * apart))
-            })
-            .collect();
-        let middle = squares.len() / 2;
-        let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-        (*median, rigid)
-    };
-    let all = with_median(&firm);
-    let trials = triples.par_iter().map(|t| with_median(t)).collect::<Vec<_>>();
-    let best = trials.into_iter().chain([all]).min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map(|(_, rigid)| rigid)
 }

@@ -270,3 +270,37 @@ fn a_wall_of_few_stones_is_not_judged() {
         .for_each(|s| *s = None);
     assert_eq!(found(&small), Deformation::default());
 }
+
+#[test]
+fn the_larger_end_of_a_settlement_without_a_crack_is_the_part_that_kept_its_shape() {
+    // Four columns stood still and three settled; those between took part.
+    let noise = errors(9);
+    let moved = |k: usize| {
+        let share = ((place(k).y - 1.1) / 0.8).clamp(0.0, 1.0);
+        Vector3::new(0.0, 0.0, -0.0025 * share)
+    };
+    let found = found(&wall(moved, |k| noise[k]));
+    for (k, stone) in found.stones.iter().enumerate() {
+        let apart = stone.deformation - moved(k);
+        assert!(apart.norm() < 6.0 * SD_M, "{k}: {apart:?}");
+        let share = moved(k).z / -0.0025;
+        assert!(share < 0.5 || stone.zone == 1, "{k}");
+        assert!(share > 0.0 || stone.zone == 0, "{k}");
+    }
+    assert_eq!(found.zones[0].kind, ZoneKind::Settlement);
+}
+
+#[test]
+fn of_two_equal_parts_the_one_that_moved_less_stood_still() {
+    let noise = errors(10);
+    for (low, high) in [(0.0, -0.0025), (-0.0025, 0.0)] {
+        let moved = |k: usize| {
+            let share = ((place(k).y - 1.05) / 0.6).clamp(0.0, 1.0);
+            Vector3::new(0.0, 0.0, low + (high - low) * share)
+        };
+        for (k, stone) in found(&wall(moved, |k| noise[k])).stones.iter().enumerate() {
+            let apart = stone.deformation - moved(k);
+            assert!(apart.norm() < 6.0 * SD_M, "{k}: {apart:?}");
+        }
+    }
+}
