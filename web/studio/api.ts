@@ -139,6 +139,16 @@ export interface NewSignature {
   readonly who: string;
 }
 
+/** `POST /stable`: a rectangle on the face whose surface did not move. */
+export interface NewStable {
+  /** Two opposite corners on the unrolled wall, `[along_m, up_m]`. */
+  readonly corners: readonly [readonly [number, number], readonly [number, number]];
+  /** How far the area reaches in front of the surface and behind it, metres. */
+  readonly margin_m: number;
+  /** What people call it; may be empty. */
+  readonly name: string;
+}
+
 /** `DELETE /remarks`: the remark that was made at this time. */
 export interface OldRemark {
   /** When it was made, as the list has it. */
@@ -174,6 +184,8 @@ export interface ProjectShown {
   readonly mistake?: MistakeShown | null;
   /** Where there is no file: the file that would be written, and why it is this one. */
   readonly proposal?: ProposalShown | null;
+  /** Its stable areas. */
+  readonly stable: readonly (StableShown)[];
   /** Its values, as TOML holds them. */
   readonly values: unknown;
 }
@@ -234,6 +246,16 @@ export interface SignatureShown {
   readonly when: string;
   /** Who signed. */
   readonly who: string;
+}
+
+/** A stable area of the project file. */
+export interface StableShown {
+  /** The rectangle that it fills on the unrolled wall, two opposite corners, metres; absent without results. */
+  readonly corners?: readonly [readonly [number, number], readonly [number, number]] | null;
+  /** What people call it; may be empty. */
+  readonly name: string;
+  /** Its edges along x, y and z of the world, metres. */
+  readonly size_m: readonly [number, number, number];
 }
 
 /** `GET /state`, and every event of `GET /events`. */

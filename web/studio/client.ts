@@ -1,6 +1,6 @@
 // The way to the server: requests, and the state that it keeps telling.
 
-import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State } from "./api.ts";
+import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, NewStable, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State } from "./api.ts";
 
 /** What the server says of a request that it refuses. */
 export class Refused extends Error {
@@ -34,6 +34,7 @@ export const server = {
   project: () => call<ProjectShown>("GET", "/project"),
   init: () => call<ProjectShown>("POST", "/project"),
   change: (changes: ProjectChanges) => call<ProjectShown>("PATCH", "/project", changes),
+  stable: (area: NewStable) => call<ProjectShown>("POST", "/stable", area),
   start: () => call<State>("POST", "/run"),
   stop: () => call<State>("DELETE", "/run"),
   edits: () => call<EditsShown>("GET", "/edits"),

@@ -17,6 +17,10 @@ export interface Area {
   readonly polygon: readonly Point[];
 }
 
+/** The colours of an area's border and name. */
+type AreaColours = readonly [string, string];
+const ZONE: AreaColours = ["#b45cff", "#7a1fd1"], STABLE: AreaColours = ["#12a3a3", "#006a6a"];
+
 /** What is drawn at the moment: a line, a polygon, or a box by two opposite corners. */
 interface Drawing {
   readonly kind: "line" | "polygon" | "box";
@@ -39,6 +43,7 @@ export class Face {
   /** Edits that the stones shown do not have yet. */
   pending: readonly Edit[] = [];
   zones: readonly Area[] = [];
+  stable: readonly Area[] = [];
   epoch: 0 | 1 = 0;
   readonly #report: Report;
   readonly #canvas: HTMLCanvasElement;
@@ -317,7 +322,8 @@ export class Face {
       line(this.#paths[i]!, "#fff", 4);
       line(this.#paths[i]!, "#0a6ed1", 2.2);
     }
-    for (const zone of this.zones) this.#area(zone);
+    for (const zone of this.zones) this.#area(zone, ZONE);
+    for (const area of this.stable) this.#area(area, STABLE);
     for (const edit of this.pending) this.#edit(edit);
     this.#sketch();
     this.#canvas.dataset["drawn"] = "true";
@@ -346,10 +352,10 @@ export class Face {
     if (edit.outline?.length) this.#trace(edit.outline, true, colour, 2.4, edit.do === "ignore" ? [6, 4] : []);
   }
 
-  #area({ polygon, name }: Area): void {
-    this.#trace(polygon, true, "#b45cff", 2.4, [9, 5]);
+  #area({ polygon, name }: Area, [border, ink]: AreaColours): void {
+    this.#trace(polygon, true, border, 2.4, [9, 5]);
     const first = polygon[0];
-    if (first) this.#label(this.#toScreen(first), name);
+    if (first) this.#label(this.#toScreen(first), name, ink);
   }
 
   #sketch(): void {
@@ -406,7 +412,7 @@ export class Face {
     pen.restore();
   }
 
-  #label([x, y]: Point, text: string): void {
+  #label([x, y]: Point, text: string, ink: string): void {
     const pen = this.#pen, ratio = window.devicePixelRatio || 1;
     pen.save();
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -415,14 +421,14 @@ export class Face {
     pen.strokeStyle = "#fff";
     pen.lineJoin = "round";
     pen.strokeText(text, x + 4, y - 6);
-    pen.fillStyle = "#7a1fd1";
+    pen.fillStyle = ink;
     pen.fillText(text, x + 4, y - 6);
     pen.restore();
   }
 }
 
 /** The corners of a box, of which two opposite ones are given. */
-function rectangle(points: readonly (readonly [number, number])[]): Point[] {
+export function rectangle(points: readonly (readonly [number, number])[]): Point[] {
   const [first, last] = [points[0], points.at(-1)];
   if (!first || !last) return [];
   return [[first[0], first[1]], [last[0], first[1]], [last[0], last[1]], [first[0], last[1]]];

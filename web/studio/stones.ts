@@ -6,7 +6,7 @@ import { fixed } from "../src/format.ts";
 import { Photos } from "../src/views/photos.ts";
 import type { Action, Change, Edit, EditsShown, ProjectShown, State } from "./api.ts";
 import { type Live, newId, server } from "./client.ts";
-import { type Area, Face, type Point } from "./face.ts";
+import { type Area, Face, type Point, rectangle } from "./face.ts";
 import { isAtWork, type Page } from "./page.ts";
 import { loadReport } from "./report.ts";
 import { type Word, tx } from "./texts.ts";
@@ -15,6 +15,8 @@ import { type Word, tx } from "./texts.ts";
 const AGREEMENT = 0.7;
 /** So much larger or smaller than the median stone is worth a look. */
 const UNLIKE = 5;
+/** How far a stable area reaches in front of the surface and behind it, metres, unless somebody says otherwise. */
+const MARGIN_M = "0.15";
 /** Rows of the queue at most. */
 const ROWS = 200;
 
@@ -60,6 +62,7 @@ class Room {
   readonly #queue: readonly { readonly stone: number; readonly why: string }[];
   readonly #rows = new Map<number, HTMLButtonElement>();
   readonly #zones = el("ul", { class: "zones" });
+  readonly #stable = el("ol", { class: "zones" });
   readonly #selection = el("div", { class: "selection" });
   readonly #undo: HTMLButtonElement;
   readonly #redo: HTMLButtonElement;
@@ -117,7 +120,8 @@ class Room {
         tool("add", "addHint", () => this.#outline("add")),
         tool("delete", "deleteHint", () => this.#delete()),
         tool("ignore", "ignoreHint", () => this.#outline("ignore")),
-        tool("zone", "zoneHint", () => this.#zone())),
+        tool("zone", "zoneHint", () => this.#zone()),
+        tool("stableArea", "stableHint", () => this.#stableArea())),
       el("span", { class: "group" }, this.#undo, this.#redo),
       this.#apply);
   }
@@ -150,7 +154,8 @@ class Room {
       el("section", {}, el("h2", {}, tx("edits")),
         el("div", { class: "signed" }, el("label", {}, tx("who"), this.#who), el("label", {}, tx("why"), this.#why)),
         this.#list),
-      el("section", {}, el("h2", {}, tx("zones")), this.#zones));
+      el("section", {}, el("h2", {}, tx("zones")), this.#zones),
+      el("section", {}, el("h2", {}, tx("stableAreas")), el("p", { class: "note" }, tx("stableNote")), this.#stable));
   }
 
   #told(state: State): void {
@@ -176,14 +181,24 @@ class Room {
     if (edits.length === 0) this.#list.replaceChildren(el("li", { class: "note" }, tx("noEdits")));
     const zones = zonesOf(this.#project);
     this.#face.zones = zones;
-    this.#zones.replaceChildren(...zones.map((zone, n) => {
-      const remove = button(tx("remove"), tx("removeZone", { name: zone.name }), () =>
-        void this.#change([{ way: ["thresholds", "zones", n], value: null }]));
-      remove.hidden = view;
-      return el("li", {}, zone.name, remove);
-    }));
+    this.#zones.replaceChildren(...zones.map((zone, n) =>
+      el("li", {}, zone.name, this.#remove(tx("removeZone", { name: zone.name }), ["thresholds", "zones", n]))));
     if (zones.length === 0) this.#zones.replaceChildren(el("li", { class: "note" }, tx("noZones")));
+    const { stable } = this.#project;
+    this.#face.stable = stable.map(({ name, corners }, n) => ({ name: `${n + 1} ${name}`, polygon: rectangle(corners ?? []) }));
+    this.#stable.replaceChildren(...stable.map(({ name, size_m }, n) => {
+      const size = size_m.map((edge) => fixed(edge, 2)).join(" × ");
+      return el("li", {}, `${name} (${size} m)`, this.#remove(tx("removeStable", { n: n + 1 }), ["registration", "stable", n]));
+    }));
+    if (stable.length === 0) this.#stable.replaceChildren(el("li", { class: "note" }, tx("noStable")));
     this.#face.redraw();
+  }
+
+  /** A button that takes an entry out of the project file. */
+  #remove(hint: string, way: Change["way"]): HTMLButtonElement {
+    const remove = button(tx("remove"), hint, () => void this.#take(server.change({ changes: [{ way, value: null }] })));
+    remove.hidden = this.#live.state!.view;
+    return remove;
   }
 
   #showSelection(): void {
@@ -221,7 +236,7 @@ class Room {
     }
     const acts: Record<string, () => void> = {
       j: () => this.#join(), s: () => this.#split(), r: () => this.#redraw(), a: () => this.#outline("add"), b: () => this.#box(), i: () => this.#outline("ignore"),
-      z: () => this.#zone(), n: () => this.#walk(1), p: () => this.#walk(-1), Delete: () => this.#delete(),
+      z: () => this.#zone(), t: () => this.#stableArea(), n: () => this.#walk(1), p: () => this.#walk(-1), Delete: () => this.#delete(),
       Escape: () => {
         this.#face.selected.clear();
         this.#showSelection();
@@ -280,29 +295,43 @@ class Room {
 
   /** Asks for the name and the thresholds of a zone. */
   #ask(polygon: Point[]): void {
-    const name = el("input", { type: "text", required: true });
-    const levels = [el("input", { type: "text", inputmode: "decimal" }), el("input", { type: "text", inputmode: "decimal" })] as const;
-    const dialog = el("dialog", { "aria-label": tx("zone") });
-    const close = () => dialog.remove();
-    const number = (input: HTMLInputElement) => {
-      const text = input.value.trim().replace(",", ".");
-      return text ? Number(text) : null;
-    };
-    const save = () => {
-      const [attention_mm, alarm_mm] = levels.map(number);
-      if (!name.value.trim() || Number.isNaN(attention_mm) || Number.isNaN(alarm_mm)) return;
+    const [name, attention, alarm] = [text(""), number(""), number("")];
+    this.#dialog(tx("zone"), [[tx("zoneName"), name], [tx("attention"), attention], [tx("alarm"), alarm]], () => {
+      const [attention_mm, alarm_mm] = [read(attention), read(alarm)];
+      if (!name.value.trim() || Number.isNaN(attention_mm) || Number.isNaN(alarm_mm)) return false;
       const value = { name: name.value.trim(), polygon, attention_mm, alarm_mm };
-      void this.#change([{ way: ["thresholds", "zones", zonesOf(this.#project).length], value }]);
-      close();
+      void this.#take(server.change({ changes: [{ way: ["thresholds", "zones", zonesOf(this.#project).length], value }] }));
+      return true;
+    });
+  }
+
+  /** A part of the face that did not move; the server finds the surface behind the rectangle. */
+  #stableArea(): void {
+    this.#face.draw("box", (corners) => {
+      const [name, margin] = [text(""), number(MARGIN_M)];
+      this.#dialog(tx("stableArea"), [[tx("stableName"), name], [tx("margin"), margin]], () => {
+        const margin_m = read(margin);
+        if (margin_m === null || Number.isNaN(margin_m)) return false;
+        void this.#take(server.stable({ name: name.value.trim(), corners: [corners[0]!, corners[1]!], margin_m }));
+        return true;
+      });
+    });
+  }
+
+  /** Asks for what these fields hold; `save` says whether they hold it. */
+  #dialog(title: string, fields: readonly (readonly [string, HTMLInputElement])[], save: () => boolean): void {
+    const dialog = el("dialog", { "aria-label": title });
+    const close = () => dialog.remove();
+    const done = () => {
+      if (save()) close();
     };
-    const keep = button(tx("save"), "", save);
+    const keep = button(tx("save"), "", done);
     keep.className = "primary";
-    dialog.append(
-      el("label", {}, tx("zoneName"), name), el("label", {}, tx("attention"), levels[0]), el("label", {}, tx("alarm"), levels[1]),
+    dialog.append(...fields.map(([label, input]) => el("label", {}, label, input)),
       el("p", { class: "group" }, keep, button(tx("cancel"), "", close)));
     dialog.addEventListener("close", close);
     dialog.addEventListener("keydown", (e) => {
-      if (e.key === "Enter") save();
+      if (e.key === "Enter" && e.target instanceof HTMLInputElement) done();
     });
     this.element.append(dialog);
     dialog.showModal();
@@ -346,9 +375,11 @@ class Room {
     });
   }
 
-  async #change(changes: readonly Change[]): Promise<void> {
+  /** Shows the project as a change leaves it. */
+  async #take(change: Promise<ProjectShown>): Promise<void> {
+    this.#error.hidden = true;
     try {
-      this.#project = await server.change({ changes });
+      this.#project = await change;
       this.#show();
     } catch (error) {
       this.#fail((error as Error).message);
@@ -396,6 +427,20 @@ function queue(report: Report): { stone: number; why: string }[] {
     if (reasons.length > 0) found.push({ stone: i, why: reasons.join("; "), weight });
   }
   return found.sort((p, q) => q.weight - p.weight);
+}
+
+function text(value: string): HTMLInputElement {
+  return el("input", { type: "text", value });
+}
+
+function number(value: string): HTMLInputElement {
+  return el("input", { type: "text", inputmode: "decimal", value });
+}
+
+/** The number in a field, with a point or a comma; `null` where it is empty. */
+function read({ value }: HTMLInputElement): number | null {
+  const text = value.trim().replace(",", ".");
+  return text ? Number(text) : null;
 }
 
 /** The zones of the project file. */

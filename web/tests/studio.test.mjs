@@ -215,6 +215,31 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   await page.click("dialog >> text=Save");
   await page.waitForSelector(".zones >> text=crest");
   assert.match(readFileSync(join(survey, "stonewise.toml"), "utf8"), /\[\[thresholds\.zones\]\]\nname = "crest"/);
+
+  // A stable area around the surface behind a rectangle, and one more that is taken away again.
+  for (const [name, [left, top, right, bottom]] of [["gate", [0.1, 0.3, 0.45, 0.6]], ["ramp", [0.7, 0.7, 0.8, 0.8]]]) {
+    await page.keyboard.press("t");
+    for (const [x, y] of [[left, top], [right, bottom]]) await click(x, y);
+    await page.fill("dialog label:nth-child(1) input", name);
+    assert.equal(await page.inputValue("dialog label:nth-child(2) input"), "0.15");
+    if (name === "gate") await shot(page, "9-stable");
+    await page.click("dialog >> text=Save");
+    await page.waitForSelector(`.zones >> text=${name}`);
+  }
+  await page.click("[title='Remove stable area 2']");
+  await page.waitForFunction(() => !document.querySelector("aside").textContent.includes("ramp"));
+  const project = readFileSync(join(survey, "stonewise.toml"), "utf8");
+  const area = /\[\[registration\.stable\]\]\nname = "gate"\npolygon = (\[.*\])\nz = (\[.*\])\n/.exec(project);
+  assert.ok(area && project.startsWith("#:schema") && !project.includes("ramp"), project);
+  // Its sides are what was drawn, and as deep as the relief with both margins.
+  const [[left, right, front], heights] = [JSON.parse(area[1]), JSON.parse(area[2])];
+  const far = (p, q) => Math.hypot(p[0] - q[0], p[1] - q[1]);
+  const deep = far(right, front), shape = far(left, right) / (heights[1] - heights[0]);
+  assert.ok(deep > 0.3 && deep < 0.6, `${deep} m deep`);
+  const drawn = (0.35 * box.width) / (0.3 * box.height);
+  const [{ corners: [low, high] }] = (await page.evaluate(() => fetch("/api/v1/project").then((r) => r.json()))).stable;
+  assert.ok(Math.abs((high[0] - low[0]) / (high[1] - low[1]) / drawn - 1) < 0.15, `${low} ${high}`);
+  assert.ok(Math.abs(shape / drawn - 1) < 0.15, `${shape} ${drawn} ${area[0]}`);
   assert.deepEqual(await findings(page), [], "stones");
   await shot(page, "10-edited");
 

@@ -14,6 +14,9 @@ pub struct StableArea(Keys);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Keys {
+    /// What people call it; it may be absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
     /// Two opposite corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     corners: Option<[[f64; 3]; 2]>,
@@ -129,7 +132,8 @@ mod tests {
                 "[lowest, highest]",
             ),
             ("polygon = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]", "either a box"),
-            ("name = \"a\"", "unknown field"),
+            ("nam = \"a\"", "unknown field"),
+            ("name = \"a\"", "either a box"),
         ] {
             assert!(read(text).unwrap_err().contains(reason), "{text}");
         }

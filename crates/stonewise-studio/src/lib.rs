@@ -20,7 +20,9 @@ mod journal;
 mod place;
 mod project_text;
 mod remarks;
+mod stable;
 mod studio;
+mod wall;
 mod work;
 
 pub use api::typescript;

@@ -220,6 +220,7 @@ fn a_page_for_looking_changes_nothing() {
         ("PATCH", "/api/v1/project"),
         ("POST", "/api/v1/edits"),
         ("POST", "/api/v1/edits/undo"),
+        ("POST", "/api/v1/stable"),
     ] {
         assert_eq!(
             studio.send(method, path, &json!({})).status,

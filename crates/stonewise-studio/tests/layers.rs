@@ -10,9 +10,10 @@ const LAYERS: [&[&str]; 4] = [
         "place",
         "project_text",
         "remarks",
+        "wall",
         "work",
     ],
-    &["assets", "epochs", "guard"],
+    &["assets", "epochs", "guard", "stable"],
     &["api"],
     &["studio"],
 ];

@@ -1,7 +1,7 @@
 //! What each address answers.
 
 use super::types::{
-    Act, CheckShown, EditsShown, FindingShown, MistakeShown, NewEdits, ProjectChanges, ProjectShown,
+    Act, Change, CheckShown, EditsShown, FindingShown, MistakeShown, NewEdits, ProjectChanges, ProjectShown,
     ProposalShown, State, Weight,
 };
 use crate::assets;
@@ -13,6 +13,7 @@ use crate::journal::Journal;
 use crate::place::Place;
 use crate::project_text::{self, Mistake, Step};
 use crate::remarks;
+use crate::stable::{self, NewStable};
 use crate::work::{Phase, Run};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -184,6 +185,7 @@ impl Api {
             (Get, "/project") => Ok(Response::json(200, &self.project_shown())),
             (Post, "/project") => self.init_project(),
             (Patch, "/project") => self.change_project(&body(request)?),
+            (Post, "/stable") => self.add_stable(&body(request)?),
             (Post, "/run") => self.start(),
             (Delete, "/run") => {
                 self.run.stop();
@@ -352,6 +354,7 @@ impl Api {
         let mut shown = ProjectShown {
             values: Value::Null,
             epochs: Vec::new(),
+            stable: Vec::new(),
             mistake: None,
             proposal: None,
         };
@@ -372,7 +375,10 @@ impl Api {
             return shown;
         };
         match project_text::values(&text) {
-            Ok(values) => shown.values = values,
+            Ok(values) => {
+                shown.stable = stable::shown(&values, &self.place.results);
+                shown.values = values;
+            }
             Err(mistake) => shown.mistake = Some(mistake.into()),
         }
         match project_text::check(&path, &text) {
@@ -394,6 +400,22 @@ impl Api {
     fn change_project(self: &Arc<Self>, changes: &ProjectChanges) -> Answer {
         let _one = locked(&self.project);
         self.write_changes(changes)?;
+        self.look_again();
+        Ok(Response::json(200, &self.project_shown()))
+    }
+
+    /// Adds a stable area where a rectangle was drawn on the face.
+    fn add_stable(self: &Arc<Self>, new: &NewStable) -> Answer {
+        let value = stable::area(&self.place.results, new).map_err(|e| failed(&e))?;
+        let _one = locked(&self.project);
+        let values = project_text::values(&self.project_text()?.1)?;
+        let areas = values.pointer("/registration/stable").and_then(Value::as_array);
+        let keys = ["registration", "stable"].map(|key| Step::Key(key.to_owned()));
+        let mut way = keys.to_vec();
+        way.push(Step::Place(areas.map_or(0, Vec::len)));
+        self.write_changes(&ProjectChanges {
+            changes: vec![Change { way, value }],
+        })?;
         self.look_again();
         Ok(Response::json(200, &self.project_shown()))
     }
@@ -607,7 +629,7 @@ impl Api {
             return Ok(());
         }
         let way = ["edits", "file"].map(|key| Step::Key(key.to_owned()));
-        let change = super::types::Change {
+        let change = Change {
             way: way.to_vec(),
             value: EDITS_FILE.into(),
         };

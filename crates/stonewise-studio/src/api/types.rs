@@ -3,6 +3,7 @@
 use crate::elsewhere::Unfinished;
 use crate::epochs::EpochShown;
 use crate::project_text::Step;
+use crate::stable::StableShown;
 use crate::work::RunShown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,6 +82,8 @@ pub struct ProjectShown {
     pub values: Value,
     /// Its epochs; none where the file is not valid.
     pub epochs: Vec<EpochShown>,
+    /// Its stable areas.
+    pub stable: Vec<StableShown>,
     /// What is wrong with the file.
     pub mistake: Option<MistakeShown>,
     /// Where there is no file: the file that would be written, and why it is this one.

@@ -2,6 +2,7 @@
 
 use super::types::{Act, EditsShown, NewEdits, ProjectChanges, ProjectShown, State};
 use crate::remarks::{NewSignature, OldRemark, RemarksShown};
+use crate::stable::NewStable;
 use schemars::SchemaGenerator;
 use serde_json::{Map, Value};
 use std::fmt::Write;
@@ -12,6 +13,7 @@ pub fn typescript() -> String {
     generator.subschema_for::<State>();
     generator.subschema_for::<ProjectShown>();
     generator.subschema_for::<ProjectChanges>();
+    generator.subschema_for::<NewStable>();
     generator.subschema_for::<EditsShown>();
     generator.subschema_for::<NewEdits>();
     generator.subschema_for::<Act>();
