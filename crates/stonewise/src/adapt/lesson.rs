@@ -1,4 +1,4 @@
-//! What a survey teaches: masks that several photos and the cloud agree on.
+//! What a survey teaches: masks that several photos and the cloud agree on, and stones that a person corrected.
 
 use crate::error::{Error, Result};
 use crate::files::{read_json, write_json};
@@ -69,9 +69,23 @@ pub struct LessonPhoto {
     pub stones: Vec<u32>,
     /// Stones of which the detector had no mask here.
     pub missed: usize,
+    /// Stones that a person corrected, by their labels.
+    pub corrected: Vec<u32>,
+    /// Masks of the detector that a person said are no stones.
+    pub deleted: usize,
 }
 
 impl Lesson {
+    /// The photos that show what a person corrected, and that is not kept for measuring; all where nobody did.
+    pub fn to_learn_from(&self) -> Vec<usize> {
+        let teaches = |photo: &LessonPhoto| {
+            photo.deleted > 0 || photo.corrected.iter().any(|label| !self.kept.contains(label))
+        };
+        let all = 0..self.photos.len();
+        let chosen: Vec<usize> = all.clone().filter(|&n| teaches(&self.photos[n])).collect();
+        if chosen.is_empty() { all.collect() } else { chosen }
+    }
+
     /// The block in which the stone of a label lies.
     pub fn block(&self, label: u32) -> Option<[i64; 3]> {
         self.blocks.get((label as usize).checked_sub(1)?).copied()
@@ -87,22 +101,31 @@ struct Taught {
     stones: Vec<StoneId>,
     /// How many of them the detector had missed here.
     missed: usize,
+    /// Those of them that a person corrected.
+    corrected: Vec<StoneId>,
+    /// How many masks a person said are no stones.
+    deleted: usize,
 }
 
-/// Gathers what the epochs without masks teach.
+/// Gathers what the epochs without masks teach, with the corrections of the project.
 ///
 /// # Errors
 /// Every epoch has masks, or too few stones are confirmed.
 pub fn lesson(run: &Run) -> Result<Lesson> {
     let project = run.context.project;
     let (mut photos, mut confirmed, mut keys) = (Vec::new(), Vec::new(), Vec::new());
+    let mut corrected: BTreeSet<u32> = BTreeSet::new();
     for epoch in project
         .epochs
         .ids()
         .filter(|&e| project.epochs[e].masks.is_none())
     {
-        let (labelled, segmented) = (run.found(epoch)?, run.segmented(epoch)?);
-        let step = teach(run, epoch, &labelled, &segmented)?;
+        let segmented = run.segmented(epoch)?;
+        let (labelled, before) = match &project.edits {
+            Some(_) => (run.labelled(epoch)?, Some(run.confirmed(epoch)?)),
+            None => (run.found(epoch)?, None),
+        };
+        let step = teach(run, epoch, (&labelled, before.as_deref()), &segmented)?;
         let of_id: BTreeMap<StoneId, &Stone> = labelled.stones.iter().map(|s| (s.id, s)).collect();
         let mut labels: BTreeMap<StoneId, u32> = BTreeMap::new();
         for taught in read_json::<Vec<Taught>>(&step.file(PHOTOS))? {
@@ -114,6 +137,12 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
                 });
                 stones.push(*label);
             }
+            let of_person: Vec<u32> = taught
+                .corrected
+                .iter()
+                .filter_map(|id| labels.get(id).copied())
+                .collect();
+            corrected.extend(&of_person);
             photos.push(LessonPhoto {
                 path: segmented.photos[taught.photo].path.clone(),
                 view: segmented.views[taught.photo].clone(),
@@ -121,6 +150,8 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
                 image: step.file(image_name(taught.photo)),
                 stones,
                 missed: taught.missed,
+                corrected: of_person,
+                deleted: taught.deleted,
             });
         }
         keys.push(step.key().as_str().to_owned());
@@ -142,8 +173,13 @@ pub fn lesson(run: &Run) -> Result<Lesson> {
         ));
     }
     let blocks = blocks(&confirmed);
-    let kept_blocks = kept_blocks(&blocks);
     let labels = (1..).zip(&blocks);
+    // Corrections are few: most of them are to be learnt from.
+    let of_person = labels.clone().filter(|(label, _)| corrected.contains(label));
+    let of_person: BTreeSet<[i64; 3]> = of_person.map(|(_, block)| *block).collect();
+    let others = blocks.iter().copied().filter(|block| !of_person.contains(block));
+    let mut kept_blocks = chosen_blocks(others.collect(), 2);
+    kept_blocks.extend(chosen_blocks(of_person, 0));
     let kept = labels
         .filter(|(_, b)| kept_blocks.contains(*b))
         .map(|(label, _)| label);
@@ -173,22 +209,28 @@ fn blocks(stones: &[Stone]) -> Vec<[i64; 3]> {
     stones.iter().map(block).collect()
 }
 
-/// Blocks chosen by their place alone, two at least where there are three.
-fn kept_blocks(blocks: &[[i64; 3]]) -> BTreeSet<[i64; 3]> {
-    let all: BTreeSet<[i64; 3]> = blocks.iter().copied().collect();
+/// Blocks chosen by their place alone, `least` of them at least where there are more.
+fn chosen_blocks(all: BTreeSet<[i64; 3]>, least: usize) -> BTreeSet<[i64; 3]> {
     let mut order: Vec<[i64; 3]> = all.into_iter().collect();
     let rank = |block: &[i64; 3]| blake3::hash(format!("{block:?}").as_bytes());
     order.sort_by_cached_key(|block| *rank(block).as_bytes());
-    let count = (order.len() as f64 * KEPT_SHARE).round().max(2.0) as usize;
-    order.truncate(count.min(order.len().saturating_sub(1)));
+    let count = (order.len() as f64 * KEPT_SHARE).round() as usize;
+    order.truncate(count.max(least).min(order.len().saturating_sub(1)));
     order.into_iter().collect()
 }
 
-/// The step of an epoch: a label image for each photo that teaches anything.
-fn teach(run: &Run, epoch: EpochId, labelled: &Labelled, segmented: &Segmented) -> Result<StepDir> {
+/// The step of an epoch: a label image for each photo that teaches anything. `before`: its stones without the
+/// corrections, where there are some.
+fn teach(
+    run: &Run,
+    epoch: EpochId,
+    (labelled, before): (&Labelled, Option<&Labelled>),
+    segmented: &Segmented,
+) -> Result<StepDir> {
     let context = run.context;
     let key = Key::new(STEP, &(), &[labelled.key.as_str(), segmented.step.key().as_str()]);
     context.step(&format!("{STEP}-{epoch}"), key, |step, _| {
+        let corrected: BTreeSet<StoneId> = labelled.edited.keys().copied().collect();
         let confirmed = confirmed(labelled);
         let mut photos = Vec::new();
         context.progress.begin("photos", segmented.views.len() as u64);
@@ -199,21 +241,26 @@ fn teach(run: &Run, epoch: EpochId, labelled: &Labelled, segmented: &Segmented) 
             let params = &context.project.settings.label;
             let cloud = photo_stones(tiles, labels, view, params, context.progress)?;
             let owners = owners(labelled, view.image);
+            let had = before.map_or(BTreeMap::new(), |before| self::owners(before, view.image));
+            let deleted = had
+                .into_keys()
+                .filter(|instance| !owners.contains_key(instance))
+                .collect();
             let shown = Shown {
                 masks: &masks,
                 cloud: &cloud,
                 owners: &owners,
+                deleted: &deleted,
             };
-            let chosen = shown.choose(&confirmed);
+            let chosen = shown.choose(&confirmed, &corrected);
             if !chosen.is_empty() {
                 write_label_png(&step.file(image_name(photo)), &shown.drawn(&chosen))?;
                 photos.push(Taught {
                     photo,
-                    missed: chosen
-                        .values()
-                        .filter(|how| **how == How::AsTheCloudShows)
-                        .count(),
+                    missed: chosen.values().filter(|how| **how == How::Missed).count(),
+                    corrected: chosen.keys().filter(|s| corrected.contains(s)).copied().collect(),
                     stones: chosen.into_keys().collect(),
+                    deleted: deleted.len(),
                 });
             }
             context.progress.advance(1);
@@ -259,9 +306,11 @@ fn owners(labelled: &Labelled, photo: ImageId) -> BTreeMap<u32, StoneId> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum How {
     /// By the detector's own mask.
-    AsFound,
+    Found,
     /// By the points that the photo sees: the detector missed it.
-    AsTheCloudShows,
+    Missed,
+    /// By the points that the photo sees, whatever the detector found: a person corrected it.
+    Corrected,
 }
 
 /// A photo with its masks and what the cloud says of it.
@@ -269,6 +318,8 @@ struct Shown<'a> {
     masks: &'a LabelImage,
     cloud: &'a PhotoStones,
     owners: &'a BTreeMap<u32, StoneId>,
+    /// Masks that a person said are no stones.
+    deleted: &'a BTreeSet<u32>,
 }
 
 /// Pixels of a stone in a photo, where the cloud says anything.
@@ -287,17 +338,19 @@ struct Pixels {
 }
 
 impl Shown<'_> {
-    /// The confirmed stones that the photo can teach.
-    fn choose(&self, confirmed: &BTreeSet<StoneId>) -> BTreeMap<StoneId, How> {
+    /// The confirmed and the corrected stones that the photo can teach.
+    fn choose(&self, confirmed: &BTreeSet<StoneId>, corrected: &BTreeSet<StoneId>) -> BTreeMap<StoneId, How> {
         let all = self
             .pixels()
             .into_iter()
-            .filter(|(stone, _)| confirmed.contains(stone));
+            .filter(|(stone, _)| confirmed.contains(stone) || corrected.contains(stone));
         let chosen = all.filter_map(|(stone, n)| {
             let how = match n.mask {
-                0 if !n.is_cut && n.foreign as f64 <= MAX_FOREIGN * n.cloud as f64 => How::AsTheCloudShows,
+                _ if corrected.contains(&stone) && n.is_cut => return None,
+                _ if corrected.contains(&stone) => How::Corrected,
+                0 if !n.is_cut && n.foreign as f64 <= MAX_FOREIGN * n.cloud as f64 => How::Missed,
                 0 => return None,
-                _ if n.both as f64 >= LEAST_OVERLAP * (n.cloud + n.mask - n.both) as f64 => How::AsFound,
+                _ if n.both as f64 >= LEAST_OVERLAP * (n.cloud + n.mask - n.both) as f64 => How::Found,
                 _ => return None,
             };
             (n.cloud >= LEAST_PIXELS).then_some((stone, how))
@@ -326,7 +379,8 @@ impl Shown<'_> {
         pixels
     }
 
-    /// The label image: the chosen stones by their place, 0 in the joints around them, [`OPEN`] elsewhere.
+    /// The label image: the chosen stones by their place, 0 in the joints around them and where a person deleted
+    /// a stone, [`OPEN`] elsewhere.
     fn drawn(&self, chosen: &BTreeMap<StoneId, How>) -> LabelImage {
         let values: BTreeMap<StoneId, (u32, How)> = (1..)
             .zip(chosen)
@@ -338,9 +392,10 @@ impl Shown<'_> {
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
             let by_mask = self.mask(index).1.and_then(|stone| values.get(&stone));
             let by_cloud = self.stone(index).and_then(|stone| values.get(&stone));
-            let found = by_mask.filter(|(_, how)| *how == How::AsFound);
-            let seen = by_cloud.filter(|(_, how)| *how == How::AsTheCloudShows);
-            if let Some((label, _)) = found.or(seen) {
+            let found = by_mask.filter(|(_, how)| *how == How::Found);
+            let seen = by_cloud.filter(|(_, how)| *how == How::Missed);
+            let corrected = by_cloud.filter(|(_, how)| *how == How::Corrected);
+            if let Some((label, _)) = corrected.or(found).or(seen) {
                 *value = *label;
                 is_stone.data_mut()[index] = true;
             }
@@ -349,8 +404,10 @@ impl Shown<'_> {
         let typical = (pixels as f64 / chosen.len().max(1) as f64).sqrt();
         let near = grown(&is_stone, (RING * typical).ceil() as usize);
         for (index, value) in drawn.data_mut().iter_mut().enumerate() {
-            let is_joint = self.cloud.known.data()[index] && self.stone(index).is_none();
-            if *value == OPEN && near.data()[index] && is_joint && self.mask(index).0 == 0 {
+            let is_no_stone = self.cloud.known.data()[index] && self.stone(index).is_none();
+            let mask = self.mask(index).0;
+            let is_joint = mask == 0 && near.data()[index];
+            if *value == OPEN && is_no_stone && (is_joint || self.deleted.contains(&mask)) {
                 *value = 0;
             }
         }
@@ -450,10 +507,11 @@ mod tests {
             masks: &masks,
             cloud: &cloud,
             owners: &owners,
+            deleted: &BTreeSet::new(),
         };
         let confirmed = (1..=5).map(StoneId).collect();
-        let chosen = shown.choose(&confirmed);
-        let expected = [(StoneId(1), How::AsFound), (StoneId(2), How::AsTheCloudShows)];
+        let chosen = shown.choose(&confirmed, &BTreeSet::new());
+        let expected = [(StoneId(1), How::Found), (StoneId(2), How::Missed)];
         assert_eq!(chosen, expected.into());
         let drawn = shown.drawn(&chosen);
         let at = |x: u32, y: u32| *drawn.get(x, y).unwrap();
@@ -462,6 +520,53 @@ mod tests {
         assert_eq!([at(41, 25), at(48, 25)], [0, 0]);
         assert_eq!([at(45, 75), at(115, 25), at(145, 25), at(185, 25)], [OPEN; 4]);
         assert_eq!(drawn.data().iter().filter(|v| **v == 1 || **v == 2).count(), 1800);
+    }
+
+    /// A photo with stone 1 that the detector found as two, 2 of which it found a part, and a mask of what is no
+    /// stone.
+    #[test]
+    fn a_photo_teaches_what_a_person_corrected_and_nothing_that_was_not_looked_at() {
+        let cloud = labels([
+            "                    ",
+            " 1111 222           ",
+            " 1111 222     333   ",
+            " 1111 222     333   ",
+            "                    ",
+            "                    ",
+            "                    ",
+            "                    ",
+        ]);
+        let masks = labels([
+            "                    ",
+            " 7788 9             ",
+            " 7788 9       666   ",
+            " 7788 9       666   ",
+            "                    ",
+            "          5555      ",
+            "          5555      ",
+            "                    ",
+        ]);
+        let owners = [(7, 1), (8, 1), (9, 2), (6, 3)].map(|(mask, stone)| (mask, StoneId(stone)));
+        let (cloud, masks) = (enlarged(&cloud), enlarged(&masks));
+        let cloud = PhotoStones {
+            stones: cloud,
+            known: Raster::filled(200, 80, true),
+        };
+        let shown = Shown {
+            masks: &masks,
+            cloud: &cloud,
+            owners: &owners.into(),
+            deleted: &[5].into(),
+        };
+        let chosen = shown.choose(&BTreeSet::new(), &[1, 2].map(StoneId).into());
+        let expected = [1, 2].map(|stone| (StoneId(stone), How::Corrected));
+        assert_eq!(chosen, expected.into());
+        let drawn = shown.drawn(&chosen);
+        let at = |x: u32, y: u32| *drawn.get(x, y).unwrap();
+        // Both stones as the cloud shows them, the joint between, the deleted one; all else is open.
+        assert_eq!([at(15, 25), at(45, 25), at(85, 25)], [1, 1, 2]);
+        assert_eq!([at(51, 25), at(59, 25), at(115, 55)], [0, 0, 0]);
+        assert_eq!([at(145, 25), at(185, 25), at(115, 75)], [OPEN; 3]);
     }
 
     #[test]
@@ -482,14 +587,12 @@ mod tests {
 
     #[test]
     fn some_blocks_are_kept_and_never_all() {
-        let block = |i: i64| [i, 0, 0];
-        let hundred: Vec<[i64; 3]> = (0..100).map(block).collect();
-        assert_eq!(kept_blocks(&hundred).len(), 15);
-        assert_eq!(kept_blocks(&hundred[..5]).len(), 2);
-        assert_eq!(kept_blocks(&hundred[..2]).len(), 1);
-        assert!(kept_blocks(&hundred[..1]).is_empty());
-        // The choice depends on the places alone.
-        let reversed: Vec<[i64; 3]> = hundred.iter().rev().copied().collect();
-        assert_eq!(kept_blocks(&hundred), kept_blocks(&reversed));
+        let chosen = |count: i64, least| chosen_blocks((0..count).map(|i| [i, 0, 0]).collect(), least);
+        assert_eq!(chosen(100, 2).len(), 15);
+        assert_eq!(chosen(5, 2).len(), 2);
+        assert_eq!(chosen(2, 2).len(), 1);
+        assert!(chosen(1, 2).is_empty());
+        // Of a few blocks that a person corrected, none.
+        assert_eq!([1, 3, 7, 20].map(|count| chosen(count, 0).len()), [0, 0, 1, 3]);
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! What several posed photos and the cloud agree on is taken for true and taught; what is open is ignored.
 //! Parts of the wall are kept apart, on which the detector is measured before and after; without a gain
-//! nothing changes. Self-training (Scudder 1965), with photos and cloud as judges of each other.
+//! nothing changes. Self-training (Scudder 1965), with photos and cloud as judges of each other. Where a person
+//! corrected stones, these are taught as they were corrected.
 
+mod changes;
 mod gain;
 mod lesson;
 mod survey_photos;
@@ -13,12 +15,18 @@ use crate::files::write_readable_json;
 use crate::output::OutputFolder;
 use crate::pipeline::{Context, Run, Until};
 use crate::project::Project;
+use crate::results::Facade;
+use crate::results::names::WORK_DIR;
 use crate::segmentation::train_for;
+use crate::storage::store::{Keeps, StepStore};
+pub use changes::{Fate, StoneChange};
 use gain::Gain;
 use lesson::lesson;
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use stonewise_core::epoch::EpochId;
 use stonewise_core::progress::Progress;
 use stonewise_io::atomic::write_atomically;
 use stonewise_segment::dataset::PhotoCrops;
@@ -29,6 +37,15 @@ use survey_photos::SurveyPhotos;
 
 /// What was decided, in the output folder.
 const RECORD: &str = "adapt.json";
+/// The folder of trainings, in the output folder.
+const TRAINING: &str = "training";
+/// The steps of [`teach`], in words.
+const TEACHING: [&str; 4] = [
+    "stones as they were corrected",
+    "training",
+    "score on the blocks kept apart",
+    "stones that would change",
+];
 /// Digits of a key that name the folder of a training.
 const FOLDER_DIGITS: usize = 16;
 
@@ -45,6 +62,8 @@ pub struct Adapted {
     pub masks: usize,
     /// Of these, masks of stones that the detector had missed in the photo.
     pub missed: usize,
+    /// Masks of stones that a person corrected, and masks that a person said are no stones.
+    pub corrected: usize,
     /// Steps of the training.
     pub steps: u64,
     /// Minutes of the training.
@@ -63,8 +82,8 @@ pub struct Adapted {
     pub model: Option<PathBuf>,
 }
 
-/// Trains the detector of a project on what the survey confirms, for `minutes` in all, and writes into the
-/// folder `out`:
+/// Trains the detector of a project on what the survey confirms and a person corrected, for `minutes` in all, and
+/// writes into the folder `out`:
 ///
 /// - `adapt.json`: what was taught, the figures before and after, and the decision,
 /// - `model.safetensors`: the detector, if it finds the stones that were kept apart significantly better,
@@ -81,52 +100,120 @@ pub fn adapt(
 ) -> Result<Adapted> {
     let context = Context::new(project, out, progress)?;
     let run = Run::new(&context, Until::Labelled);
-    let lesson = lesson(&run)?;
+    let (mut adapted, trained) = learn(&run, minutes, &out.path().join(TRAINING), &|_| {})?;
+    if adapted.is_better() {
+        adapted.model = Some(keep_detector(&trained, &out.path().join("model.safetensors"))?);
+    }
+    write_readable_json(&out.path().join(RECORD), &adapted)?;
+    Ok(adapted)
+}
+
+/// What a person is offered after a training.
+#[derive(Clone, Debug)]
+pub struct Taught {
+    /// What was taught, and the figures before and after.
+    pub adapted: Adapted,
+    /// The trained detector.
+    pub model: PathBuf,
+    /// The stones of the first epoch that it would change.
+    pub changes: Vec<StoneChange>,
+}
+
+/// Trains as [`adapt`], with the steps of a run in `results`, and finds out what the trained detector would change
+/// there. Checkpoint and detector go into a folder in `training`; nothing else is changed, and an interrupted call
+/// continues. Runs with the trained detector take over what was found out. `wall`: the unrolled wall of the changes.
+///
+/// Cost: the training, and the detector on all photos of epochs without masks.
+///
+/// # Errors
+/// As [`adapt`].
+pub fn teach(
+    project: &Project,
+    minutes: f64,
+    (results, training): (&OutputFolder, &Path),
+    wall: &Facade,
+    progress: &dyn Progress,
+) -> Result<Taught> {
+    progress.agenda(&TEACHING.map(str::to_owned));
+    // Beside the steps of the results, which stay as they are.
+    let store = Arc::new(StepStore::new(&results.path().join(WORK_DIR), Keeps::Every)?);
+    let context = |project| Context::with_store(project, results.path(), Arc::clone(&store), progress);
+    let now = context(project)?;
+    let run = Run::new(&now, Until::Labelled);
+    let (adapted, model) = learn(&run, minutes, training, &|step| progress.enter(step))?;
+    progress.enter(TEACHING.len() - 1);
+    let mut with_it = project.clone();
+    with_it.settings.segment.model.clone_from(&model);
+    let then = context(&with_it)?;
+    let other = Run::new(&then, Until::Labelled);
+    let first = [
+        run.labelled(EpochId::REFERENCE)?,
+        other.labelled(EpochId::REFERENCE)?,
+    ];
+    let changes = changes::changes((&now, &first[0]), (&then, &first[1]), wall)?;
+    Ok(Taught {
+        adapted,
+        model,
+        changes,
+    })
+}
+
+/// Trains in a folder in `training`; what came of it, and the detector. `at`: is told which step of [`TEACHING`]
+/// begins.
+fn learn(run: &Run, minutes: f64, training: &Path, at: &dyn Fn(usize)) -> Result<(Adapted, PathBuf)> {
+    let (project, progress) = (run.context.project, run.context.progress);
+    at(0);
+    let lesson = lesson(run)?;
     let params = &project.settings.segment;
     let from = Weights::named(&params.model);
-    let training = TrainParams {
+    let trained_as = TrainParams {
         relief: from.takes_relief()?,
         evaluate_steps: 0,
+        checkpoint_minutes: 1.0,
         ..TrainParams::fine_tuning()
     };
-    let photos = SurveyPhotos::new(&lesson, training.relief, &project.settings.label);
-    let crops = PhotoCrops::new(&photos, training.augment.clone(), training.crop_px, training.seed);
-    let folder = out
-        .path()
-        .join("training")
-        .join(&lesson.key.as_str()[..FOLDER_DIGITS]);
+    let photos = |which| SurveyPhotos::new(&lesson, which, trained_as.relief, &project.settings.label);
+    let (learnt, all) = (
+        photos(lesson.to_learn_from()),
+        photos((0..lesson.photos.len()).collect()),
+    );
+    let [crops, measured] = [&learnt, &all].map(|photos| {
+        PhotoCrops::new(
+            photos,
+            trained_as.augment.clone(),
+            trained_as.crop_px,
+            trained_as.seed,
+        )
+    });
+    let folder = training.join(&lesson.key.as_str()[..FOLDER_DIGITS]);
     let start = Start::Weights(from.clone());
     let no_images = || Ok(Vec::new());
+    at(1);
     let elapsed = train_for(
         minutes,
         &folder,
-        (&start, Some(training)),
+        (&start, Some(trained_as.clone())),
         &crops,
         no_images,
         progress,
     )?;
-    let kept = crops.validation()?;
-    let trained = Weights::File(model_path(&folder));
+    at(2);
+    let kept = measured.validation()?;
+    let model = model_path(&folder);
     let found = |weights: &Weights| -> Result<Vec<PhotoPairs>> {
         let detector = StoneFinder::open(weights, params.tiling.min_score as f32)?;
         progress.begin("measuring", kept.len() as u64);
         Ok(pair_samples(&detector, &kept, progress)?)
     };
-    let (before, after) = (found(&from)?, found(&trained)?);
+    let (before, after) = (found(&from)?, found(&Weights::File(model.clone()))?);
     let gain = Gain::of(&before, &after, |label| lesson.block(label));
-    let model = match gain.is_shown() {
-        true => Some(publish(
-            &model_path(&folder),
-            &out.path().join("model.safetensors"),
-        )?),
-        false => None,
-    };
     let adapted = Adapted {
         photos: lesson.photos.len(),
         stones: lesson.blocks.len(),
         kept: lesson.kept.len(),
         masks: lesson.photos.iter().map(|p| p.stones.len()).sum(),
         missed: lesson.photos.iter().map(|p| p.missed).sum(),
+        corrected: lesson.photos.iter().map(|p| p.corrected.len() + p.deleted).sum(),
         steps: elapsed.steps,
         minutes: elapsed.seconds / 60.0,
         from: params.model.clone(),
@@ -134,14 +221,27 @@ pub fn adapt(
         after: MaskScore::of(&after),
         gain: gain.mean,
         gain_interval: gain.interval,
-        model,
+        model: None,
     };
-    write_readable_json(&out.path().join(RECORD), &adapted)?;
-    Ok(adapted)
+    Ok((adapted, model))
 }
 
-/// Copies a file to its final name.
-fn publish(from: &Path, to: &Path) -> Result<PathBuf> {
+impl Adapted {
+    /// Whether the gain is more than chance.
+    pub fn is_better(&self) -> bool {
+        Gain {
+            mean: self.gain,
+            interval: self.gain_interval,
+        }
+        .is_shown()
+    }
+}
+
+/// Copies a trained detector to its final name, whole or not at all.
+///
+/// # Errors
+/// It cannot be read or written.
+pub fn keep_detector(from: &Path, to: &Path) -> Result<PathBuf> {
     write_atomically(to, |partial| fs::copy(from, partial).map(drop))
         .map_err(crate::error::Error::io("writing", to))?;
     Ok(to.to_owned())

@@ -13,28 +13,31 @@ use stonewise_segment::dataset::{DatasetError, PhotoSet};
 /// Photos with the masks of a lesson, and with relief for a detector that takes it.
 pub struct SurveyPhotos<'a> {
     lesson: &'a Lesson,
+    /// Which of its photos.
+    photos: Vec<usize>,
     relief: bool,
     params: &'a TransferParams,
 }
 
 impl<'a> SurveyPhotos<'a> {
-    /// `params`: how the cloud is seen by the photos.
-    pub fn new(lesson: &'a Lesson, relief: bool, params: &'a TransferParams) -> Self {
+    /// Some photos of a lesson. `params`: how the cloud is seen by them.
+    pub fn new(lesson: &'a Lesson, photos: Vec<usize>, relief: bool, params: &'a TransferParams) -> Self {
         Self {
             lesson,
+            photos,
             relief,
             params,
         }
     }
 
     fn photo(&self, index: usize) -> &LessonPhoto {
-        &self.lesson.photos[index]
+        &self.lesson.photos[self.photos[index]]
     }
 }
 
 impl PhotoSet for SurveyPhotos<'_> {
     fn count(&self) -> usize {
-        self.lesson.photos.len()
+        self.photos.len()
     }
 
     fn sample(&self, index: usize) -> Result<Sample, DatasetError> {

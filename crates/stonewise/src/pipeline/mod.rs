@@ -26,5 +26,6 @@ pub use run::{PairSummary, Summary, run};
 pub(crate) use run::{first_stones, run_in};
 pub(crate) use steps::label::Labelled;
 pub(crate) use steps::segment::Segmented;
+pub(crate) use steps::stone_outlines::stone_outlines;
 pub use units::{Coordinator, Plan, PlanOptions, Unit, UnitDone, do_unit, plan};
 pub use until::Until;

@@ -24,7 +24,8 @@ pub fn make_outlines(context: &Context, first: &Labelled, name: &str) -> Result<
     })
 }
 
-fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
+/// The outlines of an epoch's stones. Cost: one pass over all tiles; memory holds the points of the stones.
+pub fn stone_outlines(context: &Context, first: &Labelled) -> Result<Vec<StoneOutline>> {
     let mut points: BTreeMap<u32, Vec<Point3<f64>>> = BTreeMap::new();
     let tiles = &first.ingested.tiles;
     let all = 0..tiles.tile_count();
