@@ -17,6 +17,16 @@ export interface Change {
   readonly way: readonly (Step)[];
 }
 
+/** A stone that the trained detector would change. */
+export interface ChangeShown {
+  /** What becomes of it. */
+  readonly fate: FateShown;
+  /** Its outline on the unrolled wall, `[along_m, up_m]`; of one that goes as it is now. */
+  readonly outline: readonly (readonly [number, number])[];
+  /** The stones as they are now that lie there. */
+  readonly stones: readonly (number)[];
+}
+
 /** The look at the survey that goes on by itself. */
 export interface CheckShown {
   /** Why it could not be done. */
@@ -81,6 +91,9 @@ export interface EpochShown {
   readonly photos: number;
 }
 
+/** What becomes of a stone. */
+export type FateShown = "new" | "gone" | "changed";
+
 /** A file of a survey. */
 export interface FileShown {
   /** Its length, bytes. */
@@ -98,6 +111,9 @@ export interface FindingShown {
   /** What it means. */
   readonly weight: Weight;
 }
+
+/** What works in the background. */
+export type Job = "run" | "teach";
 
 /** Why a request was refused; the body of every error. */
 export interface MistakeShown {
@@ -147,6 +163,36 @@ export interface NewStable {
   readonly margin_m: number;
   /** What people call it; may be empty. */
   readonly name: string;
+}
+
+/** `POST /teaching`: trains the detector on the corrections. */
+export interface NewTeaching {
+  /** Minutes of training in all; those of an interrupted call count. */
+  readonly minutes: number;
+}
+
+/** A trained detector, its scores, and what it would change. */
+export interface Offer {
+  /** The trained detector. */
+  readonly after: ScoreShown;
+  /** The detector that the project uses, on these blocks. */
+  readonly before: ScoreShown;
+  /** The stones that it would change. */
+  readonly changes: readonly (ChangeShown)[];
+  /** Masks of corrected stones and masks that are none, counted in each photo. */
+  readonly corrected: number;
+  /** 95 % interval of the change of F1; absent where too few blocks were kept. */
+  readonly gain_interval?: readonly [number, number] | null;
+  /** Whether the gain is more than chance. */
+  readonly is_better: boolean;
+  /** Stones on the blocks kept apart. */
+  readonly kept: number;
+  /** How long it was trained, minutes. */
+  readonly minutes: number;
+  /** Steps of the training. */
+  readonly steps: number;
+  /** The folder of its training. */
+  readonly training: string;
 }
 
 /** `DELETE /remarks`: the remark that was made at this time. */
@@ -214,12 +260,14 @@ export interface RemarksShown {
   readonly signature?: SignatureShown | null;
 }
 
-/** A run, as pages show it. */
+/** A run, or a training, as pages show it. */
 export interface RunShown {
   /** Why the results as a whole are in doubt, one sentence each. */
   readonly doubts: readonly (string)[];
   /** Why it failed. */
   readonly error?: string | null;
+  /** Which of them. */
+  readonly job: Job;
   /** The last lines of its log. */
   readonly lines: readonly (string)[];
   /** What the step at work is at. */
@@ -234,6 +282,16 @@ export interface RunShown {
   readonly skipped: readonly (string)[];
   /** Its steps in order. */
   readonly steps: readonly (StepShown)[];
+}
+
+/** How well a detector finds stones. */
+export interface ScoreShown {
+  /** Harmonic mean of both. */
+  readonly f1?: number | null;
+  /** Share of what it found that is right; absent where it found nothing. */
+  readonly precision?: number | null;
+  /** Share of the stones that it found. */
+  readonly recall?: number | null;
 }
 
 /** A signature. */
@@ -268,6 +326,8 @@ export interface State {
   readonly has_project: boolean;
   /** Whether edits or the project changed after the report was written. */
   readonly is_outdated: boolean;
+  /** When a trained detector was offered, a number that changes with it; absent where none is. */
+  readonly offer?: string | null;
   /** The project file, and the folder of the results. */
   readonly project_file?: string | null;
   /** The number of the project file's version: it changes with every change of the file. */
@@ -297,6 +357,12 @@ export interface StepShown {
 
 /** What became of a step. */
 export type StepState = "waiting" | "working" | "done" | "earlier";
+
+/** `GET /teaching`, and the answer to what is decided about an offer. */
+export interface TeachingShown {
+  /** The trained detector that waits for a decision. */
+  readonly offer?: Offer | null;
+}
 
 /** Results that are not finished: a run in a terminal works on them, or was interrupted. */
 export interface Unfinished {

@@ -1,6 +1,6 @@
 // The way to the server: requests, and the state that it keeps telling.
 
-import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, NewStable, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State } from "./api.ts";
+import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, NewStable, NewTeaching, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State, TeachingShown } from "./api.ts";
 
 /** What the server says of a request that it refuses. */
 export class Refused extends Error {
@@ -37,6 +37,10 @@ export const server = {
   stable: (area: NewStable) => call<ProjectShown>("POST", "/stable", area),
   start: () => call<State>("POST", "/run"),
   stop: () => call<State>("DELETE", "/run"),
+  teaching: () => call<TeachingShown>("GET", "/teaching"),
+  teach: (teaching: NewTeaching) => call<State>("POST", "/teaching", teaching),
+  accept: () => call<TeachingShown>("POST", "/teaching/accept"),
+  decline: () => call<TeachingShown>("DELETE", "/teaching"),
   edits: () => call<EditsShown>("GET", "/edits"),
   edit: (edits: NewEdits) => again(() => call<EditsShown>("POST", "/edits", edits)),
   undo: (id: string) => again(() => call<EditsShown>("POST", "/edits/undo", { id })),

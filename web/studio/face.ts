@@ -6,7 +6,7 @@ import { css, el } from "../src/dom.ts";
 import { Squares, contains } from "../src/geometry.ts";
 import { Backdrop } from "../src/views/backdrop.ts";
 import type { Photos } from "../src/views/photos.ts";
-import type { Edit } from "./api.ts";
+import type { ChangeShown, Edit } from "./api.ts";
 import { tx } from "./texts.ts";
 
 export type Point = [number, number];
@@ -28,6 +28,9 @@ interface Drawing {
   readonly done: (points: Point[]) => void;
 }
 
+/** Colours of stones that come, go or change. */
+const FATES = { new: "#18b26b", gone: "#e0402f", changed: "#ff8a1f" } as const;
+
 /** Pixels that a pointer may move between pressing and letting go and still click. */
 const STILL_PX = 4;
 /** A click this near to the first vertex closes a polygon, pixels. */
@@ -44,6 +47,8 @@ export class Face {
   pending: readonly Edit[] = [];
   zones: readonly Area[] = [];
   stable: readonly Area[] = [];
+  /** Stones that another detector would change. */
+  changes: readonly ChangeShown[] = [];
   epoch: 0 | 1 = 0;
   readonly #report: Report;
   readonly #canvas: HTMLCanvasElement;
@@ -129,6 +134,17 @@ export class Face {
     const scale = Math.min(width, height) / (6 * extent);
     this.#view = { scale, x: width / 2 - a * scale, y: height / 2 + u * scale };
     this.onSelect();
+    this.redraw();
+  }
+
+  /** Brings a place of the wall into view. */
+  look(outline: readonly (readonly [number, number])[]): void {
+    if (outline.length === 0) return;
+    const [along, up] = [0, 1].map((axis) => outline.map((p) => p[axis]!)) as [number[], number[]];
+    const middle = (values: number[]) => (Math.min(...values) + Math.max(...values)) / 2;
+    const extent = Math.max(0.2, ...[along, up].map((values) => (Math.max(...values) - Math.min(...values)) / 2));
+    const { width, height } = this.#size, scale = Math.min(width, height) / (6 * extent);
+    this.#view = { scale, x: width / 2 - middle(along) * scale, y: height / 2 + middle(up) * scale };
     this.redraw();
   }
 
@@ -324,6 +340,7 @@ export class Face {
     }
     for (const zone of this.zones) this.#area(zone, ZONE);
     for (const area of this.stable) this.#area(area, STABLE);
+    for (const { outline, fate } of this.changes) this.#trace(outline, true, FATES[fate], 2.4, fate === "gone" ? [4, 4] : []);
     for (const edit of this.pending) this.#edit(edit);
     this.#sketch();
     this.#canvas.dataset["drawn"] = "true";

@@ -52,7 +52,7 @@ function start(root: HTMLElement): void {
     view.hidden = !state.view;
     progress.hidden = !isAtWork(state);
     const ended = state.run.steps.filter((s) => s.state === "done" || s.state === "earlier").length;
-    if (isAtWork(state)) progress.textContent = `${tx("run")} ${ended}/${state.run.steps.length}`;
+    if (isAtWork(state)) progress.textContent = `${tx(state.run.job === "teach" ? "training" : "run")} ${ended}/${state.run.steps.length}`;
     if (!shown) show();
   }, new AbortController().signal);
 }
@@ -60,7 +60,7 @@ function start(root: HTMLElement): void {
 /** The page to begin with: the results where there are some. */
 function first(state: State | null): Name | null {
   if (!state) return null;
-  if (state.run.phase === "running") return "run";
+  if (state.run.phase === "running") return state.run.job === "run" ? "run" : "stones";
   return state.report && !state.is_outdated ? "results" : "survey";
 }
 

@@ -40,16 +40,17 @@ export const runPage: Page = (place, live, until) => {
   live.watch((state) => {
     const { run } = state;
     const works = isAtWork(state);
-    start.textContent = tx(run.phase === "stopped" || state.elsewhere ? "continue" : state.report ? "runAgain" : "start");
+    start.textContent = tx((run.phase === "stopped" && run.job === "run") || state.elsewhere ? "continue" : state.report ? "runAgain" : "start");
     start.hidden = works || state.view;
     start.disabled = !state.has_project;
     stop.hidden = !works || state.view;
     stop.disabled = run.phase === "stopping";
     const seconds = run.phase === "idle" ? "" : ` ${span(run.seconds)}`;
-    phase.textContent = tx(`phase_${run.phase}`) + (works ? "" : seconds);
+    const kind = run.job === "teach" ? "teach" : "phase";
+    phase.textContent = tx(`${kind}_${run.phase}`) + (works ? "" : seconds);
     sentence.hidden = !run.sentence;
     sentence.textContent = run.sentence ?? "";
-    toResults.hidden = run.phase !== "done" || !state.report;
+    toResults.hidden = run.phase !== "done" || run.job !== "run" || !state.report;
     doubts.hidden = run.doubts.length === 0;
     doubts.replaceChildren(el("strong", {}, tx("doubtsTitle")), el("ul", {}, ...run.doubts.map((d) => el("li", {}, d))));
     skipped.hidden = run.skipped.length === 0;

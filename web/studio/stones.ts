@@ -9,6 +9,7 @@ import { type Live, newId, server } from "./client.ts";
 import { type Area, Face, type Point, rectangle } from "./face.ts";
 import { isAtWork, type Page } from "./page.ts";
 import { loadReport } from "./report.ts";
+import { teachingPanel } from "./teaching.ts";
 import { type Word, tx } from "./texts.ts";
 
 /** A stone whose points get less than this share of the photos' votes is worth a look. */
@@ -93,7 +94,7 @@ class Room {
     this.element = el("div", { class: "room" }, this.#toolbar(), this.#status, this.#error,
       el("div", { class: "work" },
         el("div", { class: "wall" }, this.#face.element, this.#drawing, this.#views()),
-        this.#side()));
+        this.#side(until)));
     this.#face.onSelect = () => this.#showSelection();
     this.#face.onDrawing = (isDrawing) => (this.#drawing.hidden = !isDrawing);
     document.addEventListener("keydown", (e) => this.#press(e), { signal: until });
@@ -139,7 +140,7 @@ class Room {
       button("⤢", "Home", () => this.#face.whole()));
   }
 
-  #side(): HTMLElement {
+  #side(until: AbortSignal): HTMLElement {
     const rows = this.#queue.slice(0, ROWS).map(({ stone, why }) => {
       const row = button(`${tx("stone", { id: this.#report.stones.id[stone]! })}: ${why}`, "", () => this.#face.choose(stone));
       this.#rows.set(stone, row);
@@ -155,17 +156,24 @@ class Room {
         el("div", { class: "signed" }, el("label", {}, tx("who"), this.#who), el("label", {}, tx("why"), this.#why)),
         this.#list),
       el("section", {}, el("h2", {}, tx("zones")), this.#zones),
-      el("section", {}, el("h2", {}, tx("stableAreas")), el("p", { class: "note" }, tx("stableNote")), this.#stable));
+      el("section", {}, el("h2", {}, tx("stableAreas")), el("p", { class: "note" }, tx("stableNote")), this.#stable),
+      teachingPanel(this.#live, {
+        show: (changes) => {
+          this.#face.changes = changes;
+          this.#face.redraw();
+        },
+        look: ({ outline }) => this.#face.look(outline),
+      }, until));
   }
 
   #told(state: State): void {
-    const works = isAtWork(state);
+    const isBusy = isAtWork(state), works = isBusy && state.run.job === "run";
     this.#apply.hidden = state.view;
-    this.#apply.disabled = works || !state.is_outdated;
+    this.#apply.disabled = isBusy || !state.is_outdated;
     const { skipped } = state.run;
     this.#status.hidden = !works && skipped.length === 0;
     this.#status.textContent = works ? `${tx("applying")} ${state.run.steps.find((s) => s.state === "working")?.name ?? ""}` : skipped.map((s) => `${tx("skippedTitle")}: ${s}`).join(" ");
-    if (state.run.error) this.#fail(state.run.error);
+    if (state.run.error && state.run.job === "run") this.#fail(state.run.error);
   }
 
   /** Shows the edits and zones as they are. */

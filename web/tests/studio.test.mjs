@@ -256,6 +256,91 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   await end();
 });
 
+/** Photos with light and shade, in which the detector finds stones. */
+const PHOTOS = `
+name = "Taught wall"
+[scene]
+seed = 3
+[scene.wall]
+width_m = 1.8
+height_m = 1.2
+seed = 3
+[scene.tls]
+spacing_m = 0.006
+[photos]
+columns = 2
+rows = 2
+width = 500
+height = 400
+focal_px = 900.0
+distance_m = 5.0
+rendered = true
+`;
+
+test("the detector learns from a correction, and changes nothing unseen", async () => {
+  writeFileSync(join(folder, "photos.toml"), PHOTOS);
+  const survey = join(folder, "taught");
+  execFileSync(program, ["simulate", "--quiet", "--params", join(folder, "photos.toml"), "--out", survey]);
+  const file = join(survey, "stonewise.toml");
+  writeFileSync(file, readFileSync(file, "utf8").replace(/^(masks|motion) *=.*\n/gm, ""));
+  execFileSync(program, ["run", "--quiet", file, "--out", join(survey, "results"), "--force"]);
+  const { address, end } = await studio(survey);
+  const { page, trouble, close } = await open(address);
+  page.setDefaultTimeout(400_000);
+  await page.click("nav >> text=Stones");
+  await page.waitForSelector(".face canvas[data-drawn]");
+  await page.fill(".signed label:first-child input", "A. Keller");
+  await page.keyboard.press("Tab");
+  await canvas(page).focus();
+  const box = await canvas(page).boundingBox();
+  const click = (x, y, modifiers = []) => canvas(page).click({ position: { x: x * box.width, y: y * box.height }, modifiers });
+  for (const x of [0.35, 0.4, 0.45, 0.5, 0.55, 0.6]) {
+    await click(x, 0.5, ["Shift"]);
+    if (/, \d+$/.test(await page.textContent(".selection h2"))) break;
+  }
+  await page.click(".toolbar >> text=Join");
+  await page.waitForSelector(".edits >> text=joined");
+
+  // Trained, stopped, continued.
+  const panel = page.locator(".teaching");
+  await panel.locator("input").fill("0");
+  await panel.locator("button:text-is('Train')").click();
+  await panel.locator(".error >> text=minutes must lie above 0").waitFor();
+  await panel.locator("input").fill("0.2");
+  await panel.locator("button:text-is('Train')").click();
+  await panel.locator("text=At work: training").waitFor();
+  await shot(page, "13-training");
+  await panel.locator("text=Stop").click();
+  await panel.locator("text=The training was stopped").waitFor();
+  await panel.locator("button:text-is('Train')").click();
+  await panel.locator(".scores").waitFor();
+  assert.match(await panel.locator(".scores").textContent(), /before\d+\.\d %.*after\d+\.\d %/);
+  assert.match(await panel.textContent(), /It would change/);
+  assert.deepEqual(await findings(page), [], "offer");
+  await panel.scrollIntoViewIfNeeded();
+  await shot(page, "14-offer");
+  const before = readFileSync(file, "utf8");
+  assert.ok(!before.includes("[segment]") && !before.includes("detector/"), before);
+
+  // Narrow, and still there after the studio has ended.
+  await page.setViewportSize({ width: 390, height: 844 });
+  assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "the offer is wider than the screen");
+  await panel.locator("h3").scrollIntoViewIfNeeded();
+  await shot(page, "14-offer-narrow");
+  await close();
+  await end();
+  const later = await studio(survey);
+  const again = await open(later.address);
+  await again.page.click("nav >> text=Stones");
+  await again.page.click(".teaching >> text=Use this detector");
+  await again.page.waitForSelector(".teaching .scores", { state: "detached" });
+  const [, model] = /\[segment\]\nmodel = "(detector\/taught-[0-9a-f]+\.safetensors)"/.exec(readFileSync(file, "utf8")) ?? [];
+  assert.ok(model && readFileSync(join(survey, model)).length > 1e6, model);
+  assert.deepEqual([...trouble, ...again.trouble], []);
+  await again.close();
+  await later.end();
+});
+
 test("existing results open within a second, also narrow, dark and in German", async () => {
   const began = performance.now();
   const { address, end } = await studio(join(folder, "survey/results"), "--view");

@@ -22,6 +22,7 @@ mod project_text;
 mod remarks;
 mod stable;
 mod studio;
+mod teaching;
 mod wall;
 mod work;
 

@@ -11,6 +11,17 @@ use stonewise_core::progress::Progress;
 /// Most lines of a run's log that are kept.
 const LINES: usize = 200;
 
+/// What works in the background.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Job {
+    /// A run of the project.
+    #[default]
+    Run,
+    /// A training of the detector.
+    Teach,
+}
+
 /// What a run is at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -75,9 +86,11 @@ pub struct PartShown {
     pub total: u64,
 }
 
-/// A run, as pages show it.
+/// A run, or a training, as pages show it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RunShown {
+    /// Which of them.
+    pub job: Job,
     /// What it is at.
     pub phase: Phase,
     /// Seconds since it began, until it ended.
@@ -116,14 +129,15 @@ struct Inner {
 }
 
 impl Run {
-    /// A run begins; `false` where one is at work.
-    pub fn begin(&self) -> bool {
+    /// A run or a training begins; `false` where one is at work.
+    pub fn begin(&self, job: Job) -> bool {
         let mut inner = self.inner();
         if inner.shown.phase.is_at_work() {
             return false;
         }
         self.cancelled.store(false, Ordering::Relaxed);
         inner.shown = RunShown {
+            job,
             phase: Phase::Running,
             ..RunShown::default()
         };
@@ -291,7 +305,7 @@ mod tests {
     #[test]
     fn steps_follow_what_a_run_says_of_itself() {
         let run = Run::default();
-        assert!(run.begin() && !run.begin());
+        assert!(run.begin(Job::Run) && !run.begin(Job::Teach));
         run.agenda(&["clouds", "stones", "motions"].map(str::to_owned));
         run.take_over(0);
         run.enter(1);
@@ -309,7 +323,7 @@ mod tests {
         run.end(Phase::Stopped, |_| {});
         assert_eq!(run.phase(), Phase::Stopped);
         // The next run starts afresh.
-        assert!(run.begin() && !run.is_cancelled());
+        assert!(run.begin(Job::Teach) && !run.is_cancelled());
     }
 
     #[test]

@@ -209,6 +209,37 @@ fn a_project_file_gets_no_new_path_outside_its_folder() {
     assert_eq!(fs::read_to_string(studio.path("stonewise.toml")).unwrap(), before);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_detector_is_taught_in_the_folder_of_the_survey_alone() {
+    let studio = Tested::new();
+    let teach = |minutes: f64| studio.send("POST", "/api/v1/teaching", &json!({ "minutes": minutes }));
+    for minutes in [0.0, -1.0, 1e9] {
+        let refused = teach(minutes);
+        assert!(
+            refused.status == 422 && refused.body.contains("minutes"),
+            "{}",
+            refused.body
+        );
+    }
+    // There are no results yet on which corrections could have been made.
+    assert_eq!(teach(1.0).status, 422);
+    let elsewhere = tempfile::tempdir().unwrap();
+    std::os::unix::fs::symlink(elsewhere.path(), studio.path("detector")).unwrap();
+    let offer = json!({ "training": "0123abcd" }).to_string();
+    fs::write(elsewhere.path().join("offer.json"), offer).unwrap();
+    for (method, path) in [
+        ("POST", "/api/v1/teaching"),
+        ("GET", "/api/v1/teaching"),
+        ("POST", "/api/v1/teaching/accept"),
+        ("DELETE", "/api/v1/teaching"),
+    ] {
+        let answer = studio.ask_with(method, path, "", &json!({ "minutes": 1 }).to_string());
+        assert_eq!(answer.status, 403, "{method} {path}: {}", answer.body);
+    }
+    assert_eq!(fs::read_dir(elsewhere.path()).unwrap().count(), 1);
+}
+
 #[test]
 fn a_page_for_looking_changes_nothing() {
     let studio = Tested::of(survey(), true);
@@ -221,6 +252,9 @@ fn a_page_for_looking_changes_nothing() {
         ("POST", "/api/v1/edits"),
         ("POST", "/api/v1/edits/undo"),
         ("POST", "/api/v1/stable"),
+        ("POST", "/api/v1/teaching"),
+        ("POST", "/api/v1/teaching/accept"),
+        ("DELETE", "/api/v1/teaching"),
     ] {
         assert_eq!(
             studio.send(method, path, &json!({})).status,

@@ -10,6 +10,7 @@ const LAYERS: [&[&str]; 4] = [
         "place",
         "project_text",
         "remarks",
+        "teaching",
         "wall",
         "work",
     ],

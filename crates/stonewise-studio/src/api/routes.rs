@@ -14,7 +14,9 @@ use crate::place::Place;
 use crate::project_text::{self, Mistake, Step};
 use crate::remarks;
 use crate::stable::{self, NewStable};
-use crate::work::{Phase, Run};
+use crate::teaching::{self, NewTeaching};
+use crate::wall::wall_of;
+use crate::work::{Job, Phase, Run, RunShown};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::io::{self, Write};
@@ -191,6 +193,10 @@ impl Api {
                 self.run.stop();
                 Ok(Response::json(200, &self.state()))
             }
+            (Get, "/teaching") => self.teaching(),
+            (Post, "/teaching") => self.teach(&body(request)?),
+            (Post, "/teaching/accept") => self.accept_taught(),
+            (Delete, "/teaching") => self.close_offer(),
             (Get, "/edits") => Ok(Response::json(200, &self.edits()?)),
             (Post, "/edits") => self.add_edits(body(request)?),
             (Post, "/edits/undo") => self.act(&body(request)?, Journal::undo),
@@ -313,6 +319,7 @@ impl Api {
             results_folder: results.display().to_string(),
             has_project: project.is_some_and(Path::is_file),
             report: version(&report),
+            offer: self.place.survey().and_then(|s| version(&teaching::offer_of(s))),
             is_outdated: inputs.into_iter().any(is_newer),
             elsewhere: if run.phase.is_at_work() {
                 None
@@ -511,39 +518,110 @@ impl Api {
         let project = self.read_project()?;
         let folder =
             OutputFolder::of_project(&self.place.results, &project, false).map_err(|e| failed(&e))?;
-        if !self.run.begin() {
+        self.work(Job::Run, move |run| {
+            let summary = stonewise::run(&project, &folder, Until::Reported, run)?;
+            let german = project.settings.report.language == Language::German;
+            Ok(move |shown: &mut RunShown| {
+                let said = |w: &stonewise::Warning| {
+                    let german = w.german.clone().filter(|_| german);
+                    format!("{}: {}", w.subject, german.unwrap_or_else(|| w.message.clone()))
+                };
+                shown.doubts = summary.doubts().map(said).collect();
+                let skipped = summary.warnings.iter().filter(|w| w.skipped_input && !w.doubt);
+                shown.skipped = skipped.map(said).collect();
+                shown.sentence = summary.verdict.as_ref().map(|v| v.sentence.clone());
+            })
+        })
+    }
+
+    /// Does something in the background that others are told of; one at a time.
+    fn work<T: FnOnce(&mut RunShown)>(
+        self: &Arc<Self>,
+        job: Job,
+        work: impl FnOnce(&Run) -> stonewise::Result<T> + Send + 'static,
+    ) -> Answer {
+        if !self.run.begin(job) {
             return Err(Response::error(409, "a run is at work already"));
         }
         let api = Arc::clone(self);
-        let work = move || {
-            let run = || stonewise::run(&project, &folder, Until::Reported, &api.run);
-            let german = project.settings.report.language == Language::German;
-            match catch_unwind(AssertUnwindSafe(run)) {
-                Ok(Ok(summary)) => api.run.end(Phase::Done, |shown| {
-                    let said = |w: &stonewise::Warning| {
-                        let german = w.german.clone().filter(|_| german);
-                        format!("{}: {}", w.subject, german.unwrap_or_else(|| w.message.clone()))
-                    };
-                    shown.doubts = summary.doubts().map(said).collect();
-                    let skipped = summary.warnings.iter().filter(|w| w.skipped_input && !w.doubt);
-                    shown.skipped = skipped.map(said).collect();
-                    shown.sentence = summary.verdict.as_ref().map(|v| v.sentence.clone());
-                }),
-                Ok(Err(Error::Interrupted)) => api.run.end(Phase::Stopped, |_| {}),
-                Ok(Err(error)) => api
-                    .run
-                    .end(Phase::Failed, |shown| shown.error = Some(error.to_string())),
-                Err(_) => api.run.end(Phase::Failed, |shown| {
-                    shown.error =
-                        Some("a defect of stonewise; the lines in the terminal say where".to_owned());
-                }),
-            }
+        let work = move || match catch_unwind(AssertUnwindSafe(|| work(&api.run))) {
+            Ok(Ok(outcome)) => api.run.end(Phase::Done, outcome),
+            Ok(Err(Error::Interrupted)) => api.run.end(Phase::Stopped, |_| {}),
+            Ok(Err(error)) => api
+                .run
+                .end(Phase::Failed, |shown| shown.error = Some(error.to_string())),
+            Err(_) => api.run.end(Phase::Failed, |shown| {
+                shown.error = Some("a defect of stonewise; the lines in the terminal say where".to_owned());
+            }),
         };
         if let Err(error) = thread::Builder::new().name("run".to_owned()).spawn(work) {
             self.run
                 .end(Phase::Failed, |shown| shown.error = Some(error.to_string()));
         }
         Ok(Response::json(200, &self.state()))
+    }
+
+    fn teaching(&self) -> Answer {
+        let survey = self.survey()?;
+        Ok(Response::json(
+            200,
+            &teaching::shown(survey).map_err(|e| failed(&e))?,
+        ))
+    }
+
+    /// Trains the detector on the corrections, beside the results, under their lock.
+    fn teach(self: &Arc<Self>, new: &NewTeaching) -> Answer {
+        new.check().map_err(|e| failed(&e))?;
+        let project = self.read_project()?;
+        let (survey, minutes) = (self.survey()?.to_path_buf(), new.minutes);
+        let wall = wall_of(&self.place.results).map_err(|e| failed(&e))?;
+        let folder =
+            OutputFolder::of_project(&self.place.results, &project, false).map_err(|e| failed(&e))?;
+        self.work(Job::Teach, move |run| {
+            teaching::train((&project, &survey), minutes, &folder, &wall, run)?;
+            Ok(|_: &mut RunShown| {})
+        })
+    }
+
+    /// Has the project use the detector that is offered.
+    fn accept_taught(self: &Arc<Self>) -> Answer {
+        let survey = self.survey()?;
+        let _no_run = OutputFolder::of_results(&self.place.results).map_err(|e| failed(&e))?;
+        let _one = locked(&self.project);
+        let name = teaching::accept(survey).map_err(|e| failed(&e))?;
+        let way = ["segment", "model"].map(|key| Step::Key(key.to_owned()));
+        self.write_changes(&ProjectChanges {
+            changes: vec![Change {
+                way: way.to_vec(),
+                value: name.into(),
+            }],
+        })?;
+        teaching::close(survey).map_err(|e| failed(&e))?;
+        self.look_again();
+        self.teaching()
+    }
+
+    /// Does without the detector that is offered.
+    fn close_offer(&self) -> Answer {
+        let survey = self.survey()?;
+        let _no_run = OutputFolder::of_results(&self.place.results).map_err(|e| failed(&e))?;
+        teaching::close(survey).map_err(|e| failed(&e))?;
+        self.run.touch();
+        self.teaching()
+    }
+
+    /// The folder of the project file, in which detectors lie that were taught.
+    fn survey(&self) -> Result<&Path, Response> {
+        let survey = self.place.survey();
+        let survey = survey.ok_or_else(|| Response::error(404, "the project of these results is gone"))?;
+        let folder = teaching::folder_of(survey);
+        match folder.exists() && !self.place.holds(&folder) {
+            true => {
+                let message = format!("{} lies outside the survey's folder", folder.display());
+                Err(Response::error(403, &message))
+            }
+            false => Ok(survey),
+        }
     }
 
     /// The file of edits that the project names, else the usual one beside it.

@@ -25,6 +25,8 @@ pub struct State {
     pub report: Option<String>,
     /// Whether edits or the project changed after the report was written.
     pub is_outdated: bool,
+    /// When a trained detector was offered, a number that changes with it; absent where none is.
+    pub offer: Option<String>,
     /// The run.
     pub run: RunShown,
     /// A run that was started elsewhere and has not finished.

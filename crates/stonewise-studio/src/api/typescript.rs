@@ -3,6 +3,7 @@
 use super::types::{Act, EditsShown, NewEdits, ProjectChanges, ProjectShown, State};
 use crate::remarks::{NewSignature, OldRemark, RemarksShown};
 use crate::stable::NewStable;
+use crate::teaching::{NewTeaching, TeachingShown};
 use schemars::SchemaGenerator;
 use serde_json::{Map, Value};
 use std::fmt::Write;
@@ -14,6 +15,8 @@ pub fn typescript() -> String {
     generator.subschema_for::<ProjectShown>();
     generator.subschema_for::<ProjectChanges>();
     generator.subschema_for::<NewStable>();
+    generator.subschema_for::<TeachingShown>();
+    generator.subschema_for::<NewTeaching>();
     generator.subschema_for::<EditsShown>();
     generator.subschema_for::<NewEdits>();
     generator.subschema_for::<Act>();
