@@ -10,7 +10,7 @@ use crate::registration::adjustment::joint_motions::JointStone;
 use crate::registration::observers::JointErrors;
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Columns for the six unknowns of a rigid motion.
 pub(super) type Matrix3x6 = SMatrix<f64, 3, 6>;
@@ -27,6 +27,8 @@ pub(super) struct Body<'a> {
 /// A stone of it.
 pub(super) struct BodyStone<'a> {
     pub id: StoneId,
+    /// Whether it counts for the shape of the wall: it is not loose, and its part has stones enough.
+    pub is_firm: bool,
     /// Node of the field.
     node: usize,
     pub joint: &'a JointStone,
@@ -43,40 +45,63 @@ pub(super) struct BodyStone<'a> {
 
 impl<'a> Body<'a> {
     /// All parts of at least this many stones that are not loose. Parts that are neighbours are one: only a crack
-    /// parts them, and what lies on its other side has moved.
+    /// parts them, and what lies on its other side has moved. Smaller parts go with a neighbour, and their stones count
+    /// like loose ones.
     pub fn all(
         motions: &'a JointMotions,
         errors: Option<(&JointErrors, &[StoneId])>,
         least_stones: usize,
     ) -> Vec<Self> {
         let measured = || motions.stones.iter().flatten();
-        let bodies: BTreeSet<u32> = measured().map(|s| s.body).collect();
-        let is_large =
-            |body: &u32| measured().filter(|s| s.body == *body && !s.is_loose).count() >= least_stones;
-        let large: Vec<u32> = bodies.into_iter().filter(is_large).collect();
+        let mut firm: BTreeMap<u32, usize> = BTreeMap::new();
+        measured().for_each(|s| *firm.entry(s.body).or_default() += usize::from(!s.is_loose));
+        let large: Vec<u32> = firm
+            .into_iter()
+            .filter(|(_, stones)| *stones >= least_stones)
+            .map(|(body, _)| body)
+            .collect();
+        let part_of = |node: usize| Some(motions.stones[node].as_ref()?.body);
+        let place = |part: u32| large.binary_search(&part).ok();
         let mut next = vec![Vec::new(); large.len()];
-        let part = |node: usize| large.binary_search(&motions.stones[node].as_ref()?.body).ok();
+        let mut small: BTreeMap<u32, usize> = BTreeMap::new();
         for &(low, high) in &motions.edges {
-            if let (Some(a), Some(b)) = (part(low), part(high)) {
-                next[a].push(b);
-                next[b].push(a);
+            let (Some(low), Some(high)) = (part_of(low), part_of(high)) else {
+                continue;
+            };
+            match (place(low), place(high)) {
+                (Some(a), Some(b)) => {
+                    next[a].push(b);
+                    next[b].push(a);
+                }
+                (Some(a), None) => {
+                    small.entry(high).or_insert(a);
+                }
+                (None, Some(b)) => {
+                    small.entry(low).or_insert(b);
+                }
+                (None, None) => {}
             }
         }
-        let walls = components(&next);
-        let of_wall = |wall: &Vec<usize>| wall.iter().map(|&part| large[part]).collect();
-        walls
-            .iter()
-            .map(|wall| Self::new(motions, errors, &of_wall(wall)))
-            .collect()
+        let of_wall = |wall: &Vec<usize>| {
+            let beside = small.iter().filter(|(_, neighbour)| wall.contains(neighbour));
+            let parts: BTreeMap<u32, bool> = wall
+                .iter()
+                .map(|&place| (large[place], true))
+                .chain(beside.map(|(part, _)| (*part, false)))
+                .collect();
+            Self::new(motions, errors, &parts)
+        };
+        components(&next).iter().map(of_wall).collect()
     }
 
+    /// `parts`: with whether their stones count.
     fn new(
         motions: &'a JointMotions,
         errors: Option<(&JointErrors, &[StoneId])>,
-        parts: &BTreeSet<u32>,
+        parts: &BTreeMap<u32, bool>,
     ) -> Self {
         let of_body = |(node, stone): (usize, &'a Option<JointStone>)| {
-            Some((node, stone.as_ref().filter(|s| parts.contains(&s.body))?))
+            Some((node, stone.as_ref().filter(|s| parts.contains_key(&s.body))?))
         };
         let members: Vec<(usize, &JointStone)> =
             motions.stones.iter().enumerate().filter_map(of_body).collect();
@@ -105,6 +130,7 @@ impl<'a> Body<'a> {
             let (information, vector) = joint.observed;
             BodyStone {
                 id: joint.id,
+                is_firm: !joint.is_loose && parts.get(&joint.body) == Some(&true),
                 node: *node,
                 joint,
                 displacement: joint.displacement - taken_off,

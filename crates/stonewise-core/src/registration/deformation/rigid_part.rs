@@ -38,7 +38,7 @@ pub(super) fn rigid_part(body: &Body) -> Option<RigidPart> {
         covariance,
     };
     let firm: Vec<usize> = (0..body.stones.len())
-        .filter(|&i| !body.stones[i].joint.is_loose)
+        .filter(|&i| body.stones[i].is_firm)
         .collect();
     // What all stones share, the datum above all, must not hide how they moved against each other.
     let whole = fit.relative_to(&fit.shares(&firm, |_| 1.0));

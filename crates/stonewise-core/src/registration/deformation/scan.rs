@@ -61,7 +61,7 @@ struct Bulge {
 /// Tests a body; `None` where its stones show no bulge.
 pub(super) fn scan(body: &Body) -> Option<Scan> {
     let firm: Vec<usize> = (0..body.stones.len())
-        .filter(|&i| !body.stones[i].joint.is_loose)
+        .filter(|&i| body.stones[i].is_firm)
         .collect();
     let model = Model::new(body, &firm)?;
     let bulges = bulges(body, &firm, &model);

@@ -304,3 +304,23 @@ fn of_two_equal_parts_the_one_that_moved_less_stood_still() {
         }
     }
 }
+
+#[test]
+fn a_small_part_beyond_a_crack_is_measured_against_the_wall() {
+    let noise = errors(12);
+    let is_beyond = |k: usize| k % COLUMNS == COLUMNS - 1;
+    let settled = Vector3::new(0.0, 0.0, -0.0025);
+    let mut wall = wall(
+        |k| if is_beyond(k) { settled } else { Vector3::zeros() },
+        |k| noise[k],
+    );
+    for (k, stone) in wall.stones.iter_mut().enumerate() {
+        stone.as_mut().unwrap().body = if is_beyond(k) { 2 } else { 1 };
+    }
+    let found = found(&wall);
+    assert_eq!(found.stones.len(), COLUMNS * ROWS);
+    assert!(found.zones.is_empty(), "{:?}", found.zones);
+    for stone in found.stones.iter().filter(|s| is_beyond(s.stone.0 as usize - 1)) {
+        assert!((stone.deformation - settled).norm() < 6.0 * SD_M, "{stone:?}");
+    }
+}

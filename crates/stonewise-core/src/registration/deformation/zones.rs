@@ -32,7 +32,7 @@ const TILT_STONES: usize = 6;
 pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
     let law = ChiSquared::new(3.0).ok();
     let p = |(i, square): (usize, &f64)| {
-        let is_firm = !body.stones[i].joint.is_loose;
+        let is_firm = body.stones[i].is_firm;
         law.as_ref().filter(|_| is_firm).map(|law| law.sf(*square))
     };
     let p_values: Vec<Option<f64>> = rigid.squares.iter().enumerate().map(p).collect();
