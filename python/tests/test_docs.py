@@ -46,6 +46,30 @@ def test_the_page(survey, tmp_path, monkeypatch):
     assert (names["stones"][0] > 0).any()
 
 
+RECIPES = PAGE.with_name("recipes.md").read_text()
+
+
+@pytest.mark.parametrize("recipe", re.findall(r"^```python\n(.*?)^```", RECIPES, re.DOTALL | re.MULTILINE))
+def test_recipes(recipe, results, tmp_path, monkeypatch):
+    for module in re.findall(r"^import (\w+)", recipe, re.MULTILINE):
+        pytest.importorskip(module)
+    if "geopandas" in recipe:
+        pytest.importorskip("matplotlib").use("agg")
+    (tmp_path / "results").symlink_to(Path(results.report).parents[1])
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {}
+    exec(compile(recipe, "recipes.md", "exec"), names)
+    assert "axes" not in names or os.path.getsize("stones.png") > 5_000
+    # The stones that moved farthest, as the table's own columns say.
+    if "farthest" in names:
+        lengths = dict(zip(*(results.stones_arrow[c].to_pylist() for c in ("stone_id", "length_m"))))
+        lengths = {stone: length for stone, length in lengths.items() if length is not None}
+        assert [row[0] for row in names["farthest"].fetchall()] == sorted(lengths, key=lengths.get, reverse=True)[:5]
+    if "epoch" in names:
+        measured = [stone for stone in results.displacement.tolist() if stone[0] == stone[0]]
+        assert names["epoch"].additional_dimensions["dx"].tolist() == [stone[0] for stone in measured]
+
+
 def test_the_notebook(tmp_path, monkeypatch):
     """All cells of the notebook, in its order."""
     pytest.importorskip("geopandas")
