@@ -429,7 +429,7 @@ fn a_part_of_the_wall_that_stepped_is_found_in_five_epochs() {
     // Three observations are left over by constant and trend; a third of the stones would spoil them.
     for seed in 0..5 {
         let mut draw = Draw(7000 + 100 * seed);
-        let stepped = |i: usize| i % 3 == 0;
+        let stepped = |i: usize| i.is_multiple_of(3);
         let truth = |i: usize, k: usize| match stepped(i) && k >= 2 {
             true => Vector3::new(0.0, -2.4e-3, 0.0),
             false => Vector3::zeros(),
@@ -455,7 +455,7 @@ fn stones_that_err_more_than_claimed_are_not_called_stepped() {
     for seed in 0..40 {
         let mut draw = Draw(9000 + 1000 * seed);
         let stone = |i: usize, draw: &mut Draw| {
-            let size = if i % 4 == 0 { 6.0 } else { 2.0 };
+            let size = if i.is_multiple_of(4) { 6.0 } else { 2.0 };
             let looks: Vec<Vector3<f64>> = (0..6).map(|_| size * draw.vector().component_mul(&SD)).collect();
             pairs_of(i, &looks, 0)
         };
