@@ -6,6 +6,8 @@ use stonewise_io::layers::LayerStyle;
 
 /// Classes of a scale in the legend, odd so that one holds zero.
 const CLASSES: i32 = 9;
+/// Colour and width, millimetres, of the outline of a stone.
+const OUTLINE: [&str; 2] = ["90,88,84,255", "0.1"];
 
 /// A class of a scale in the legend.
 struct Class {
@@ -63,7 +65,7 @@ pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) ->
         ..
     } in classes(column, scale)
     {
-        let fill = simple_fill(&colour, "solid");
+        let fill = simple_fill(&colour, "solid", OUTLINE);
         let label = format!("{:.1} to {:.1} mm", from * 1e3, to * 1e3);
         if fade {
             add(&format!("{range} AND \"significant\" = 1"), &label, &fill, 1.0);
@@ -80,7 +82,7 @@ pub(super) fn stone_style(name: &str, column: &str, scale: Scale, fade: bool) ->
     add(
         &format!("\"{column}\" IS NULL"),
         "not measured",
-        &simple_fill("150,148,142,255", "b_diagonal"),
+        &simple_fill("150,148,142,255", "b_diagonal", OUTLINE),
         1.0,
     );
     let qml = document(&rules, &symbols, 2);
@@ -107,7 +109,7 @@ pub(super) fn arrow_style() -> LayerStyle {
                 ("is_curved", "0"),
                 ("is_repeated", "0"),
             ]),
-            simple_fill("30,34,40,255", "solid")
+            simple_fill("30,34,40,255", "solid", OUTLINE)
         )
     };
     let rule = |key: usize, value: u8, label: &str| {
@@ -167,6 +169,18 @@ pub(super) fn line_style(name: &str, column: &str, scale: Scale) -> LayerStyle {
     }
 }
 
+/// Outlines of zones, through which the stones below show.
+pub(super) fn zone_style() -> LayerStyle {
+    let line = simple_fill("0,0,0,0", "no", ["150,30,110,255", "0.8"]);
+    let symbol =
+        format!(r#"<symbol type="fill" name="0" alpha="1" clip_to_extent="1" force_rhr="0">{line}</symbol>"#);
+    LayerStyle {
+        name: "Outlines".into(),
+        description: "outlines of the zones of deformation".into(),
+        qml: document(r#"<rule key="r0" symbol="0" label="zone"/>"#, &symbol, 2),
+    }
+}
+
 /// A style of rules; `kind` is QGIS's number of the geometry: 1 lines, 2 polygons.
 fn document(rules: &str, symbols: &str, kind: u8) -> String {
     format!(
@@ -178,13 +192,14 @@ fn document(rules: &str, symbols: &str, kind: u8) -> String {
     )
 }
 
-fn simple_fill(colour: &str, pattern: &str) -> String {
+/// `outline`: colour and width, millimetres.
+fn simple_fill(colour: &str, pattern: &str, [outline, width]: [&str; 2]) -> String {
     let list = options(&[
         ("color", colour),
         ("style", pattern),
-        ("outline_color", "90,88,84,255"),
+        ("outline_color", outline),
         ("outline_style", "solid"),
-        ("outline_width", "0.1"),
+        ("outline_width", width),
         ("outline_width_unit", "MM"),
     ]);
     format!(r#"<layer class="SimpleFill" enabled="1" locked="0" pass="0">{list}</layer>"#)

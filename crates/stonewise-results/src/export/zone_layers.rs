@@ -1,5 +1,6 @@
 //! The zones of deformation as layers of polygons.
 
+use super::layer_style::zone_style;
 use crate::{ResultSet, StoneOutline, StoneRow, ZonePlace};
 use nalgebra::{Point2, Point3, Vector3};
 use stonewise_core::geometry::convex_hull;
@@ -45,7 +46,7 @@ pub(super) fn zone_layers(
             crs,
             attributes: attributes(&zones)?,
             vertices,
-            styles: Vec::new(),
+            styles: vec![zone_style()],
         })
     };
     Ok(vec![
@@ -172,6 +173,12 @@ mod tests {
         let layers = zone_layers(&results, &named, &named, None).unwrap();
         let names: Vec<&str> = layers.iter().map(|l| l.name.as_str()).collect();
         assert_eq!(names, ["zones", "zones_facade"]);
+        // Stones show through.
+        assert!(
+            layers
+                .iter()
+                .all(|l| l.styles[0].qml.contains(r#"name="style" value="no""#))
+        );
         let hull = &layers[1].vertices[0];
         // By brute force: every corner of the zone's outlines lies to the left of every edge.
         for stone in results.stones.iter().filter(|s| s.zone_id == 1) {
