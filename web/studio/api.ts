@@ -17,16 +17,6 @@ export interface Change {
   readonly way: readonly (Step)[];
 }
 
-/** A stone that the trained detector would change. */
-export interface ChangeShown {
-  /** What becomes of it. */
-  readonly fate: FateShown;
-  /** Its outline on the unrolled wall, `[along_m, up_m]`; of one that goes as it is now. */
-  readonly outline: readonly (readonly [number, number])[];
-  /** The stones as they are now that lie there. */
-  readonly stones: readonly (number)[];
-}
-
 /** The look at the survey that goes on by itself. */
 export interface CheckShown {
   /** Why it could not be done. */
@@ -92,7 +82,7 @@ export interface EpochShown {
 }
 
 /** What becomes of a stone. */
-export type FateShown = "new" | "gone" | "changed";
+export type Fate = "new" | "gone" | "changed";
 
 /** A file of a survey. */
 export interface FileShown {
@@ -178,7 +168,7 @@ export interface Offer {
   /** The detector that the project uses, on these blocks. */
   readonly before: ScoreShown;
   /** The stones that it would change. */
-  readonly changes: readonly (ChangeShown)[];
+  readonly changes: readonly (StoneChange)[];
   /** Masks of corrected stones and masks that are none, counted in each photo. */
   readonly corrected: number;
   /** 95 % interval of the change of F1; absent where too few blocks were kept. */
@@ -357,6 +347,16 @@ export interface StepShown {
 
 /** What became of a step. */
 export type StepState = "waiting" | "working" | "done" | "earlier";
+
+/** A stone of the first epoch that another detector would change. */
+export interface StoneChange {
+  /** What becomes of it. */
+  readonly fate: Fate;
+  /** Its outline on the unrolled wall, `[along_m, up_m]`, to a millimetre: as it would be; of one that is gone as it is. */
+  readonly outline: readonly (readonly [number, number])[];
+  /** The numbers of the stones as they are now that lie there. */
+  readonly stones: readonly (number)[];
+}
 
 /** `GET /teaching`, and the answer to what is decided about an offer. */
 export interface TeachingShown {

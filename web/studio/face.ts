@@ -6,7 +6,7 @@ import { css, el } from "../src/dom.ts";
 import { Squares, contains } from "../src/geometry.ts";
 import { Backdrop } from "../src/views/backdrop.ts";
 import type { Photos } from "../src/views/photos.ts";
-import type { ChangeShown, Edit } from "./api.ts";
+import type { StoneChange, Edit } from "./api.ts";
 import { tx } from "./texts.ts";
 
 export type Point = [number, number];
@@ -48,7 +48,7 @@ export class Face {
   zones: readonly Area[] = [];
   stable: readonly Area[] = [];
   /** Stones that another detector would change. */
-  changes: readonly ChangeShown[] = [];
+  changes: readonly StoneChange[] = [];
   epoch: 0 | 1 = 0;
   readonly #report: Report;
   readonly #canvas: HTMLCanvasElement;

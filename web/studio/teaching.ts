@@ -2,7 +2,7 @@
 
 import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
-import type { ChangeShown, Offer, ScoreShown, State } from "./api.ts";
+import type { StoneChange, Offer, ScoreShown, State } from "./api.ts";
 import { type Live, server } from "./client.ts";
 import { isAtWork } from "./page.ts";
 import { tx } from "./texts.ts";
@@ -13,9 +13,9 @@ const MINUTES = "20";
 /** What the panel needs of the page around it. */
 export interface Wall {
   /** Outlines the stones that would change. */
-  readonly show: (changes: readonly ChangeShown[]) => void;
+  readonly show: (changes: readonly StoneChange[]) => void;
   /** Brings one of them into view. */
-  readonly look: (change: ChangeShown) => void;
+  readonly look: (change: StoneChange) => void;
 }
 
 /** The panel; it follows the state until the signal ends it. */

@@ -67,15 +67,29 @@ impl From<StableArea> for Keys {
 }
 
 impl StableArea {
+    /// What people call it.
+    pub fn name(&self) -> Option<&str> {
+        self.0.name.as_deref()
+    }
+
+    /// All its corners: of a box eight, of a polygon two above each other for each of its own.
+    pub fn corners(&self) -> impl Iterator<Item = Point3<f64>> {
+        let above = |[x, y]: [f64; 2], heights: [f64; 2]| heights.map(|z| Point3::new(x, y, z));
+        let of_box = self
+            .0
+            .corners
+            .iter()
+            .flat_map(move |&[[ax, ay, az], [bx, by, bz]]| {
+                [[ax, ay], [bx, ay], [bx, by], [ax, by]].map(|p| above(p, [az, bz]))
+            });
+        let heights = self.0.z.unwrap_or_default();
+        let ring = self.0.polygon.iter().flatten();
+        of_box.flatten().chain(ring.flat_map(move |&p| above(p, heights)))
+    }
+
     /// The smallest box around the area.
     pub fn bounds(&self) -> Option<Bounds> {
-        let [low, high] = self.0.z.unwrap_or_default();
-        let ring = self.0.polygon.iter().flatten();
-        let corners = self.0.corners.iter().flatten().map(|c| Point3::from(*c));
-        Bounds::of(
-            ring.flat_map(|p| [low, high].map(|z| Point3::new(p[0], p[1], z)))
-                .chain(corners),
-        )
+        Bounds::of(self.corners())
     }
 
     /// Whether a point lies in it.

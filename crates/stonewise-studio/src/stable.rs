@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use stonewise::nalgebra::{Point2, Point3, Vector3};
 use stonewise::results::{Facade, ResultSet};
-use stonewise::{Error, Result};
+use stonewise::{Error, Result, StableArea};
 
 /// What lies within this much of each other, out of the face, is one surface, metres: more than the relief of
 /// rubble masonry.
@@ -55,7 +55,8 @@ pub fn shown(values: &Value, results: &Path) -> Vec<StableShown> {
 }
 
 fn shown_area(area: &Value, wall: Option<&Facade>) -> StableShown {
-    let corners = corners(area);
+    let area: Option<StableArea> = StableArea::deserialize(area).ok();
+    let corners: Vec<Point3<f64>> = area.iter().flat_map(StableArea::corners).collect();
     let edge = |axis: usize| {
         let [low, high] = span(corners.iter().map(|corner| corner[axis])).unwrap_or_default();
         high - low
@@ -63,37 +64,14 @@ fn shown_area(area: &Value, wall: Option<&Facade>) -> StableShown {
     let on_wall: Vec<Point2<f64>> = wall.map_or(Vec::new(), |w| corners.iter().map(|c| w.place(c)).collect());
     let along = span(on_wall.iter().map(|p| p.x));
     let up = span(on_wall.iter().map(|p| p.y));
+    let name = area.as_ref().and_then(StableArea::name);
     StableShown {
-        name: area.get("name").and_then(Value::as_str).unwrap_or("").to_owned(),
+        name: name.unwrap_or_default().to_owned(),
         corners: along
             .zip(up)
             .map(|([left, right], [low, high])| [[left, low], [right, high]]),
         size_m: [0, 1, 2].map(edge),
     }
-}
-
-/// All corners of an area, world, metres.
-fn corners(area: &Value) -> Vec<Point3<f64>> {
-    let list = |key: &str| -> Option<Vec<Vec<f64>>> { serde_json::from_value(area.get(key)?.clone()).ok() };
-    let heights: Vec<f64> = area
-        .get("z")
-        .and_then(|z| serde_json::from_value(z.clone()).ok())
-        .unwrap_or_default();
-    let at = |x: f64, y: f64, z: f64| Point3::new(x, y, z);
-    if let Some([a, b]) = list("corners").as_deref()
-        && let ([ax, ay, az], [bx, by, bz]) = (&a[..], &b[..])
-    {
-        let plan = [(ax, ay), (bx, ay), (bx, by), (ax, by)];
-        return plan
-            .iter()
-            .flat_map(|(x, y)| [az, bz].map(|z| at(**x, **y, *z)))
-            .collect();
-    }
-    let ring = list("polygon").unwrap_or_default();
-    let corners = ring.iter().filter_map(|p| Some((*p.first()?, *p.get(1)?)));
-    corners
-        .flat_map(|(x, y)| heights.iter().map(move |z| at(x, y, *z)))
-        .collect()
 }
 
 /// The area as the project file holds it: seen from above a rectangle along the wall, around the surface that the
@@ -190,7 +168,6 @@ fn span(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stonewise::StableArea;
 
     /// A wall that turns by 60 degrees on a radius of 20 m and leans by 0.1, and the ground before it.
     fn wall() -> (Facade, Vec<Point3<f64>>, Vec<Point3<f64>>) {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use stonewise::results::Facade;
-use stonewise::{Error, Fate, OutputFolder, Project, Result, StoneChange, Taught, keep_detector, teach};
+use stonewise::{Error, OutputFolder, Project, Result, StoneChange, Taught, keep_detector, teach};
 use stonewise_base::files::{create_results_folder, read_json, write_json};
 use stonewise_core::progress::Progress;
 
@@ -73,7 +73,7 @@ pub struct Offer {
     /// Whether the gain is more than chance.
     pub is_better: bool,
     /// The stones that it would change.
-    pub changes: Vec<ChangeShown>,
+    pub changes: Vec<StoneChange>,
 }
 
 /// How well a detector finds stones.
@@ -85,29 +85,6 @@ pub struct ScoreShown {
     pub recall: Option<f64>,
     /// Harmonic mean of both.
     pub f1: Option<f64>,
-}
-
-/// A stone that the trained detector would change.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ChangeShown {
-    /// What becomes of it.
-    pub fate: FateShown,
-    /// The stones as they are now that lie there.
-    pub stones: Vec<u32>,
-    /// Its outline on the unrolled wall, `[along_m, up_m]`; of one that goes as it is now.
-    pub outline: Vec<[f64; 2]>,
-}
-
-/// What becomes of a stone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum FateShown {
-    /// It is found where none was.
-    New,
-    /// It is not found any more.
-    Gone,
-    /// It has another border.
-    Changed,
 }
 
 /// The folder of a survey's detectors.
@@ -147,10 +124,10 @@ pub fn train(
     create_results_folder(&folder_of(survey))?;
     let training = folder_of(survey).join(TRAINING);
     let taught = teach(project, minutes, (results, &training), wall, progress)?;
-    write_json(&offer_of(survey), &offer(&taught))
+    write_json(&offer_of(survey), &offer(taught))
 }
 
-fn offer(taught: &Taught) -> Offer {
+fn offer(taught: Taught) -> Offer {
     let Taught {
         adapted,
         model,
@@ -173,21 +150,7 @@ fn offer(taught: &Taught) -> Offer {
         after: score([after.precision, after.recall, after.f1]),
         gain_interval: adapted.gain_interval,
         is_better: adapted.is_better(),
-        changes: changes.iter().map(change).collect(),
-    }
-}
-
-fn change(change: &StoneChange) -> ChangeShown {
-    // Finer than anyone sees.
-    let round = |p: &[f64; 2]| p.map(|v| (v * 1e3).round() / 1e3);
-    ChangeShown {
-        fate: match change.fate {
-            Fate::New => FateShown::New,
-            Fate::Gone => FateShown::Gone,
-            Fate::Changed => FateShown::Changed,
-        },
-        stones: change.stones.clone(),
-        outline: change.outline.iter().map(round).collect(),
+        changes,
     }
 }
 

@@ -14,7 +14,6 @@ from qgis.core import (
     Qgis,
     QgsCoordinateReferenceSystem,
     QgsEditFormConfig,
-    QgsFillSymbol,
     QgsMapLayerStyle,
     QgsPalLayerSettings,
     QgsProject,
@@ -85,7 +84,7 @@ class Plugin:
     def tell(self, text: str, level=Qgis.MessageLevel.Info):
         self.iface.messageBar().pushMessage("stonewise", text, level, 0)
 
-    # What asks
+    # Dialogs
 
     def ask_open(self):
         last = QgsSettings().value("stonewise/last", "")
@@ -245,9 +244,6 @@ class Plugin:
             label.fieldName, label.fitInPolygonOnly = "stone_id", True
             layer.setLabeling(QgsVectorLayerSimpleLabeling(label))
             layer.setLabelsEnabled(True)
-        if "layername=zones" in layer.source():
-            outline = {"style": "no", "outline_color": "150,30,110", "outline_width": "0.8"}
-            layer.renderer().setSymbol(QgsFillSymbol.createSimple(outline))
         for style, text in styles.items():
             layer.styleManager().addStyle(style, QgsMapLayerStyle(text))
         QgsProject.instance().addMapLayer(layer, False)

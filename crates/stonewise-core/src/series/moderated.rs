@@ -4,6 +4,7 @@ use crate::statistics::{median, student_95};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use statrs::function::gamma::digamma;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Half the width of a normal 95 % interval in standard deviations.
 const Z: f64 = 1.959_963_984_540_054;
@@ -61,10 +62,14 @@ impl VarianceFactor {
     /// The factor of all stones from the median of theirs, which stones that fit no model do not change; see
     /// [`Self::of`].
     pub(super) fn typical(residuals: &[(f64, usize)]) -> Self {
-        let of_stone = |(sum, freedom): &(f64, usize)| {
-            let law = ChiSquared::new(*freedom as f64).ok()?;
-            Some(sum / law.inverse_cdf(0.5))
+        // Few freedoms are unlike, and a quantile is sought numerically.
+        let freedoms: BTreeSet<usize> = residuals.iter().map(|r| r.1).collect();
+        let expected = |freedom: usize| {
+            let law = ChiSquared::new(freedom as f64).ok()?;
+            Some((freedom, law.inverse_cdf(0.5)))
         };
+        let expected: BTreeMap<usize, f64> = freedoms.into_iter().filter_map(expected).collect();
+        let of_stone = |(sum, freedom): &(f64, usize)| Some(sum / expected.get(freedom)?);
         let mut factors: Vec<f64> = residuals.iter().filter_map(of_stone).collect();
         Self {
             factor: median(&mut factors).unwrap_or(1.0).max(1.0),

@@ -3,9 +3,11 @@
 use crate::error::Result;
 use crate::pipeline::{Context, Labelled, stone_outlines};
 use crate::results::Facade;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::cloud::TileSource;
+use stonewise_core::evaluate::LabelConfusion;
 
 /// Overlap (intersection over union) of two stones in points, from which they are the same.
 const SAME: f64 = 0.75;
@@ -13,7 +15,7 @@ const SAME: f64 = 0.75;
 const PART: f64 = 0.1;
 
 /// What becomes of a stone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
     /// It is found where none was.
@@ -25,13 +27,14 @@ pub enum Fate {
 }
 
 /// A stone of the first epoch that another detector would change.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StoneChange {
     /// What becomes of it.
     pub fate: Fate,
     /// The numbers of the stones as they are now that lie there.
     pub stones: Vec<u32>,
-    /// Its outline on the unrolled wall, `[along, up]`, metres: as it would be; of one that is gone as it is.
+    /// Its outline on the unrolled wall, `[along_m, up_m]`, to a millimetre: as it would be; of one that is gone as it
+    /// is.
     pub outline: Vec<[f64; 2]>,
 }
 
@@ -42,7 +45,7 @@ pub fn changes(
     wall: &Facade,
 ) -> Result<Vec<StoneChange>> {
     let tiles = &now.1.ingested.tiles;
-    let mut shared = Shared::default();
+    let mut shared = LabelConfusion::default();
     let all = 0..tiles.tile_count();
     now.0.progress.each("compare stones", all, |tile| -> Result<()> {
         let (old, new) = (now.1.labels(tile)?, then.1.labels(tile)?);
@@ -58,7 +61,10 @@ pub fn changes(
             .into_iter()
             .filter_map(|outline| {
                 let centroid = centroids.get(&outline.stone_id)?;
-                let place = |p| wall.place_in_stone(p, centroid, &outline.normal).into();
+                let place = |p| {
+                    let at = wall.place_in_stone(p, centroid, &outline.normal);
+                    [at.x, at.y].map(|v| (v * 1e3).round() / 1e3)
+                };
                 Some((outline.stone_id, outline.ring.iter().map(place).collect()))
             });
         Ok(outlines.collect())
@@ -73,51 +79,35 @@ pub fn changes(
             outline: rings.remove(&stone).unwrap_or_default(),
         }
     };
-    Ok(shared.fates().into_iter().map(change).collect())
+    Ok(fates(&shared).into_iter().map(change).collect())
 }
 
-/// Points by the stones that they belong to in both labellings; 0 is none.
-#[derive(Default)]
-struct Shared {
-    both: BTreeMap<(u32, u32), u64>,
-    old: BTreeMap<u32, u64>,
-    new: BTreeMap<u32, u64>,
-}
-
-impl Shared {
-    fn add(&mut self, old: u32, new: u32) {
-        *self.both.entry((old, new)).or_default() += 1;
-        *self.old.entry(old).or_default() += 1;
-        *self.new.entry(new).or_default() += 1;
-    }
-
-    /// What becomes of which stone, with the stones that are there now.
-    fn fates(&self) -> Vec<(Fate, u32, Vec<u32>)> {
-        let pairs = self.both.iter().filter(|((old, new), _)| *old != 0 && *new != 0);
-        let (mut same, mut parts): (BTreeSet<u32>, BTreeMap<u32, Vec<u32>>) = Default::default();
-        let mut lives: BTreeSet<u32> = BTreeSet::new();
-        for (&(old, new), &n) in pairs {
-            let (n, old_size, new_size) = (n as f64, self.old[&old] as f64, self.new[&new] as f64);
-            if n >= SAME * (old_size + new_size - n) {
-                same.insert(new);
-            }
-            if n >= PART * old_size.min(new_size) {
-                parts.entry(new).or_default().push(old);
-                lives.insert(old);
-            }
+/// What becomes of which stone, with the stones that are there now. `shared`: points by their stones now and then.
+fn fates(shared: &LabelConfusion) -> Vec<(Fate, u32, Vec<u32>)> {
+    let (old_sizes, new_sizes) = (shared.predicted_sizes(), shared.true_sizes());
+    let (mut same, mut parts): (BTreeSet<u32>, BTreeMap<u32, Vec<u32>>) = Default::default();
+    let mut lives: BTreeSet<u32> = BTreeSet::new();
+    for (old, new, n) in shared.overlaps() {
+        let (n, old_size, new_size) = (n as f64, old_sizes[&old] as f64, new_sizes[&new] as f64);
+        if n >= SAME * (old_size + new_size - n) {
+            same.insert(new);
         }
-        let found = self.new.keys().filter(|&&new| new != 0 && !same.contains(&new));
-        let found = found.map(|&new| match parts.remove(&new) {
-            Some(stones) => (Fate::Changed, new, stones),
-            None => (Fate::New, new, Vec::new()),
-        });
-        let found: Vec<_> = found.collect();
-        let gone = self.old.keys().filter(|&&old| old != 0 && !lives.contains(&old));
-        found
-            .into_iter()
-            .chain(gone.map(|&old| (Fate::Gone, old, vec![old])))
-            .collect()
+        if n >= PART * old_size.min(new_size) {
+            parts.entry(new).or_default().push(old);
+            lives.insert(old);
+        }
     }
+    let found = new_sizes.keys().filter(|new| !same.contains(new));
+    let found = found.map(|&new| match parts.remove(&new) {
+        Some(stones) => (Fate::Changed, new, stones),
+        None => (Fate::New, new, Vec::new()),
+    });
+    let found: Vec<_> = found.collect();
+    let gone = old_sizes.keys().filter(|old| !lives.contains(old));
+    found
+        .into_iter()
+        .chain(gone.map(|&old| (Fate::Gone, old, vec![old])))
+        .collect()
 }
 
 #[cfg(test)]
@@ -138,7 +128,7 @@ mod tests {
             (0, 15, 30),
             (0, 0, 1000),
         ];
-        let mut shared = Shared::default();
+        let mut shared = LabelConfusion::default();
         for (old, new, n) in points {
             (0..n).for_each(|_| shared.add(old, new));
         }
@@ -149,6 +139,6 @@ mod tests {
             (Fate::New, 15, vec![]),
             (Fate::Gone, 5, vec![5]),
         ];
-        assert_eq!(shared.fates(), expected);
+        assert_eq!(fates(&shared), expected);
     }
 }

@@ -34,27 +34,27 @@ pub(super) fn rigid_part(body: &Body) -> Option<RigidPart> {
     let covariance = body.covariance(&pattern)?;
     let fit = Fit {
         body,
+        firm: (0..body.stones.len())
+            .filter(|&i| body.stones[i].is_firm)
+            .collect(),
         weights: covariance.diagonal.iter().map(inverse_or_zero).collect(),
         covariance,
     };
-    let firm: Vec<usize> = (0..body.stones.len())
-        .filter(|&i| body.stones[i].is_firm)
-        .collect();
     // What all stones share, the datum above all, must not hide how they moved against each other.
-    let whole = fit.relative_to(&fit.shares(&firm, |_| 1.0));
+    let whole = fit.relative_to(&fit.shares(|_| 1.0));
     let precisions: Vec<Matrix3<f64>> = whole
         .deformations
         .iter()
         .map(|(_, c)| inverse_or_zero(c))
         .collect();
-    let start = fit.most_shared(&firm, &precisions)?;
+    let start = fit.most_shared(&precisions)?;
     let mut part = RigidPart {
         squares: fit.squares(&start, &precisions),
         ..whole
     };
     for _ in 0..ROUNDS {
-        let scale = congruent_scale(firm.iter().map(|&i| part.squares[i]))?;
-        part = fit.relative_to(&fit.shares(&firm, |i| biweight(part.squares[i] / scale)));
+        let scale = fit.scale(&part.squares)?;
+        part = fit.relative_to(&fit.shares(|i| biweight(part.squares[i] / scale)));
     }
     Some(part)
 }
@@ -62,6 +62,8 @@ pub(super) fn rigid_part(body: &Body) -> Option<RigidPart> {
 /// Rigid motions of parts of a body.
 struct Fit<'a> {
     body: &'a Body<'a>,
+    /// The stones that count for the shape of the wall.
+    firm: Vec<usize>,
     covariance: Covariance<'a>,
     /// Inverse covariances of single stones.
     weights: Vec<Matrix3<f64>>,
@@ -69,10 +71,15 @@ struct Fit<'a> {
 
 impl Fit<'_> {
     /// With how much of its weight each stone counts.
-    fn shares(&self, firm: &[usize], of: impl Fn(usize) -> f64) -> Vec<f64> {
+    fn shares(&self, of: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut shares = vec![0.0; self.body.stones.len()];
-        firm.iter().for_each(|&i| shares[i] = of(i));
+        self.firm.iter().for_each(|&i| shares[i] = of(i));
         shares
+    }
+
+    /// By how much squared standardised distances exceed what is expected.
+    fn scale(&self, squares: &[f64]) -> Option<f64> {
+        congruent_scale(self.firm.iter().map(|&i| squares[i]))
     }
 
     /// The deformation of all stones relative to those that count.
@@ -130,70 +137,76 @@ impl Fit<'_> {
         self.body.stones.iter().zip(precisions).map(square).collect()
     }
 
+    /// The rigid motion closest to stones that count with these shares of their weight.
+    fn solved(&self, shares: impl Iterator<Item = (usize, f64)>) -> Vector6<f64> {
+        let (normal, right) = self.normal(shares);
+        inverse(&normal) * right
+    }
+
     /// The rigid motion that most stones share: triples of stones are tried as a start, the best ones are followed to
     /// the part of the wall that moved like them, and that of the least loss is taken.
-    fn most_shared(&self, firm: &[usize], precisions: &[Matrix3<f64>]) -> Option<Vector6<f64>> {
-        let solved = |(normal, right): (Matrix6<f64>, Vector6<f64>)| inverse(&normal) * right;
+    fn most_shared(&self, precisions: &[Matrix3<f64>]) -> Option<Vector6<f64>> {
+        let firm = &self.firm;
         let mut random = Random::new(1);
         let mut pick = || firm[((random.uniform() * firm.len() as f64) as usize).min(firm.len() - 1)];
         let triples: Vec<[usize; 3]> = (0..TRIALS).map(|_| [pick(), pick(), pick()]).collect();
-        let of_triple = |triple: &[usize; 3]| solved(self.normal(triple.iter().map(|&i| (i, 1.0))));
-        let of_all = solved(self.normal(firm.iter().map(|&i| (i, 1.0))));
-        let mut trials: Vec<(f64, Vector6<f64>)> = triples
+        let of_all = self.solved(firm.iter().map(|&i| (i, 1.0)));
+        let trials: Vec<(Vector6<f64>, Vec<f64>)> = triples
             .par_iter()
-            .map(of_triple)
+            .map(|triple| self.solved(triple.iter().map(|&i| (i, 1.0))))
             .chain([of_all])
-            .map(|rigid| (0.0, rigid))
+            .map(|rigid| (rigid, self.squares(&rigid, precisions)))
             .collect();
-        let squares: Vec<Vec<f64>> = trials
-            .par_iter()
-            .map(|(_, rigid)| self.squares(rigid, precisions))
-            .collect();
-        let scales = squares
-            .iter()
-            .filter_map(|squares| congruent_scale(firm.iter().map(|&i| squares[i])));
+        let scales = trials.iter().filter_map(|(_, squares)| self.scale(squares));
         let scale = scales.reduce(f64::min)?;
-        let loss = |squares: &[f64]| {
-            firm.iter()
-                .map(|&i| biweight_loss(squares[i] / scale))
-                .sum::<f64>()
-        };
-        for ((of_trial, _), squares) in trials.iter_mut().zip(&squares) {
-            *of_trial = loss(squares);
-        }
-        trials.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let loss = |squares: &[f64]| -> f64 { firm.iter().map(|&i| biweight_loss(squares[i] / scale)).sum() };
+        let mut starts: Vec<(f64, Vector6<f64>)> = trials
+            .into_iter()
+            .map(|(rigid, squares)| (loss(&squares), rigid))
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let shares = |rigid: &Vector6<f64>| {
             let squares = self.squares(rigid, precisions);
-            self.shares(firm, |i| biweight(squares[i] / scale))
+            self.shares(|i| biweight(squares[i] / scale))
         };
         let follow = |(_, start): &(f64, Vector6<f64>)| {
             let mut rigid = *start;
             for _ in 0..ROUNDS {
-                rigid = solved(self.normal(shares(&rigid).into_iter().enumerate()));
+                rigid = self.solved(shares(&rigid).into_iter().enumerate());
             }
             (loss(&self.squares(&rigid, precisions)), rigid)
         };
-        let mut followed: Vec<_> = trials.par_iter().take(FOLLOWED).map(follow).collect();
+        let mut followed: Vec<_> = starts.par_iter().take(FOLLOWED).map(follow).collect();
         followed.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let (least, best) = *followed.first()?;
-        // Of another part that is about as large, the one that moved less counts as the one that stood still.
-        let of_best = shares(&best);
+        self.least_moved(&followed, shares)
+    }
+
+    /// The first of these losses and rigid motions, which are sorted; or, where another part of the wall is about as
+    /// large and moved less, the motion of that one, as the part that stood still. `shares`: with how much of its
+    /// weight each stone counts for a motion.
+    fn least_moved(
+        &self,
+        followed: &[(f64, Vector6<f64>)],
+        shares: impl Fn(&Vector6<f64>) -> Vec<f64>,
+    ) -> Option<Vector6<f64>> {
+        let (least, best) = followed.first()?;
+        let of_best = shares(best);
         let is_other = |rigid: &Vector6<f64>| {
             let common: f64 = shares(rigid).iter().zip(&of_best).map(|(a, b)| a.min(*b)).sum();
             common < 0.5 * of_best.iter().sum::<f64>()
         };
-        let size = |loss: f64| firm.len() as f64 - loss;
-        let moved = |rigid: &Vector6<f64>| {
+        let size = |loss: f64| self.firm.len() as f64 - loss;
+        let moved = |rigid: &Vector6<f64>| -> f64 {
             let motion = |&i: &usize| (self.body.stones[i].lever * rigid).norm_squared();
-            firm.iter().map(motion).sum::<f64>()
+            self.firm.iter().map(motion).sum()
         };
         let rival = followed
             .iter()
-            .find(|(loss, rigid)| size(*loss) > AS_LARGE * size(least) && is_other(rigid));
-        let of_rival = rival
-            .map(|(_, rigid)| *rigid)
-            .filter(|rigid| moved(rigid) < moved(&best));
-        Some(of_rival.unwrap_or(best))
+            .find(|(loss, rigid)| size(*loss) > AS_LARGE * size(*least) && is_other(rigid));
+        match rival {
+            Some((_, rigid)) if moved(rigid) < moved(best) => Some(*rigid),
+            _ => Some(*best),
+        }
     }
 }
 
