@@ -26,7 +26,7 @@ use crate::table::Table;
 use crate::words::Words;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::path::Path;
 use stonewise::project::{ConditionsFile, DAYS_A_YEAR, day_of};
@@ -257,9 +257,11 @@ impl Case {
     fn measure(&self, seed: u64) -> Wall {
         let count = self.epochs.len();
         let mut places: BTreeMap<StoneId, Shown> = BTreeMap::new();
+        let mut zones: Vec<BTreeSet<StoneId>> = Vec::new();
         for epoch in 1..count {
             let wall = ScannedWall::later(&self.params(seed, epoch), STATIONS, epoch);
             let (found, seen) = wall.deformation();
+            zones.extend(found.zones.iter().map(|z| z.stones.iter().copied().collect()));
             let motions = wall
                 .report
                 .results
@@ -310,7 +312,7 @@ impl Case {
             StoneSeries::of_pairs(ids[i], 0, &pairs)
         };
         let series: Vec<StoneSeries> = (0..ids.len()).map(one).collect();
-        let found = analyse(&self.epochs, &series);
+        let found = analyse(&self.epochs, &series, &zones);
         let place_of: BTreeMap<StoneId, usize> = ids.iter().copied().zip(0..).collect();
         // Where an epoch misses a stone its true place is not known here, and the stone is left out.
         let whole = |i: usize| stones[i].deformations[1..].iter().all(Option::is_some);

@@ -36,7 +36,7 @@ pub fn run(words: &Words) -> Outcome {
             .map(|(id, place)| of_place(id, place))
             .collect();
         let epochs: Vec<SeriesEpoch> = (0..count).map(epoch).collect();
-        let found = analyse(&epochs, &series);
+        let found = analyse(&epochs, &series, &[]);
         let ended = processor_seconds();
         assert_eq!(found.stones.len(), stones as usize);
         table.row(vec![

@@ -1,29 +1,26 @@
 //! From the looks of all epochs to the model of every stone and the four answers.
 
-use super::answers::{Answer, CLAIM_LEVEL, Extrapolation, LEVEL, SeriesAnswers, Unanswered, Word};
+use super::answers::{Answer, CLAIM_LEVEL, Extrapolation, LEVEL, SeriesAnswers, Shown, Unanswered, Word};
 use super::basis::{Basis, SeriesEpoch, Term};
 use super::fit::Fit;
 use super::look::StoneSeries;
 use super::moderated::VarianceFactor;
+use super::steps::{Fitted, Settled, SteppedZone, factors_of, settle};
 use super::stone_model::{
-    AxisModel, Coefficient, Seen, Step, Wave, coefficient, likeliest_step, of_term, scale_of, wave,
-    with_step, without_trend,
+    AxisModel, Coefficient, Seen, Step, Wave, coefficient, likeliest_step, of_term, scale_of, wave, with_step,
 };
 use super::terms::{Inseparable, Model, WhyInseparable, models};
 use crate::id::StoneId;
 use crate::statistics::q_values;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Epochs without which no answer is given.
 const LEAST_EPOCHS: usize = 4;
 /// Epochs of a straight line with something left over.
 const LEAST_OF_A_LINE: usize = 3;
-/// Rounds of steps and variance factors, each of which the other changes.
-const ROUNDS: usize = 5;
-/// Rounds in which steps and trends of all stones, and how many there are of each, follow each other.
-const MIXTURE_ROUNDS: usize = 5;
 /// Factor on variances beyond which a stone loses weight in the choice of terms.
 const OUTLYING_FACTOR: f64 = 9.0;
 /// Part of a year within which epochs lie in one season: two months.
@@ -85,36 +82,18 @@ pub struct StoneTrend {
     pub scale: Vector3<f64>,
 }
 
-/// A stone while the model is fitted.
-struct Fitted {
-    stone: StoneId,
-    seen: Seen,
-    fits: [Fit; 3],
-    /// Which is in the fits.
-    step: Option<Step>,
-    /// Where the step takes the place of a trend: what would be left of the trend beside it.
-    instead: Option<Coefficient>,
-}
-
-impl Fitted {
-    /// The design of its model, of the terms of `model` and its step but for one at `but`.
-    fn design(&self, model: &Model, but: Option<usize>) -> DMatrix<f64> {
-        let base = match self.instead {
-            Some(_) => without_trend(&model.design),
-            None => model.design.clone(),
-        };
-        match self.step.filter(|s| Some(s.epoch) != but) {
-            Some(step) => with_step(&base, step.epoch),
-            None => base,
-        }
-    }
-}
-
 /// Fits the model in time. `epochs`: all of them; `stones`: with a look for each.
 ///
 /// Epochs without a date take no part. Terms beside the trend enter by Akaike's criterion with the correction for few
 /// observations (Hurvich & Tsai 1989), over all stones that all epochs show. Cost: linear in the stones.
-pub fn analyse(epochs: &[SeriesEpoch], stones: &[StoneSeries]) -> SeriesFindings {
+///
+/// `zones`: what pairs of epochs name as zones of deformation. What the mean of a zone shows, its stones need not show
+/// each by itself.
+pub fn analyse(
+    epochs: &[SeriesEpoch],
+    stones: &[StoneSeries],
+    zones: &[BTreeSet<StoneId>],
+) -> SeriesFindings {
     let mut dated: Vec<usize> = (0..epochs.len()).filter(|&e| epochs[e].years.is_some()).collect();
     dated.sort_by(|a, b| {
         epochs[*a]
@@ -146,23 +125,24 @@ pub fn analyse(epochs: &[SeriesEpoch], stones: &[StoneSeries]) -> SeriesFindings
     let Some(model) = choose(&models, &stones) else {
         return found;
     };
-    let (fitted, factors) = settle(model, &stones);
+    let settled = settle(model, &stones, zones);
     found.basis = Some(model.basis.clone());
-    found.factors = Some(factors);
-    found.stones = described(&fitted, model, &factors, &dated);
+    found.factors = Some(settled.factors);
+    found.stones = described(&settled, model, &dated);
     if epochs.len() < LEAST_EPOCHS {
         return found;
     }
     let plain = &models[0];
-    found.departures = departures(&fitted, model);
+    let departing = departures(&settled, model);
+    found.departures = departing.iter().map(|d| (d.stone, d.does)).collect();
     found.answers = SeriesAnswers {
         as_predicted: Answer {
             extrapolated: extrapolated(&epochs, model),
-            ..continued(&found.departures)
+            ..Answer::of(&departing, Word::No, LEVEL)
         },
-        as_in_the_past: continued(&departures(&fitted, plain)),
+        as_in_the_past: Answer::of(&departures(&settled, plain), Word::No, LEVEL),
         trend: trend(&found),
-        anomaly: anomaly(&fitted, model, &factors, &epochs),
+        anomaly: anomaly(&settled, model, &epochs),
     };
     found
 }
@@ -218,155 +198,9 @@ fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> 
     by_criterion.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(m, _)| m)
 }
 
-/// Fits, steps and variance factors that agree with each other.
-fn settle(model: &Model, stones: &[StoneSeries]) -> (Vec<Fitted>, [VarianceFactor; 3]) {
-    let start = |stone: &StoneSeries| {
-        let seen = Seen::of(stone);
-        let fits = seen.fit(&model.design).filter(|f| f[0].freedom > 0)?;
-        Some(Fitted {
-            stone: stone.stone,
-            seen,
-            fits,
-            step: None,
-            instead: None,
-        })
-    };
-    let mut fitted: Vec<Fitted> = stones.par_iter().filter_map(start).collect();
-    // Steps that are not in the models yet must not count as errors that single stones have.
-    let mut factors = factors_of(fitted.iter().map(|f| &f.fits), VarianceFactor::typical);
-    for _ in 0..ROUNDS {
-        let likeliest = |f: &Fitted| likeliest_step(&f.seen, model, &factors);
-        let steps: Vec<Option<(Step, f64)>> = fitted.par_iter().map(likeliest).collect();
-        let p: Vec<f64> = steps.iter().map(|s| s.as_ref().map_or(1.0, |s| s.1)).collect();
-        let shown = q_values(&p);
-        for ((stone, step), q) in fitted.iter_mut().zip(&steps).zip(shown) {
-            stone.step = step.filter(|_| q <= CLAIM_LEVEL).map(|s| s.0);
-            if let Some(fits) = stone.seen.fit(&stone.design(model, None)) {
-                stone.fits = fits;
-            }
-        }
-        factors = factors_of(fitted.iter().map(|f| &f.fits), VarianceFactor::of);
-    }
-    steps_for_trends(&mut fitted, model, &factors);
-    (fitted, factors)
-}
-
-/// What a stone with a trend shows of a step instead of it: twice the log likelihoods of the trend and of a step before
-/// each epoch, less a constant.
-struct Rival {
-    stone: usize,
-    trend: f64,
-    steps: Vec<Option<f64>>,
-}
-
-/// Gives stones whose trend is shown a step instead, where that is more probable.
-///
-/// Both have one coefficient a component, so that their likelihoods compare. How probable a trend and a step before each
-/// epoch are beforehand is estimated over all these stones (expectation maximisation), so that stones that stepped
-/// together support each other.
-fn steps_for_trends(fitted: &mut [Fitted], model: &Model, factors: &[VarianceFactor; 3]) {
-    let Some(column) = model.place(Term::Trend) else {
-        return;
-    };
-    let trends: Vec<Coefficient> = fitted
-        .iter()
-        .map(|f| coefficient(&f.fits, factors, column))
-        .collect();
-    let q = q_values(&trends.iter().map(|t| t.p).collect::<Vec<f64>>());
-    let epochs = model.design.nrows();
-    let fit = |fits: &[Fit; 3]| -> f64 {
-        let squares = fits
-            .iter()
-            .zip(factors)
-            .map(|(fit, factor)| fit.residuals / factor.factor);
-        -squares.sum::<f64>()
-    };
-    let plain = without_trend(&model.design);
-    let rival = |stone: usize| {
-        let of = &fitted[stone];
-        let step = |epoch: usize| {
-            let is_seen = of.seen.epochs.first().is_some_and(|first| *first < epoch);
-            let fits = of.seen.fit(&with_step(&plain, epoch)).filter(|_| is_seen)?;
-            Some(fit(&fits))
-        };
-        (of.step.is_none() && q[stone] <= CLAIM_LEVEL).then(|| Rival {
-            stone,
-            trend: fit(&of.fits),
-            steps: (1..epochs).map(step).collect(),
-        })
-    };
-    let rivals: Vec<Rival> = (0..fitted.len()).into_par_iter().filter_map(rival).collect();
-    // The trend first, then a step before each epoch.
-    let mut shares = vec![0.5 / (epochs - 1) as f64; epochs];
-    shares[0] = 0.5;
-    let mut likeliest = Vec::new();
-    for _ in 0..MIXTURE_ROUNDS {
-        let mut sums = vec![1.0 / epochs as f64; epochs];
-        likeliest.clear();
-        for rival in &rivals {
-            let of_class = |c: usize| match c {
-                0 => Some(rival.trend),
-                _ => rival.steps[c - 1],
-            };
-            let logs =
-                (0..epochs).map(|c| of_class(c).map_or(f64::NEG_INFINITY, |l| 0.5 * l + shares[c].ln()));
-            let logs: Vec<f64> = logs.collect();
-            let largest = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let odds: Vec<f64> = logs.iter().map(|l| (l - largest).exp()).collect();
-            let total: f64 = odds.iter().sum();
-            sums.iter_mut()
-                .zip(&odds)
-                .for_each(|(sum, odds)| *sum += odds / total);
-            likeliest.push(logs.iter().position(|l| *l == largest).unwrap_or(0));
-        }
-        let total: f64 = sums.iter().sum();
-        shares = sums.into_iter().map(|sum| sum / total).collect();
-    }
-    for (rival, epoch) in rivals.iter().zip(likeliest).filter(|(_, class)| *class > 0) {
-        let stone = &mut fitted[rival.stone];
-        let both = stone.seen.fit(&with_step(&model.design, epoch));
-        let Some(fits) = stone.seen.fit(&with_step(&plain, epoch)) else {
-            continue;
-        };
-        let fits = fits.map(|fit| fit.with_zero(column));
-        let found = coefficient(&fits, factors, model.unknowns());
-        stone.step = Some(Step {
-            epoch,
-            value: found.value,
-            sd: found.sd,
-        });
-        // Where trend and step cannot both be told, the trend alone says how well it is known.
-        let left = both.map_or(trends[rival.stone], |fits| coefficient(&fits, factors, column));
-        stone.instead = Some(Coefficient {
-            value: Vector3::zeros(),
-            sd: left.sd,
-            p: trends[rival.stone].p,
-        });
-        stone.fits = fits;
-    }
-}
-
-/// The variance factors of three components, from the residuals of all stones.
-fn factors_of<'a>(
-    fits: impl Iterator<Item = &'a [Fit; 3]> + Clone,
-    of: fn(&[(f64, usize)]) -> VarianceFactor,
-) -> [VarianceFactor; 3] {
-    [0, 1, 2].map(|axis| {
-        let all: Vec<(f64, usize)> = fits
-            .clone()
-            .map(|f| (f[axis].residuals, f[axis].freedom))
-            .collect();
-        of(&all)
-    })
-}
-
 /// `places`: of the epochs that take part among all.
-fn described(
-    fitted: &[Fitted],
-    model: &Model,
-    factors: &[VarianceFactor; 3],
-    places: &[usize],
-) -> Vec<StoneTrend> {
+fn described(settled: &Settled, model: &Model, places: &[usize]) -> Vec<StoneTrend> {
+    let factors = &settled.factors;
     let describe = |f: &Fitted| {
         let term = |term: Term| of_term(&f.fits, factors, model, term);
         let season = model.place(Term::Season);
@@ -392,7 +226,7 @@ fn described(
             }),
         })
     };
-    let mut all: Vec<StoneTrend> = fitted.iter().filter_map(describe).collect();
+    let mut all: Vec<StoneTrend> = settled.stones.iter().filter_map(describe).collect();
     let p: Vec<f64> = all.iter().map(|s| s.velocity.p).collect();
     all.iter_mut()
         .zip(q_values(&p))
@@ -401,34 +235,49 @@ fn described(
 }
 
 /// How far the newest epoch is from where the others say by a model: its look gets an unknown of its own.
-fn departures(fitted: &[Fitted], model: &Model) -> Vec<(StoneId, Trend)> {
+fn departures(settled: &Settled, model: &Model) -> Vec<Shown> {
     let newest = model.design.nrows() - 1;
     let depart = |f: &Fitted| {
         if f.seen.epochs.last() != Some(&newest) {
             return None;
         }
-        let base = f.design(model, Some(newest));
-        let column = base.ncols();
-        let fits = f
-            .seen
-            .fit(&with_step(&base, newest))
-            .filter(|f| f[0].freedom > 0)?;
-        Some((f.stone, fits, column))
+        let design = with_step(&f.design(model, Some(newest)), newest);
+        f.seen.fit(&design).filter(|f| f[0].freedom > 0)
     };
-    let found: Vec<(StoneId, [Fit; 3], usize)> = fitted.par_iter().filter_map(depart).collect();
-    let factors = factors_of(found.iter().map(|d| &d.1), VarianceFactor::of);
-    let found = found.iter();
-    found
-        .map(|(stone, fits, column)| (*stone, coefficient(fits, &factors, *column)))
-        .collect()
-}
+    let fits: Vec<Option<[Fit; 3]>> = settled.stones.par_iter().map(depart).collect();
+    let factors = factors_of(fits.iter().flatten(), VarianceFactor::of);
+    let of_stone = |place: usize| {
+        let fits = fits[place].as_ref()?;
+        Some(coefficient(fits, &factors, fits[0].coefficients.len() - 1))
+    };
 
-fn continued(departures: &[(StoneId, Trend)]) -> Answer {
-    let found: Vec<_> = departures
-        .iter()
-        .map(|(stone, departure)| (*stone, *departure, None))
-        .collect();
-    Answer::of(&found, Word::No, LEVEL)
+    let typical = factors_of(fits.iter().flatten(), VarianceFactor::typical);
+    let of_zone = |z: &SteppedZone| {
+        z.zone
+            .last(&with_step(&z.design(model, newest), newest), &typical)
+    };
+    let of_zones: Vec<Option<Coefficient>> = settled.zones.iter().map(of_zone).collect();
+    let p: Vec<f64> = of_zones.iter().map(|z| z.map_or(1.0, |z| z.p)).collect();
+    let mut with_zone: BTreeMap<usize, f64> = BTreeMap::new();
+    for ((zone, does), q) in settled.zones.iter().zip(&of_zones).zip(q_values(&p)) {
+        let Some(does) = does.filter(|_| q <= LEVEL) else {
+            continue;
+        };
+        for (place, _) in zone.zone.taking_part(&does, of_stone) {
+            let smallest = with_zone.entry(place).or_insert(q);
+            *smallest = smallest.min(q);
+        }
+    }
+
+    let shown = |(place, stone): (usize, &Fitted)| {
+        Some(Shown {
+            stone: stone.stone,
+            does: of_stone(place)?,
+            epoch: None,
+            with_zone: with_zone.get(&place).copied(),
+        })
+    };
+    settled.stones.iter().enumerate().filter_map(shown).collect()
 }
 
 /// The conditions of the model in which the newest epoch lies beyond the others.
@@ -463,7 +312,13 @@ fn extrapolated(epochs: &[&SeriesEpoch], model: &Model) -> Vec<Extrapolation> {
 }
 
 fn trend(found: &SeriesFindings) -> Answer {
-    let velocities: Vec<_> = found.stones.iter().map(|s| (s.stone, s.velocity, None)).collect();
+    let of_stone = |s: &StoneTrend| Shown {
+        stone: s.stone,
+        does: s.velocity,
+        epoch: None,
+        with_zone: None,
+    };
+    let velocities: Vec<Shown> = found.stones.iter().map(of_stone).collect();
     let mut answer = Answer::of(&velocities, Word::Yes, CLAIM_LEVEL);
     let cause = found
         .inseparable
@@ -476,25 +331,28 @@ fn trend(found: &SeriesFindings) -> Answer {
     answer
 }
 
-fn anomaly(
-    fitted: &[Fitted],
-    model: &Model,
-    factors: &[VarianceFactor; 3],
-    epochs: &[&SeriesEpoch],
-) -> Answer {
+fn anomaly(settled: &Settled, model: &Model, epochs: &[&SeriesEpoch]) -> Answer {
     let step = |f: &Fitted| {
         let (step, p) = match f.step.zip(f.instead) {
             // As probable by chance as the trend in whose place it stands.
             Some((step, instead)) => (step, instead.p),
-            None => likeliest_step(&f.seen, model, factors)?,
+            None => {
+                let (likeliest, p) = likeliest_step(&f.seen, model, &settled.factors)?;
+                (f.step.filter(|_| f.with_zone.is_some()).unwrap_or(likeliest), p)
+            }
         };
-        let found = Coefficient {
+        let does = Coefficient {
             value: step.value,
             sd: step.sd,
             p,
         };
-        Some((f.stone, found, Some(epochs[step.epoch].name.clone())))
+        Some(Shown {
+            stone: f.stone,
+            does,
+            epoch: Some(epochs[step.epoch].name.clone()),
+            with_zone: f.with_zone,
+        })
     };
-    let found: Vec<_> = fitted.par_iter().filter_map(step).collect();
+    let found: Vec<Shown> = settled.stones.par_iter().filter_map(step).collect();
     Answer::of(&found, Word::Yes, CLAIM_LEVEL)
 }

@@ -49,6 +49,16 @@ pub enum Unanswered {
     },
 }
 
+/// What a stone does, for the test of all stones: a departure, a velocity or a step.
+pub(super) struct Shown {
+    pub stone: StoneId,
+    pub does: Coefficient,
+    /// Of a step: the first epoch after it.
+    pub epoch: Option<String>,
+    /// Where it takes part in what a zone does: the false discovery rate at which the zone is named.
+    pub with_zone: Option<f64>,
+}
+
 /// What one stone does: a departure, a velocity or a step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Departure {
@@ -84,9 +94,10 @@ pub struct Answer {
     pub reason: Option<Unanswered>,
     /// Stones that were tested.
     pub tested: usize,
-    /// Stones that are named, with the false discovery rate controlled at 5 %, of trends and steps at 2.5 %.
+    /// Stones that are named, with the false discovery rate controlled at 5 %, of trends and steps at 2.5 %: by
+    /// themselves, or as part of a zone that is.
     pub stones: Vec<u32>,
-    /// Smallest q value of a stone.
+    /// Smallest q value of a stone, or of a zone to which it belongs.
     pub smallest_q: Option<f64>,
     /// The stone that does most among those named.
     pub largest: Option<Departure>,
@@ -121,19 +132,22 @@ impl Answer {
     }
 
     /// From what each stone does. `if_named`: the answer where stones are named; otherwise the opposite.
-    pub(super) fn of(found: &[(StoneId, Coefficient, Option<String>)], if_named: Word, level: f64) -> Self {
+    pub(super) fn of(found: &[Shown], if_named: Word, level: f64) -> Self {
         if found.is_empty() {
             return Self::none(Unanswered::NothingMeasured);
         }
-        let p: Vec<f64> = found.iter().map(|f| f.1.p).collect();
-        let q = q_values(&p);
+        let p: Vec<f64> = found.iter().map(|f| f.does.p).collect();
+        let mut q = q_values(&p);
+        q.iter_mut()
+            .zip(found)
+            .for_each(|(q, f)| *q = q.min(f.with_zone.unwrap_or(1.0)));
         let named: Vec<usize> = (0..found.len()).filter(|&i| q[i] <= level).collect();
-        let length = |i: &usize| found[*i].1.value.norm();
+        let length = |i: &usize| found[*i].does.value.norm();
         let largest = named
             .iter()
             .copied()
             .max_by(|a, b| length(a).total_cmp(&length(b)));
-        let mut widths: Vec<f64> = found.iter().map(|f| 1e3 * Z * f.1.sd.max()).collect();
+        let mut widths: Vec<f64> = found.iter().map(|f| 1e3 * Z * f.does.sd.max()).collect();
         let opposite = match if_named {
             Word::Yes => Word::No,
             Word::No => Word::Yes,
@@ -143,7 +157,7 @@ impl Answer {
             answer: if named.is_empty() { opposite } else { if_named },
             reason: None,
             tested: found.len(),
-            stones: named.iter().map(|&i| found[i].0.0).collect(),
+            stones: named.iter().map(|&i| found[i].stone.0).collect(),
             smallest_q: q.iter().copied().reduce(f64::min),
             largest: largest.map(|i| departure(&found[i])),
             half_width_mm: median(&mut widths),
@@ -152,14 +166,15 @@ impl Answer {
     }
 }
 
-fn departure((stone, found, epoch): &(StoneId, Coefficient, Option<String>)) -> Departure {
-    let length = found.value.norm();
-    let direction = found.value / length.max(f64::MIN_POSITIVE);
-    let half = Z * direction.component_mul(&found.sd).norm();
+fn departure(shown: &Shown) -> Departure {
+    let does = &shown.does;
+    let length = does.value.norm();
+    let direction = does.value / length.max(f64::MIN_POSITIVE);
+    let half = Z * direction.component_mul(&does.sd).norm();
     Departure {
-        stone_id: stone.0,
+        stone_id: shown.stone.0,
         length_mm: 1e3 * length,
         interval_mm: [1e3 * (length - half).max(0.0), 1e3 * (length + half)],
-        epoch: epoch.clone(),
+        epoch: shown.epoch.clone(),
     }
 }

@@ -15,10 +15,12 @@ mod fit;
 mod look;
 mod moderated;
 mod path;
+mod steps;
 mod stone_model;
 mod terms;
 #[cfg(test)]
 mod tests;
+mod zones;
 
 pub use analyse::{SeriesFindings, StoneTrend, Trend, analyse};
 pub use answers::{Answer, Departure, Extrapolation, SeriesAnswers, Unanswered, Word};

@@ -3,6 +3,7 @@ use super::*;
 use crate::id::StoneId;
 use crate::statistics::{normal_pair, split_mix};
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
+use std::collections::BTreeSet;
 
 /// Normal numbers that repeat.
 struct Draw(u64);
@@ -119,7 +120,7 @@ fn the_reference_does_not_matter_to_velocities() {
             .enumerate()
             .map(|(i, looks)| pairs_of(i, looks, reference))
             .collect();
-        analyse(&epochs(6), &stones)
+        analyse(&epochs(6), &stones, &[])
     };
     let (first, third) = (by(0), by(2));
     assert_eq!(first.terms(), third.terms());
@@ -141,7 +142,7 @@ fn intervals_of_velocities_hold_the_truth_and_zones_that_creep_are_found() {
             Vector3::new(0.0, 0.0, if creeps(i) { 1e-3 * years } else { 0.0 })
         };
         let stones = measured(&mut draw, 60, 7, 0, truth);
-        let found = analyse(&epochs(7), &stones);
+        let found = analyse(&epochs(7), &stones, &[]);
         for stone in &found.stones {
             let expected = truth(stone.stone.0 as usize, 2);
             all += 1;
@@ -166,7 +167,7 @@ fn still_walls_are_rarely_said_to_do_anything() {
     let mut said = [0; 5];
     for seed in 0..100 {
         let stones = measured(&mut Draw(77_000 + 1000 * seed), 40, 6, 0, |_, _| Vector3::zeros());
-        let a = analyse(&epochs(6), &stones).answers;
+        let a = analyse(&epochs(6), &stones, &[]).answers;
         let happened = [
             a.as_predicted.answer == Word::No,
             a.as_in_the_past.answer == Word::No,
@@ -186,7 +187,7 @@ fn still_walls_are_rarely_said_to_do_anything() {
 fn a_step_is_found_at_its_epoch_and_makes_no_trend() {
     let step = |i: usize, k: usize| Vector3::y() * if i == 5 && k >= 4 { -2e-3 } else { 0.0 };
     let stones = measured(&mut Draw(5), 50, 8, 0, step);
-    let found = analyse(&epochs(8), &stones);
+    let found = analyse(&epochs(8), &stones, &[]);
     let anomaly = &found.answers.anomaly;
     assert_eq!(
         (anomaly.answer, anomaly.stones.as_slice()),
@@ -212,7 +213,7 @@ fn a_step_that_looks_partly_like_a_trend_is_told_from_one() {
         _ => Vector3::zeros(),
     };
     let stones = measured(&mut Draw(17), 60, 6, 0, truth);
-    let found = analyse(&epochs(6), &stones);
+    let found = analyse(&epochs(6), &stones, &[]);
     let named =
         |answer: &Answer, of: std::ops::Range<u32>| answer.stones.iter().filter(|id| of.contains(id)).count();
     let (trend, anomaly) = (&found.answers.trend, &found.answers.anomaly);
@@ -259,7 +260,7 @@ fn groups_follow_level_season_and_steps_and_predict_other_days() {
         .iter_mut()
         .filter(|s| s.stone.0.is_multiple_of(2))
         .for_each(|s| s.looks[9] = None);
-    let found = analyse(&all, &stones);
+    let found = analyse(&all, &stones, &[]);
     assert_eq!(found.terms(), [Term::Trend, Term::Level, Term::Season]);
     let members = found
         .stones
@@ -299,7 +300,7 @@ fn a_newest_epoch_at_another_level_is_named_as_extrapolated() {
     let mut all = epochs(8);
     all[7].level = Some(309.0);
     let bends = |_: usize, k: usize| Vector3::z() * 0.5e-3 * (all[k].level.unwrap() - 300.0);
-    let answer = analyse(&all, &measured(&mut Draw(22), 40, 8, 0, bends))
+    let answer = analyse(&all, &measured(&mut Draw(22), 40, 8, 0, bends), &[])
         .answers
         .as_predicted;
     assert_eq!(answer.answer, Word::Yes);
@@ -315,7 +316,7 @@ fn a_newest_epoch_at_another_level_is_named_as_extrapolated() {
 fn a_jump_of_the_newest_epoch_is_not_as_predicted() {
     let jump = |i: usize, k: usize| Vector3::z() * if i < 20 && k == 5 { 2e-3 } else { 0.0 };
     let stones = measured(&mut Draw(6), 50, 6, 0, jump);
-    let answer = analyse(&epochs(6), &stones).answers.as_predicted;
+    let answer = analyse(&epochs(6), &stones, &[]).answers.as_predicted;
     assert_eq!(answer.answer, Word::No);
     let largest = answer.largest.unwrap();
     assert!(
@@ -330,7 +331,7 @@ fn a_level_that_bends_the_wall_enters_the_model_and_leaves_no_trend() {
     let bends =
         |i: usize, k: usize| Vector3::z() * 0.5e-3 * (i as f64 / 40.0) * (all[k].level.unwrap() - 300.0);
     let stones = measured(&mut Draw(8), 40, 8, 0, bends);
-    let found = analyse(&all, &stones);
+    let found = analyse(&all, &stones, &[]);
     assert_eq!(found.terms(), [Term::Trend, Term::Level]);
     let level = found.stones[39].level.unwrap();
     assert!((level.value.z - 0.5e-3 * 39.0 / 40.0).abs() < 3.0 * level.sd.z);
@@ -348,7 +349,7 @@ fn what_cannot_be_told_apart_is_named() {
         })
         .collect();
     let stones = measured(&mut Draw(9), 20, 10, 0, |_, _| Vector3::zeros());
-    let found = analyse(&tidal, &stones).inseparable;
+    let found = analyse(&tidal, &stones, &[]).inseparable;
     let goes_with_level = WhyInseparable::GoesWith { other: Term::Level };
     assert!(
         found
@@ -359,7 +360,7 @@ fn what_cannot_be_told_apart_is_named() {
     // A level that rises with time may be the cause of what looks like a trend.
     let rising: Vec<SeriesEpoch> = (0..6).map(|k| epoch(k, k as f64, 300.0 + k as f64)).collect();
     let creep = |_: usize, k: usize| Vector3::z() * 1e-3 * k as f64;
-    let found = analyse(&rising, &measured(&mut Draw(10), 20, 6, 0, creep));
+    let found = analyse(&rising, &measured(&mut Draw(10), 20, 6, 0, creep), &[]);
     assert_eq!(found.answers.trend.answer, Word::CannotTell);
     assert_eq!(
         found.answers.trend.reason,
@@ -379,14 +380,14 @@ fn gaps_and_missing_dates_leave_the_rest_as_it_is() {
     stones[4].looks[1..6].fill(None);
     let mut all = epochs(7);
     all[2].years = None;
-    let found = analyse(&all, &stones);
+    let found = analyse(&all, &stones, &[]);
     assert_eq!(found.undated, ["E3"]);
     let of = |stone: u32| found.stones.iter().find(|s| s.stone.0 == stone);
     assert!(of(4).is_none());
     let gap = of(3).unwrap();
     assert_eq!(gap.epochs, 5);
     assert!((gap.velocity.value.z - 1e-3).abs() < 3.0 * gap.velocity.sd.z);
-    let few = analyse(&all[..4], &stones).answers.trend;
+    let few = analyse(&all[..4], &stones, &[]).answers.trend;
     assert_eq!(few.reason, Some(Unanswered::FewEpochs { have: 3, need: 4 }));
 }
 
@@ -435,7 +436,7 @@ fn a_part_of_the_wall_that_stepped_is_found_in_five_epochs() {
             false => Vector3::zeros(),
         };
         let stones = measured(&mut draw, 60, 5, 0, truth);
-        let found = analyse(&epochs(5), &stones);
+        let found = analyse(&epochs(5), &stones, &[]);
         let named = &found.answers.anomaly.stones;
         assert_eq!(found.answers.anomaly.answer, Word::Yes, "{seed}");
         assert!(
@@ -460,8 +461,68 @@ fn stones_that_err_more_than_claimed_are_not_called_stepped() {
             pairs_of(i, &looks, 0)
         };
         let stones: Vec<StoneSeries> = (0..40).map(|i| stone(i, &mut draw)).collect();
-        let found = analyse(&epochs(6), &stones);
+        let found = analyse(&epochs(6), &stones, &[]);
         claimed += usize::from(found.answers.anomaly.answer == Word::Yes);
     }
     assert!(claimed <= 4, "{claimed}");
+}
+
+/// Stones of which each errs by a factor of its own, which spreads over an order of magnitude.
+fn unlike(draw: &mut Draw, count: usize, truth: impl Fn(usize, usize) -> Vector3<f64>) -> Vec<StoneSeries> {
+    let stone = |i: usize| {
+        let factor = (0.7 * draw.normal()).exp();
+        let looks: Vec<Vector3<f64>> = (0..count)
+            .map(|k| truth(i, k) + draw.vector().component_mul(&SD) * factor)
+            .collect();
+        pairs_of(i, &looks, 0)
+    };
+    (0..59).map(stone).collect()
+}
+
+#[test]
+fn a_step_of_a_zone_is_shown_where_no_stone_shows_it_alone() {
+    let zone: BTreeSet<StoneId> = (0..17).map(StoneId).collect();
+    let truth = |i: usize, k: usize| Vector3::y() * if i < 17 && k >= 2 { -2e-3 } else { 0.0 };
+    let (mut alone, mut together, mut others) = (0, 0, 0);
+    for seed in 0..20 {
+        let stones = unlike(&mut Draw(300 + 5000 * seed), 5, truth);
+        let named = |zones: &[BTreeSet<StoneId>]| analyse(&epochs(5), &stones, zones).answers.anomaly;
+        alone += named(&[]).stones.len();
+        let anomaly = named(std::slice::from_ref(&zone));
+        assert_eq!(anomaly.answer, Word::Yes, "{anomaly:?}");
+        assert_eq!(anomaly.largest.and_then(|d| d.epoch).as_deref(), Some("E3"));
+        let right = anomaly.stones.iter().filter(|s| **s < 17).count();
+        together += right;
+        others += anomaly.stones.len() - right;
+    }
+    assert!(together >= 17 * 16 && together >= 2 * alone, "{together} {alone}");
+    assert!(others <= 40, "{others}");
+}
+
+#[test]
+fn a_zone_whose_stones_err_together_is_rarely_said_to_do_anything() {
+    let zone: BTreeSet<StoneId> = (0..12).map(StoneId).collect();
+    let mut said = [0; 3];
+    for seed in 0..100 {
+        let mut draw = Draw(900_000 + 7000 * seed);
+        let common: Vec<Vector3<f64>> = (0..6).map(|_| draw.vector().component_mul(&SD)).collect();
+        let looks = |i: usize, draw: &mut Draw| -> Vec<Vector3<f64>> {
+            let own = |k: usize| match i < 12 {
+                true => common[k],
+                false => draw.vector().component_mul(&SD),
+            };
+            (0..6).map(own).collect()
+        };
+        let stones: Vec<StoneSeries> = (0..40).map(|i| pairs_of(i, &looks(i, &mut draw), 0)).collect();
+        let a = analyse(&epochs(6), &stones, std::slice::from_ref(&zone)).answers;
+        let happened = [
+            a.as_predicted.answer == Word::No,
+            a.as_in_the_past.answer == Word::No,
+            a.anomaly.answer == Word::Yes,
+        ];
+        said.iter_mut()
+            .zip(happened)
+            .for_each(|(n, h)| *n += usize::from(h));
+    }
+    assert!(said.iter().all(|n| *n <= 11), "{said:?}");
 }

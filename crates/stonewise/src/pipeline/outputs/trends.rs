@@ -45,7 +45,12 @@ fn write_trends(run: &Run) -> Result<()> {
     let first = run.labelled(EpochId::REFERENCE)?;
     let tracked = run.tracked()?;
     let stones = series(run, &order, &first.stones, &tracked)?;
-    let found = analyse(&epochs, &stones);
+    let named = zones_by_epoch(run, &order)?;
+    let all_zones: Vec<BTreeSet<StoneId>> = named
+        .iter()
+        .flat_map(|(_, zones)| zones.values().cloned())
+        .collect();
+    let found = analyse(&epochs, &stones, &all_zones);
     let ids: Vec<StoneId> = first.stones.iter().map(|s| s.id).collect();
     let all: Vec<StoneId> = stones.iter().map(|s| s.stone).collect();
     let names: Vec<&str> = order.iter().map(|id| project.epochs[*id].name.as_str()).collect();
@@ -75,7 +80,7 @@ fn write_trends(run: &Run) -> Result<()> {
         conditions: timed.conditions(),
         variance_factors: found.factors,
         wall: timed.wall(&ids.iter().copied().collect()),
-        zones: zones(run, &timed)?,
+        zones: zones(&named, &timed),
         epochs: dated,
         undated: found.undated.clone(),
         answers: found.answers.clone(),
@@ -83,11 +88,14 @@ fn write_trends(run: &Run) -> Result<()> {
     write_readable_json(&context.out.join(FILE), &record)
 }
 
-/// The zones of deformation of the newest epoch that shows any, with the other epochs that confirm them.
-fn zones(run: &Run, timed: &TimedSeries) -> Result<Vec<ZoneTrend>> {
-    let mut by_epoch: Vec<(&str, BTreeMap<u32, BTreeSet<StoneId>>)> = Vec::new();
-    for id in timed.order.iter().rev().filter(|id| !id.is_reference()) {
-        let mut zones: BTreeMap<u32, BTreeSet<StoneId>> = BTreeMap::new();
+/// The stones of each zone by its number.
+type Zones = BTreeMap<u32, BTreeSet<StoneId>>;
+
+/// The zones of deformation of the epochs that show any, the newest first.
+fn zones_by_epoch(run: &Run, order: &[EpochId]) -> Result<Vec<(EpochId, Zones)>> {
+    let mut by_epoch = Vec::new();
+    for id in order.iter().rev().filter(|id| !id.is_reference()) {
+        let mut zones = Zones::new();
         for row in run.measured(*id)?.rows.iter().filter(|r| r.zone_id > 0) {
             zones
                 .entry(row.zone_id)
@@ -95,26 +103,32 @@ fn zones(run: &Run, timed: &TimedSeries) -> Result<Vec<ZoneTrend>> {
                 .insert(StoneId(row.stone_id));
         }
         if !zones.is_empty() {
-            by_epoch.push((&timed.project.epochs[*id].name, zones));
+            by_epoch.push((*id, zones));
         }
     }
+    Ok(by_epoch)
+}
+
+/// The zones of the newest epoch that shows any, with the other epochs that confirm them.
+fn zones(by_epoch: &[(EpochId, Zones)], timed: &TimedSeries) -> Vec<ZoneTrend> {
     let Some(((newest, zones), others)) = by_epoch.split_first() else {
-        return Ok(Vec::new());
+        return Vec::new();
     };
+    let name = |id: &EpochId| timed.project.epochs[*id].name.as_str();
     let confirmed = |stones: &BTreeSet<StoneId>| {
         let others = others.iter().filter(|(_, zones)| {
             let shown = stones.iter().filter(|s| zones.values().any(|z| z.contains(s)));
             2 * shown.count() >= stones.len()
         });
-        others.rev().map(|(name, _)| (*name).to_owned()).collect()
+        others.rev().map(|(id, _)| name(id).to_owned()).collect()
     };
     let zone = |(id, stones): (&u32, &BTreeSet<StoneId>)| {
         Some(ZoneTrend {
             confirmed_by: confirmed(stones),
-            ..timed.of(stones, newest, *id)?
+            ..timed.of(stones, name(newest), *id)?
         })
     };
-    Ok(zones.iter().filter_map(zone).collect())
+    zones.iter().filter_map(zone).collect()
 }
 
 /// Every stone with its deformation in each epoch, in one frame.
