@@ -52,6 +52,7 @@ pub fn run(words: &Words) -> Outcome {
         stable: &stable,
         offered: &[],
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
+        response: None,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
     println!("{:?} in {:.1} s", found.datum, started.elapsed().as_secs_f64());

@@ -422,6 +422,38 @@ fn stones_of_the_wrong_partner_are_refused() {
 }
 
 #[test]
+fn stones_that_ivy_covers_are_refused_and_leave_the_others_as_they_were() {
+    let wall = Wall::default();
+    let pairs = wall.pairs(|_, c| (smooth(c), Vector3::zeros()));
+    let is_covered = |k: usize| k % wall.columns as usize <= 1;
+    let grown = |(k, pair): (usize, &PairPoints)| {
+        let mut rng = ChaCha8Rng::seed_from_u64(900 + k as u64);
+        let mut covered = |p: Point3<f64>| match is_covered(k) && rng.random_bool(0.8) {
+            true => p + Vector3::x() * (0.01 + 0.03 * normal(&mut rng).abs()),
+            false => p,
+        };
+        let points = (0..pair.points_second.len()).map(|i| pair.points_second.world(i));
+        PairPoints {
+            points_second: Cloud::from_world(pair.centroid, points.map(&mut covered)),
+            ..pair.clone()
+        }
+    };
+    let report = run(pairs.iter().enumerate().map(grown).collect());
+    for (k, r) in report.results.iter().enumerate() {
+        match &r.motion {
+            Ok(m) => {
+                assert!(!is_covered(k), "{k}: {}", m.displacement);
+                assert!((m.displacement - smooth(&pairs[k].centroid)).norm() < 1.5e-3);
+            }
+            Err(e) => assert!(
+                is_covered(k) && *e == MotionFailure::Disagreement && r.body == 0,
+                "{k}: {e}"
+            ),
+        }
+    }
+}
+
+#[test]
 fn the_answer_turns_with_the_world() {
     let wall = Wall {
         rows: 4,

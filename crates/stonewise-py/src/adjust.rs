@@ -227,6 +227,7 @@ fn relative_errors(
         stable: &[],
         offered: &[],
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
+        response: None,
     };
     let errors = epoch_errors(&pair, params);
     stones.iter().map(|s| s.id).zip(errors.relative).collect()

@@ -91,6 +91,7 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
             stable,
             offered: &[],
             sigma_m: survey.sigma_m,
+            response: None,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };

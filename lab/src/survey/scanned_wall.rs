@@ -5,7 +5,9 @@ use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Silent;
-use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, SeenStone, Source, epoch_errors};
+use stonewise_core::registration::observers::{
+    EpochErrorParams, EpochPair, Response, SeenStone, Source, epoch_errors,
+};
 use stonewise_core::registration::{
     AdjustmentParams, AdjustmentReport, Deformation, MemoryPairs, adjust, deformation,
 };
@@ -77,6 +79,7 @@ impl ScannedWall {
         let measured = self.report.results.iter().filter(|r| r.motion.is_ok());
         let seen: BTreeMap<StoneId, SeenStone> = measured.map(|r| (r.first, self.seen(r.first))).collect();
         let stones: Vec<SeenStone> = seen.values().cloned().collect();
+        let ids: Vec<StoneId> = seen.keys().copied().collect();
         let pair = EpochPair {
             sources: &sources,
             stones: &stones,
@@ -84,9 +87,12 @@ impl ScannedWall {
             stable: &[],
             offered: &[],
             sigma_m: self.sigma_m(),
+            response: self.report.joint.as_ref().map(|motions| Response {
+                motions,
+                stones: &ids,
+            }),
         };
         let errors = epoch_errors(&pair, &EpochErrorParams::default());
-        let ids: Vec<StoneId> = seen.keys().copied().collect();
         let errors = errors.joint.as_ref().map(|e| (e, ids.as_slice()));
         let found = deformation(self.report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
         (found, seen)

@@ -3,7 +3,7 @@
 use super::candidate::Moving;
 use super::estimate::{Estimate, widening};
 use super::field::{information, stone_from_field};
-use super::joint_motions::{JointMotions, JointStone};
+use super::joint_motions::{JointMotions, JointStone, Pull};
 use super::observation::NormalEquations;
 use super::octaves::Octaves;
 use super::solution::Solution;
@@ -76,10 +76,28 @@ pub(super) fn joint_motions(
         })
     };
     let graph = &adjustment.prior.graph;
+    let stones: Vec<Option<JointStone>> = (0..results.len()).into_par_iter().map(stone).collect();
+    let equations = solution.equations.iter().map(|e| &e.with_field);
+    let (information, of_stones) = information(&adjustment.problem(equations));
+    let pull = |i: usize| {
+        let frame = graph.nodes[i].face_from_world;
+        let of_points = adjustment.photo_part(i).map_or_else(Matrix3::identity, |photos| {
+            frame.transpose() * photos.share_of_points() * frame
+        });
+        let followed = stones[i].as_ref().map_or_else(Matrix3::zeros, |stone| {
+            Matrix3::identity() - stone.by_field.fixed_columns::<3>(0)
+        });
+        Pull {
+            stone: results[i].first,
+            on_field: of_stones[i].fixed_columns::<3>(0) * of_points,
+            on_stone: followed * of_points,
+        }
+    };
     JointMotions {
-        stones: (0..results.len()).into_par_iter().map(stone).collect(),
+        pulls: (0..results.len()).into_par_iter().map(pull).collect(),
+        stones,
         edges: graph.edges.iter().map(|e| (e.low, e.high)).collect(),
-        information: information(&adjustment.problem(solution.equations.iter().map(|e| &e.with_field))),
+        information,
         poses: adjustment
             .photos
             .as_ref()

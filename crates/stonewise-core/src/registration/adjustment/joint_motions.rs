@@ -17,12 +17,25 @@ pub struct JointMotions {
     pub(crate) edges: Vec<(usize, usize)>,
     /// Information of the field: nine unknowns a stone.
     pub(crate) information: BlockMatrix<9>,
+    /// One per node.
+    pub(crate) pulls: Vec<Pull>,
     /// Covariance of the errors of the photos' poses; of no unknowns where photos take no part.
     pub(crate) poses: DMatrix<f64>,
     /// Octaves of length between the distance of neighbours and the wall over which points share errors.
     pub(crate) octaves: f64,
     /// Distance of neighbours, metres.
     pub(crate) step_m: f64,
+}
+
+/// How a displacement of a stone's points pulls the solution; world.
+#[derive(Clone, Debug)]
+pub(crate) struct Pull {
+    /// Stone of the first epoch.
+    pub stone: StoneId,
+    /// What it adds to the equations of the field, by metres.
+    pub on_field: SMatrix<f64, 9, 3>,
+    /// What the stone follows of it by itself, besides the field.
+    pub on_stone: Matrix3<f64>,
 }
 
 /// A measured stone; world, metres.

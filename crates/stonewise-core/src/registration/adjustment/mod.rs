@@ -9,6 +9,7 @@ mod adjust;
 mod bodies;
 mod breaks;
 mod candidate;
+mod covered;
 mod equations;
 mod error;
 mod estimate;
@@ -33,7 +34,7 @@ mod step;
 pub(crate) mod stone_vector;
 mod survey;
 #[cfg(test)]
-mod testing;
+pub(super) mod testing;
 mod tracking;
 
 pub use adjust::{adjust, adjust_with_photos};

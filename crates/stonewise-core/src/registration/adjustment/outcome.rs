@@ -3,6 +3,7 @@
 use super::bodies::{bodies, refuse_unconfirmed};
 use super::breaks::find_breaks;
 use super::candidate::Moving;
+use super::covered::{covered, leave_out_covered};
 use super::estimate::Estimate;
 use super::joint::joint_motions;
 use super::joint_motions::JointMotions;
@@ -79,12 +80,14 @@ impl Found {
     fn of(adjustment: &Adjustment, solution: &Solution) -> Self {
         let tested = test_stones(adjustment, solution);
         let shared = adjustment.shared_variances(1.0);
-        let estimates = estimates(adjustment, solution, &shared);
+        let covered = covered(adjustment);
+        let estimates = estimates(adjustment, solution, &shared, &covered);
         let octaves = Octaves::of(adjustment, |i| {
             let estimate = estimates[i].as_ref().ok().filter(|_| !tested[i].is_loose)?;
             Some((estimate.mean + adjustment.prior.common_in(i)).translation())
         });
         let mut results = results(adjustment, solution, &tested, &estimates, &octaves);
+        leave_out_covered(&covered, &mut results);
         refuse_unconfirmed(adjustment, &mut results);
         Self {
             breaks: find_breaks(adjustment, &solution.field.state, |i| tested[i].is_loose),
@@ -118,9 +121,11 @@ fn estimates(
     adjustment: &Adjustment,
     solution: &Solution,
     shared: &[f64; 9],
+    covered: &[bool],
 ) -> Vec<Result<Estimate, MotionFailure>> {
     let estimate = |i: usize| match failure(adjustment, i) {
         Some(failure) => Err(failure),
+        None if covered[i] => Err(MotionFailure::Disagreement),
         None => Ok(adjustment.estimate(i, solution, shared)),
     };
     (0..adjustment.stones.len())

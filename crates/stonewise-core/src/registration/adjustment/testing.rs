@@ -21,7 +21,11 @@ const HALF_M: [f64; 2] = [0.1, 0.08];
 /// Stones 30 cm wide and 20 cm high in the plane x = 0, each with a wavy face of its own.
 ///
 /// `noise_m`: standard deviation along the normal, per epoch. `motion`: of each stone, world, metres.
-pub(super) fn wall(rows: u32, noise_m: [f64; 2], motion: impl Fn(u32) -> Vector3<f64>) -> Vec<PairPoints> {
+pub(in crate::registration) fn wall(
+    rows: u32,
+    noise_m: [f64; 2],
+    motion: impl Fn(u32) -> Vector3<f64>,
+) -> Vec<PairPoints> {
     wall_apart(rows, noise_m, |_| Vector3::zeros(), motion)
 }
 

@@ -46,10 +46,15 @@ impl PhotoPart<'_> {
         by_photos.map(|(unknown, by)| (unknown, self.share * by))
     }
 
+    /// What is left of an error of the points in the stone's displacement, in its frame.
+    pub fn share_of_points(&self) -> Matrix3<f64> {
+        Matrix3::identity() - self.share
+    }
+
     /// What is left of a covariance of errors of the points in the stone's displacement, in its frame: the
     /// photos do not share them.
     pub fn left_of(&self, of_points: &Matrix3<f64>) -> Matrix3<f64> {
-        let rest = Matrix3::identity() - self.share;
+        let rest = self.share_of_points();
         rest * of_points * rest.transpose()
     }
 

@@ -7,7 +7,7 @@ use crate::id::StoneId;
 use crate::linalg::{BlockFactor, BlockPattern};
 use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
-use crate::registration::observers::JointErrors;
+use crate::registration::observers::{JointErrors, Row};
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -21,7 +21,10 @@ pub(super) struct Body<'a> {
     pub stones: Vec<BodyStone<'a>>,
     /// Pairs of neighbours, as indices into the stones.
     pub neighbours: Vec<[usize; 2]>,
+    /// Errors that the motions share.
     pub shared: SharedErrors,
+    /// Errors that the stones' own observations share.
+    pub of_points: SharedErrors,
 }
 
 /// A stone of it.
@@ -119,7 +122,8 @@ impl<'a> Body<'a> {
         let error_of = |id: StoneId| Some((errors?.0, *number.get(&id)?));
         let stone = |(node, joint): &(usize, &'a JointStone)| {
             let error = error_of(joint.id);
-            let taken_off = error.map_or_else(Vector3::zeros, |(e, k)| e.mean[k]);
+            let taken_off = error.map_or_else(Vector3::zeros, |(e, k)| e.mean_of_motions[k]);
+            let off_points = error.map_or_else(Vector3::zeros, |(e, k)| e.mean_of_points[k]);
             // In the face a stone follows its neighbours, and what the field does not share already counts there as an
             // error of its observations.
             let out = joint.face_from_world.row(2).transpose();
@@ -135,7 +139,7 @@ impl<'a> Body<'a> {
                 joint,
                 displacement: joint.displacement - taken_off,
                 information,
-                vector: vector - information * taken_off,
+                vector: vector - information * off_points,
                 lever,
                 own: joint.own + of_sources,
             }
@@ -148,22 +152,23 @@ impl<'a> Body<'a> {
         if motions.poses.nrows() > 0 {
             shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
         }
-        if let Some((errors, _)) = errors {
-            let row = |stone: &BodyStone| {
-                let row = error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]);
-                let columns = |(first, by): &(usize, Matrix3<f64>)| {
-                    let (first, by) = (*first, *by);
-                    (0..3).map(move |c| (first + c, by.column(c).into_owned()))
-                };
-                row.iter().flat_map(columns).collect()
-            };
-            shared.add_joint(&errors.covariance, stones.iter().map(row));
-        }
+        let with_errors = |rows: fn(&JointErrors) -> &[Row]| {
+            let mut shared = shared.clone();
+            if let Some((errors, _)) = errors {
+                let row = |stone: &BodyStone| error_of(stone.id).map_or(&[][..], |(e, k)| &rows(e)[k]);
+                let columns = |stone: &BodyStone| row(stone).iter().flat_map(columns).collect();
+                shared.add_joint(&errors.covariance, stones.iter().map(columns));
+            }
+            shared
+        };
+        let of_points = with_errors(|e| &e.of_points);
+        let shared = with_errors(|e| &e.of_motions);
         Self {
             motions,
             neighbours: motions.edges.iter().filter_map(pair).collect(),
             stones,
             shared,
+            of_points,
         }
     }
 
@@ -189,6 +194,12 @@ impl<'a> Body<'a> {
             diagonal,
         })
     }
+}
+
+/// Coefficients of three unknowns, one by one.
+fn columns((first, by): &(usize, Matrix3<f64>)) -> impl Iterator<Item = (usize, Vector3<f64>)> {
+    let (first, by) = (*first, *by);
+    (0..3).map(move |c| (first + c, by.column(c).into_owned()))
 }
 
 /// Errors that points share over octaves of length, from twice the distance of neighbours up: patches of a

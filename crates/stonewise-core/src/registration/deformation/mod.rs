@@ -65,7 +65,11 @@ pub fn deformation(
         found.detection_limits_m = scan.detection_limits_m;
     }
     let mut by_stone: BTreeMap<StoneId, StoneDeformation> = BTreeMap::new();
-    for (body, rigid, scan) in &judged {
+    for (body, rigid, scan) in &mut judged {
+        let is_shown = scan.p * count <= LEVEL;
+        if is_shown {
+            rigid.doubt_smoothed(body, &scan.most_likely);
+        }
         for (stone, (deformation, covariance)) in body.stones.iter().zip(&rigid.deformations) {
             let row = StoneDeformation {
                 stone: stone.id,
@@ -75,7 +79,7 @@ pub fn deformation(
             };
             by_stone.insert(stone.id, row);
         }
-        if scan.p * count <= LEVEL {
+        if is_shown {
             found.zones.extend(zones(body, rigid, scan));
         }
     }

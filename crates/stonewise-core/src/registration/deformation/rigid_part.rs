@@ -2,6 +2,7 @@
 
 use super::body::{Body, BodyStone, Covariance, Matrix3x6};
 use super::random::Random;
+use super::scan::MostLikely;
 use crate::statistics::{biweight, biweight_loss, congruent_scale};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use rayon::prelude::*;
@@ -16,12 +17,33 @@ const AS_LARGE: f64 = 0.9;
 /// Least information of a rigid motion, as a share of the largest: below it the stones do not show it.
 const LEAST: f64 = 1e-9;
 
+/// Standard deviations by which a bulge in the stones' own observations must exceed that of their motions to be smoothed.
+const SMOOTHED_SD: f64 = 1.0;
+
 /// The deformation of each stone of a body.
 pub(super) struct RigidPart {
     /// Deformation and covariance of each stone, world.
     pub deformations: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// Squared standardised deformation of each stone.
     pub squares: Vec<f64>,
+}
+
+impl RigidPart {
+    /// Adds to the covariances of the stones of a bulge what the field has smoothed of it, where that is more than chance.
+    pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
+        if bulge.smoothed_m.abs() < SMOOTHED_SD * bulge.amplitude_m.1 {
+            return;
+        }
+        for (i, share) in &bulge.stones {
+            let direction = body.stones[*i]
+                .joint
+                .face_from_world
+                .row(bulge.direction)
+                .transpose();
+            let missed = direction * (bulge.smoothed_m * share);
+            self.deformations[*i].1 += missed * missed.transpose();
+        }
+    }
 }
 
 /// Finds the largest congruent part by iteratively reweighted least squares (Tukey's biweight), from the triple of

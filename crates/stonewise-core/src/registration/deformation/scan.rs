@@ -5,7 +5,8 @@
 //! of the bulge is s = sum b_i' (v_i - M_i J_i r), linear in the observations; s^2 / var(s) is twice the log
 //! likelihood ratio of the bulge. The test is the largest of all bulges. No variance is estimated under the
 //! alternative, so that nothing lies at a bound (compare Self & Liang 1987), and what its largest value is on a
-//! wall that moved as one body is simulated from the same model.
+//! wall that moved as one body is simulated from the same model. What is left over of a stone counts up to a limit, here
+//! and there (Huber 1964), so that no single stone is called a deformation of the wall.
 
 use super::body::{Body, BodyStone};
 use super::found::ZONE_EXTENTS_M;
@@ -33,6 +34,13 @@ const LEAST_STONES: usize = 3;
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
 const POWER: f64 = 1.645;
+/// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
+/// three degrees of freedom).
+const LARGEST_RESIDUAL: f64 = 3.368;
+/// Rounds in which the rigid motion and what counts of the residuals follow each other.
+const ROUNDS: usize = 6;
+/// Share of its trace that is added to a covariance in its null directions.
+const REGULARISATION: f64 = 1e-9;
 /// Number of the direction out of the wall.
 const OUT: usize = 2;
 /// Share of still walls that are called deformed.
@@ -42,10 +50,22 @@ const LEVEL: f64 = 0.05;
 pub(super) struct Scan {
     /// Probability of so likely a bulge on a wall that moved as one rigid body.
     pub p: f64,
-    /// Stones of the most likely bulge, all that move by more than a quarter of its amplitude.
-    pub most_likely: Vec<usize>,
+    /// The most likely bulge.
+    pub most_likely: MostLikely,
     /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
+}
+
+/// The bulge of the largest score.
+pub(super) struct MostLikely {
+    /// Stones that move by more than a quarter of its amplitude, with their share of it.
+    pub stones: Vec<(usize, f64)>,
+    /// Its direction: along, up or out.
+    pub direction: usize,
+    /// Amplitude and its standard deviation, metres.
+    pub amplitude_m: (f64, f64),
+    /// What the motions show less of it than the stones' own observations, metres.
+    pub smoothed_m: f64,
 }
 
 /// A bulge of some place and size in three directions: along, up and out.
@@ -58,6 +78,38 @@ struct Bulge {
     directions: [Option<(f64, f64)>; 3],
 }
 
+impl Bulge {
+    /// The score of each direction. `rest`: what a rigid motion leaves over of each stone.
+    fn scores(&self, rest: &[Vector3<f64>]) -> Vector3<f64> {
+        self.stones.iter().map(|(i, share)| rest[*i] * *share).sum()
+    }
+
+    /// The largest score of any direction in standard deviations.
+    fn largest(&self, rest: &[Vector3<f64>]) -> f64 {
+        let score = self.scores(rest);
+        let z = |k: usize| self.directions[k].map_or(0.0, |(sd, _)| score[k].abs() / sd);
+        z(0).max(z(1)).max(z(2))
+    }
+
+    /// Its stones and amplitude in the direction of the largest score. `left_over`: of the observations, and of what they
+    /// show beyond the motions. `None` where nothing shows it.
+    fn most_likely(&self, left_over: &[Vec<Vector3<f64>>; 2]) -> Option<MostLikely> {
+        let [score, smoothed] = left_over.each_ref().map(|rest| self.scores(rest));
+        let shown = |k: usize| self.directions[k].map(|(sd, information)| (k, sd, information));
+        let size = |(k, sd, _): &(usize, f64, f64)| score[*k].abs() / sd;
+        let (direction, sd, information) = (0..3)
+            .filter_map(shown)
+            .max_by(|a, b| size(a).total_cmp(&size(b)))?;
+        let stones = self.stones.iter().filter(|(_, share)| *share > 0.25);
+        Some(MostLikely {
+            stones: stones.copied().collect(),
+            direction,
+            amplitude_m: (score[direction] / information, sd / information),
+            smoothed_m: smoothed[direction] / information,
+        })
+    }
+}
+
 /// Tests a body; `None` where its stones show no bulge.
 pub(super) fn scan(body: &Body) -> Option<Scan> {
     let firm: Vec<usize> = (0..body.stones.len())
@@ -66,14 +118,18 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let model = Model::new(body, &firm)?;
     let bulges = bulges(body, &firm, &model);
     let observed: Vec<Vector3<f64>> = body.stones.iter().map(|s| s.vector).collect();
-    let (largest, most_likely) = model.largest(&bulges, &observed)?;
+    let (largest, place) = model.largest(&bulges, &observed)?;
+    let smoothed = |s: &BodyStone| s.vector - s.information * s.displacement;
+    let smoothed: Vec<Vector3<f64>> = body.stones.iter().map(smoothed).collect();
+    let left_over = [observed, smoothed].map(|vectors| model.left_over(&vectors));
+    let most_likely = bulges[place].most_likely(&left_over)?;
     let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
     let simulate = |k: usize| {
         let mut random = Random::new(k as u64 + 1);
-        let u = body.shared.draw(&mut random);
+        let u = body.of_points.draw(&mut random);
         let of_stone = |(i, stone): (usize, &BodyStone)| {
             let noise = Vector3::from_fn(|_, _| random.normal());
-            stone.information * body.shared.at::<1>(i, &u) + roots[i] * noise
+            stone.information * body.of_points.at::<1>(i, &u) + roots[i] * noise
         };
         let vectors: Vec<Vector3<f64>> = body.stones.iter().enumerate().map(of_stone).collect();
         model.largest(&bulges, &vectors).map_or(0.0, |(z, _)| z)
@@ -88,12 +144,7 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let limit = still[((1.0 - LEVEL) * SIMULATIONS as f64) as usize];
     Some(Scan {
         p: simulated.min(sum),
-        most_likely: bulges[most_likely]
-            .stones
-            .iter()
-            .filter(|(_, share)| *share > 0.25)
-            .map(|(i, _)| *i)
-            .collect(),
+        most_likely,
         detection_limits_m: ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, limit)),
     })
 }
@@ -117,71 +168,98 @@ struct Model<'a> {
     inverse: Matrix6<f64>,
     /// Unknowns of shared errors times what the rigid motion takes up of them.
     of_shared: OMatrix<f64, Dyn, Const<6>>,
+    /// Of each stone: the inverse covariance of what its observations give.
+    weights: Vec<Matrix3<f64>>,
 }
 
 impl<'a> Model<'a> {
     fn new(body: &'a Body, firm: &'a [usize]) -> Option<Self> {
         let mut information = Matrix6::zeros();
-        let mut of_shared = body.shared.zeros::<6>();
+        let mut of_shared = body.of_points.zeros::<6>();
         for &i in firm {
             let stone = &body.stones[i];
             let weighted = stone.information * stone.lever;
             information += stone.lever.transpose() * weighted;
-            body.shared.add_transposed(i, &weighted, &mut of_shared);
+            body.of_points.add_transposed(i, &weighted, &mut of_shared);
         }
         Some(Self {
             body,
             firm,
             inverse: information.try_inverse()?,
             of_shared,
+            weights: (0..body.stones.len()).map(|i| weight(body, i)).collect(),
         })
     }
 
     /// The largest standardised score, and the number of its bulge. `vectors`: of all stones' observations.
     fn largest(&self, bulges: &[Bulge], vectors: &[Vector3<f64>]) -> Option<(f64, usize)> {
-        let right: Vector6<f64> = self
-            .firm
-            .iter()
-            .map(|&i| self.body.stones[i].lever.transpose() * vectors[i])
-            .sum();
-        let rigid = self.inverse * right;
-        let mut rest = vec![Vector3::zeros(); vectors.len()];
-        for &i in self.firm {
-            let stone = &self.body.stones[i];
-            let residual = vectors[i] - stone.information * (stone.lever * rigid);
-            rest[i] = stone.joint.face_from_world * residual;
-        }
-        let of_bulge = |bulge: &Bulge| {
-            let score: Vector3<f64> = bulge.stones.iter().map(|(i, share)| rest[*i] * *share).sum();
-            let z = |k: usize| bulge.directions[k].map_or(0.0, |(sd, _)| score[k].abs() / sd);
-            z(0).max(z(1)).max(z(2))
-        };
-        let scores = bulges.iter().map(of_bulge).zip(0..);
+        let rest = self.left_over(vectors);
+        let scores = bulges.iter().map(|b| b.largest(&rest)).zip(0..);
         scores.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// What the rigid motion leaves over of each stone, in its frame and up to the limit; the motion is found with what
+    /// counts.
+    fn left_over(&self, vectors: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut rigid = Vector6::zeros();
+        let mut rest = vec![Vector3::zeros(); vectors.len()];
+        for round in 0..ROUNDS {
+            let mut any_limited = false;
+            let mut right = Vector6::zeros();
+            for &i in self.firm {
+                let stone = &self.body.stones[i];
+                let residual = vectors[i] - stone.information * (stone.lever * rigid);
+                let deviations = residual.dot(&(self.weights[i] * residual)).max(0.0).sqrt();
+                // The first round finds the motion of all.
+                let is_limited = round > 0 && deviations > LARGEST_RESIDUAL;
+                any_limited |= is_limited;
+                rest[i] = match is_limited {
+                    true => residual * (LARGEST_RESIDUAL / deviations),
+                    false => residual,
+                };
+                right += stone.lever.transpose() * rest[i];
+            }
+            if round > 0 && !any_limited {
+                break;
+            }
+            rigid += self.inverse * right;
+        }
+        for &i in self.firm {
+            rest[i] = self.body.stones[i].joint.face_from_world * rest[i];
+        }
+        rest
     }
 
     /// Standard deviation of the score of each direction, and information on the amplitude.
     fn directions(&self, stones: &[(usize, f64)]) -> [Option<(f64, f64)>; 3] {
         let (mut plain, mut with_rigid) = (Matrix3::zeros(), SMatrix::<f64, 6, 3>::zeros());
-        let mut of_shared = self.body.shared.zeros::<3>();
+        let mut of_shared = self.body.of_points.zeros::<3>();
         for (i, share) in stones {
             let stone = &self.body.stones[*i];
             let moved = stone.joint.face_from_world.transpose() * *share;
             let weighted = stone.information * moved;
             plain += moved.transpose() * weighted;
             with_rigid += stone.lever.transpose() * weighted;
-            self.body.shared.add_transposed(*i, &weighted, &mut of_shared);
+            self.body.of_points.add_transposed(*i, &weighted, &mut of_shared);
         }
         let explained = self.inverse * with_rigid;
         let information = plain - with_rigid.transpose() * explained;
         of_shared -= &self.of_shared * explained;
-        let shared = of_shared.transpose() * self.body.shared.spread(&of_shared);
+        let shared = of_shared.transpose() * self.body.of_points.spread(&of_shared);
         std::array::from_fn(|k| {
             let left = information[(k, k)];
             let variance = left + shared[(k, k)];
             (left > LEAST_SHARE * plain[(k, k)] && variance > 0.0).then(|| (variance.sqrt(), left))
         })
     }
+}
+
+/// The inverse covariance of what the observations of a stone give: of their own errors and of those that stones share.
+fn weight(body: &Body, stone: usize) -> Matrix3<f64> {
+    let information = body.stones[stone].information;
+    let covariance = information + information * body.of_points.covariance(stone) * information;
+    let regularised = covariance + Matrix3::identity() * (REGULARISATION * covariance.trace());
+    regularised.try_inverse().unwrap_or_else(Matrix3::zeros)
 }
 
 /// All bulges of a body.

@@ -3,11 +3,11 @@
 use super::body::Body;
 use super::found::{DeformationZone, ZoneKind};
 use super::rigid_part::RigidPart;
-use super::scan::Scan;
+use super::scan::{MostLikely, Scan};
 use crate::components::components;
 use crate::statistics::discoveries;
 use nalgebra::{Matrix3, Vector3};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use std::collections::BTreeSet;
 
 /// Share of false discoveries that is accepted among the stones of all zones.
@@ -16,6 +16,8 @@ const FALSE_DISCOVERY_RATE: f64 = 0.05;
 const LEAST_STONES: usize = 3;
 /// Standard deviations on either side of an interval of 95 %.
 const QUANTILE: f64 = 1.96;
+/// Share of cases that lies outside of it.
+const OUTSIDE: f64 = 0.05;
 /// Share of the variance of the motion across a zone that a plane must explain to call it a tilt.
 const TILTED: f64 = 0.8;
 /// Least standard deviation of the motion across a tilted zone, as a share of its mean: half of what a tilt about one
@@ -27,8 +29,8 @@ const TILT_STONES: usize = 6;
 /// The zones of a body that deformed; their numbers are left open.
 ///
 /// Stones are tested one by one with the false discovery rate controlled over the body (Benjamini & Hochberg 1995; tests
-/// of stones that share errors are positively dependent). Where no three connected stones stand out, the zone is that of
-/// the most likely bulge.
+/// of stones that share errors are positively dependent). Where no three connected stones stand out, the zone is the most
+/// likely bulge, as large as the stones' own observations say: the field smooths what it shows no more clearly.
 pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<DeformationZone> {
     let law = ChiSquared::new(3.0).ok();
     let p = |(i, square): (usize, &f64)| {
@@ -44,41 +46,66 @@ pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<Deformat
             next[*high].push(*low);
         }
     }
-    let mut parts: Vec<Vec<usize>> = components(&next)
+    let parts: Vec<Vec<usize>> = components(&next)
         .into_iter()
         .filter(|part| part.len() >= LEAST_STONES)
         .collect();
-    if parts.is_empty() {
-        parts.push(scan.most_likely.clone());
+    match parts.is_empty() {
+        true => vec![bulge(body, &scan.most_likely)],
+        false => parts.iter().map(|stones| zone(body, rigid, stones)).collect(),
     }
-    parts
-        .iter()
-        .filter_map(|stones| zone(body, rigid, stones))
-        .collect()
 }
 
-fn zone(body: &Body, rigid: &RigidPart, stones: &[usize]) -> Option<DeformationZone> {
-    let length = |i: &usize| rigid.deformations[*i].0.norm();
-    let largest = *stones.iter().max_by(|a, b| length(a).total_cmp(&length(b)))?;
-    let (deformation, covariance) = &rigid.deformations[largest];
-    let largest_m = deformation.norm();
-    let direction = deformation.try_normalize(0.0).unwrap_or_else(Vector3::x);
-    let half_m = QUANTILE * direction.dot(&(covariance * direction)).max(0.0).sqrt();
-    let in_face: Vec<Vector3<f64>> = stones
-        .iter()
-        .map(|&i| body.stones[i].joint.face_from_world * rigid.deformations[i].0)
-        .collect();
+/// The zone of a bulge.
+fn bulge(body: &Body, found: &MostLikely) -> DeformationZone {
+    let (amplitude_m, sd_m) = found.amplitude_m;
+    let moved = |(_, share): &(usize, f64)| Vector3::ith(found.direction, amplitude_m * share);
+    let in_face: Vec<Vector3<f64>> = found.stones.iter().map(moved).collect();
+    let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);
+    let (largest_m, half_m) = (largest * amplitude_m.abs(), QUANTILE * largest * sd_m);
+    let interval_m = [(largest_m - half_m).max(0.0), largest_m + half_m];
+    let stones: Vec<usize> = found.stones.iter().map(|s| s.0).collect();
+    described(body, &stones, &in_face, largest_m, interval_m)
+}
+
+/// The zone of these stones. Its interval holds the largest deformation of them all, not only that of the stone at which
+/// the measured one is largest (Bonferroni over the stones).
+fn zone(body: &Body, rigid: &RigidPart, stones: &[usize]) -> DeformationZone {
+    let quantile = Normal::standard().inverse_cdf(1.0 - 0.5 * OUTSIDE / stones.len() as f64);
+    let (mut largest_m, mut low_m, mut high_m): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    for &i in stones {
+        let (deformation, covariance) = &rigid.deformations[i];
+        let length_m = deformation.norm();
+        let direction = deformation.try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let half_m = quantile * direction.dot(&(covariance * direction)).max(0.0).sqrt();
+        largest_m = largest_m.max(length_m);
+        low_m = low_m.max(length_m - half_m);
+        high_m = high_m.max(length_m + half_m);
+    }
+    let motion = |&i: &usize| body.stones[i].joint.face_from_world * rigid.deformations[i].0;
+    let in_face: Vec<Vector3<f64>> = stones.iter().map(motion).collect();
+    described(body, stones, &in_face, largest_m, [low_m, high_m])
+}
+
+/// `in_face`: the motion of each stone along, up and out; `interval_m`: of the largest, 95 %.
+fn described(
+    body: &Body,
+    stones: &[usize],
+    in_face: &[Vector3<f64>],
+    largest_m: f64,
+    interval_m: [f64; 2],
+) -> DeformationZone {
     let mean_m = in_face.iter().sum::<Vector3<f64>>() / stones.len() as f64;
     let mut ids: Vec<_> = stones.iter().map(|&i| body.stones[i].id).collect();
     ids.sort_unstable();
-    Some(DeformationZone {
+    DeformationZone {
         number: 0,
         stones: ids,
         largest_m,
-        interval_m: [(largest_m - half_m).max(0.0), largest_m + half_m],
+        interval_m,
         mean_m,
-        kind: kind(body, stones, &in_face, &mean_m),
-    })
+        kind: kind(body, stones, in_face, &mean_m),
+    }
 }
 
 /// What the motions of a zone (along, up, out) resemble: by their largest mean component, and across the wall by

@@ -11,10 +11,11 @@ use super::joint::JointErrors;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
-use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
+use super::rigid::{RigidError, rigid_rows, shares};
 use super::sensors::Sharpest;
 use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
+use super::stone_rows::StoneRows;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -181,18 +182,20 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     };
     let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
-    let rigid = rigid_rows(pair, &unknowns).error(&found.weighted());
+    let rigid_rows = rigid_rows(pair, &unknowns);
+    let rigid = rigid_rows.error(&found.weighted());
+    let rows = StoneRows::new(pair, &unknowns, &rigid_rows);
     let relative = match datum {
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
     };
     let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
-    let at = found.at_stones(pair, &unknowns, model.components.nugget_m);
+    let at = found.at_stones(pair, &rows, model.components.nugget_m);
     let (relative, between, joint) = match relative {
         Some(relative) => (relative.at, relative.between, relative.joint),
         None => {
-            let joint = found.joint(pair, &unknowns, model.components.nugget_m);
-            (Vec::new(), found.between(pair, &unknowns), joint)
+            let joint = found.joint(pair, &rows, model.components.nugget_m);
+            (Vec::new(), found.between(pair, &rows), joint)
         }
     };
     let cross_check = match datum {
@@ -331,32 +334,30 @@ impl Averaged {
     }
 
     /// `nugget_m`: independent error of each source at each stone, in the face and across it.
-    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
-        let at = |stone: &SeenStone| {
-            let mut error = self.function(&difference_row(stone, pair.sources, unknowns));
+    fn at_stones(&self, pair: &EpochPair, rows: &StoneRows, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
+        let at = |(stone, row): (&SeenStone, &Row)| {
+            let mut error = self.function(row);
             error.covariance += of_stone_alone(stone, pair, nugget_m);
             error
         };
-        pair.stones.par_iter().map(at).collect()
+        pair.stones.par_iter().zip(&rows.of_motions).map(at).collect()
     }
 
     /// The error at all stones together.
-    fn joint(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Option<JointErrors> {
-        let stones = pair.stones.iter();
-        let rows = stones.clone().map(|s| difference_row(s, pair.sources, unknowns));
+    fn joint(&self, pair: &EpochPair, rows: &StoneRows, nugget_m: [f64; 2]) -> Option<JointErrors> {
         let weighted: Vec<_> = self
             .solutions
             .iter()
             .map(|(w, s)| (*w, &s.mean, &s.covariance))
             .collect();
+        let stones = pair.stones.iter();
         let own = stones.map(|s| of_stone_alone(s, pair, nugget_m)).collect();
-        JointErrors::new(rows.collect(), &weighted, own, true)
+        JointErrors::new(rows, &weighted, own, true)
     }
 
     /// Covariances between neighbours, without the independent error of each source at each stone.
-    fn between(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<Matrix3<f64>> {
-        let difference =
-            |stones: &[usize; 2]| self.function(&neighbour_row(pair, stones, unknowns)).covariance;
+    fn between(&self, pair: &EpochPair, rows: &StoneRows) -> Vec<Matrix3<f64>> {
+        let difference = |stones: &[usize; 2]| self.function(&rows.between(stones)).covariance;
         pair.neighbours.par_iter().map(difference).collect()
     }
 

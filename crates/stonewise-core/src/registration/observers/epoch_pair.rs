@@ -2,6 +2,7 @@
 
 use super::contrast::ContrastParams;
 use super::observation::Observation;
+use super::response::Response;
 use super::sight::{SeenStone, Sight, Source, Target};
 use super::stable::{StableParams, StablePoints};
 use crate::params::{Params, Range, Ranged, with_ranges};
@@ -55,6 +56,8 @@ pub struct EpochPair<'a> {
     pub offered: &'a [StablePoints],
     /// Noise of single points along the normal, metres.
     pub sigma_m: f64,
+    /// What the motions follow of errors of the points; `None`: each stone its own.
+    pub response: Option<Response<'a>>,
 }
 
 /// All sights; they determine the blocks of the unknowns.

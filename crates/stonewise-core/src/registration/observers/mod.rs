@@ -34,10 +34,12 @@ mod joint;
 mod model;
 mod observation;
 mod relative;
+mod response;
 mod rigid;
 mod sensors;
 mod sight;
 mod stable;
+mod stone_rows;
 #[cfg(test)]
 mod tests;
 
@@ -47,5 +49,7 @@ pub use cross_check::CrossCheck;
 pub use epoch_error::{Datum, EpochErrors, ErrorAt, SourceError, epoch_errors};
 pub use epoch_pair::{EpochErrorParams, EpochPair};
 pub use joint::JointErrors;
+pub(crate) use model::Row;
+pub use response::Response;
 pub use sight::{SeenStone, Source, SourcePoints};
 pub use stable::{StableParams, StablePoints};

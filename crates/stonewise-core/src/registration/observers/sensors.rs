@@ -72,6 +72,7 @@ impl Sharpest {
             offered: &self.offered,
             neighbours: of.neighbours,
             sigma_m: of.sigma_m,
+            response: of.response,
         }
     }
 }

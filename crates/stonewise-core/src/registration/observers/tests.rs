@@ -308,6 +308,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
             stable,
             offered: &[],
             sigma_m: 0.002,
+            response: None,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };
@@ -406,6 +407,7 @@ fn an_area_that_moved_is_named_and_left_out() {
             stable: &stable,
             offered: &[],
             sigma_m: 0.002,
+            response: None,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };
@@ -438,6 +440,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         stable: &stable_points(&errors, 0.002),
         offered: &[],
         sigma_m: 0.002,
+        response: None,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
     let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
@@ -467,6 +470,7 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
             stable: &[],
             offered: if is_offered { &offered } else { &[] },
             sigma_m: 0.002,
+            response: None,
         };
         epoch_errors(&pair, &EpochErrorParams::default())
     };
@@ -513,6 +517,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
         stable: &[],
         offered: &[],
         sigma_m: 0.002,
+        response: None,
     };
     // One survey: nothing else is uncertain where the same sources count alike.
     let found = epoch_errors(&pair, &EpochErrorParams::default());
@@ -539,6 +544,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
         stable: &[],
         offered: &[],
         sigma_m: 0.002,
+        response: None,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
     assert_eq!(
@@ -583,6 +589,7 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
         stable: &[],
         offered: &[],
         sigma_m: 0.002,
+        response: None,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default());
     assert_eq!(

@@ -40,19 +40,27 @@ pub(crate) fn normal_equations<'a>(problem: &FieldProblem<'a>) -> Option<Normal<
     assemble(problem, prior, eliminated)
 }
 
-/// The matrix of these equations: the information of prior and stones together.
-pub(crate) fn information(problem: &FieldProblem) -> BlockMatrix<9> {
+/// The matrix of these equations: the information of prior and stones together, and that of each stone.
+pub(crate) fn information(problem: &FieldProblem) -> (BlockMatrix<9>, Vec<Matrix9>) {
     let eliminated = eliminate_own_motions(problem, &problem.own_variances());
     let mut matrix = prior(problem.graph, &problem.components, &problem.ties);
-    add_stones(&mut matrix, problem, &eliminated);
-    matrix
+    let of_stones = of_stones(problem, &eliminated);
+    add_stones(&mut matrix, &of_stones);
+    (matrix, of_stones)
 }
 
-fn add_stones(matrix: &mut BlockMatrix<9>, problem: &FieldProblem, eliminated: &[Eliminated]) {
-    for (i, stone) in eliminated.iter().enumerate() {
+/// What the stones say of the field's unknowns.
+fn of_stones(problem: &FieldProblem, eliminated: &[Eliminated]) -> Vec<Matrix9> {
+    let of_stone = |(i, stone): (usize, &Eliminated)| {
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
-        matrix.diagonal[i] += a.transpose() * stone.information * a;
-    }
+        a.transpose() * stone.information * a
+    };
+    eliminated.iter().enumerate().map(of_stone).collect()
+}
+
+fn add_stones(matrix: &mut BlockMatrix<9>, of_stones: &[Matrix9]) {
+    let diagonal = matrix.diagonal.iter_mut().zip(of_stones);
+    diagonal.for_each(|(sum, of_stone)| *sum += of_stone);
 }
 
 /// `matrix`: the information of the prior.
@@ -62,7 +70,7 @@ pub(crate) fn assemble<'a>(
     eliminated: Vec<Eliminated>,
 ) -> Option<Normal<'a>> {
     let mut rhs = vec![Vector9::zeros(); eliminated.len()];
-    add_stones(&mut matrix, problem, &eliminated);
+    add_stones(&mut matrix, &of_stones(problem, &eliminated));
     for (i, stone) in eliminated.iter().enumerate() {
         let a = stone_from_field(&problem.graph.nodes[i].face_from_world);
         rhs[i] = a.transpose() * stone.vector;

@@ -9,15 +9,17 @@ use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
-use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, epoch_errors};
+use stonewise_core::registration::JointMotions;
+use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, Response, epoch_errors};
 
-/// Estimates that error, and adds it to the covariances of neighbours.
+/// Estimates that error, and adds it to the covariances of neighbours. `joint`: the last solution of the adjustment.
 pub(super) fn add_epoch_error(
     context: &Context,
     epochs: Pair<EpochId>,
     labelled: Pair<&Labelled>,
     matches: &[(StoneId, StoneId)],
     registered: &mut Registered,
+    joint: Option<&JointMotions>,
 ) -> Result<()> {
     let project = context.project;
     let params = &project.settings.registration;
@@ -37,6 +39,10 @@ pub(super) fn add_epoch_error(
         stable: &sights.stable,
         offered: &sights.offered,
         sigma_m: registered.noise_m(),
+        response: joint.map(|motions| Response {
+            motions,
+            stones: &sights.stones,
+        }),
     };
     let observers = EpochErrorParams {
         shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),

@@ -116,7 +116,14 @@ fn register(
         key,
         |step, warnings| {
             let (mut registered, joint) = estimate(run, epochs, labelled, matches, step, warnings)?;
-            add_epoch_error(run.context, epochs, labelled, matches, &mut registered)?;
+            add_epoch_error(
+                run.context,
+                epochs,
+                labelled,
+                matches,
+                &mut registered,
+                joint.as_ref(),
+            )?;
             if let Some(joint) = joint {
                 let errors = registered.epoch_errors.as_ref().and_then(|e| e.joint.as_ref());
                 let errors = errors.map(|e| (e, registered.error_stones.as_slice()));
