@@ -16,7 +16,7 @@ from ._progress import Progress, listener
 
 
 def read_cameras(path: Union[str, os.PathLike[str]]) -> list[_native.View]:
-    """The posed photos of a camera file: Metashape XML, COLMAP folder, OpenSfM ``reconstruction.json``.
+    """The posed photos of a camera file: Metashape XML, COLMAP folder, RealityCapture CSV and others.
 
     >>> views = stonewise.read_cameras("epoch1/cameras_metashape.xml")          # doctest: +SKIP
     """

@@ -2,14 +2,16 @@
 
 lens.json      pixels of points in the camera frame, by OpenCV's projectPoints and fisheye.projectPoints, and by the
                formulae of Metashape's user manual (appendix "Camera models") written out in numpy below.
-metashape.xml, colmap_bin/, colmap_txt/, opensfm.json, pix4d/, transforms.json
+metashape.xml, colmap_bin/, colmap_txt/, opensfm.json, pix4d/, transforms.json, realitycapture/
                camera files with every model that is read, and expected.json with the pixels of world points in each.
+bundler/       a COLMAP model, and what `colmap model_converter --output_type Bundler` makes of it (COLMAP 3.8 of Debian).
 rejected/      COLMAP folders that must be refused.
 
 Run: python3 generate.py   (needs numpy and opencv-python-headless; OpenCV 5.0.0 and numpy 2.4.6 made the files)
 """
 import json
 import struct
+import subprocess
 from pathlib import Path
 
 import cv2
@@ -386,9 +388,86 @@ def openmvg():
     return expected
 
 
+def angles(r):
+    """Heading, pitch and roll of a world-to-camera rotation, as RealityCapture counts them: of an aircraft in axes north,
+    east and down, about z, y and x in this order, whose camera looks down with its upper side to the nose."""
+    ned_from_world = body_from_camera = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
+    camera_up = np.diag([1, -1, -1.0])  # axes of photogrammetry: y up, z against the view
+    m = ned_from_world @ (camera_up @ r).T @ body_from_camera.T
+    yaw, pitch, roll = np.arctan2(m[1, 0], m[0, 0]), -np.arcsin(m[2, 0]), np.arctan2(m[2, 1], m[2, 2])
+    return np.degrees([yaw, pitch, roll])
+
+
+def realitycapture():
+    """A photo of either format, in the three ways of writing a camera; t1 and t2 are OpenCV's p2 and p1."""
+    folder = HERE / "realitycapture"
+    (folder / "xmp" / "wing").mkdir(parents=True, exist_ok=True)
+    angled = "#cameras 4\n#name,x,y,alt,heading,pitch,roll,f,px,py,k1,k2,k3,k4,t1,t2\n"
+    plain = ("#name,tx,ty,tz,R00,R01,R02,R10,R11,R12,R20,R21,R22,f_pix,px_pix,py_pix,k1,k2,t2,t1,k3,k4 (R = [Rij], row by row, "
+             "and t = (tx,ty,tz) are the pose)\n")
+    expected, sidecars = {}, {}
+    for i, (name, model, width, height, k4, tangential) in enumerate([
+            ("none.jpg", "perspective", 400, 300, 0, [0, 0]), ("wing/brown3, b.jpg", "brown3", 300, 400, 0, [0, 0]),
+            ("brown3t2.jpg", "brown3t2", 400, 300, 0, P), ("wing/brown4t2.jpg", "brown4t2", 300, 400, 0.0047, P)]):
+        unit, f, px, py = max(width, height), 0.72 + 0.01 * i, 0.003 * i, -0.004 * i
+        q, centre = random_quaternion(), rng.uniform(-20, 20, 3)
+        r = quaternion_to_matrix(q)
+        points = rays(width, height, f * unit, 20)
+        k, (p1, p2) = ([0, 0, 0] if model == "perspective" else K), tangential
+        cx, cy = width / 2 + px * unit, height / 2 + py * unit
+        if k4:
+            c = {"f": f * unit, "cx": px * unit, "cy": py * unit, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k4, "p1": p2, "p2": p1}
+            pixels = metashape(points, width, height, c)
+        else:
+            pixels = opencv(points, f * unit, f * unit, cx, cy, [*k[:2], p1, p2, k[2]])
+        expected[name] = rounded(np.hstack([points @ r + centre, pixels]))
+        terms = [*k, k4, p2, p1]
+        comma = lambda values: ",".join(f"{v:.17g}" for v in values)
+        angled += f"{name},{comma([*centre, *angles(r), 36 * f, px, py, *terms])}\n"
+        plain += f"{name},{comma([*(-r @ centre), *r.ravel(), f * unit, cx, cy, *k[:2], p1, p2, k[2], k4])}\n"
+        rotation, position = num(r.ravel()), num(centre)
+        as_attribute = f' xcr:Position="{position}"' if i % 2 else ""
+        as_element = "" if i % 2 else f"<xcr:Position>{position}</xcr:Position>"
+        sidecar = (
+            '<x:xmpmeta xmlns:x="adobe:ns:meta/">\n<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#">\n'
+            f'<rdf:Description xcr:Version="3" xcr:PosePrior="locked" xcr:DistortionModel="{model}"'
+            f' xcr:FocalLength35mm="{36 * f:.17g}" xcr:Skew="0" xcr:AspectRatio="1" xcr:PrincipalPointU="{px:.17g}"'
+            f' xcr:PrincipalPointV="{py:.17g}"{as_attribute} xmlns:xcr="http://www.capturingreality.com/ns/xcr/1.1#">\n'
+            f"<xcr:Rotation>{rotation}</xcr:Rotation>{as_element}"
+            f"<xcr:DistortionCoeficients>{num(terms)}</xcr:DistortionCoeficients>\n</rdf:Description></rdf:RDF></x:xmpmeta>\n")
+        (folder / "xmp" / name).with_suffix(".xmp").write_text(sidecar)
+    (folder / "cameras.csv").write_text(angled)
+    (folder / "opencv.csv").write_text(plain)
+    (folder / "xmp" / "lightroom.xmp").write_text('<x:xmpmeta xmlns:x="adobe:ns:meta/"/>\n')
+    return expected
+
+
+def bundler():
+    """COLMAP's own way from its model to Bundler's; its principal points are the middle, as Bundler knows no other."""
+    model = HERE / "bundler" / "colmap"
+    model.mkdir(parents=True, exist_ok=True)
+    cameras = f"1 SIMPLE_PINHOLE 400 300 290.5 200 150\n2 SIMPLE_RADIAL 300 400 288.25 150 200 {K[0]}\n"
+    cameras += f"3 RADIAL 400 300 301.75 200 150 {K[0]} {K[1]}\n"
+    images, tracks = "", [[] for _ in range(5)]
+    world = rng.uniform(-1, 1, (5, 3))
+    for i in range(1, 4):
+        q = random_quaternion()
+        t = np.array([0.1 * i, -0.2, 9.0])  # the points lie before each photo
+        observed = " ".join(f"{10 * i + j}.5 {20 * i}.25 {j + 1}" for j in range(5))
+        images += f"{i} {num(q)} {num(t)} {i} photo_{i}.jpg\n{observed}\n"
+        for j in range(5):
+            tracks[j] += [i, j]
+    points = "".join(f"{j + 1} {num(p)} 200 190 180 0.5 {' '.join(map(str, tracks[j]))}\n" for j, p in enumerate(world))
+    for name, text in [("cameras", cameras), ("images", images), ("points3D", points)]:
+        (model / f"{name}.txt").write_text(text)
+    subprocess.run(["colmap", "model_converter", "--input_path", model, "--output_path", model.parent / "dam", "--output_type",
+                    "Bundler"], check=True)
+
+
 if __name__ == "__main__":
     compact = lambda value: json.dumps(value, separators=(",", ":")).replace('{"name"', '\n{"name"')
     (HERE / "lens.json").write_text(compact(list(lens_cases())) + "\n")
     files = {"colmap": colmap(), "metashape": metashape_file(), "opensfm": opensfm(), "pix4d": pix4d(),
-             "nerfstudio": nerfstudio(), "openmvg": openmvg()}
+             "nerfstudio": nerfstudio(), "openmvg": openmvg(), "realitycapture": realitycapture()}
+    bundler()
     (HERE / "expected.json").write_text(json.dumps(files, separators=(",", ":")) + "\n")

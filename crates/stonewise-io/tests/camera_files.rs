@@ -7,7 +7,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
 use stonewise_core::id::ImageId;
-use stonewise_io::cameras::{CameraError, CameraFile, Remark, read_cameras, write_colmap, write_metashape};
+use stonewise_io::cameras::{
+    CameraError, CameraFile, MapFrame, Remark, find_photos, read_cameras, read_cameras_on_map, write_colmap,
+    write_metashape,
+};
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -106,6 +109,219 @@ fn openmvg_puts_points_where_opencv_does() {
     let file = read_cameras(&fixture("sfm_data.json")).unwrap();
     assert_pixels(&file, &expected("openmvg"));
     assert_eq!(file.skipped, [("lost.jpg".to_owned(), Remark::NotAligned)]);
+}
+
+/// A folder with photos of these sizes.
+fn photos(sizes: &[(&str, u32, u32)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, width, height) in sizes {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        image::GrayImage::new(*width, *height).save(path).unwrap();
+    }
+    folder
+}
+
+fn realitycapture_photos() -> tempfile::TempDir {
+    photos(&[
+        ("none.jpg", 400, 300),
+        ("wing/brown3, b.jpg", 300, 400),
+        ("brown3t2.jpg", 400, 300),
+        ("wing/brown4t2.jpg", 300, 400),
+    ])
+}
+
+#[test]
+fn realitycapture_puts_points_where_opencv_does() {
+    let photos = realitycapture_photos();
+    let expected = expected("realitycapture");
+    let read = |path: &str| {
+        let path = fixture("realitycapture").join(path);
+        read_cameras_on_map(&path, Some(photos.path()), &MapFrame::default()).unwrap()
+    };
+    for path in ["cameras.csv", "opencv.csv"] {
+        let file = read(path);
+        assert_pixels(&file, &expected);
+        assert!(file.skipped.is_empty() && file.warnings.is_empty());
+        assert_eq!(
+            find_photos(photos.path(), &file).unwrap().without_camera,
+            Vec::<PathBuf>::new()
+        );
+    }
+    let without_extension =
+        |(name, rows): (&String, &Vec<[f64; 5]>)| (name.replace(".jpg", ""), rows.clone());
+    let expected: Expected = expected.iter().map(without_extension).collect();
+    for path in ["xmp", "xmp/none.xmp"] {
+        let file = read(path);
+        assert_pixels(&file, &expected);
+        assert_eq!(
+            find_photos(photos.path(), &file).unwrap().without_camera,
+            Vec::<PathBuf>::new()
+        );
+    }
+}
+
+#[test]
+fn realitycapture_warns_of_yaw_on_a_map() {
+    let photos = realitycapture_photos();
+    let text = std::fs::read_to_string(fixture("realitycapture/cameras.csv")).unwrap();
+    let path = photos.path().join("cameras.csv");
+    std::fs::write(&path, text.replacen(".jpg,", ".jpg,4512", 1)).unwrap();
+    assert_eq!(read_cameras(&path).unwrap().warnings, [Remark::YawFromTrueNorth]);
+}
+
+#[test]
+fn bundler_agrees_with_the_colmap_model_that_it_was_made_from() {
+    let photos = photos(&[
+        ("photo_1.jpg", 400, 300),
+        ("photo_2.jpg", 300, 400),
+        ("photo_3.jpg", 400, 300),
+    ]);
+    let model = read_cameras(&fixture("bundler/colmap")).unwrap();
+    let path = fixture("bundler/dam.bundle.out");
+    let file = read_cameras_on_map(&path, Some(photos.path()), &MapFrame::default()).unwrap();
+    assert_eq!(file.views.len(), 3);
+    for (a, b) in model.views.iter().zip(&file.views) {
+        assert_eq!(a.name, b.name);
+        assert!((a.centre() - b.centre()).norm() < 1e-9);
+        for i in 0..100 {
+            let world = Point3::new(
+                f64::from(i % 5) - 2.0,
+                f64::from(i / 5 % 5) - 2.0,
+                f64::from(i / 25) - 2.0,
+            );
+            let (a, b) = (a.project(&world).unwrap().pixel, b.project(&world).unwrap().pixel);
+            assert!((a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn bundler_leaves_out_photos_without_a_camera_and_reads_its_own_lists() {
+    let photos = photos(&[("photo_1.jpg", 400, 300), ("photo_3.jpg", 400, 300)]);
+    let text = std::fs::read_to_string(fixture("bundler/dam.bundle.out")).unwrap();
+    let path = photos.path().join("bundle.out");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let nothing = ["0 0 0"; 5];
+    lines.splice(7..12, nothing);
+    std::fs::write(&path, lines.join("\n")).unwrap();
+    let list = "./photo_1.jpg\n./photo 2.jpg\n./photo_3.jpg 0 301.75\n";
+    std::fs::write(photos.path().join("list.txt"), list).unwrap();
+    let file = read_cameras(&path).unwrap();
+    let names: Vec<&str> = file.views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, ["./photo_1.jpg", "./photo_3.jpg"]);
+    assert_eq!(file.skipped, [("./photo 2.jpg".to_owned(), Remark::NotAligned)]);
+    assert!(
+        find_photos(photos.path(), &file)
+            .unwrap()
+            .paths
+            .iter()
+            .all(Option::is_some)
+    );
+}
+
+#[test]
+fn cameras_without_sizes_that_cannot_be_read_say_why() {
+    let photos = realitycapture_photos();
+    let check = |source: &str, name: &str, from: &str, to: &str, part: &str| {
+        let path = photos.path().join(name);
+        let good = std::fs::read_to_string(fixture(source)).unwrap();
+        assert!(good.contains(from), "{from}");
+        std::fs::write(&path, good.replace(from, to)).unwrap();
+        let text = read_cameras(&path).unwrap_err().to_string();
+        assert!(text.contains(part) && text.contains(name), "{text}");
+        std::fs::remove_file(path).unwrap();
+    };
+    for (from, to, part) in [
+        (",pitch,", ",slope,", "column pitch is missing"),
+        (",f,", ",focus,", "a positive focal length"),
+        (",heading,", ",direction,", "column heading or yaw is missing"),
+        (
+            "26.280000000000001,",
+            "wide,",
+            "f is no number: \"wide\", at line 4",
+        ),
+        (
+            "26.280000000000001,",
+            "NaN,",
+            "f is no number: \"NaN\", at line 4",
+        ),
+        ("none.jpg,", "none.jpg", "expected 16 values, found 15, at line 3"),
+        (
+            ",0.083000000000000004,-0.017000000000000001,0,0,0\n",
+            ",0,0,0,0,0\n",
+            "model division (k1 alone) of photo wing/brown3, b.jpg",
+        ),
+        ("#name", "#image", "not a camera file"),
+        (".jpg", ".tif2", "none of them can be read"),
+    ] {
+        check("realitycapture/cameras.csv", "cameras.csv", from, to, part);
+    }
+    check(
+        "realitycapture/opencv.csv",
+        "opencv.csv",
+        ",ty,",
+        ",why,",
+        "column ty is missing",
+    );
+    check(
+        "realitycapture/opencv.csv",
+        "opencv.csv",
+        ",f_pix,",
+        ",focus,",
+        "a positive focal length",
+    );
+    for (from, to, part) in [
+        ("brown3t2\"", "division\"", "model division of photo brown3t2"),
+        (
+            "Skew=\"0\"",
+            "Skew=\"0.1\"",
+            "model K + brown3t2 of photo brown3t2",
+        ),
+        (
+            "xcr:FocalLength35mm",
+            "xcr:FocalLength",
+            "a positive xcr:FocalLength35mm is missing",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 ",
+            "xcr:Rotation needs 9 number(s)",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 0 0 0 1 0 0 0 -1</xcr:Rotation><xcr:R>",
+            "broken xml",
+        ),
+        (
+            "<xcr:Rotation>",
+            "<xcr:Rotation>1 0 0 0 1 0 0 0 -1</xcr:Rotation><xcr:Rotation>",
+            "xcr:Rotation is no rotation",
+        ),
+        (
+            "xcr:Rotation>",
+            "xcr:Turn>",
+            "no aligned camera in the file (1 without",
+        ),
+    ] {
+        check("realitycapture/xmp/brown3t2.xmp", "brown3t2.xmp", from, to, part);
+    }
+
+    std::fs::copy(fixture("bundler/dam.list.txt"), photos.path().join("list.txt")).unwrap();
+    for (from, to, part) in [
+        ("v0.3", "v0.9", "not a Bundler file"),
+        ("\n3 5\n", "\n3 x\n", "expected the numbers of photos and points"),
+        ("\n3 5\n", "\n99999999999999 5\n", "names 3"),
+        ("\n3 5\n", "\n3 9\n", "point 6 needs its place, colour and views"),
+        ("\n290.5 0 0\n", "\n-290.5 0 0\n", "photo photo_1.jpg"),
+        ("\n290.5 0 0\n", "\n290.5 inf 0\n", "expected 15 numbers"),
+        (" -9\n", " 9\n", "export as Bundler v0.3 (negative Z)"),
+        ("", "", "none of them can be read"),
+    ] {
+        check("bundler/dam.bundle.out", "cut.out", from, to, part);
+    }
+    std::fs::remove_file(photos.path().join("list.txt")).unwrap();
+    check("bundler/dam.bundle.out", "cut.out", "", "", "cut.list.txt");
 }
 
 #[test]

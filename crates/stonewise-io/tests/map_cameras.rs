@@ -128,7 +128,7 @@ fn earth_centred_cameras_see_the_clouds_where_they_are() {
             false_origin,
         };
         for (map, shift) in [(MapFrame::default(), [0.0; 3]), (shifted, false_origin)] {
-            let file = read_cameras_on_map(&metashape(folder.path(), &chunk, &poses), &map).unwrap();
+            let file = read_cameras_on_map(&metashape(folder.path(), &chunk, &poses), None, &map).unwrap();
             for (view, row) in file.views.iter().zip(&rows) {
                 // The curvature of the earth over 100 m, at 3000 px per radian.
                 let worst = check_view(view, row, shift);
@@ -158,10 +158,10 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
         crs: Some(crs.to_owned()),
         false_origin: [0.0; 3],
     };
-    let file = read_cameras_on_map(&path, &map("EPSG:25832")).unwrap();
+    let file = read_cameras_on_map(&path, None, &map("EPSG:25832")).unwrap();
     assert!(check_view(&file.views[0], row, [0.0; 3]) < 0.05);
     assert_eq!(file.crs.as_deref(), Some("EPSG:25832"));
-    let refused = |map: &MapFrame| match read_cameras_on_map(&path, map).unwrap_err() {
+    let refused = |map: &MapFrame| match read_cameras_on_map(&path, None, map).unwrap_err() {
         CameraError::UnsupportedCrs { reason, .. } => reason,
         other => panic!("{other}"),
     };
@@ -195,7 +195,7 @@ fn poses_that_are_not_earth_centred_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let local = serde_json::json!([1, 0, 0, 4.0, 0, 1, 0, 5.0, 0, 0, 1, 6.0, 0, 0, 0, 1]);
     let path = metashape(folder.path(), &Crs::parse("EPSG:25832").unwrap().wkt, &[&local]);
-    let error = read_cameras_on_map(&path, &MapFrame::default())
+    let error = read_cameras_on_map(&path, None, &MapFrame::default())
         .unwrap_err()
         .to_string();
     assert!(error.contains("photo 0.jpg would be -63"), "{error}");

@@ -206,7 +206,7 @@ fn project_text(dir: &Path, epochs: &[Found]) -> String {
             (
                 "cameras",
                 &epoch.cameras,
-                "not found: of Metashape, COLMAP, OpenSfM, Pix4D, OpenMVG or nerfstudio",
+                "not found: of Metashape, RealityCapture, Pix4D, COLMAP, OpenSfM, OpenMVG, nerfstudio or Bundler",
             ),
             (
                 "masks",
@@ -359,6 +359,37 @@ mod tests {
             "{text}"
         );
         assert!(!lines.contains("left out"), "{lines}");
+    }
+
+    #[test]
+    fn cameras_of_realitycapture_and_bundler_are_no_clouds() {
+        let files = [
+            "2024/x.laz",
+            "2024/cams.csv",
+            "2024/images/1.png",
+            "2025/x.laz",
+            "2025/2.png",
+            "2025/2.xmp",
+        ];
+        let survey = survey(&[files.as_slice(), &["2026/x.laz", "2026/a.out", "2026/a.list.txt"]].concat());
+        let of = |path: &str| survey.path().join(path);
+        let header = "#name,x,y,alt,heading,pitch,roll,f\n1.png,1,2,3,0,0,0,30\n";
+        std::fs::write(of("2024/cams.csv"), header).unwrap();
+        std::fs::write(
+            of("2025/2.xmp"),
+            "<a b=\"http://www.capturingreality.com/ns/xcr/1.1#\"/>",
+        )
+        .unwrap();
+        std::fs::write(of("2026/a.out"), "# Bundle file v0.3\n").unwrap();
+        let text = propose(survey.path()).unwrap().text;
+        for part in [
+            "clouds = [\"2024/x.laz\"]\nimages = \"2024/images\"\ncameras = \"2024/cams.csv\"",
+            "clouds = [\"2025/x.laz\"]\nimages = \"2025\"\ncameras = \"2025\"",
+            "clouds = [\"2026/x.laz\"]",
+            "# cameras = \"2026/a.out\"",
+        ] {
+            assert!(text.contains(part), "{text}");
+        }
     }
 
     #[test]

@@ -162,7 +162,7 @@ struct RawEpoch {
     /// Folder of the photos that the cameras name. Absent, with `cameras`: views of the clouds are looked at.
     #[schemars(with = "Option<PathBuf>")]
     images: Option<Spanned<PathBuf>>,
-    /// Cameras: Metashape XML, COLMAP folder or OpenSfM json.
+    /// Cameras: Metashape XML, COLMAP folder, RealityCapture CSV and others.
     #[schemars(with = "Option<PathBuf>")]
     cameras: Option<Spanned<PathBuf>>,
     /// Masks of the stones: COCO json, or a folder of 16-bit label PNGs. Absent: the detector finds them.

@@ -94,7 +94,7 @@ impl Epoch {
         for cloud in self.clouds.iter().take_while(|_| self.map.crs.is_none()) {
             map.crs = map.crs.or(cloud_crs(cloud)?);
         }
-        Ok(read_cameras_on_map(&photos.cameras, &map)?)
+        Ok(read_cameras_on_map(&photos.cameras, Some(&photos.images), &map)?)
     }
 }
 

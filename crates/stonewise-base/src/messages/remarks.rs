@@ -30,6 +30,12 @@ fn german(remark: &Remark) -> Option<String> {
              übertragen werden: Punkte können im Foto um einige Pixel versetzt liegen"
                 .to_owned()
         }
+        Remark::YawFromTrueNorth => {
+            "die Datei gibt Orte auf der Karte, aber den Gierwinkel ab geographisch Nord; alle Kameras können um den \
+             Winkel zwischen beiden Nordrichtungen verdreht sein: XMP-Dateien oder die OpenCV-konformen \
+             Kameraparameter exportieren"
+                .to_owned()
+        }
         Remark::RigSlave | Remark::NotPlaced(_) => return None,
     })
 }

@@ -25,7 +25,8 @@ pub enum CameraError {
     /// Not a camera file.
     #[error(
         "not a camera file: give a Metashape cameras.xml, a COLMAP folder (cameras and images, .txt or .bin), an OpenSfM \
-         reconstruction.json, Pix4D's calibrated_camera_parameters.txt, a transforms.json or an sfm_data.json: {}", path.display()
+         reconstruction.json, Pix4D's calibrated_camera_parameters.txt, a transforms.json or an sfm_data.json, RealityCapture's camera \
+         parameters (.csv) or a folder of its .xmp files, or a bundle.out: {}", path.display()
     )]
     UnknownFormat {
         /// File or folder.
@@ -54,8 +55,8 @@ pub enum CameraError {
     },
     /// The lens model is not supported.
     #[error(
-        "camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame or fisheye \
-         model: {}", path.display()
+        "camera model {model} of photo {photo} is not supported: undistort the photos or calibrate with a frame (Brown) \
+         or fisheye model: {}", path.display()
     )]
     UnsupportedModel {
         /// File.

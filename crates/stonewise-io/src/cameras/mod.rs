@@ -1,10 +1,11 @@
-//! Posed photos from other programs: Agisoft Metashape, COLMAP, OpenSfM, Pix4D,
-//! OpenMVG, nerfstudio.
+//! Posed photos from other programs: Agisoft Metashape, RealityCapture, COLMAP, OpenSfM, Pix4D, OpenMVG,
+//! nerfstudio, Bundler.
 //!
 //! Whatever the file says is turned into [`View`](stonewise_core::geometry::View)s: world frame of the file,
 //! first pixel centre at (0.5, 0.5), poses that take world to camera. Views keep the order of the file, and a
 //! view's image id is its index.
 
+mod bundler;
 mod camera_file;
 mod colmap;
 mod error;
@@ -13,9 +14,12 @@ mod metashape;
 mod nerfstudio;
 mod openmvg;
 mod opensfm;
+mod photo_sizes;
 mod photos;
 mod pix4d;
+mod pose;
 mod read;
+mod realitycapture;
 mod remark;
 mod xml;
 
@@ -26,6 +30,7 @@ pub use map_frame::MapFrame;
 pub use metashape::write_metashape;
 pub use photos::{Photos, find_photos};
 pub use read::{is_camera_file, read_cameras, read_cameras_on_map};
+pub use realitycapture::is_sidecar_folder;
 pub use remark::Remark;
 
 use error::{malformed, read_text};

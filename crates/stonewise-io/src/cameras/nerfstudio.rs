@@ -4,8 +4,9 @@
 //! the world (`applied_transform`) is undone, so that cameras come back to the frame of the model they were
 //! made from (nerfstudio documentation, "Data conventions").
 
+use super::pose::{FLIP, camera_at, rotation};
 use super::{CameraError, CameraFile, malformed, read_text};
-use nalgebra::{Matrix3, Matrix4, Point3, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Matrix4, Point3};
 use serde::Deserialize;
 use std::path::Path;
 use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
@@ -101,14 +102,8 @@ fn matrix(rows: &[Vec<f64>]) -> Option<Matrix4<f64>> {
 /// World to camera with y down and z along the view; `None` where the matrix is no rigid motion.
 fn pose_of(world_from_cam: &Matrix4<f64>) -> Option<Rigid3> {
     let turn: Matrix3<f64> = world_from_cam.fixed_view::<3, 3>(0, 0).into_owned();
-    let error = (turn.transpose() * turn - Matrix3::identity()).amax();
-    if error.is_nan() || error > 1e-3 || turn.determinant() < 0.0 {
-        return None;
-    }
-    let own_axes = Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, -1.0, -1.0));
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&(turn * own_axes)));
     let centre = Point3::from(world_from_cam.fixed_view::<3, 1>(0, 3).into_owned());
-    Some(Rigid3::from_parts(centre.into(), rotation).inverse())
+    Some(camera_at(centre, &rotation(&(FLIP * turn.transpose()))?))
 }
 
 fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, CameraError> {

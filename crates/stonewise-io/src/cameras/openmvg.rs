@@ -3,8 +3,9 @@
 //! Poses are a rotation from world to camera and the place of the camera; lenses have the polynomials that
 //! OpenCV has too (OpenMVG documentation, "cameras" and "sfm").
 
+use super::pose::{camera_at, rotation};
 use super::{CameraError, CameraFile, Remark, malformed, read_text};
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion};
+use nalgebra::{Matrix3, Point3};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -71,13 +72,8 @@ fn pose_of(value: &Value) -> Option<Rigid3> {
     let rows: Option<Vec<[f64; 3]>> = rows.iter().map(numbers).collect();
     let rows: [[f64; 3]; 3] = rows?.try_into().ok()?;
     let turn = Matrix3::from_row_slice(rows.as_flattened());
-    let error = (turn.transpose() * turn - Matrix3::identity()).amax();
-    if error.is_nan() || error > 1e-3 || turn.determinant() < 0.0 {
-        return None;
-    }
     let centre = Point3::from(numbers::<3>(&value["center"])?);
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
-    Some(Rigid3::from_parts(centre.into(), rotation.inverse()).inverse())
+    Some(camera_at(centre, &rotation(&turn)?))
 }
 
 /// A camera whose lens the names of its parameters tell; older files hold everything in one object.

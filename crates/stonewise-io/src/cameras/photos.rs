@@ -24,42 +24,18 @@ pub struct Photos {
 /// # Errors
 /// The folder cannot be read or holds no photo, or two files fit one view equally well.
 pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, CameraError> {
-    let mut files =
-        files_below(folder, &is_photo).map_err(|(path, source)| CameraError::Read { path, source })?;
-    if files.is_empty() {
-        return Err(CameraError::NoPhotos {
-            folder: folder.to_owned(),
-        });
-    }
-    files.sort();
-    let names: Vec<PhotoName> = files
-        .iter()
-        .map(|path| PhotoName::new(&path.strip_prefix(folder).unwrap_or(path).to_string_lossy()))
-        .collect();
-    let mut is_used = vec![false; files.len()];
+    let photos = PhotoFolder::open(folder)?;
+    let mut is_used = vec![false; photos.files.len()];
     let mut paths = Vec::with_capacity(cameras.views.len());
     for view in &cameras.views {
-        let wanted = PhotoName::new(&view.name);
-        let scored = names.iter().enumerate().filter_map(|(i, name)| {
-            let (sort, shared) = wanted.fit(name)?;
-            Some(((sort, shared, Reverse(name.depth())), i))
-        });
-        let best = scored.clone().map(|(fit, _)| fit).max();
-        let mut fitting = scored.filter(|(fit, _)| Some(*fit) == best).map(|(_, i)| i);
-        let (first, second) = (fitting.next(), fitting.next());
-        if let (Some(first), Some(second)) = (first, second) {
-            return Err(CameraError::AmbiguousPhoto {
-                camera: view.name.clone(),
-                first: files[first].clone(),
-                second: files[second].clone(),
-            });
+        let found = photos.find(&view.name)?;
+        if let Some(found) = found {
+            is_used[found] = true;
         }
-        if let Some(first) = first {
-            is_used[first] = true;
-        }
-        paths.push(first.map(|i| files[i].clone()));
+        paths.push(found.map(|i| photos.files[i].clone()));
     }
-    let without_camera = files
+    let without_camera = photos
+        .files
         .into_iter()
         .zip(is_used)
         .filter(|(_, used)| !used)
@@ -68,4 +44,54 @@ pub fn find_photos(folder: &Path, cameras: &CameraFile) -> Result<Photos, Camera
         paths,
         without_camera: without_camera.collect(),
     })
+}
+
+/// All photos in a folder and below it.
+pub(super) struct PhotoFolder {
+    pub folder: PathBuf,
+    /// Sorted.
+    pub files: Vec<PathBuf>,
+    names: Vec<PhotoName>,
+}
+
+impl PhotoFolder {
+    pub fn open(folder: &Path) -> Result<Self, CameraError> {
+        let mut files =
+            files_below(folder, &is_photo).map_err(|(path, source)| CameraError::Read { path, source })?;
+        if files.is_empty() {
+            return Err(CameraError::NoPhotos {
+                folder: folder.to_owned(),
+            });
+        }
+        files.sort();
+        let names = files
+            .iter()
+            .map(|path| PhotoName::new(&path.strip_prefix(folder).unwrap_or(path).to_string_lossy()))
+            .collect();
+        Ok(Self {
+            folder: folder.to_owned(),
+            files,
+            names,
+        })
+    }
+
+    /// The file that fits a name best.
+    pub fn find(&self, name: &str) -> Result<Option<usize>, CameraError> {
+        let wanted = PhotoName::new(name);
+        let scored = self.names.iter().enumerate().filter_map(|(i, name)| {
+            let (sort, shared) = wanted.fit(name)?;
+            Some(((sort, shared, Reverse(name.depth())), i))
+        });
+        let best = scored.clone().map(|(fit, _)| fit).max();
+        let mut fitting = scored.filter(|(fit, _)| Some(*fit) == best).map(|(_, i)| i);
+        let (first, second) = (fitting.next(), fitting.next());
+        if let (Some(first), Some(second)) = (first, second) {
+            return Err(CameraError::AmbiguousPhoto {
+                camera: name.to_owned(),
+                first: self.files[first].clone(),
+                second: self.files[second].clone(),
+            });
+        }
+        Ok(first)
+    }
 }

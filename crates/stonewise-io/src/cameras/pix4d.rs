@@ -4,10 +4,11 @@
 //! documentation, "How are the internal and external camera parameters defined?"). Places are relative to the
 //! offset that `PROJECT_offset.xyz` names.
 
+use super::pose::{camera_at, rotation};
 use super::{CameraError, CameraFile, malformed, read_text};
-use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 use std::path::Path;
-use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
+use stonewise_core::geometry::{Camera, Distortion, View};
 use stonewise_core::id::ImageId;
 
 /// The end of the file's name.
@@ -82,13 +83,10 @@ fn view(
     let calibration = Matrix3::from_row_slice(values.get(..9)?);
     let [k1, k2, k3, p1, p2, x, y, z] = *values.get(9..17)?.first_chunk()?;
     let turn = Matrix3::from_row_slice(values.get(17..26)?);
-    let is_rotation =
-        (turn.transpose() * turn - Matrix3::identity()).amax() < 1e-3 && turn.determinant() > 0.0;
     let focal_px = [calibration[(0, 0)], calibration[(1, 1)]];
-    if !is_rotation || focal_px.iter().any(|f| *f <= 0.0) {
+    if focal_px.iter().any(|f| *f <= 0.0) {
         return None;
     }
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&turn));
     let centre = Point3::new(x, y, z) + offset;
     Some(View {
         image: ImageId(index as u32),
@@ -101,7 +99,7 @@ fn view(
             skew_px: calibration[(0, 1)],
             distortion: Distortion::brown([k1, k2, k3, 0.0], [0.0; 3], [p1, p2]),
         },
-        cam_from_world: Rigid3::from_parts(centre.into(), rotation.inverse()).inverse(),
+        cam_from_world: camera_at(centre, &rotation(&turn)?),
     })
 }
 

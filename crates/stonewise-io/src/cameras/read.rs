@@ -1,8 +1,9 @@
 //! Camera files of any of the known formats.
 
+use super::photo_sizes::PhotoSizes;
 use super::{
-    CameraError, CameraFile, MapFrame, colmap, malformed, metashape, nerfstudio, openmvg, opensfm, pix4d,
-    read_text,
+    CameraError, CameraFile, MapFrame, bundler, colmap, malformed, metashape, nerfstudio, openmvg, opensfm,
+    pix4d, read_text, realitycapture,
 };
 use std::path::Path;
 use stonewise_core::geometry::View;
@@ -19,6 +20,10 @@ const MAX_PIXELS: u64 = 1 << 30;
 /// - Pix4D: PROJECT_calibrated_camera_parameters.txt, with PROJECT_offset.xyz beside it.
 /// - nerfstudio and instant-ngp: transforms.json.
 /// - OpenMVG: sfm_data.json.
+/// - RealityCapture: the CSV of internal and external camera parameters, or a folder with XMP sidecars.
+/// - Bundler: bundle.out, with its list of photos beside it.
+///
+/// The last two do not tell the sizes of the photos, which must lie in the file's folder or below it.
 ///
 /// ```
 /// use stonewise_io::cameras::read_cameras;
@@ -36,10 +41,11 @@ const MAX_PIXELS: u64 = 1 << 30;
 /// The file cannot be read or is none of these, a value is missing or impossible, a lens model or reference
 /// system is not supported, or no photo has a pose.
 pub fn read_cameras(path: &Path) -> Result<CameraFile, CameraError> {
-    read_cameras_on_map(path, &MapFrame::default())
+    read_cameras_on_map(path, None, &MapFrame::default())
 }
 
-/// As [`read_cameras`], for clouds whose place on the map is known.
+/// As [`read_cameras`], for clouds whose place on the map is known, and with the folder of the photos where it is
+/// another than that of the camera file.
 ///
 /// Metashape stores the poses of georeferenced chunks earth-centred. They are brought to the system of the
 /// clouds; without one, to the chunk's own if it is a projected one. Transverse Mercator grids and Lambert's
@@ -47,15 +53,28 @@ pub fn read_cameras(path: &Path) -> Result<CameraFile, CameraError> {
 ///
 /// # Errors
 /// As [`read_cameras`].
-pub fn read_cameras_on_map(path: &Path, map: &MapFrame) -> Result<CameraFile, CameraError> {
+pub fn read_cameras_on_map(
+    path: &Path,
+    photos: Option<&Path>,
+    map: &MapFrame,
+) -> Result<CameraFile, CameraError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    let sizes = || PhotoSizes::below(photos.unwrap_or(folder), path);
     let file = if path.is_dir() {
-        colmap::read_folder(path)?
+        match colmap::is_camera_folder(path) {
+            false if realitycapture::is_sidecar_folder(path) => realitycapture::read_sidecars(path, photos)?,
+            _ => colmap::read_folder(path)?,
+        }
     } else {
         match extension(path).as_str() {
             "xml" => metashape::read(path, map)?,
             "json" => read_json(path)?,
             "txt" if pix4d::is_pix4d(path) => pix4d::read(path)?,
-            "txt" | "bin" => colmap::read_folder(path.parent().unwrap_or(Path::new(".")))?,
+            "txt" | "bin" => colmap::read_folder(folder)?,
+            "csv" if realitycapture::is_csv(path) => realitycapture::read_csv(path, &sizes()?)?,
+            "xmp" => realitycapture::read_sidecars(folder, photos)?,
+            "out" => bundler::read(path, &sizes()?)?,
             _ => {
                 return Err(CameraError::UnknownFormat {
                     path: path.to_owned(),
@@ -85,7 +104,7 @@ fn read_json(path: &Path) -> Result<CameraFile, CameraError> {
     }
 }
 
-/// Whether a file bears the name of a camera file, by which it is told from masks and clouds.
+/// Whether a file is a camera file, by its name, or by its first lines where clouds have such names too.
 pub fn is_camera_file(path: &Path) -> bool {
     let name = path
         .file_name()
@@ -94,6 +113,8 @@ pub fn is_camera_file(path: &Path) -> bool {
         .to_lowercase();
     match extension(path).as_str() {
         "xml" => true,
+        "csv" => realitycapture::is_csv(path),
+        "out" => bundler::is_bundler(path),
         "json" => ["reconstruction", "transforms", "sfm_data"]
             .iter()
             .any(|n| name.contains(n)),

@@ -28,6 +28,8 @@ pub enum Remark {
     },
     /// A camera has a rolling shutter, which is not corrected.
     RollingShutter,
+    /// Yaw angles count from true north, places from the map's.
+    YawFromTrueNorth,
 }
 
 impl fmt::Display for Remark {
@@ -45,6 +47,10 @@ impl fmt::Display for Remark {
             Self::ChunkNotRead { chunk, used } => {
                 write!(f, "chunk {chunk} was not read, only {used}, the first with aligned cameras")
             }
+            Self::YawFromTrueNorth => f.write_str(
+                "the file gives places on a map but yaw from true north, so that all cameras may be turned by the angle between \
+                 both norths: export XMP files, or the OpenCV-compliant camera parameters",
+            ),
             Self::RollingShutter => f.write_str(
                 "the camera's rolling shutter is not corrected when stones are transferred from photos to clouds: points may be \
                  assigned to places a few pixels off in the photo",

@@ -25,7 +25,7 @@ use std::path::Path;
 use stonewise_base::error::Result;
 use stonewise_base::messages::findings::{CAMERAS, MASKS, PHOTOS};
 use stonewise_core::progress::Progress;
-use stonewise_io::cameras::{CameraError, CameraFile, read_cameras};
+use stonewise_io::cameras::{CameraError, CameraFile, MapFrame, read_cameras_on_map};
 use unreadable::Unreadable;
 
 /// Looks at everything that a project names.
@@ -102,7 +102,7 @@ fn cameras_of(epoch: &Epoch, files: &PhotoFiles, clouds_are_read: bool) -> Resul
     if clouds_are_read {
         return epoch.read_cameras().map(Some);
     }
-    match read_cameras(&files.cameras) {
+    match read_cameras_on_map(&files.cameras, Some(&files.images), &MapFrame::default()) {
         Err(CameraError::UnsupportedCrs { .. }) => Ok(None),
         read => Ok(Some(read?)),
     }

@@ -3,7 +3,9 @@
 use super::listing::{files, folders, has_extension, is_made_by_stonewise, name};
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
-use stonewise_io::cameras::{CameraFile, find_photos, is_camera_file, read_cameras};
+use stonewise_io::cameras::{
+    CameraFile, MapFrame, find_photos, is_camera_file, is_sidecar_folder, read_cameras_on_map,
+};
 
 /// Extensions of point clouds.
 pub(super) const CLOUDS: [&str; 11] = [
@@ -13,9 +15,10 @@ pub(super) const CLOUDS: [&str; 11] = [
 pub(super) const MASKS: &str = "masks";
 /// Extensions of photos.
 const PHOTOS: [&str; 5] = ["jpg", "jpeg", "png", "tif", "tiff"];
-/// Names of the files that make a folder a COLMAP model, and of all of its texts.
+/// Names of the files that make a folder a COLMAP model.
 const COLMAP: [&str; 2] = ["images.txt", "images.bin"];
-const COLMAP_TEXTS: [&str; 3] = ["images.txt", "cameras.txt", "points3d.txt"];
+/// Ends of the names of texts that belong to cameras: those of COLMAP, and Bundler's list of photos.
+const CAMERA_TEXTS: [&str; 4] = ["images.txt", "cameras.txt", "points3d.txt", "list.txt"];
 /// Extensions of scans that lie beside each other: no texts, which may be anything.
 const SCANS: [&str; 8] = ["laz", "las", "e57", "ptx", "pts", "ply", "pcd", "xyz"];
 /// Words in names of clouds, by sensor.
@@ -164,7 +167,7 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
     let files = files(dir)?;
     let is_colmap = files.iter().any(|f| COLMAP.contains(&name(f).as_str()));
     let is_masks = name(dir).contains("mask");
-    if is_colmap {
+    if is_colmap || is_sidecar_folder(dir) {
         found.cameras.push(dir.to_path_buf());
     }
     if files.iter().any(|f| has_extension(f, &PHOTOS)) {
@@ -180,7 +183,7 @@ fn gather(dir: &Path, found: &mut Candidates) -> Result<()> {
             found.cameras.push(file.clone());
         } else if has_extension(file, &["json"]) {
             found.masks.push(file.clone());
-        } else if has_extension(file, &CLOUDS) && !COLMAP_TEXTS.contains(&name(file).as_str()) {
+        } else if has_extension(file, &CLOUDS) && !CAMERA_TEXTS.iter().any(|end| name(file).ends_with(end)) {
             found.clouds.push(file.clone());
         }
     }
@@ -225,8 +228,10 @@ fn best(cameras: &[PathBuf], images: &[PathBuf]) -> (Option<PathBuf>, Option<Pat
     let mut chosen = (cameras.first().cloned(), images.first().cloned());
     let mut most = 0;
     for path in cameras {
-        let Ok(file) = read_cameras(path) else { continue };
         for folder in images {
+            let Ok(file) = read_cameras_on_map(path, Some(folder), &MapFrame::default()) else {
+                continue;
+            };
             let n = photos_of(&file, folder);
             if n > most {
                 most = n;

@@ -147,6 +147,25 @@ pub fn targets() -> Vec<Target> {
             testdata(&["cameras/pix4d/dam_calibrated_camera_parameters.txt"]),
             cameras,
         ),
+        Target::of_text(
+            "realitycapture",
+            testdata(&[
+                "cameras/realitycapture/cameras.csv",
+                "cameras/realitycapture/opencv.csv",
+                "cameras/realitycapture/xmp/brown3t2.xmp",
+            ]),
+            cameras,
+        )
+        .beside(vec![photo_named("none.jpg"), photo_named("brown3t2.jpg")]),
+        Target::of_text("bundler", testdata(&["cameras/bundler/dam.bundle.out"]), cameras).beside(
+            [
+                testdata(&["cameras/bundler/dam.list.txt"]),
+                vec![photo_named("photo_1.jpg")],
+            ]
+            .into_iter()
+            .flatten()
+            .collect(),
+        ),
         Target::of_bytes(
             "colmap",
             testdata(&["cameras/colmap_bin/cameras.bin", "cameras/colmap_bin/images.bin"]),
@@ -222,6 +241,11 @@ fn label_images() -> Vec<Seed> {
     seeds
 }
 
+fn photo_named(name: &str) -> Seed {
+    let picture = Raster::filled(40, 30, [99; 3]);
+    written(name, |path| write_jpeg(path, &picture, 90).unwrap())
+}
+
 fn photos() -> Vec<Seed> {
     let pixels = (0..64 * 48).map(|i| [i as u8, (i / 64) as u8, 99]).collect();
     let picture = Raster::from_vec(64, 48, pixels).unwrap();
@@ -275,12 +299,12 @@ fn map_cameras(path: &Path) -> Result<(), String> {
         crs: Some("EPSG:25832".to_owned()),
         false_origin: [450_000.0, 5_600_000.0, 0.0],
     };
-    let _ = read_cameras_on_map(path, &on_map);
+    let _ = read_cameras_on_map(path, None, &on_map);
     cameras(path)
 }
 
 fn cameras(path: &Path) -> Result<(), String> {
-    let file = read_cameras_on_map(path, &MapFrame::default()).map_err(line)?;
+    let file = read_cameras_on_map(path, None, &MapFrame::default()).map_err(line)?;
     for view in &file.views {
         assert!(
             view.centre().iter().all(|c| c.is_finite()),

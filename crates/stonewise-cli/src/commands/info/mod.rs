@@ -17,7 +17,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::Path;
 use stonewise::Project;
-use stonewise_io::cameras::{is_camera_file, is_camera_folder, read_cameras};
+use stonewise_io::cameras::{is_camera_file, is_camera_folder, is_sidecar_folder, read_cameras};
 use stonewise_io::cloud::CloudFormat;
 use stonewise_io::image_io::is_photo;
 use stonewise_io::masks::CocoMasks;
@@ -59,7 +59,7 @@ fn describe(path: &Path) -> Result<Described> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let extension = extension.to_lowercase();
     if path.is_dir() {
-        return if is_camera_folder(path) {
+        return if is_camera_folder(path) || is_sidecar_folder(path) {
             cameras(path)
         } else {
             pictures(path)
@@ -71,6 +71,7 @@ fn describe(path: &Path) -> Result<Described> {
         "xml" => cameras(path),
         "json" => json_file(path),
         "txt" | "bin" if matches!(&*name, "cameras" | "images" | "points3D") => cameras(path),
+        "csv" if is_camera_file(path) => cameras(path),
         _ if is_photo(path) => picture(path),
         extension if CLOUDS.contains(&extension) || CloudFormat::of(path).is_ok() => cloud(path),
         _ => cameras(path),
