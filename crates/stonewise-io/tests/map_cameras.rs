@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stonewise_core::geometry::View;
 use stonewise_io::cameras::{CameraError, MapFrame, read_cameras_on_map};
-use stonewise_io::crs::{Coordinates, Crs, Geodetic, MapSystem, is_in_feet};
+use stonewise_io::crs::{Coordinates, Crs, Geodetic, Geoid, MapSystem, is_in_feet};
 
 fn expected() -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/crs/expected.json");
@@ -126,6 +126,7 @@ fn earth_centred_cameras_see_the_clouds_where_they_are() {
         let shifted = MapFrame {
             crs: Some(named),
             false_origin,
+            geoid: None,
         };
         for (map, shift) in [(MapFrame::default(), [0.0; 3]), (shifted, false_origin)] {
             let file = read_cameras_on_map(&metashape(folder.path(), &chunk, &poses), None, &map).unwrap();
@@ -156,7 +157,7 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
     );
     let map = |crs: &str| MapFrame {
         crs: Some(crs.to_owned()),
-        false_origin: [0.0; 3],
+        ..MapFrame::default()
     };
     let file = read_cameras_on_map(&path, None, &map("EPSG:25832")).unwrap();
     assert!(check_view(&file.views[0], row, [0.0; 3]) < 0.05);
@@ -187,7 +188,137 @@ fn a_chunk_in_degrees_comes_to_the_system_of_the_clouds() {
     let utm = Crs::parse("EPSG:25832").unwrap().wkt;
     let above_geoid =
         format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");
-    assert!(refused(&map(&above_geoid)).contains("heights are above a geoid (DHHN2016 height)"));
+    let above_geoid = map(&above_geoid);
+    assert!(refused(&above_geoid).contains("above a geoid (DHHN2016 height): give its grid (GTX) as geoid"));
+}
+
+fn geoid_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata/crs")
+        .join(name)
+}
+
+#[test]
+fn heights_of_a_geoid_are_those_of_proj() {
+    let expected: Value =
+        serde_json::from_str(&std::fs::read_to_string(geoid_file("geoid.json")).unwrap()).unwrap();
+    let geoid = Geoid::read(&geoid_file("geoid.gtx")).unwrap();
+    let at = |latitude: f64, longitude: f64| Geodetic {
+        latitude: latitude.to_radians(),
+        longitude: longitude.to_radians(),
+        height_m: 100.0,
+    };
+    let points: Vec<Vec<f64>> = expected["points"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(numbers)
+        .collect();
+    assert_eq!(points.len(), 40);
+    for p in points {
+        for turn in [0.0, 360.0] {
+            let height = geoid.height_m(&at(p[0], p[1] + turn)).unwrap();
+            assert!((height - p[2]).abs() < 1e-5, "{height} is not {}", p[2]);
+        }
+    }
+    // The corners of the grid, beside it, and beside the node without a height.
+    assert!(geoid.height_m(&at(46.0, 4.5)).is_some() && geoid.height_m(&at(52.0, 4.5)).is_some());
+    for (latitude, longitude) in [
+        (45.99, 5.0),
+        (52.01, 5.0),
+        (47.0, 4.49),
+        (47.0, 10.76),
+        (51.9, 10.7),
+    ] {
+        assert_eq!(geoid.height_m(&at(latitude, longitude)), None);
+    }
+}
+
+#[test]
+fn cameras_come_to_clouds_whose_heights_are_above_a_geoid() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = expected();
+    let rows = expected["cameras"].as_array().unwrap().iter();
+    let rows: Vec<&Value> = rows.filter(|r| r["epsg"] == 25832).collect();
+    let poses: Vec<&Value> = rows.iter().map(|r| &r["pose"]).collect();
+    let heights: Value =
+        serde_json::from_str(&std::fs::read_to_string(geoid_file("geoid.json")).unwrap()).unwrap();
+    let utm = Crs::parse("EPSG:25832").unwrap().wkt;
+    let compound =
+        format!("COMPD_CS[\"both\",{utm},VERT_CS[\"DHHN2016 height\",VERT_DATUM[\"DHHN2016\",2005]]]");
+    let path = metashape(folder.path(), &compound, &poses);
+    for crs in [None, Some(compound), Some("EPSG:25832".to_owned())] {
+        let map = MapFrame {
+            crs,
+            geoid: Some(geoid_file("geoid.gtx")),
+            ..MapFrame::default()
+        };
+        let file = read_cameras_on_map(&path, None, &map).unwrap();
+        for ((view, row), height) in file
+            .views
+            .iter()
+            .zip(&rows)
+            .zip(heights["cameras"].as_array().unwrap())
+        {
+            let centre = numbers(&row["centre"]);
+            let error = view.centre() - Point3::new(centre[0], centre[1], centre[2] - numbers(height)[2]);
+            assert!(error.norm() < 1e-4, "{error}");
+        }
+    }
+    // Off the grid.
+    let south = rows_of(&expected, 32733);
+    let path = metashape(
+        folder.path(),
+        &Crs::parse("EPSG:32733").unwrap().wkt,
+        &[&south["pose"]],
+    );
+    let map = MapFrame {
+        geoid: Some(geoid_file("geoid.gtx")),
+        ..MapFrame::default()
+    };
+    let error = read_cameras_on_map(&path, None, &map).unwrap_err().to_string();
+    assert!(error.contains("off the grid of the geoid"), "{error}");
+}
+
+fn rows_of(expected: &Value, code: u32) -> Value {
+    let rows = expected["cameras"].as_array().unwrap();
+    rows.iter().find(|r| r["epsg"] == code).unwrap().clone()
+}
+
+#[test]
+fn grids_that_are_cut_or_impossible_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = std::fs::read(geoid_file("geoid.gtx")).unwrap();
+    let path = folder.path().join("bad.gtx");
+    let refused = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        let error = Geoid::read(&path).unwrap_err().to_string();
+        assert!(
+            error.contains("give a GTX file") && error.contains("bad.gtx"),
+            "{error}"
+        );
+    };
+    (0..good.len()).for_each(|end| refused(&good[..end]));
+    // Rows and columns whose product overflows or fits the length, steps and corners off the earth.
+    for (place, bytes) in [
+        (32, [0x7f; 8].as_slice()),
+        (32, &[0xff; 4]),
+        (32, &[0, 0, 0, 1, 0, 0, 0, 54]),
+        (16, &0f64.to_be_bytes()),
+        (24, &f64::NAN.to_be_bytes()),
+        (0, &91f64.to_be_bytes()),
+        (8, &f64::INFINITY.to_be_bytes()),
+    ] {
+        let mut bad = good.clone();
+        bad[place..place + bytes.len()].copy_from_slice(bytes);
+        refused(&bad);
+    }
+    assert!(
+        Geoid::read(&folder.path().join("none.gtx"))
+            .unwrap_err()
+            .to_string()
+            .contains("cannot read the geoid")
+    );
 }
 
 #[test]

@@ -24,7 +24,7 @@ use stonewise_core::params::Params;
 use stonewise_core::transfer::{CarryParams, StoneParams, TransferParams};
 use stonewise_core::views::ViewParams;
 use stonewise_io::cameras::MapFrame;
-use stonewise_io::crs::MapSystem;
+use stonewise_io::crs::{Geoid, MapSystem};
 use stonewise_segment::Weights;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -142,6 +142,9 @@ struct RawHeader {
     /// Lengths that were taken off the clouds' coordinates, x, y, z, metres.
     #[serde(default)]
     false_origin: [f64; 3],
+    /// Grid of the geoid above which the heights of the clouds are, GTX. Absent: heights above the ellipsoid.
+    #[schemars(with = "Option<PathBuf>")]
+    geoid: Option<Spanned<PathBuf>>,
 }
 
 #[derive(Deserialize, JsonSchema)]
@@ -374,9 +377,14 @@ impl Source<'_> {
                 self.error(crs.span(), message)
             })?;
         }
+        let geoid = header.geoid.clone().map(|path| self.existing(path)).transpose()?;
+        if let (Some(path), Some(place)) = (&geoid, &header.geoid) {
+            Geoid::read(path).map_err(|error| self.error(place.span(), error.to_string()))?;
+        }
         Ok(MapFrame {
             crs: header.crs.as_ref().map(|crs| crs.get_ref().clone()),
             false_origin: header.false_origin,
+            geoid,
         })
     }
 

@@ -102,6 +102,12 @@ impl Project {
     /// Every file and folder that the project reads, the project file first.
     pub fn inputs(&self) -> Vec<PathBuf> {
         let mut inputs = vec![self.path.clone()];
+        inputs.extend(
+            self.epochs
+                .iter()
+                .next()
+                .and_then(|epoch| epoch.map.geoid.clone()),
+        );
         for epoch in &self.epochs {
             inputs.extend(epoch.clouds.iter().cloned());
             let photos = epoch.photos.iter();

@@ -5,8 +5,9 @@
 //! 2004, section 6.2.4), whose focal lengths, centre and skew differ by as little. What remains is the
 //! curvature of the earth, 0.8 mm at 100 m, and a thousandth of the lens's distortion.
 
-use crate::crs::{Coordinates, Ellipsoid, MapSystem, Projection};
+use crate::crs::{Coordinates, Ellipsoid, Geoid, MapSystem, Projection};
 use nalgebra::{Matrix3, Point3, Vector3};
+use std::path::PathBuf;
 use stonewise_core::geometry::{Camera, Rigid3, View, nearest_rotation};
 
 /// Half the way over which the turn of the map is measured, metres: long against rounding (1 nm), short
@@ -22,6 +23,8 @@ pub struct MapFrame {
     pub crs: Option<String>,
     /// What was taken off the coordinates of the clouds, metres.
     pub false_origin: [f64; 3],
+    /// Grid of the geoid above which the heights of the clouds are (GTX); `None` for heights above the ellipsoid.
+    pub geoid: Option<PathBuf>,
 }
 
 /// What happens to the poses of a chunk.
@@ -41,6 +44,7 @@ pub struct MapPlacing {
     ellipsoid: Ellipsoid,
     projection: Projection,
     false_origin: Vector3<f64>,
+    geoid: Option<Geoid>,
 }
 
 impl MapFrame {
@@ -75,12 +79,22 @@ impl MapFrame {
         match target.coordinates {
             Coordinates::Geocentric => Ok(Placing::Kept),
             Coordinates::Geographic => Err(format!("the clouds are in degrees ({})", target.name)),
-            Coordinates::Projected(projection) => Ok(Placing::Mapped(MapPlacing {
-                name: target.name,
-                ellipsoid: target.ellipsoid,
-                projection,
-                false_origin: self.false_origin.into(),
-            })),
+            Coordinates::Projected(projection) => {
+                let geoid = self.geoid.as_deref().map(Geoid::read).transpose();
+                let geoid = geoid.map_err(|error| error.to_string())?;
+                if let (Some(heights), None) = (&target.heights, &geoid) {
+                    return Err(format!(
+                        "the heights of the clouds are above a geoid ({heights}): give its grid (GTX) as geoid under [project]"
+                    ));
+                }
+                Ok(Placing::Mapped(MapPlacing {
+                    name: target.name,
+                    ellipsoid: target.ellipsoid,
+                    projection,
+                    false_origin: self.false_origin.into(),
+                    geoid,
+                }))
+            }
         }
     }
 }
@@ -89,7 +103,7 @@ impl MapPlacing {
     /// Brings a view from earth-centred to map coordinates.
     ///
     /// # Errors
-    /// The camera is nowhere near the ground, or off the map.
+    /// The camera is nowhere near the ground, off the map, or off the grid of the geoid.
     pub fn place(&self, view: &mut View) -> Result<(), String> {
         let centre = view.centre();
         let height = self.ellipsoid.geodetic(&centre).height_m;
@@ -105,7 +119,12 @@ impl MapPlacing {
             (self.map(&(centre + step)) - self.map(&(centre - step))) / (2.0 * STEP_M)
         };
         let turn = Matrix3::from_columns(&[side(0), side(1), side(2)]);
-        let off_map = || format!("photo {} lies off the map of {}", view.name, self.name);
+        let grid = if self.geoid.is_some() {
+            ", or off the grid of the geoid"
+        } else {
+            ""
+        };
+        let off_map = || format!("photo {} lies off the map of {}{grid}", view.name, self.name);
         let is_on_map = place.iter().chain(turn.iter()).all(|v| v.is_finite());
         let earth_from_map = turn.try_inverse().filter(|_| is_on_map).ok_or_else(off_map)?;
         let seen = calibration(&view.camera)
@@ -130,7 +149,9 @@ impl MapPlacing {
     fn map(&self, position: &Point3<f64>) -> Point3<f64> {
         let at = self.ellipsoid.geodetic(position);
         let [east, north] = self.projection.forward(&self.ellipsoid, &at);
-        Point3::new(east, north, at.height_m)
+        // Off the grid there is no height, which `place` refuses.
+        let geoid_m = self.geoid.as_ref().map_or(Some(0.0), |geoid| geoid.height_m(&at));
+        Point3::new(east, north, at.height_m - geoid_m.unwrap_or(f64::NAN))
     }
 }
 

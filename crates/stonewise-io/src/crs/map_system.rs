@@ -19,6 +19,8 @@ pub struct MapSystem {
     pub ellipsoid: Ellipsoid,
     /// What the coordinates are.
     pub coordinates: Coordinates,
+    /// The vertical system whose heights are above a geoid, by its name; `None` for ellipsoidal heights.
+    pub heights: Option<String>,
 }
 
 /// Kind of coordinates.
@@ -36,8 +38,8 @@ impl MapSystem {
     /// The system that a WKT (1 or 2) or `EPSG:` and a code define; `None` for a local frame.
     ///
     /// # Errors
-    /// Why the system is not covered: another projection, heights above a geoid, units that are not metres, a
-    /// code that is not known, a text that cannot be understood.
+    /// Why the system is not covered: another projection, units that are not metres, a code that is not known, a
+    /// text that cannot be understood.
     pub fn parse(text: &str) -> Result<Option<Self>, String> {
         let text = text.trim();
         if let Some(code) = text.strip_prefix("EPSG:") {
@@ -63,16 +65,14 @@ impl MapSystem {
     fn of(node: &Node<'_>) -> Result<Option<Self>, String> {
         match node.keyword.to_ascii_uppercase().as_str() {
             "COMPD_CS" | "COMPOUNDCRS" => {
-                if let Some(heights) = node.children.iter().find(|c| is_geoid(c)) {
-                    let name = heights.name().unwrap_or_default();
-                    return Err(format!(
-                        "its heights are above a geoid ({name}), which is not known here"
-                    ));
-                }
-                node.children
+                let heights = node.children.iter().find(|c| is_geoid(c));
+                let heights = heights.map(|heights| heights.name().unwrap_or_default());
+                let flat = node
+                    .children
                     .iter()
                     .find(|c| c.is_crs())
-                    .map_or(Ok(None), Self::of)
+                    .map_or(Ok(None), Self::of)?;
+                Ok(flat.map(|flat| Self { heights, ..flat }))
             }
             "BOUNDCRS" => {
                 let source = node
@@ -125,6 +125,7 @@ impl MapSystem {
                 inverse_flattening,
             },
             coordinates,
+            heights: None,
         })
     }
 }

@@ -5,6 +5,7 @@ mod ellipsoid;
 mod epsg;
 mod equal_area;
 mod feet;
+mod geoid;
 mod map_system;
 mod projection;
 mod system;
@@ -12,6 +13,7 @@ mod wkt;
 
 pub use ellipsoid::{Ellipsoid, Geodetic};
 pub use feet::is_in_feet;
+pub use geoid::{Geoid, GeoidError};
 pub use map_system::{Coordinates, MapSystem};
 pub use projection::{MapOrigin, Projection};
 pub use system::Crs;

@@ -64,7 +64,7 @@ pub fn split(
         });
     }
     let edits = halves_edits(project, epoch, &photos, &out.join(EDITS))?;
-    let mut text = head(project, epoch);
+    let mut text = head(project, epoch)?;
     for half in 0..2 {
         if let Some(files) = &epoch.photos {
             copy_photos(&photos, &files.images, half, out, progress)?;
@@ -89,7 +89,7 @@ pub fn split(
     })
 }
 
-fn head(project: &Project, epoch: &Epoch) -> String {
+fn head(project: &Project, epoch: &Epoch) -> Result<String> {
     let name = quoted(&format!("{}, {} split", project.name, epoch.name));
     let mut text = format!("[project]\nname = {name}\n");
     if let Some(crs) = &epoch.map.crs {
@@ -98,7 +98,10 @@ fn head(project: &Project, epoch: &Epoch) -> String {
     if epoch.map.false_origin != [0.0; 3] {
         let _ = writeln!(text, "false_origin = {:?}", epoch.map.false_origin);
     }
-    text
+    if let Some(geoid) = &epoch.map.geoid {
+        let _ = writeln!(text, "geoid = {}", absolute(geoid)?);
+    }
+    Ok(text)
 }
 
 fn epoch_table(epoch: &Epoch, half: usize, clouds: &[String]) -> Result<String> {

@@ -14,7 +14,7 @@ use stonewise_io::cloud::{
     CloudError, CloudFormat, LabelColumns, PointChunk, PointLabel, cloud_info, measure_cloud, read_mesh,
     write_labelled,
 };
-use stonewise_io::crs::{Crs, MapSystem};
+use stonewise_io::crs::{Crs, Geodetic, Geoid, MapSystem};
 use stonewise_io::image_io::{image_size, read_rgb, write_jpeg, write_png_rgb};
 use stonewise_io::masks::{CocoMasks, LabelFolder, ValidRegions, write_label_png};
 
@@ -176,6 +176,7 @@ pub fn targets() -> Vec<Target> {
             "cameras/colmap_bin/images.bin",
         ])),
         Target::of_text("opensfm", testdata(&["cameras/opensfm.json"]), cameras),
+        Target::of_bytes("geoid", testdata(&["crs/geoid.gtx"]), geoid),
         Target::of_text("coco", vec![text("masks.json", MASKS)], coco),
         Target::of_text("regions", vec![text("regions.json", REGIONS)], regions),
         Target::of_bytes("labels", label_images(), labels).repaired(repair::png),
@@ -298,6 +299,7 @@ fn map_cameras(path: &Path) -> Result<(), String> {
     let on_map = MapFrame {
         crs: Some("EPSG:25832".to_owned()),
         false_origin: [450_000.0, 5_600_000.0, 0.0],
+        geoid: None,
     };
     let _ = read_cameras_on_map(path, None, &on_map);
     cameras(path)
@@ -315,6 +317,18 @@ fn cameras(path: &Path) -> Result<(), String> {
         let _ = view.project(&ahead);
     }
     let _ = find_photos(&path.with_file_name("images"), &file);
+    Ok(())
+}
+
+fn geoid(path: &Path) -> Result<(), String> {
+    let geoid = Geoid::read(path).map_err(line)?;
+    for (latitude, longitude) in [(0.89, 0.135), (-1.5, 6.0), (f64::NAN, 0.1)] {
+        let _ = geoid.height_m(&Geodetic {
+            latitude,
+            longitude,
+            height_m: 0.0,
+        });
+    }
     Ok(())
 }
 

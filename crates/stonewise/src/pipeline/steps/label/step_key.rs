@@ -15,9 +15,10 @@ pub fn label_name(epoch: EpochId) -> String {
 pub fn label_key(context: &Context, epoch: EpochId, ingested: &Ingested, photos: &Segmented) -> Key {
     let params = &context.project.settings.label;
     let map = &context.project.epochs[epoch].map;
+    let geoid = map.geoid.as_deref().and_then(|path| context.digest(path).ok());
     Key::new(
         "label",
-        &(params, &map.crs, map.false_origin),
+        &(params, &map.crs, map.false_origin, geoid),
         &[ingested.step.key().as_str(), photos.step.key().as_str()],
     )
 }
