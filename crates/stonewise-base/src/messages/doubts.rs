@@ -78,12 +78,13 @@ messages! {
             anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. {cause}";
 
         PART_REFUSED = "part-in-disagreement":
-            "a part of the wall of {stones} stones, around stone {stone}, seems to have moved unlike the rest, and the photos, which find most \
-            other stones, do not find it there: it moved, or its clouds mislead. None of its stones has a motion, so nothing is said of it. \
-            Look at the part, and at the photos and masks that show it",
-            "ein Teil der Mauer aus {stones} Steinen um Stein {stone} scheint sich anders bewegt zu haben als der Rest, und die Fotos, die die \
-            meisten anderen Steine finden, finden ihn dort nicht: er hat sich bewegt, oder seine Punktwolken täuschen. Keiner seiner Steine hat \
-            eine Bewegung, über ihn ist also nichts gesagt. Den Teil und die Fotos und Masken, die ihn zeigen, ansehen";
+            "{stones} neighbouring stones of a part of the wall, around stone {stone}, have no motion: the clouds of the two epochs show \
+            different surfaces there, or a motion unlike that of the rest which nothing confirms. Something covers the part (plants, snow, a \
+            banner), it moved, or its clouds or masks mislead. Nothing is said of it. Look at the part on site and in all that shows it",
+            "{stones} benachbarte Steine eines Teils der Mauer um Stein {stone} haben keine Bewegung: die Punktwolken der beiden Epochen zeigen \
+            dort verschiedene Oberflächen, oder eine Bewegung anders als die der übrigen Mauer, die nichts bestätigt. Etwas bedeckt den Teil \
+            (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Über ihn ist nichts gesagt. Den \
+            Teil vor Ort ansehen und in allem, was ihn zeigt";
 
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
