@@ -82,6 +82,7 @@ pub(crate) struct Clauses {
     pub below: Number,
     pub below_with_joints: Number,
     pub none_shown: &'static str,
+    pub not_measured: Number,
     pub deformed_alarm: Number,
     pub deformed_attention: Number,
     pub deformed_reaches: Number,
@@ -255,6 +256,10 @@ static ENGLISH: Texts = Texts {
             "none of the {n} measured stones and no joint reaches the attention threshold of {t}",
         ],
         none_shown: "no motion is shown",
+        not_measured: [
+            "{n} of {m} stones was not measured",
+            "{n} of {m} stones were not measured",
+        ],
         deformed_alarm: [
             "{n} zone deformed beyond the alarm threshold of {t}",
             "{n} zones deformed beyond the alarm threshold of {t}",
@@ -472,6 +477,10 @@ static GERMAN: Texts = Texts {
             "keiner der {n} gemessenen Steine und keine Fuge erreicht die Warnschwelle von {t}",
         ],
         none_shown: "keine Bewegung ist nachweisbar",
+        not_measured: [
+            "{n} von {m} Steinen wurde nicht gemessen",
+            "{n} von {m} Steinen wurden nicht gemessen",
+        ],
         deformed_alarm: [
             "{n} Zone hat sich \u{fc}ber die Alarmschwelle von {t} hinaus verformt",
             "{n} Zonen haben sich \u{fc}ber die Alarmschwelle von {t} hinaus verformt",

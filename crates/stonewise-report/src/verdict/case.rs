@@ -31,6 +31,8 @@ pub(crate) struct StoneCase {
     pub place: Point2<f64>,
     /// The first epoch shows it well, and the later one shows its place without it.
     pub lost: bool,
+    /// It is a stone of the wall, not a field of a door.
+    pub is_masonry: bool,
     /// What was measured.
     pub measured: Option<StoneMeasured>,
 }

@@ -11,7 +11,7 @@ use stonewise_base::thresholds::Thresholds;
 use stonewise_core::geometry::{DisplacementSample, SmallMotion};
 use stonewise_core::registration::DeformationZone;
 use stonewise_results::records::{DatumState, DeformationVerdict, DeformedZone, EpochVerdict, State};
-use stonewise_results::{Joint, ResultSet, RowMotion, StoneRow, ZonePlace, joints};
+use stonewise_results::{Joint, ResultSet, RowMotion, Status, StoneRow, ZonePlace, joints};
 
 /// The verdict on the pair of epochs of these results. `in_doubt`: there is a doubt about the run as a whole;
 /// `epochs`: their names.
@@ -44,6 +44,7 @@ fn stones(results: &ResultSet) -> Vec<StoneCase> {
         stone_id: stone.stone_id,
         place: Point2::new(stone.along_m, stone.up_m),
         lost,
+        is_masonry: stone.status != Status::NotMasonry,
         measured: stone.motion.as_ref().map(|motion| StoneMeasured {
             motion: Estimate {
                 vector: tested.motion(stone, motion),

@@ -40,6 +40,7 @@ pub(super) fn sentence(
     let mut clauses: Vec<String> = speaker.deciding().iter().map(|r| speaker.clause(*r)).collect();
     clauses.extend(speaker.numbers(apparent));
     clauses.extend(speaker.shape());
+    clauses.extend(speaker.not_measured());
     format!("{}: {}.", speaker.texts.state(wall.state), clauses.join("; "))
 }
 
@@ -65,7 +66,31 @@ pub(super) fn reasons(
     wall.reasons.iter().map(reason).collect()
 }
 
+/// Share of the stones without a motion from which the sentence says how many they are.
+const MANY_NOT_MEASURED: f64 = 0.2;
+
 impl Speaker<'_> {
+    /// How many stones the sentence says nothing of, where they are many and no reason says so.
+    fn not_measured(&self) -> Option<String> {
+        use ReasonCode as R;
+        let masonry = || self.case.stones.iter().filter(|s| s.is_masonry);
+        let (stones, missing) = (
+            masonry().count(),
+            masonry().filter(|s| s.measured.is_none()).count(),
+        );
+        let is_said = |r: &ReasonCode| {
+            matches!(
+                r,
+                R::NothingMeasured | R::FewMeasured | R::InDoubt | R::NotConverged
+            )
+        };
+        let is_worth_saying = missing as f64 >= MANY_NOT_MEASURED * stones as f64 && missing > 0;
+        (is_worth_saying && !self.wall.reasons.iter().any(is_said)).then(|| {
+            let text = self.texts.clauses.not_measured;
+            counted(text, missing, &[("m", &count(stones))])
+        })
+    }
+
     /// The reasons that the sentence names: those that give the state; of several doubts the first.
     fn deciding(&self) -> Vec<ReasonCode> {
         let wanted = |reason: &ReasonCode| match self.wall.state {

@@ -34,6 +34,7 @@ fn stone(stone_id: u32, place: [f64; 2], moved: Vector3<f64>, normal: &mut Norma
         stone_id,
         place: Point2::from(place),
         lost: false,
+        is_masonry: true,
         measured: Some(StoneMeasured {
             motion: Estimate { vector, covariance },
             neighbours: Estimate { vector, covariance },
@@ -448,4 +449,23 @@ fn deformations_have_thresholds_of_their_own_or_those_of_lengths() {
     let verdict = judge(&doubted, &thresholds("deformation_alarm_mm = 1.0"));
     assert_eq!(verdict.state, State::CannotTell);
     assert!(!verdict.sentence.contains("bulged"), "{}", verdict.sentence);
+}
+
+#[test]
+fn the_sentence_says_how_many_stones_it_says_nothing_of() {
+    let mut case = wall(0, 0.0, 5);
+    let many = 30;
+    for stone in case.stones.iter_mut().take(many) {
+        stone.measured = None;
+    }
+    let said = |case: &Case| judge(case, &Thresholds::default()).sentence;
+    assert!(
+        said(&case).ends_with("; 30 of 100 stones were not measured."),
+        "{}",
+        said(&case)
+    );
+    for stone in case.stones.iter_mut().take(many) {
+        stone.is_masonry = false;
+    }
+    assert!(!said(&case).contains("not measured"), "{}", said(&case));
 }

@@ -7,7 +7,7 @@ use crate::id::StoneId;
 use crate::linalg::{BlockFactor, BlockPattern};
 use crate::registration::adjustment::JointMotions;
 use crate::registration::adjustment::joint_motions::JointStone;
-use crate::registration::observers::{JointErrors, Row};
+use crate::registration::observers::JointErrors;
 use nalgebra::{Matrix3, Point3, SMatrix, SVector, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -21,10 +21,7 @@ pub(super) struct Body<'a> {
     pub stones: Vec<BodyStone<'a>>,
     /// Pairs of neighbours, as indices into the stones.
     pub neighbours: Vec<[usize; 2]>,
-    /// Errors that the motions share.
     pub shared: SharedErrors,
-    /// Errors that the stones' own observations share.
-    pub of_points: SharedErrors,
 }
 
 /// A stone of it.
@@ -123,7 +120,7 @@ impl<'a> Body<'a> {
         let stone = |(node, joint): &(usize, &'a JointStone)| {
             let error = error_of(joint.id);
             let taken_off = error.map_or_else(Vector3::zeros, |(e, k)| e.mean_of_motions[k]);
-            let off_points = error.map_or_else(Vector3::zeros, |(e, k)| e.mean_of_points[k]);
+            let off_points = error.map_or_else(Vector3::zeros, |(e, k)| e.mean[k]);
             // In the face a stone follows its neighbours, and what the field does not share already counts there as an
             // error of its observations.
             let out = joint.face_from_world.row(2).transpose();
@@ -152,23 +149,22 @@ impl<'a> Body<'a> {
         if motions.poses.nrows() > 0 {
             shared.add_joint(&motions.poses, stones.iter().map(|s| s.joint.by_poses.clone()));
         }
-        let with_errors = |rows: fn(&JointErrors) -> &[Row]| {
-            let mut shared = shared.clone();
-            if let Some((errors, _)) = errors {
-                let row = |stone: &BodyStone| error_of(stone.id).map_or(&[][..], |(e, k)| &rows(e)[k]);
-                let columns = |stone: &BodyStone| row(stone).iter().flat_map(columns).collect();
-                shared.add_joint(&errors.covariance, stones.iter().map(columns));
-            }
-            shared
-        };
-        let of_points = with_errors(|e| &e.of_points);
-        let shared = with_errors(|e| &e.of_motions);
+        if let Some((errors, _)) = errors {
+            let row = |stone: &BodyStone| {
+                let row = error_of(stone.id).map_or(&[][..], |(e, k)| &e.rows[k]);
+                let columns = |(first, by): &(usize, Matrix3<f64>)| {
+                    let (first, by) = (*first, *by);
+                    (0..3).map(move |c| (first + c, by.column(c).into_owned()))
+                };
+                row.iter().flat_map(columns).collect()
+            };
+            shared.add_joint(&errors.covariance, stones.iter().map(row));
+        }
         Self {
             motions,
             neighbours: motions.edges.iter().filter_map(pair).collect(),
             stones,
             shared,
-            of_points,
         }
     }
 
@@ -194,12 +190,6 @@ impl<'a> Body<'a> {
             diagonal,
         })
     }
-}
-
-/// Coefficients of three unknowns, one by one.
-fn columns((first, by): &(usize, Matrix3<f64>)) -> impl Iterator<Item = (usize, Vector3<f64>)> {
-    let (first, by) = (*first, *by);
-    (0..3).map(move |c| (first + c, by.column(c).into_owned()))
 }
 
 /// Errors that points share over octaves of length, from twice the distance of neighbours up: patches of a

@@ -126,10 +126,10 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
     let simulate = |k: usize| {
         let mut random = Random::new(k as u64 + 1);
-        let u = body.of_points.draw(&mut random);
+        let u = body.shared.draw(&mut random);
         let of_stone = |(i, stone): (usize, &BodyStone)| {
             let noise = Vector3::from_fn(|_, _| random.normal());
-            stone.information * body.of_points.at::<1>(i, &u) + roots[i] * noise
+            stone.information * body.shared.at::<1>(i, &u) + roots[i] * noise
         };
         let vectors: Vec<Vector3<f64>> = body.stones.iter().enumerate().map(of_stone).collect();
         model.largest(&bulges, &vectors).map_or(0.0, |(z, _)| z)
@@ -175,12 +175,12 @@ struct Model<'a> {
 impl<'a> Model<'a> {
     fn new(body: &'a Body, firm: &'a [usize]) -> Option<Self> {
         let mut information = Matrix6::zeros();
-        let mut of_shared = body.of_points.zeros::<6>();
+        let mut of_shared = body.shared.zeros::<6>();
         for &i in firm {
             let stone = &body.stones[i];
             let weighted = stone.information * stone.lever;
             information += stone.lever.transpose() * weighted;
-            body.of_points.add_transposed(i, &weighted, &mut of_shared);
+            body.shared.add_transposed(i, &weighted, &mut of_shared);
         }
         Some(Self {
             body,
@@ -233,19 +233,19 @@ impl<'a> Model<'a> {
     /// Standard deviation of the score of each direction, and information on the amplitude.
     fn directions(&self, stones: &[(usize, f64)]) -> [Option<(f64, f64)>; 3] {
         let (mut plain, mut with_rigid) = (Matrix3::zeros(), SMatrix::<f64, 6, 3>::zeros());
-        let mut of_shared = self.body.of_points.zeros::<3>();
+        let mut of_shared = self.body.shared.zeros::<3>();
         for (i, share) in stones {
             let stone = &self.body.stones[*i];
             let moved = stone.joint.face_from_world.transpose() * *share;
             let weighted = stone.information * moved;
             plain += moved.transpose() * weighted;
             with_rigid += stone.lever.transpose() * weighted;
-            self.body.of_points.add_transposed(*i, &weighted, &mut of_shared);
+            self.body.shared.add_transposed(*i, &weighted, &mut of_shared);
         }
         let explained = self.inverse * with_rigid;
         let information = plain - with_rigid.transpose() * explained;
         of_shared -= &self.of_shared * explained;
-        let shared = of_shared.transpose() * self.body.of_points.spread(&of_shared);
+        let shared = of_shared.transpose() * self.body.shared.spread(&of_shared);
         std::array::from_fn(|k| {
             let left = information[(k, k)];
             let variance = left + shared[(k, k)];
@@ -257,7 +257,7 @@ impl<'a> Model<'a> {
 /// The inverse covariance of what the observations of a stone give: of their own errors and of those that stones share.
 fn weight(body: &Body, stone: usize) -> Matrix3<f64> {
     let information = body.stones[stone].information;
-    let covariance = information + information * body.of_points.covariance(stone) * information;
+    let covariance = information + information * body.shared.covariance(stone) * information;
     let regularised = covariance + Matrix3::identity() * (REGULARISATION * covariance.trace());
     regularised.try_inverse().unwrap_or_else(Matrix3::zeros)
 }

@@ -5,7 +5,6 @@ use super::random::Random;
 use nalgebra::{DMatrix, DVector, Dyn, Matrix3, OMatrix, Vector3};
 
 /// Errors of the stones as linear functions of unknowns that are normal about zero: e_i = L_i u.
-#[derive(Clone)]
 pub(super) struct SharedErrors {
     /// Of each stone: unknowns, and the displacement by each of them, metres a unit.
     rows: Vec<Vec<(usize, Vector3<f64>)>>,
@@ -15,7 +14,6 @@ pub(super) struct SharedErrors {
 }
 
 /// Distribution of a group of unknowns.
-#[derive(Clone)]
 enum Spread {
     /// So many independent ones of variance one.
     Unit(usize),

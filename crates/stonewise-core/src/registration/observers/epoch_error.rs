@@ -11,11 +11,10 @@ use super::joint::JointErrors;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
-use super::rigid::{RigidError, rigid_rows, shares};
+use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
 use super::sensors::Sharpest;
 use super::sight::{SeenStone, Source};
 use super::stable::stable_observations;
-use super::stone_rows::StoneRows;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -182,20 +181,24 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     };
     let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
-    let rigid_rows = rigid_rows(pair, &unknowns);
-    let rigid = rigid_rows.error(&found.weighted());
-    let rows = StoneRows::new(pair, &unknowns, &rigid_rows);
+    let rigid = rigid_rows(pair, &unknowns).error(&found.weighted());
     let relative = match datum {
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
     };
     let merged_error_m = relative.as_ref().and_then(|r| r.merged_error_m);
-    let at = found.at_stones(pair, &rows, model.components.nugget_m);
+    let mut at = found.at_stones(pair, &unknowns, model.components.nugget_m);
+    let motions = means_of_motions(pair, &at, &rigid);
+    at.iter_mut().zip(&motions).for_each(|(at, mean)| at.mean = *mean);
     let (relative, between, joint) = match relative {
         Some(relative) => (relative.at, relative.between, relative.joint),
         None => {
-            let joint = found.joint(pair, &rows, model.components.nugget_m);
-            (Vec::new(), found.between(pair, &rows), joint)
+            let joint = found.joint(pair, &unknowns, model.components.nugget_m);
+            let joint = joint.map(|joint| JointErrors {
+                mean_of_motions: motions,
+                ..joint
+            });
+            (Vec::new(), found.between(pair, &unknowns), joint)
         }
     };
     let cross_check = match datum {
@@ -220,6 +223,16 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
         between,
         joint,
     }
+}
+
+/// The error of each stone's motion, from that of its points: the rigid part as it is, the rest as the solution follows
+/// it.
+fn means_of_motions(pair: &EpochPair, points: &[ErrorAt], rigid: &RigidError) -> Vec<Vector3<f64>> {
+    let rigidly: Vec<Vector3<f64>> = pair.stones.iter().map(|s| rigid.at(&s.centroid)).collect();
+    let rest: Vec<Vector3<f64>> = points.iter().zip(&rigidly).map(|(p, r)| p.mean - r).collect();
+    let followed = pair.response.as_ref().and_then(|response| response.of(&rest));
+    let followed = followed.unwrap_or(rest);
+    rigidly.iter().zip(followed).map(|(r, f)| r + f).collect()
 }
 
 /// Whether sources of the later epoch have the error of sources of the reference.
@@ -334,30 +347,32 @@ impl Averaged {
     }
 
     /// `nugget_m`: independent error of each source at each stone, in the face and across it.
-    fn at_stones(&self, pair: &EpochPair, rows: &StoneRows, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
-        let at = |(stone, row): (&SeenStone, &Row)| {
-            let mut error = self.function(row);
+    fn at_stones(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Vec<ErrorAt> {
+        let at = |stone: &SeenStone| {
+            let mut error = self.function(&difference_row(stone, pair.sources, unknowns));
             error.covariance += of_stone_alone(stone, pair, nugget_m);
             error
         };
-        pair.stones.par_iter().zip(&rows.of_motions).map(at).collect()
+        pair.stones.par_iter().map(at).collect()
     }
 
     /// The error at all stones together.
-    fn joint(&self, pair: &EpochPair, rows: &StoneRows, nugget_m: [f64; 2]) -> Option<JointErrors> {
+    fn joint(&self, pair: &EpochPair, unknowns: &Unknowns, nugget_m: [f64; 2]) -> Option<JointErrors> {
+        let stones = pair.stones.iter();
+        let rows = stones.clone().map(|s| difference_row(s, pair.sources, unknowns));
         let weighted: Vec<_> = self
             .solutions
             .iter()
             .map(|(w, s)| (*w, &s.mean, &s.covariance))
             .collect();
-        let stones = pair.stones.iter();
         let own = stones.map(|s| of_stone_alone(s, pair, nugget_m)).collect();
-        JointErrors::new(rows, &weighted, own, true)
+        JointErrors::new(rows.collect(), &weighted, own, true)
     }
 
     /// Covariances between neighbours, without the independent error of each source at each stone.
-    fn between(&self, pair: &EpochPair, rows: &StoneRows) -> Vec<Matrix3<f64>> {
-        let difference = |stones: &[usize; 2]| self.function(&rows.between(stones)).covariance;
+    fn between(&self, pair: &EpochPair, unknowns: &Unknowns) -> Vec<Matrix3<f64>> {
+        let difference =
+            |stones: &[usize; 2]| self.function(&neighbour_row(pair, stones, unknowns)).covariance;
         pair.neighbours.par_iter().map(difference).collect()
     }
 

@@ -1,24 +1,21 @@
 //! The error of the later epoch at all stones as one joint distribution.
 
 use super::model::Row;
-use super::stone_rows::StoneRows;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 /// Error of the later epoch against the reference at the stones: a linear function of a few unknowns, and what is
 /// independent from stone to stone. World, metres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointErrors {
-    /// Of the points of each stone: coefficients of three unknowns each, by the first of them.
-    pub(crate) of_points: Vec<Row>,
-    /// The same of the motion of each stone.
-    pub(crate) of_motions: Vec<Row>,
+    /// Of each stone: coefficients of three unknowns each, by the first of them.
+    pub(crate) rows: Vec<Row>,
     /// Covariance of the unknowns; second moments where the error is not taken off the motions.
     pub(crate) covariance: DMatrix<f64>,
     /// Covariance of each stone's independent error.
     pub(crate) own: Vec<Matrix3<f64>>,
     /// Expectation of the error of each stone's points where it is taken off the motions; else zero.
-    pub(crate) mean_of_points: Vec<Vector3<f64>>,
-    /// The same of each stone's motion.
+    pub(crate) mean: Vec<Vector3<f64>>,
+    /// The same of each stone's motion, which follows its neighbours.
     pub(crate) mean_of_motions: Vec<Vector3<f64>>,
 }
 
@@ -26,7 +23,7 @@ impl JointErrors {
     /// `weighted`: solutions for the unknowns (mean, covariance) with weights that sum to one; `is_taken_off`:
     /// whether motions are less the expectation.
     pub(super) fn new(
-        rows: &StoneRows,
+        rows: Vec<Row>,
         weighted: &[(f64, &DVector<f64>, &DMatrix<f64>)],
         own: Vec<Matrix3<f64>>,
         is_taken_off: bool,
@@ -46,11 +43,11 @@ impl JointErrors {
                 .map(|(first, by)| by * mean.fixed_rows::<3>(*first))
                 .sum()
         };
+        let mean: Vec<Vector3<f64>> = rows.iter().map(at).collect();
         Some(Self {
-            mean_of_points: rows.of_points.iter().map(at).collect(),
-            mean_of_motions: rows.of_motions.iter().map(at).collect(),
-            of_points: rows.of_points.clone(),
-            of_motions: rows.of_motions.clone(),
+            mean_of_motions: mean.clone(),
+            mean,
+            rows,
             covariance,
             own,
         })

@@ -39,7 +39,6 @@ mod rigid;
 mod sensors;
 mod sight;
 mod stable;
-mod stone_rows;
 #[cfg(test)]
 mod tests;
 
@@ -49,7 +48,6 @@ pub use cross_check::CrossCheck;
 pub use epoch_error::{Datum, EpochErrors, ErrorAt, SourceError, epoch_errors};
 pub use epoch_pair::{EpochErrorParams, EpochPair};
 pub use joint::JointErrors;
-pub(crate) use model::Row;
 pub use response::Response;
 pub use sight::{SeenStone, Source, SourcePoints};
 pub use stable::{StableParams, StablePoints};

@@ -99,7 +99,7 @@ impl Prior {
 }
 
 /// A row of the design: coefficients of a world displacement, block by block of three unknowns.
-pub(crate) type Row = Vec<(usize, Matrix3<f64>)>;
+pub(super) type Row = Vec<(usize, Matrix3<f64>)>;
 
 impl Unknowns {
     /// The unknowns of these sources, which see these sights.

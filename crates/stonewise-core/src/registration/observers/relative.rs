@@ -5,9 +5,8 @@ use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::joint::JointErrors;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::Observation;
-use super::rigid::{RigidRows, rigid_rows};
+use super::rigid::{RigidRows, difference_row, neighbour_row, rigid_rows};
 use super::sight::Source;
-use super::stone_rows::StoneRows;
 use nalgebra::{Dyn, Matrix3, Matrix6, OMatrix, SMatrix, U6};
 use rayon::prelude::*;
 
@@ -55,18 +54,18 @@ pub(super) fn relative_errors(
     };
     let all: Vec<&Observation> = within.iter().flatten().collect();
     let solution = Problem::new(&unknowns, &all).solve(&prior, components)?;
-    let rigid_rows = rigid_rows(pair, &unknowns);
-    let rows = StoneRows::new(pair, &unknowns, &rigid_rows);
-    let rigid = Rigid::new(rigid_rows, &solution);
+    let rigid = Rigid::new(rigid_rows(pair, &unknowns), &solution);
+    let row = |k: usize| difference_row(&pair.stones[k], pair.sources, &unknowns);
     let lever = |k: usize| rigid.rows.lever(&pair.stones[k].centroid);
-    let at = |k: usize| rigid.relative(&rows.of_motions[k], &lever(k), &solution);
+    let at = |k: usize| rigid.relative(&row(k), &lever(k), &solution);
     let between = |stones: &[usize; 2]| {
         let [first, second] = *stones;
-        rigid.relative(&rows.between(stones), &(lever(second) - lever(first)), &solution)
+        let difference = neighbour_row(pair, stones, &unknowns);
+        rigid.relative(&difference, &(lever(second) - lever(first)), &solution)
     };
     let count = pair.stones.len();
     let joint = JointErrors::new(
-        &rows,
+        (0..count).map(row).collect(),
         &[(1.0, &solution.mean, &solution.covariance)],
         vec![Matrix3::zeros(); count],
         false,

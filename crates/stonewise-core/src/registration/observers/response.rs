@@ -3,16 +3,11 @@
 //! A stone follows its neighbours, so that an error of a station which one stone sees and its neighbours do not is in the
 //! motions of all of them, smoothed as the adjustment smooths. A rigid motion of all points passes as it is.
 
-use super::model::Row;
 use crate::id::StoneId;
-use crate::linalg::{BlockFactor, BlockPattern};
+use crate::linalg::BlockPattern;
 use crate::registration::adjustment::JointMotions;
-use nalgebra::{Matrix3, SVector};
-use rayon::prelude::*;
-use std::collections::{BTreeMap, BTreeSet};
-
-/// Coefficients that are a smaller share of the largest one count nothing.
-const NEGLIGIBLE: f64 = 1e-3;
+use nalgebra::{SVector, Vector3};
+use std::collections::BTreeMap;
 
 /// The last solution of an adjustment, for stones in an order of their own.
 #[derive(Clone, Copy)]
@@ -24,85 +19,31 @@ pub struct Response<'a> {
 }
 
 impl Response<'_> {
-    /// The rows of the motions of stones whose points have the errors of `rows`. `rigidly`: the part of an unknown, by its
-    /// number, at a stone that all points follow as a rigid body. The rows themselves where memory does not suffice.
-    pub(super) fn of(&self, rows: &[Row], rigidly: impl Fn(usize, usize) -> Matrix3<f64> + Sync) -> Vec<Row> {
+    /// What the motions of the stones follow of these errors of their points, world, metres. `None` where memory does not
+    /// suffice.
+    pub(super) fn of(&self, errors: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
         let motions = self.motions;
-        let Some(pattern) = BlockPattern::<9>::new(motions.stones.len(), &motions.edges) else {
-            return rows.to_vec();
-        };
-        let Some(factor) = pattern.factor(&motions.information) else {
-            return rows.to_vec();
-        };
-        let nodes = self.nodes();
-        let unknowns: BTreeSet<usize> = rows.iter().flatten().map(|(first, _)| *first).collect();
-        let unknowns: Vec<usize> = unknowns.into_iter().collect();
-        let of_unknown = |first: &usize| {
-            let own = |row: &Row| -> Matrix3<f64> {
-                row.iter().filter(|(k, _)| k == first).map(|(_, by)| by).sum()
-            };
-            let rest: Vec<Matrix3<f64>> = rows
-                .iter()
-                .zip(0..)
-                .map(|(row, k)| own(row) - rigidly(*first, k))
-                .collect();
-            let followed = self.followed(&factor, &nodes, &rest);
-            followed
-                .into_iter()
-                .zip(0..)
-                .map(|(by, k)| by + rigidly(*first, k))
-                .collect()
-        };
-        let columns: Vec<Vec<Matrix3<f64>>> = unknowns.par_iter().map(of_unknown).collect();
+        let pattern = BlockPattern::<9>::new(motions.stones.len(), &motions.edges)?;
+        let factor = pattern.factor(&motions.information)?;
+        let nodes: BTreeMap<StoneId, usize> = motions.pulls.iter().map(|p| p.stone).zip(0..).collect();
+        let node_of = |stone: &StoneId| nodes.get(stone).copied();
 
-        let mut found = vec![Row::new(); rows.len()];
-        for (first, column) in unknowns.iter().zip(columns) {
-            let largest = column.iter().map(Matrix3::norm).fold(0.0, f64::max);
-            for (row, by) in found.iter_mut().zip(column) {
-                if by.norm() > NEGLIGIBLE * largest {
-                    row.push((*first, by));
-                }
+        let mut right = vec![SVector::<f64, 9>::zeros(); motions.pulls.len()];
+        for (stone, error) in self.stones.iter().zip(errors) {
+            if let Some(node) = node_of(stone) {
+                right[node] += motions.pulls[node].on_field * error;
             }
         }
-        found
-    }
+        let field = factor.solve(&right);
 
-    /// The node of each stone.
-    fn nodes(&self) -> Vec<Option<usize>> {
-        let nodes: BTreeMap<StoneId, usize> = self.motions.pulls.iter().map(|p| p.stone).zip(0..).collect();
-        self.stones
-            .iter()
-            .map(|stone| nodes.get(stone).copied())
-            .collect()
-    }
-
-    /// What motions follow of these errors of the stones' points, a column for each direction.
-    fn followed(
-        &self,
-        factor: &BlockFactor<9>,
-        nodes: &[Option<usize>],
-        errors: &[Matrix3<f64>],
-    ) -> Vec<Matrix3<f64>> {
-        let pulls = &self.motions.pulls;
-        let solve = |c: usize| {
-            let mut right = vec![SVector::<f64, 9>::zeros(); pulls.len()];
-            for (node, error) in nodes.iter().zip(errors) {
-                if let Some(node) = *node {
-                    right[node] += pulls[node].on_field * error.column(c);
-                }
+        let followed = |(stone, error): (&StoneId, &Vector3<f64>)| {
+            let measured = node_of(stone).and_then(|node| Some((node, motions.stones[node].as_ref()?)));
+            match measured {
+                Some((node, stone)) => stone.by_field * field[node] + motions.pulls[node].on_stone * error,
+                None => *error,
             }
-            factor.solve(&right)
         };
-        let fields = [solve(0), solve(1), solve(2)];
-        let of_stone = |(node, error): (&Option<usize>, &Matrix3<f64>)| {
-            let Some(stone) = node.and_then(|node| self.motions.stones[node].as_ref()) else {
-                return *error;
-            };
-            let node = node.unwrap_or_default();
-            let by_field = |c: usize| stone.by_field * fields[c][node];
-            Matrix3::from_columns(&[by_field(0), by_field(1), by_field(2)]) + pulls[node].on_stone * error
-        };
-        nodes.iter().zip(errors).map(of_stone).collect()
+        Some(self.stones.iter().zip(errors).map(followed).collect())
     }
 }
 
@@ -136,23 +77,15 @@ mod tests {
             motions,
             stones: &stones,
         };
-        let pattern = BlockPattern::<9>::new(motions.stones.len(), &motions.edges).unwrap();
-        let factor = pattern.factor(&motions.information).unwrap();
-        let error = |k: u32| {
-            if errs(k) {
-                Matrix3::identity()
-            } else {
-                Matrix3::zeros()
-            }
-        };
-        let errors: Vec<Matrix3<f64>> = (0..stones.len() as u32).map(error).collect();
-        let followed = response.followed(&factor, &response.nodes(), &errors);
+        let error = |k: u32| if errs(k) { shift } else { Vector3::zeros() };
+        let errors: Vec<Vector3<f64>> = (0..stones.len() as u32).map(error).collect();
+        let followed = response.of(&errors).unwrap();
 
         let (mut apart, mut largest): (f64, f64) = (0.0, 0.0);
         for ((before, after), by) in still.results.iter().zip(&moved.results).zip(&followed) {
             let change =
                 after.motion.as_ref().unwrap().displacement - before.motion.as_ref().unwrap().displacement;
-            apart = apart.max((change - by * shift).norm());
+            apart = apart.max((change - by).norm());
             largest = largest.max((change - shift / 3.0).norm());
         }
         assert!(apart < 0.15 * shift.norm(), "{apart} of {largest}");

@@ -110,6 +110,13 @@ pub(super) fn shares(stone: &SeenStone, sources: &[Source]) -> Vec<f64> {
     stone.sights.iter().map(share).collect()
 }
 
+/// The error at the second of two neighbours less that at the first.
+pub(super) fn neighbour_row(pair: &EpochPair, stones: &[usize; 2], unknowns: &Unknowns) -> Row {
+    let [first, mut row] = stones.map(|k| difference_row(&pair.stones[k], pair.sources, unknowns));
+    row.extend(first.into_iter().map(|(k, m)| (k, -m)));
+    row
+}
+
 /// The later epoch's error less that of the reference at a stone.
 pub(super) fn difference_row(stone: &SeenStone, sources: &[Source], unknowns: &Unknowns) -> Row {
     let mut row = Row::new();

@@ -14,6 +14,8 @@ const ACROSS: [usize; 6] = [2, 3, 4, 6, 7, 8];
 /// Relative ridge on every unknown: keeps those that no point determines solvable; far below any information
 /// that counts, as blocks are scaled to a unit diagonal and double precision has 16 digits.
 const RIDGE: f64 = 1e-12;
+/// Information of an unknown of which no point says anything, so that its inverse stays finite.
+const NOTHING: f64 = 1e-100;
 
 /// The equations with the variances of the motion in the face times `factor`, at least 1, and those of the
 /// translation in it larger by `error_m` squared; its optimum, and what is known of the other unknowns once
@@ -88,8 +90,7 @@ fn inverted<const N: usize>(matrix: nalgebra::SMatrix<f64, N, N>) -> Option<nalg
 where
     nalgebra::Const<N>: nalgebra::DimSub<nalgebra::U1>,
 {
-    let scale =
-        nalgebra::SVector::<f64, N>::from_fn(|r, _| matrix[(r, r)].max(f64::MIN_POSITIVE).sqrt().recip());
+    let scale = nalgebra::SVector::<f64, N>::from_fn(|r, _| matrix[(r, r)].max(NOTHING).sqrt().recip());
     let scaled = nalgebra::SMatrix::<f64, N, N>::from_fn(|r, c| {
         matrix[(r, c)] * scale[r] * scale[c] + if r == c { RIDGE } else { 0.0 }
     });
@@ -105,6 +106,21 @@ mod tests {
     use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+
+    #[test]
+    fn a_face_without_any_slope_says_nothing_of_a_motion_in_it() {
+        // Ground in coordinates rounded to a centimetre: all heights are equal.
+        let mut information = Matrix9::zeros();
+        ACROSS.iter().for_each(|&k| information[(k, k)] = 1e6);
+        let mut flat = NormalEquations::nothing();
+        flat.information = information;
+        let found = discounted(flat, 3.0, 1e-3);
+        assert_eq!(found.information, information);
+        assert!(
+            found.constant == 0.0 && found.vector == Vector9::zeros(),
+            "{found:?}"
+        );
+    }
 
     fn term(columns: usize) -> NormalEquations {
         let mut rng = ChaCha8Rng::seed_from_u64(9);
