@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a panel of small simulated surveys, whole or disturbed, gets wrong against the truth.
 
-    cargo build --release -p stonewise
+    cargo build --release -p stonewise-cli
     python3 lab/panel.py                          # pip install numpy pandas laspy[lazrs]
     python3 lab/panel.py 'm_*' s_ivy --out FOLDER
     python3 lab/panel.py --list
