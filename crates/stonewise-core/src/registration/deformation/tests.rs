@@ -367,7 +367,6 @@ fn what_the_field_smooths_of_a_bulge_widens_its_intervals() {
         }
         assert!(bulge(k).x > 0.0 || sd < 3.0 * SD_M, "{k}: {sd}");
     }
-    // By the covariance of the motions alone it would be four to six standard deviations.
-    missed.sort_by(f64::total_cmp);
-    assert!(missed[missed.len() / 2] < 2.0, "{missed:?}");
+    // By the covariance of the motions alone the largest are five to six standard deviations.
+    assert!(missed.iter().all(|m| *m < 3.0), "{missed:?}");
 }
