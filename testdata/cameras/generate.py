@@ -443,7 +443,7 @@ def realitycapture():
 
 
 def bundler():
-    """COLMAP's own way from its model to Bundler's; its principal points are the middle, as Bundler knows no other."""
+    """COLMAP's own way from its model to Bundler's; its principal points are the middle, the only one that Bundler's format allows."""
     model = HERE / "bundler" / "colmap"
     model.mkdir(parents=True, exist_ok=True)
     cameras = f"1 SIMPLE_PINHOLE 400 300 290.5 200 150\n2 SIMPLE_RADIAL 300 400 288.25 150 200 {K[0]}\n"

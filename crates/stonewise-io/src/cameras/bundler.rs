@@ -16,7 +16,7 @@ use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
 use stonewise_core::id::ImageId;
 
 const HEAD: &str = "# Bundle file v0.3";
-/// Points of which it is asked whether they lie before the photos that show them.
+/// Most points that are tested for lying in front of the photos that show them.
 const POINTS: usize = 1000;
 
 /// Whether a file is of this format, by its first line.
