@@ -5,28 +5,28 @@ use crate::statistics::upper_median;
 use crate::stone::{MotionFailure, PairResult};
 use std::collections::BTreeMap;
 
-/// Scatter of a stone's points about the joint surface, in units of the usual one, beyond which something covers the
-/// stone in one of the epochs.
+/// Mean distance of a stone's points from the joint surface, in units of the usual one, beyond which something covers
+/// the stone in one of the epochs.
 const COVERED: f64 = 4.0;
-/// Fewest stones of which the usual scatter is known.
+/// Fewest stones of which the usual distance is known.
 const LEAST_OF_USUAL: usize = 8;
 
-/// Which stones something covers in one of the epochs: ivy, snow, a net. Their points scatter by several times what those
-/// of other stones do about the joint surface, and the motion would be that of what covers them.
+/// Which stones something covers in one of the epochs: ivy, snow, a net. Their points lie several times as far from the
+/// joint surface as those of other stones, and the motion would be that of what covers them.
 pub(super) fn covered(adjustment: &Adjustment) -> Vec<bool> {
-    let scatter = |stone: &StoneState| {
+    let distance = |stone: &StoneState| {
         let equations = stone.more_probable().surface.equations()?;
-        Some(equations.scatter.map(|(sum, points)| (sum / points).sqrt()))
+        Some([0, 1].map(|epoch| equations.distances[epoch] / equations.points[epoch] as f64))
     };
-    let scatters: Vec<Option<[f64; 2]>> = adjustment.stones.iter().map(scatter).collect();
+    let distances: Vec<Option<[f64; 2]>> = adjustment.stones.iter().map(distance).collect();
     let usual = |epoch: usize| {
-        let mut all: Vec<f64> = scatters.iter().flatten().map(|s| s[epoch]).collect();
+        let mut all: Vec<f64> = distances.iter().flatten().map(|s| s[epoch]).collect();
         all.retain(|s| s.is_finite());
         upper_median(&mut all).filter(|_| all.len() >= LEAST_OF_USUAL)
     };
     let limits = [0, 1].map(|epoch| usual(epoch).map_or(f64::INFINITY, |usual| COVERED * usual));
-    let is_covered = |scatter: &[f64; 2]| (0..2).any(|epoch| scatter[epoch] > limits[epoch]);
-    scatters
+    let is_covered = |distance: &[f64; 2]| (0..2).any(|epoch| distance[epoch] > limits[epoch]);
+    distances
         .iter()
         .map(|s| s.as_ref().is_some_and(is_covered))
         .collect()

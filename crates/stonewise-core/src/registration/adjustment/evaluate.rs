@@ -1,6 +1,7 @@
 //! Evaluation of the stones' own points, batch by batch.
 
 use super::candidate::CandidateMotion;
+use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
 use super::observation::surface::{Correlation, Equations, LocalPair, estimate_noise};
@@ -64,9 +65,13 @@ impl Adjustment {
             }
             points.progress.advance(range.len() as u64);
         }
-        let known: Vec<(&Equations, f64)> = self
+        let covered = covered(self);
+        let uncovered = self
             .stones
             .iter()
+            .zip(&covered)
+            .filter_map(|(s, covered)| (!covered).then_some(s));
+        let known: Vec<(&Equations, f64)> = uncovered
             .filter_map(|s| Some((s.with_field.surface.equations()?, s.effective_freedom)))
             .collect();
         self.surface.correlation = Correlation::of(&known);

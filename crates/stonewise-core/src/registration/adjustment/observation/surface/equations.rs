@@ -36,8 +36,10 @@ pub(crate) struct Equations {
     pub slopes: [SlopeScatter; 2],
     /// Root mean square of the second epoch's residuals, metres.
     pub rms_m: f64,
-    /// Sum of weighted squared residuals in units of sigma and number of points, per epoch.
-    pub scatter: [(f64, f64); 2],
+    /// Number of points, per epoch.
+    pub points: [usize; 2],
+    /// Sum of the points' distances from the surface, outliers and all, in units of sigma, per epoch.
+    pub distances: [f64; 2],
 }
 
 impl Equations {
@@ -53,7 +55,8 @@ impl Equations {
             coarse_variances: Vec::new(),
             slopes: [SlopeScatter::default(); 2],
             rms_m: 0.0,
-            scatter: [(0.0, 0.0); 2],
+            points: [0; 2],
+            distances: [0.0; 2],
         }
     }
 }
@@ -77,11 +80,12 @@ pub(crate) fn equations(
     let motion = InverseMotion::new(motion);
     let patches = pool_into_patches(pair, &motion, &InverseMotion::new(window), noise, layout);
     let mut sum = Equations::zeros(patches.overlap);
+    let mut squares = 0.0;
     for patch in patches.list {
-        add_patch(patch, &motion, noise, layout, &mut sum);
+        squares += add_patch(patch, &motion, noise, layout, &mut sum);
     }
-    if sum.scatter[1].1 > 0.0 {
-        sum.rms_m = noise.sigma_m[1] * (sum.scatter[1].0 / sum.scatter[1].1).sqrt();
+    if sum.points[1] > 0 {
+        sum.rms_m = noise.sigma_m[1] * (squares / sum.points[1] as f64).sqrt();
     }
     sum
 }
@@ -105,17 +109,18 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
         .sum()
 }
 
-/// Adds what a patch says to the equations.
+/// Adds what a patch says to the equations; the sum of the second epoch's weighted squared residuals, in units of sigma.
 fn add_patch(
     PatchPoints { grid, mut epochs }: PatchPoints,
     motion: &InverseMotion,
     noise: &SurfaceNoise,
     layout: &Layout,
     sum: &mut Equations,
-) {
+) -> f64 {
     let Some(fit) = robust_fit(grid, &mut epochs, noise, layout) else {
-        return;
+        return 0.0;
     };
+    let mut squares = [0.0; 2];
     let shares = Shares::new(&grid, &epochs, noise);
     let mut coupling = vec![[0.0; 9]; grid.coefficient_count()];
     let mut cells = PatchCells::new(&grid, layout.cell_m);
@@ -126,8 +131,9 @@ fn add_patch(
             let [h, hu, hv] = fit.surface(&o.basis);
             let r = o.position[2] - h;
             cells.add(epoch, o, r, [hu, hv]);
-            sum.scatter[epoch].0 += o.weight * r * r / (sigma * sigma);
-            sum.scatter[epoch].1 += 1.0;
+            sum.points[epoch] += 1;
+            sum.distances[epoch] += r.abs() * steepness([hu, hv]).sqrt() / sigma;
+            squares[epoch] += o.weight * r * r / (sigma * sigma);
             sum.deviance += o.weight * r * r / (sigma * sigma);
             let w = o.weight / (sigma * sigma);
             // The surface follows each point a little, most at the edge of the points, and takes the slope
@@ -147,6 +153,7 @@ fn add_patch(
     sum.deviance += fit.surface_deviance(noise) - epochs.iter().map(Vec::len).sum::<usize>() as f64;
     take_off_surface(&fit, coupling, &mut sum.information);
     cells.finish(noise, sum);
+    squares[1]
 }
 
 /// How the epochs share the stone's motion at each place of a patch: each takes the more of it, the less its

@@ -4,14 +4,19 @@ use super::inverse_motion::InverseMotion;
 use super::layout::Layout;
 use super::local_pair::LocalPair;
 use super::patch_fit::PatchFit;
+use super::patch_grid::WeightedPoint;
 use super::patches::{PatchPoints, pool_into_patches};
 use super::robust::robust_fit;
 use super::surface_noise::SurfaceNoise;
 use crate::registration::adjustment::stone_vector::StoneVector;
+use crate::statistics::upper_median;
 use rayon::prelude::*;
 
 /// Patches that the estimate uses at most; more do not move it by a percent.
 const PATCHES: usize = 64;
+/// Scatter of a patch's points, in units of the usual one, beyond which they are not those of the wall alone: ivy or a
+/// net in one of the epochs. Incidence and range change the noise of a scanner by a factor of two.
+const FOREIGN: f64 = 4.0;
 /// Most steps; six are usual from a start that is off by a factor of three.
 const STEPS: usize = 12;
 /// Largest change of a logarithm in one step: a factor of 3.3, as far as the first parabola's width can be
@@ -34,6 +39,8 @@ const UNSOLVABLE: f64 = f64::MAX / 1e6;
 
 /// The noise under which the sampled stones' points are most likely, surface and planes integrated out.
 ///
+/// Patches that something else covers in one of the epochs are left out, as long as they are fewer than half.
+///
 /// Source: Patterson & Thompson 1971 (restricted likelihood); a quadratic through three values in each
 /// logarithm, until no step exceeds a percent.
 pub(crate) fn estimate_noise(
@@ -41,7 +48,7 @@ pub(crate) fn estimate_noise(
     start: &SurfaceNoise,
     layout: &Layout,
 ) -> SurfaceNoise {
-    let patches = sampled(sample, start, layout);
+    let patches = without_foreign(sampled(sample, start, layout), start, layout);
     if patches.is_empty() {
         return *start;
     }
@@ -115,6 +122,34 @@ fn sampled(sample: &[(&LocalPair, StoneVector)], noise: &SurfaceNoise, layout: &
     all.into_iter().step_by(stride).collect()
 }
 
+/// The patches whose points scatter about the surface of both epochs like those of the others.
+fn without_foreign(patches: Vec<PatchPoints>, noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
+    let scatters: Vec<[f64; 2]> = patches.par_iter().map(|p| scatter(p, noise, layout)).collect();
+    let limits = [0, 1].map(|epoch| {
+        let mut all: Vec<f64> = scatters.iter().map(|s| s[epoch]).collect();
+        upper_median(&mut all).map_or(f64::INFINITY, |usual| FOREIGN * usual)
+    });
+    let is_alike = |scatter: &[f64; 2]| (0..2).all(|epoch| scatter[epoch] <= limits[epoch]);
+    let pairs = patches.into_iter().zip(&scatters);
+    pairs
+        .filter(|(_, s)| is_alike(s))
+        .map(|(patch, _)| patch)
+        .collect()
+}
+
+/// Median distance of a patch's points of each epoch from the surface of both, metres; zero where they determine none.
+fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 2] {
+    let mut epochs = patch.epochs.clone();
+    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
+        return [0.0; 2];
+    };
+    epochs.map(|points| {
+        let distance = |o: &WeightedPoint| (o.position[2] - fit.surface(&o.basis)[0]).abs();
+        let mut distances: Vec<f64> = points.iter().map(distance).collect();
+        upper_median(&mut distances).unwrap_or(0.0)
+    })
+}
+
 fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) -> Vec<PatchPoints> {
     patches
         .par_iter()
@@ -143,6 +178,12 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
+    const LAYOUT: Layout = Layout {
+        cell_m: 0.016,
+        patch_cells: 24,
+        outlier_sigmas: 3.5,
+    };
+
     /// A bumpy face of 20 x 16 cm, scanned at random places with white noise.
     fn scan(rng: &mut ChaCha8Rng, sigma_m: f64) -> Vec<[f64; 3]> {
         (0..700)
@@ -167,17 +208,12 @@ mod tests {
             .collect();
         let sample: Vec<(&LocalPair, StoneVector)> =
             pairs.iter().map(|p| (p, StoneVector::zeros())).collect();
-        let layout = Layout {
-            cell_m: 0.016,
-            patch_cells: 24,
-            outlier_sigmas: 3.5,
-        };
         let found = [1e-4, 3e-2].map(|start| {
             let start = SurfaceNoise {
                 sigma_m: [start; 2],
                 tau_m: 1e-3,
             };
-            estimate_noise(&sample, &start, &layout)
+            estimate_noise(&sample, &start, &LAYOUT)
         });
         for noise in &found {
             for (sigma, truth) in noise.sigma_m.iter().zip(truth) {
@@ -189,16 +225,36 @@ mod tests {
     }
 
     #[test]
+    fn ivy_on_a_third_of_the_stones_is_no_noise_of_the_sensor() {
+        let truth = [0.002, 0.003];
+        let ivy = 0.03;
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let pairs: Vec<LocalPair> = (0..18)
+            .map(|stone| {
+                let second = if stone % 3 == 0 { ivy } else { truth[1] };
+                LocalPair::of_points(scan(&mut rng, truth[0]), scan(&mut rng, second))
+            })
+            .collect();
+        let sample: Vec<(&LocalPair, StoneVector)> =
+            pairs.iter().map(|p| (p, StoneVector::zeros())).collect();
+        for start in [1e-3, 1e-2] {
+            let start = SurfaceNoise {
+                sigma_m: [start; 2],
+                tau_m: 1e-3,
+            };
+            let found = estimate_noise(&sample, &start, &LAYOUT);
+            for (sigma, truth) in found.sigma_m.iter().zip(truth) {
+                assert!((sigma / truth - 1.0).abs() < 0.06, "{sigma} {truth}");
+            }
+        }
+    }
+
+    #[test]
     fn without_points_the_start_stays() {
         let start = SurfaceNoise {
             sigma_m: [0.003; 2],
             tau_m: 0.001,
         };
-        let layout = Layout {
-            cell_m: 0.016,
-            patch_cells: 24,
-            outlier_sigmas: 3.5,
-        };
-        assert_eq!(estimate_noise(&[], &start, &layout), start);
+        assert_eq!(estimate_noise(&[], &start, &LAYOUT), start);
     }
 }
