@@ -43,9 +43,29 @@ impl<'a> Walls<'a> {
 
     /// Whether a point lies on the ground or another level surface, which views leave black.
     pub fn is_level(&self, point: &Point3<f64>) -> bool {
-        let cell = self.level.get(&cell_of(point, self.cell_m));
-        cell.is_some_and(|c| (point - c.centroid).dot(&c.normal).abs() < GROUND_M)
+        let cell = cell_of(point, self.cell_m);
+        match self.level.get(&cell) {
+            Some(own) => lies_on(own, point),
+            None => self.is_between_level(cell, point),
+        }
     }
+
+    /// Whether level cells on two opposite sides continue under a point, so that what else its cell shows, as the
+    /// foot of a railing, stands on the same ground.
+    fn is_between_level(&self, [x, y, z]: [i64; 3], point: &Point3<f64>) -> bool {
+        let continues = |dx: i64, dy: i64| {
+            let column = [z, z - 1, z + 1].map(|z| self.level.get(&[x + dx, y + dy, z]));
+            column.into_iter().flatten().any(|cell| lies_on(cell, point))
+        };
+        [[1, 0], [0, 1]]
+            .into_iter()
+            .any(|[dx, dy]| continues(dx, dy) && continues(-dx, -dy))
+    }
+}
+
+/// Whether a point lies on the plane of a cell.
+fn lies_on(cell: &SurfaceCell, point: &Point3<f64>) -> bool {
+    (point - cell.centroid).dot(&cell.normal).abs() < GROUND_M
 }
 
 #[cfg(test)]
@@ -53,18 +73,36 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
+    fn cell(x: f64, z: f64, normal: Vector3<f64>) -> SurfaceCell {
+        let centroid = Point3::new(x, 0.1, z);
+        SurfaceCell {
+            cell: cell_of(&centroid, 0.25),
+            centroid,
+            normal,
+            spacing_m: 0.01,
+            skewness: 0.0,
+        }
+    }
+
+    #[test]
+    fn what_stands_on_the_ground_leaves_the_ground_around_it_level() {
+        // The foot of a railing from 0.25 to 0.5 m: its cell is upright.
+        let cells = [
+            cell(0.1, 0.02, Vector3::z()),
+            cell(0.4, 0.15, Vector3::x()),
+            cell(0.6, -0.01, Vector3::z()),
+            cell(0.9, 0.15, Vector3::x()),
+        ];
+        let walls = Walls::among(&cells, 0.25);
+        let is_level = |x: f64, z: f64| walls.is_level(&Point3::new(x, 0.1, z));
+        assert!(is_level(0.3, 0.01) && is_level(0.45, -0.01));
+        assert!(!is_level(0.4, 0.2), "the railing");
+        assert!(!is_level(0.9, 0.01), "ground on one side alone");
+        assert!(!is_level(0.3, 0.7));
+    }
+
     #[test]
     fn the_foot_of_a_wall_is_no_ground() {
-        let cell = |x: f64, z: f64, normal: Vector3<f64>| {
-            let centroid = Point3::new(x, 0.1, z);
-            SurfaceCell {
-                cell: cell_of(&centroid, 0.25),
-                centroid,
-                normal,
-                spacing_m: 0.01,
-                skewness: 0.0,
-            }
-        };
         let cells = [
             cell(0.1, 0.02, Vector3::z()),
             cell(0.4, 0.02, Vector3::z()),
