@@ -121,8 +121,15 @@ pub struct EpochSource {
 pub struct EpochSources {
     /// In the order of their first points.
     pub list: Vec<EpochSource>,
+    /// Number of sources that count as one, because they are too many to be compared with each other.
+    pub too_many: Option<usize>,
     raw: Vec<(usize, f64)>,
 }
+
+/// Most sources that are compared with each other, a hundred: no survey has as many stations, but some files number
+/// scan lines or points. Of their pieces in several files, the most.
+const MOST_SOURCES: usize = 100;
+const MOST_PIECES: usize = 10_000;
 
 /// Pieces of one strip in neighbouring files follow each other within this time, seconds.
 const SAME_PASS_S: f64 = 30.0;
@@ -130,6 +137,9 @@ const SAME_PASS_S: f64 = 30.0;
 impl EpochSources {
     /// Joins the pieces of one strip that lie in several files: the same number, and times that touch.
     pub fn new(raw: &[RawSource], clouds: &[PathBuf]) -> Self {
+        if raw.len() > MOST_PIECES {
+            return Self::as_one(raw, raw.len());
+        }
         let mut of_raw: Vec<usize> = (0..raw.len()).collect();
         for k in 0..raw.len() {
             if let Some(j) = (0..k).find(|&j| is_same_pass(&raw[j], &raw[k])) {
@@ -139,6 +149,9 @@ impl EpochSources {
         let mut heads: Vec<usize> = of_raw.clone();
         heads.sort_unstable();
         heads.dedup();
+        if heads.len() > MOST_SOURCES {
+            return Self::as_one(raw, heads.len());
+        }
         let list = heads.iter().map(|&h| {
             let source = &raw[h];
             let file = clouds.get(source.file).and_then(|p| p.file_name());
@@ -150,11 +163,24 @@ impl EpochSources {
         let index = |head: usize| heads.binary_search(&head).unwrap_or(0);
         Self {
             list: list.collect(),
+            too_many: None,
             raw: raw
                 .iter()
                 .zip(&of_raw)
                 .map(|(r, &h)| (index(h), r.start_s))
                 .collect(),
+        }
+    }
+
+    /// All of them as one source.
+    fn as_one(raw: &[RawSource], count: usize) -> Self {
+        Self {
+            list: vec![EpochSource {
+                name: String::new(),
+                has_times: false,
+            }],
+            too_many: Some(count),
+            raw: raw.iter().map(|r| (0, r.start_s)).collect(),
         }
     }
 
@@ -188,6 +214,16 @@ mod tests {
             times_s: Some(times.to_vec()),
             ..PointChunk::default()
         }
+    }
+
+    #[test]
+    fn numbers_of_scan_lines_are_no_stations() {
+        let mut list = SourceList::new(SourceRule::Auto);
+        let numbers: Vec<u16> = (0..1000).collect();
+        list.of_chunk(0, &chunk(&numbers, &[0.0; 1000]));
+        let sources = EpochSources::new(&list.finish(), &["a.laz".into()]);
+        assert_eq!((sources.list.len(), sources.too_many), (1, Some(1000)));
+        assert_eq!(sources.of(999, 2.0), (0, 2.0));
     }
 
     fn names(sources: &EpochSources) -> Vec<&str> {

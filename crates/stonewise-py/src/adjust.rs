@@ -16,7 +16,7 @@ use stonewise_core::cloud::{Cloud, TileSource};
 use stonewise_core::geometry::{Camera, Plane, View, cell_of};
 use stonewise_core::id::{ImageId, StoneId};
 use stonewise_core::matching::{Footprints, MatchReport, Surroundings, footprint_overlap, match_stones};
-use stonewise_core::progress::Progress;
+use stonewise_core::progress::{Interrupted, Progress};
 use stonewise_core::registration::observers::{
     EpochErrorParams, EpochPair, SeenStone, Source, SourcePoints, epoch_errors,
 };
@@ -98,7 +98,7 @@ fn measure(
         e => stonewise::Error::Registration(e.to_string()),
     })?;
     report.results.sort_by_key(|r| r.first);
-    let relative = relative_errors(&first, &report, &settings.registration.observers);
+    let relative = relative_errors(&first, &report, &settings.registration.observers, progress)?;
     Ok((
         stone_table(&rows(&first, &second, &matched, &report.results, &relative))?,
         report,
@@ -197,7 +197,8 @@ fn relative_errors(
     first: &Epoch,
     report: &AdjustmentReport,
     params: &EpochErrorParams,
-) -> BTreeMap<StoneId, Matrix3<f64>> {
+    progress: &dyn Progress,
+) -> Result<BTreeMap<StoneId, Matrix3<f64>>, Interrupted> {
     let matched: BTreeSet<StoneId> = report.results.iter().map(|r| r.first).collect();
     let stones: Vec<&Stone> = first.stones.iter().filter(|s| matched.contains(&s.id)).collect();
     let sources = [0, 1].map(|epoch| Source {
@@ -229,8 +230,8 @@ fn relative_errors(
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
         response: None,
     };
-    let errors = epoch_errors(&pair, params);
-    stones.iter().map(|s| s.id).zip(errors.relative).collect()
+    let errors = epoch_errors(&pair, params, progress)?;
+    Ok(stones.iter().map(|s| s.id).zip(errors.relative).collect())
 }
 
 /// One row for each stone of the first epoch, as of a run in which nothing is known about the registration of

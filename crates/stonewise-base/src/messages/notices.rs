@@ -58,13 +58,37 @@ messages! {
             "mittlere Bewegung der gemessenen Steine, die nicht lose sind, wie gemessen: {mean} (Standardabweichungen ohne den \
             Registrierungsfehler der Epochen, der unbekannt ist)";
 
-        STABLE_MOVED = "stable-moved":
-            "[[registration.stable]] number {n} moved against the other stable areas and is left out",
-            "[[registration.stable]] Nummer {n} hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
+        TOO_MANY_SOURCES = "too-many-sources":
+            "the clouds name {n} sources, more than the 100 stations or strips that can be compared with each other; they count as one. \
+            Where they number scan lines or points, say so with sources = \"file\" or \"none\" under [[epochs]]",
+            "die Punktwolken nennen {n} Quellen, mehr als die 100 Standpunkte oder Streifen, die sich miteinander vergleichen lassen; sie \
+            gelten als eine. Nummerieren sie Scanzeilen oder Punkte, gehört sources = \"file\" oder \"none\" unter [[epochs]]";
 
-        OFF_WALL_MOVED = "stable-moved":
-            "auto_stable: the area off the wall around ({place}) moved against the other stable areas and is left out",
-            "auto_stable: die Fläche neben der Mauer um ({place}) hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
+        NAMED_AREA:
+            "[[registration.stable]] \"{name}\"",
+            "[[registration.stable]] „{name}“";
+
+        NUMBERED_AREA:
+            "[[registration.stable]] number {n}",
+            "[[registration.stable]] Nummer {n}";
+
+        AREA_OFF_WALL:
+            "the area off the wall around ({place})",
+            "die Fläche neben der Mauer um ({place})";
+
+        STABLE_MOVED = "stable-moved":
+            "{area} moved against the other stable areas and is left out",
+            "{area} hat sich gegen die anderen stabilen Flächen bewegt und ist weggelassen";
+
+        STABLE_ALONE = "stable-alone":
+            "{area} alone shows that the registration is off by {shift_mm} mm, {sds} times the standard deviation expected without it. \
+            Nothing tells whether the registration is off or the area moved; if the area moved, all motions are wrong by as much. \
+            Name a second stable area that shows the same directions, or look at this one on site. The deformation of the wall does \
+            not depend on it",
+            "{area} allein zeigt einen Registrierungsfehler von {shift_mm} mm, das {sds}-Fache der Standardabweichung, die ohne sie zu \
+            erwarten ist. Nichts zeigt, ob die Registrierung falsch ist oder sich die Fläche bewegt hat; hat sie sich bewegt, sind alle \
+            Bewegungen um so viel falsch. Eine zweite stabile Fläche nennen, die dieselben Richtungen zeigt, oder diese vor Ort ansehen. \
+            Die Verformung der Mauer hängt nicht davon ab";
 
         STABLE_TOO_FEW = "stable-too-few":
             "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \

@@ -1,14 +1,16 @@
-//! Factors of the two kinds of matrix that the adjustment solves, bands and sparse blocks, and small helpers.
+//! Factors of the kinds of matrix that the adjustment solves, bands, sparse blocks and dense ones, and small helpers.
 //! Nothing here refers to stones.
 
 mod band;
 mod block;
+mod dense;
 mod least_squares;
 mod selected_inverse;
 mod without_negative;
 
 pub(crate) use band::{Band, BandFactor, BandInverse};
 pub(crate) use block::{BlockFactor, BlockMatrix, BlockPattern};
+pub(crate) use dense::DenseFactor;
 pub use least_squares::least_squares;
 pub(crate) use selected_inverse::SelectedInverse;
 pub use without_negative::without_negative;

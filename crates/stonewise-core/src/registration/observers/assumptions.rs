@@ -38,9 +38,9 @@ impl Model {
         (prior, self.components)
     }
 
-    /// With the error of the whole epoch as large as stable areas show it, along the directions in which that is
-    /// far more than is assumed: an assumption that does not hold would pull the error towards none. Along what
-    /// the areas show worse than it is assumed, the assumption holds: no area makes the expected error larger.
+    /// With the error of the whole epoch as large as stable areas show it, where that is far more than is assumed: an
+    /// assumption that does not hold would pull the error towards none. Along what the areas show worse than it is
+    /// assumed, the assumption holds: no area makes the expected error larger.
     pub fn widened(self, unknowns: &Unknowns, observations: &[&Observation]) -> Self {
         let (prior, components) = self.opened();
         let Some(solution) = Problem::new(unknowns, observations).solve(&prior, &components) else {
@@ -57,17 +57,24 @@ impl Model {
     /// With an error of the whole epoch that was found with this covariance, left open.
     fn widened_to(self, shown: &Vector3<f64>, covariance: &Matrix3<f64>) -> Self {
         let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
-        let mut wider = self;
+        let (mut seen, mut surprise) = (Vector3::zeros(), 0.0);
         for (variance, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
-            let along = |m: &Matrix3<f64>| direction.dot(&(m * direction));
-            let (assumed, open) = (along(&self.whole), along(&self.open));
-            let square = direction.dot(shown).powi(2);
-            let is_seen = *variance < assumed;
-            if is_seen && square > SURPRISING * SURPRISING * (assumed + variance) {
-                let outer = direction * direction.transpose();
-                wider.whole += outer * (square.max(open) - assumed);
-                wider.open += outer * (square.max(open) - open);
+            let assumed = direction.dot(&(self.whole * direction));
+            if *variance < assumed {
+                let along = direction.dot(shown);
+                seen += direction * along;
+                surprise += along * along / (assumed + variance);
             }
+        }
+        let mut wider = self;
+        if surprise > SURPRISING * SURPRISING {
+            let direction = seen.normalize();
+            let widen = |m: &mut Matrix3<f64>| {
+                let missing = seen.norm_squared() - direction.dot(&(*m * direction));
+                *m += direction * direction.transpose() * missing.max(0.0);
+            };
+            widen(&mut wider.whole);
+            widen(&mut wider.open);
         }
         wider
     }

@@ -3,10 +3,18 @@
 
 use super::components::{BOUNDS, COUNT, ObserverComponents, SensorClass};
 use super::model::{Prior, Problem};
+use crate::progress::{Interrupted, Progress};
 use rayon::prelude::*;
 
 /// The components under which the differences are most probable.
-pub(super) fn estimate(problem: &Problem, class: SensorClass) -> ObserverComponents {
+///
+/// # Errors
+/// The caller stopped the work.
+pub(super) fn estimate(
+    problem: &Problem,
+    class: SensorClass,
+    progress: &dyn Progress,
+) -> Result<ObserverComponents, Interrupted> {
     let value = |log: &[f64; COUNT]| {
         let components = ObserverComponents::from_log(*log);
         let deviance = problem.deviance(&Prior::new(&components, 0.0), &components);
@@ -18,6 +26,7 @@ pub(super) fn estimate(problem: &Problem, class: SensorClass) -> ObserverCompone
     let mut log = clamp(ObserverComponents::expected(class).to_log());
     let mut width = 0.5;
     for _ in 0..12 {
+        progress.check()?;
         let mut probes = vec![log];
         for k in 0..COUNT {
             for sign in [-1.0, 1.0] {
@@ -50,5 +59,5 @@ pub(super) fn estimate(problem: &Problem, class: SensorClass) -> ObserverCompone
         }
         width = (0.7 * width).max(0.1);
     }
-    ObserverComponents::from_log(log)
+    Ok(ObserverComponents::from_log(log))
 }

@@ -1,6 +1,7 @@
 //! The error of a later epoch against the reference, at every stone.
 
 use super::assumptions::{Model, WIDE, whole_m};
+use super::compared::Compared;
 use super::component_estimate::estimate;
 use super::components::{ObserverComponents, SensorClass};
 use super::congruence::{reweighted, standing};
@@ -8,13 +9,15 @@ use super::contrast::contrasts;
 use super::cross_check::{CrossCheck, cross_check};
 use super::epoch_pair::{EpochErrorParams, EpochPair, all_sights};
 use super::joint::JointErrors;
+use super::lone_area::LoneArea;
 use super::model::{Prior, Problem, Row, Solution, Unknowns};
 use super::observation::{Observation, in_face};
 use super::relative::relative_errors;
 use super::rigid::{RigidError, difference_row, neighbour_row, rigid_rows, shares};
 use super::sensors::Sharpest;
-use super::sight::{SeenStone, Source};
+use super::sight::{SeenStone, Sight, Source};
 use super::stable::stable_observations;
+use crate::progress::{Interrupted, Progress};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -76,6 +79,9 @@ pub struct EpochErrors {
     /// Stable areas that moved against the others; they are left out.
     #[serde(default)]
     pub moved_areas: Vec<usize>,
+    /// The stable area that shows an error which nothing else confirms, if there is one.
+    #[serde(default)]
+    pub lone_area: Option<LoneArea>,
     /// Per source, in their order.
     pub sources: Vec<SourceError>,
     /// The rigid part of the error over all stones.
@@ -121,22 +127,35 @@ const OPEN_M: f64 = 0.03;
 ///
 /// Cost: three evaluations of the compared stones' points; then dense algebra over the unknowns of the
 /// sources.
-pub fn epoch_errors(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
+///
+/// # Errors
+/// The caller stopped the work.
+pub fn epoch_errors(
+    pair: &EpochPair,
+    params: &EpochErrorParams,
+    progress: &dyn Progress,
+) -> Result<EpochErrors, Interrupted> {
     match Sharpest::of(pair) {
-        Some(sharpest) => of_sources(&sharpest.pair(pair), params),
-        None => of_sources(pair, params),
+        Some(sharpest) => of_sources(&sharpest.pair(pair), params, progress),
+        None => of_sources(pair, params, progress),
     }
 }
 
 /// Errors of the epochs from sources that are all used.
-fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
+fn of_sources(
+    pair: &EpochPair,
+    params: &EpochErrorParams,
+    progress: &dyn Progress,
+) -> Result<EpochErrors, Interrupted> {
     let class = SensorClass::of_noise(pair.sigma_m);
     let shared_error_m = params.shared_error_m.unwrap_or(class.shared_error_m());
     let mut within: [Vec<Observation>; 2] =
         [0, 1].map(|e| contrasts(pair.sources, pair.stones, e, &params.contrasts));
     let stable = stable_observations(pair.stable, pair.sigma_m, &params.stable);
-    let unknowns = Unknowns::new(pair.sources, &all_sights(pair, &stable), class);
-    let (components, significance) = estimated(&unknowns, &mut within, class);
+    let sights = all_sights(pair, &stable);
+    let unknowns = Unknowns::new(pair.sources, &sights, class);
+    let (components, significance) =
+        estimated((pair.sources, &sights), &unknowns, &mut within, class, progress)?;
     let overlaps = within.iter().all(|w| !w.is_empty());
     let is_significant = overlaps && significance > SIGNIFICANT;
     let whole_m = match is_one_survey(pair) {
@@ -161,6 +180,7 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
     let unknowns = unknowns.with_planes(&stable);
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
     let judging = model.widened(&unknowns, &all);
+    progress.check()?;
     let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);
     let observations = [within[0].len(), within[1].len(), stable.len()];
     let datum = if stable.len() >= params.stable.min_cells {
@@ -175,13 +195,17 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
         moved_areas.clear();
     }
     let all: Vec<&Observation> = within.iter().flatten().chain(&stable).collect();
+    let assumed = model;
     let model = match datum {
-        Datum::Stable => model.widened(&unknowns, &all),
-        Datum::Sources | Datum::Unknown => model,
+        Datum::Stable => assumed.widened(&unknowns, &all),
+        Datum::Sources | Datum::Unknown => assumed,
     };
+    progress.check()?;
     let reweighted = reweighted(&unknowns, &all, &model);
     let found = Averaged::new(&unknowns, &reweighted.iter().collect::<Vec<_>>(), &model);
-    let rigid = rigid_rows(pair, &unknowns).error(&found.weighted());
+    let rows = rigid_rows(pair, &unknowns);
+    let rigid = rows.error(&found.weighted());
+    let lone_area = LoneArea::among(&stable, &within, &unknowns, &assumed, &rows, &rigid);
     let relative = match datum {
         Datum::Unknown => relative_errors(pair, &within, &components, class, params),
         Datum::Stable | Datum::Sources => None,
@@ -205,7 +229,7 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
         Datum::Sources => cross_check(pair, &within, &rigid, &model, params),
         Datum::Stable | Datum::Unknown => None,
     };
-    EpochErrors {
+    Ok(EpochErrors {
         datum,
         class,
         shared_error_m,
@@ -214,6 +238,7 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
         significance,
         observations,
         moved_areas,
+        lone_area,
         sources: found.sources(pair, &unknowns),
         rigid,
         cross_check,
@@ -222,7 +247,7 @@ fn of_sources(pair: &EpochPair, params: &EpochErrorParams) -> EpochErrors {
         relative,
         between,
         joint,
-    }
+    })
 }
 
 /// The error of each stone's motion, from that of its points: the rigid part as it is, the rest as the solution follows
@@ -247,25 +272,33 @@ fn counts(pair: &EpochPair) -> [usize; 2] {
 
 /// The components, and twice what they gain in log likelihood over sources without errors; disturbed stones
 /// lose weight on the way.
+///
+/// # Errors
+/// The caller stopped the work.
 fn estimated(
+    (sources, sights): (&[Source], &[Sight]),
     unknowns: &Unknowns,
     within: &mut [Vec<Observation>; 2],
     class: SensorClass,
-) -> (ObserverComponents, f64) {
+    progress: &dyn Progress,
+) -> Result<(ObserverComponents, f64), Interrupted> {
     let expected = ObserverComponents::expected(class);
     if within.iter().all(Vec::is_empty) {
-        return (expected, 0.0);
+        return Ok((expected, 0.0));
     }
     let mut components = expected;
     for round in 0..2 {
         let all: Vec<&Observation> = within.iter().flatten().collect();
+        let compared = Compared::of(sources, sights, &all);
+        let of_compared = Unknowns::new(&compared.sources, &compared.sights, class);
+        let observations: Vec<&Observation> = compared.observations.iter().collect();
+        components = estimate(&Problem::new(&of_compared, &observations), class, progress)?;
         let problem = Problem::new(unknowns, &all);
-        components = estimate(&problem, class);
         let prior = Prior::new(&components, 0.0);
         if round == 0
-            && let Some(solution) = problem.solve(&prior, &components)
+            && let Some(mean) = problem.mean(&prior, &components)
         {
-            let weights = problem.weights(&solution.mean, &components);
+            let weights = problem.weights(&mean, &components);
             within
                 .iter_mut()
                 .flatten()
@@ -279,7 +312,7 @@ fn estimated(
     let gain = deviance(&components.scaled(1e-3))
         .zip(deviance(&components))
         .map_or(0.0, |(without, with)| without - with);
-    (components, gain)
+    Ok((components, gain))
 }
 
 /// Components of sources whose errors only stable areas show.

@@ -23,6 +23,7 @@
 //! Frame: world; metres, seconds, radians.
 
 mod assumptions;
+mod compared;
 mod component_estimate;
 mod components;
 mod congruence;
@@ -31,6 +32,7 @@ mod cross_check;
 mod epoch_error;
 mod epoch_pair;
 mod joint;
+mod lone_area;
 mod model;
 mod observation;
 mod relative;
@@ -48,6 +50,7 @@ pub use cross_check::CrossCheck;
 pub use epoch_error::{Datum, EpochErrors, ErrorAt, SourceError, epoch_errors};
 pub use epoch_pair::{EpochErrorParams, EpochPair};
 pub use joint::JointErrors;
+pub use lone_area::LoneArea;
 pub use response::Response;
 pub use sight::{SeenStone, Source, SourcePoints};
 pub use stable::{StableParams, StablePoints};

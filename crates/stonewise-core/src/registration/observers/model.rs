@@ -3,6 +3,7 @@
 use super::components::{MergedDrift, ObserverComponents, SensorClass, Stretch};
 use super::observation::Observation;
 use super::sight::{Sight, Source, StablePlane, Target};
+use crate::linalg::DenseFactor;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Point3, Vector3};
 use std::collections::BTreeMap;
 
@@ -414,7 +415,7 @@ impl<'a> Problem<'a> {
         &self,
         prior: &Prior,
         components: &ObserverComponents,
-    ) -> Option<(Cholesky<f64, Dyn>, DVector<f64>, f64)> {
+    ) -> Option<(DenseFactor, DVector<f64>, f64)> {
         let (mut information, prior_log_det) = self.unknowns.prior(prior);
         let mut vector = DVector::zeros(self.unknowns.count());
         let mut deviance = -prior_log_det;
@@ -434,14 +435,19 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        Some((Cholesky::new(information)?, vector, deviance))
+        Some((DenseFactor::of(&information)?, vector, deviance))
     }
 
     /// Minus twice the log marginal likelihood, up to a constant; `None` where the numbers fail.
     pub fn deviance(&self, prior: &Prior, components: &ObserverComponents) -> Option<f64> {
         let (factor, vector, deviance) = self.normal(prior, components)?;
-        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
-        Some(deviance + log_det - vector.dot(&factor.solve(&vector)))
+        Some(deviance + factor.log_det() - vector.dot(&factor.solve(&vector)))
+    }
+
+    /// The unknowns without their covariance; `None` where the numbers fail.
+    pub fn mean(&self, prior: &Prior, components: &ObserverComponents) -> Option<DVector<f64>> {
+        let (factor, vector, _) = self.normal(prior, components)?;
+        Some(factor.solve(&vector))
     }
 
     /// The unknowns; `None` where the numbers fail.

@@ -34,6 +34,32 @@ impl Observation {
         self.values.len()
     }
 
+    /// What it says of some of its sights, by their places in `sights`, two at least: differences against the first of
+    /// them.
+    pub fn among(&self, kept: &[usize]) -> Self {
+        let m = self.directions.len();
+        let [first, others @ ..] = kept else {
+            return self.clone();
+        };
+        let mut differences = DMatrix::zeros(m * others.len(), self.len());
+        for (row, k) in others.iter().enumerate() {
+            for (sight, sign) in [(*k, 1.0), (*first, -1.0)] {
+                if sight > 0 {
+                    let mut block = differences.view_mut((m * row, m * (sight - 1)), (m, m));
+                    block.fill_diagonal(sign);
+                }
+            }
+        }
+        Self {
+            sights: kept.iter().map(|&k| self.sights[k]).collect(),
+            directions: self.directions.clone(),
+            values: &differences * &self.values,
+            covariance: &differences * &self.covariance * differences.transpose(),
+            face_from_world: self.face_from_world,
+            weight: self.weight,
+        }
+    }
+
     /// Covariance of the differences with the noise of the points times `scale` and an independent error of
     /// each sight, standard deviations `nugget_m` in the face and across it.
     pub fn covariance(&self, scale: f64, nugget_m: [f64; 2]) -> DMatrix<f64> {

@@ -348,17 +348,25 @@ fn mean_normal(plane: &CellPlane, planes: &[(usize, CellPlane)], params: &Stable
     sum.try_normalize(0.0).unwrap_or(plane.normal)
 }
 
-/// Centre, normal and ascending variances along the principal axes.
+/// Centre, normal and ascending variances along the principal axes, of each source's points about their own mean: what
+/// lies between the sources is what is measured, and would tilt the plane.
 fn plane_of(points: &[CellPoint]) -> Option<(Point3<f64>, Vector3<f64>, [f64; 3])> {
     if points.len() < 8 {
         return None;
     }
     let count = points.len() as f64;
     let centre = Point3::from(points.iter().map(|p| p.place.coords).sum::<Vector3<f64>>() / count);
+    let mut sums: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
     let mut spread = Matrix3::zeros();
     for p in points {
         let d = p.place - centre;
         spread += d * d.transpose() / count;
+        let (n, sum) = sums.entry(p.source).or_insert((0.0, Vector3::zeros()));
+        *n += 1.0;
+        *sum += d;
+    }
+    for (n, sum) in sums.values() {
+        spread -= sum * sum.transpose() / (n * count);
     }
     let eigen = spread.symmetric_eigen();
     let mut order = [0, 1, 2];

@@ -9,6 +9,7 @@ use super::observation::Observation;
 use super::sight::{SeenStone, Sight, Source, SourcePoints, Target};
 use super::stable::{StableParams, StablePoints, stable_observations};
 use crate::cloud::Cloud;
+use crate::progress::Silent;
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -84,7 +85,7 @@ fn the_size_of_the_sources_errors_is_found_within_its_sampling_range() {
     let all: Vec<&Observation> = list.iter().collect();
     let sights: Vec<Sight> = list.iter().flat_map(|o| o.sights.clone()).collect();
     let unknowns = Unknowns::new(&sources(count), &sights, SensorClass::Airborne);
-    let found = estimate(&Problem::new(&unknowns, &all), SensorClass::Airborne);
+    let found = estimate(&Problem::new(&unknowns, &all), SensorClass::Airborne, &Silent).unwrap();
     assert!((0.0022..0.0042).contains(&found.translation_m), "{found:?}");
     assert!(found.drift_m < 0.001 && found.noise_scale < 1.5, "{found:?}");
 }
@@ -128,7 +129,7 @@ fn a_stretch_that_all_stations_share_is_not_taken_for_errors_of_their_registrati
     let class = SensorClass::Terrestrial;
     let unknowns = Unknowns::new(&sources(count), &sights, class);
     let problem = Problem::new(&unknowns, &all);
-    let components = estimate(&problem, class);
+    let components = estimate(&problem, class, &Silent).unwrap();
     // The scatter of 72 shifts has a standard error of a tenth.
     assert!(
         (0.2e-3..0.4e-3).contains(&components.translation_m),
@@ -310,7 +311,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
             sigma_m: 0.002,
             response: None,
         };
-        epoch_errors(&pair, &EpochErrorParams::default())
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
     let truth = 0.5 * (ERRORS[2] + ERRORS[3] - ERRORS[0] - ERRORS[1]);
     let with = found(&stable);
@@ -409,7 +410,7 @@ fn an_area_that_moved_is_named_and_left_out() {
             sigma_m: 0.002,
             response: None,
         };
-        epoch_errors(&pair, &EpochErrorParams::default())
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
     let still = found(Vector3::zeros());
     assert_eq!(still.moved_areas, Vec::<usize>::new());
@@ -442,12 +443,46 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         sigma_m: 0.002,
         response: None,
     };
-    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
     for at in &found.at {
         let rest = at.mean - truth;
         assert!(rest.norm() < 3e-4, "{rest}");
     }
+}
+
+#[test]
+fn an_error_that_one_stable_area_alone_shows_is_named() {
+    let sources = sources(2);
+    // Sources that differ, of epochs that agree on the mean.
+    let mean = |e: usize| 0.5 * (ERRORS[e] + ERRORS[e + 1]);
+    let errors = [0, 1, 2, 3].map(|k| 0.3 * (ERRORS[k] - mean(k / 2 * 2)));
+    let shift = Vector3::new(0.02, -0.015, 0.0);
+    let lone_area = |shift: Vector3<f64>, areas: usize| {
+        let mut of_area = errors;
+        of_area[2..].iter_mut().for_each(|e| *e += shift);
+        let beside = |area: usize| Vector3::new(3.0 * area as f64, 0.0, 0.0);
+        let stable: Vec<StablePoints> = (0..areas)
+            .flat_map(|area| stable_area(area, &beside(area), &of_area, 0.002))
+            .collect();
+        let pair = EpochPair {
+            sources: &sources,
+            stones: &wall(&errors, 0.002, 1),
+            neighbours: &[],
+            stable: &stable,
+            offered: &[],
+            sigma_m: 0.002,
+            response: None,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
+            .unwrap()
+            .lone_area
+    };
+    assert_eq!(lone_area(Vector3::zeros(), 1), None);
+    let lone = lone_area(shift, 1).expect("nothing confirms 25 mm");
+    assert_eq!(lone.area, 0);
+    assert!((lone.shift - shift).norm() < 1e-3, "{}", lone.shift);
+    assert_eq!(lone_area(shift, 2), None, "the areas confirm each other");
 }
 
 #[test]
@@ -472,7 +507,7 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
             sigma_m: 0.002,
             response: None,
         };
-        epoch_errors(&pair, &EpochErrorParams::default())
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
     // An error of the epoch as small as the differences between its sources: no contradiction.
     let own = 0.5 * (ERRORS[2] + ERRORS[3] - ERRORS[0] - ERRORS[1]);
@@ -520,7 +555,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
         response: None,
     };
     // One survey: nothing else is uncertain where the same sources count alike.
-    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     let [inside, across] = found.components.unwrap().nugget_m;
     for (k, share) in [(3, 1.0), (20, 2.0)] {
         let covariance = found.at[k].covariance;
@@ -546,7 +581,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
         sigma_m: 0.002,
         response: None,
     };
-    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(
         found.datum,
         Datum::Unknown,
@@ -591,7 +626,7 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
         sigma_m: 0.002,
         response: None,
     };
-    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(
         (found.datum, found.merged_error_m),
         (Datum::Unknown, Some(0.7e-3))

@@ -2,11 +2,12 @@
 
 use super::datum::is_one_survey;
 use super::off_wall::OffWall;
-use super::registered::Registered;
+use super::registered::{Registered, STEP};
 use super::sights::Sights;
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
+use crate::texts::notices::TOO_MANY_SOURCES;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
 use stonewise_core::registration::JointMotions;
@@ -31,6 +32,12 @@ pub(super) fn add_epoch_error(
     };
     registered.off_wall = off_wall.areas().to_vec();
     let sights = Sights::gather(project, epochs, labelled, matches, &off_wall, context.progress)?;
+    for (id, count) in epochs.into_array().into_iter().zip(sights.too_many) {
+        if let Some(count) = count {
+            let message = TOO_MANY_SOURCES.say(&[("n", count.to_string().into())]);
+            context.warnings.notice(STEP, &project.epochs[id].name, message);
+        }
+    }
     let neighbours = registered.neighbours_among(&sights.stones);
     let pair = EpochPair {
         sources: &sights.sources,
@@ -48,7 +55,7 @@ pub(super) fn add_epoch_error(
         shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),
         ..params.observers.clone()
     };
-    let errors = epoch_errors(&pair, &observers);
+    let errors = epoch_errors(&pair, &observers, context.progress)?;
     registered.add_registration(&errors.between);
     registered.epoch_errors = Some(errors);
     registered.error_stones = sights.stones;

@@ -6,8 +6,8 @@ use crate::pipeline::context::Context;
 use crate::results::records::{Datum, DatumState, EstimatorRecord};
 use crate::texts::Said;
 use crate::texts::notices::{
-    AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, OFF_WALL_MOVED, OFF_WALL_TOO_FEW, STABLE_MOVED,
-    STABLE_TOO_FEW,
+    AREA_OFF_WALL, AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, NAMED_AREA, NUMBERED_AREA,
+    OFF_WALL_TOO_FEW, STABLE_ALONE, STABLE_MOVED, STABLE_TOO_FEW,
 };
 use nalgebra::Point3;
 use stonewise_core::epoch::EpochId;
@@ -78,19 +78,22 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
         .epoch_errors
         .as_ref()
         .is_some_and(|e| e.datum == observers::Datum::Stable);
-    let moved = registered.epoch_errors.iter().flat_map(|e| &e.moved_areas);
-    for &area in moved {
-        match area.checked_sub(named).and_then(|k| registered.off_wall.get(k)) {
-            None => {
-                let message = STABLE_MOVED.say(&[("n", (area + 1).to_string().into())]);
-                context.warnings.skipped(STEP, epoch, message);
+    if let Some(errors) = &registered.epoch_errors {
+        for &area in &errors.moved_areas {
+            let message = STABLE_MOVED.say(&[("area", name_of(context, registered, area))]);
+            match area < named {
+                true => context.warnings.skipped(STEP, epoch, message),
+                false => context.warnings.notice(STEP, epoch, message),
             }
-            Some([low, high]) => {
-                let middle: [f64; 3] = nalgebra::center(low, high).into();
-                let place = Said::list(&middle.map(|m| format!("{m:.1}")));
-                let message = OFF_WALL_MOVED.say(&[("place", place)]);
-                context.warnings.notice(STEP, epoch, message);
-            }
+        }
+        if let Some(lone) = &errors.lone_area {
+            let shift_mm = Said::numbers(format!("{:.1}", 1e3 * lone.shift.norm()));
+            let message = STABLE_ALONE.say(&[
+                ("area", name_of(context, registered, lone.area)),
+                ("shift_mm", shift_mm),
+                ("sds", format!("{:.0}", lone.standard_deviations).into()),
+            ]);
+            context.warnings.notice(STEP, epoch, message);
         }
     }
     let values = [("cells", cells.to_string().into())];
@@ -101,5 +104,22 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
         context
             .warnings
             .notice(STEP, epoch, OFF_WALL_TOO_FEW.say(&values));
+    }
+}
+
+/// A stable area as a sentence names it: those of the project first, then those off the wall.
+fn name_of(context: &Context, registered: &Registered, area: usize) -> Said {
+    let stable = &context.project.settings.registration.stable;
+    if let Some(name) = stable.get(area).and_then(|named| named.name()) {
+        return NAMED_AREA.say(&[("name", name.into())]);
+    }
+    let off_wall = area.checked_sub(stable.len());
+    match off_wall.and_then(|k| registered.off_wall.get(k)) {
+        Some([low, high]) => {
+            let middle: [f64; 3] = nalgebra::center(low, high).into();
+            let place = Said::list(&middle.map(|m| format!("{m:.1}")));
+            AREA_OFF_WALL.say(&[("place", place)])
+        }
+        None => NUMBERED_AREA.say(&[("n", (area + 1).to_string().into())]),
     }
 }

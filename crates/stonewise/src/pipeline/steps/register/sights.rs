@@ -27,6 +27,8 @@ const STABLE_POINTS: u32 = 40;
 pub struct Sights {
     /// Those of the reference epoch, then those of the later one.
     pub sources: Vec<Source>,
+    /// Number of sources of an epoch that count as one, because they are too many.
+    pub too_many: [Option<usize>; 2],
     /// Stones of the reference epoch, in the order of `seen`.
     pub stones: Vec<StoneId>,
     /// What the sources show of them.
@@ -75,6 +77,7 @@ impl Sights {
         }
         let places = matched_stones(&labelled.first.stones, matches);
         let mut sights = Self {
+            too_many: [0, 1].map(|e| of_epoch[e].too_many),
             stones: places.iter().map(|(first, _, _)| *first).collect(),
             seen: Vec::new(),
             stable: Vec::new(),
