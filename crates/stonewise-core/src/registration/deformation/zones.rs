@@ -5,6 +5,7 @@ use super::found::{DeformationZone, ZoneKind};
 use super::rigid_part::RigidPart;
 use super::scan::{MostLikely, Scan};
 use crate::components::components;
+use crate::geometry::FaceFrame;
 use crate::statistics::discoveries;
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -25,6 +26,8 @@ const TILTED: f64 = 0.8;
 const UNEVEN: f64 = 0.3;
 /// Fewest stones that show a tilt.
 const TILT_STONES: usize = 6;
+/// Cosine of the angle to the vertical above which a face lies level, as on a step or a crest.
+const LEVEL: f64 = 0.7;
 
 /// The zones of a body that deformed; their numbers are left open.
 ///
@@ -95,6 +98,7 @@ fn described(
     largest_m: f64,
     interval_m: [f64; 2],
 ) -> DeformationZone {
+    let in_face = &in_wall(body, stones, in_face);
     let mean_m = in_face.iter().sum::<Vector3<f64>>() / stones.len() as f64;
     let mut ids: Vec<_> = stones.iter().map(|&i| body.stones[i].id).collect();
     ids.sort_unstable();
@@ -106,6 +110,26 @@ fn described(
         mean_m,
         kind: kind(body, stones, in_face, &mean_m),
     }
+}
+
+/// The motions (along, up, out) with those of level faces along, up and out of the upright wall around them: what moves
+/// out of a level face rises.
+fn in_wall(body: &Body, stones: &[usize], in_face: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let frame = |i: usize| body.stones[i].joint.face_from_world;
+    let out = |i: usize| frame(i).row(2).transpose();
+    let is_level = |i: usize| out(i).z.abs() > LEVEL;
+    let upright = |stones: &mut dyn Iterator<Item = usize>| {
+        let sum: Vector3<f64> = stones.filter(|&i| !is_level(i)).map(out).sum();
+        Vector3::new(sum.x, sum.y, 0.0).try_normalize(0.0)
+    };
+    let wall = upright(&mut stones.iter().copied()).or_else(|| upright(&mut (0..body.stones.len())));
+    let of_stone = |(&i, motion): (&usize, &Vector3<f64>)| match &wall {
+        Some(out) if is_level(i) => {
+            FaceFrame::from_normal(out).face_from_world() * frame(i).transpose() * motion
+        }
+        _ => *motion,
+    };
+    stones.iter().zip(in_face).map(of_stone).collect()
 }
 
 /// What the motions of a zone (along, up, out) resemble: by their largest mean component, and across the wall by
