@@ -192,7 +192,7 @@ impl Default for RegistrationParams {
 impl Params for RegistrationParams {
     fn ranges(&self) -> Vec<Ranged> {
         vec![
-            Range::NOT_NEGATIVE.holds("epoch_error_m", self.epoch_error_m),
+            Range::between(0.0, 1.0).holds("epoch_error_m", self.epoch_error_m),
             Range::NOT_NEGATIVE.holds("border_noises", self.border_noises),
         ]
     }

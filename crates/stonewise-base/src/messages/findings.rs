@@ -35,6 +35,8 @@ messages! {
         SAME_FILE = "same-cloud": "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
         SAME_POINTS = "same-cloud": "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
             "{share} % der Punkte sind die der Epoche {first}: ist die Punktwolke einer Epoche eine Kopie der anderen?";
+        STABLE_EMPTY = "stable-empty": "{area} holds no point of this epoch: give its place in the frame of the clouds, in metres",
+            "{area} enthält keinen Punkt dieser Epoche: ihren Ort im System der Punktwolken angeben, in Metern";
         TWICE = "points-twice": "{share} % of the points are there twice and would count twice, so the intervals of motions would be too small: name \
                 each cloud only once",
             "{share} % der Punkte sind doppelt vorhanden und würden doppelt zählen; die Intervalle der Bewegungen wären dann zu klein: \

@@ -32,6 +32,13 @@ messages! {
             nicht. Zeigen die meisten Fotos einen Stein, sind es {best} %, und die Fotos finden {found} von {sought} Steinen dort, wo Punktwolken und \
             Kameras sie vermuten lassen; diese passen also zueinander, und Bewegungen leiden nicht darunter";
 
+        STONES_MISSED_BY_VOTES = "stones-missed":
+            "a typical stone gets {share} % of the photos' votes on its points: the detector misses it in some photos that show it. Where \
+            the most photos show a stone, that is {best} %, so clouds and cameras fit each other, and motions do not suffer",
+            "ein typischer Stein erhält {share} % der Stimmen der Fotos zu seinen Punkten: in manchen Fotos, die ihn zeigen, findet ihn der \
+            Detektor nicht. Zeigen die meisten Fotos einen Stein, sind es {best} %; Punktwolken und Kameras passen also zueinander, und \
+            Bewegungen leiden nicht darunter";
+
         COMPONENT_AT_BOUND = "component-at-bound":
             "the variance component \"{name}\" lies at the upper end of its range: the survey shows larger differences than are expected of \
             masonry. Parts of the wall moved unlike the rest, clouds of the epochs do not fit each other, or masks are no stones",

@@ -13,6 +13,7 @@ mod photos;
 mod repeats;
 mod resources;
 mod sample;
+mod stable;
 mod unreadable;
 
 pub use depth::Depth;
@@ -87,6 +88,7 @@ pub fn check(project: &Project, out: &Path, depth: Depth, progress: &dyn Progres
     report.findings.extend(unreadable.findings);
     report.findings.extend(clouds::look(project, &surveys));
     report.findings.extend(repeats::look(project, &surveys));
+    report.findings.extend(stable::look(project, &surveys));
     if surveys.iter().all(Option::is_some) {
         report
             .findings

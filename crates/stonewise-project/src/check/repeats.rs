@@ -7,14 +7,14 @@ use super::clouds::read;
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{CLOUDS, ROUGH, ROUNDED, SAME_POINTS, TWICE};
 use stonewise_core::geometry::cell_of;
 use stonewise_core::statistics::{split_mix, upper_median};
 
 /// Edge of the cells, metres; points in the same cell count as the same point. A tenth of what scanners
-/// resolve.
+/// resolve. Points of two epochs are compared in steps of the coarser coordinates, if those are larger.
 const SAME_M: f64 = 1e-4;
 /// About how many points of an epoch are compared.
 const COMPARED: usize = 400_000;
@@ -37,7 +37,7 @@ const STEP_SDS: f64 = 3.464;
 /// Looks for repeated points and for coarse steps of the coordinates.
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
-    let mut earlier: Vec<(&str, Cells)> = Vec::new();
+    let mut earlier: Vec<(&str, &[Point3<f64>], f64)> = Vec::new();
     for (epoch, survey) in read(project, surveys) {
         let mut say =
             |verdict: Verdict, text: Said| found.push(Finding::new(&epoch.name, &CLOUDS, verdict, text));
@@ -56,23 +56,23 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         if step_m > spacing_m * CHANCE_STEP {
             continue;
         }
-        let cells = Cells::of(&survey.points);
-        let twice = cells.share_of_repeats();
+        let twice = Cells::of(&survey.points, SAME_M).share_of_repeats();
         if twice > TOO_MANY {
             say(Verdict::Doubt, TWICE.say(&[("share", percent(twice).into())]));
         }
         // A known motion moves the points after this look.
         let is_moved = epoch.motion.is_some();
-        for (name, other) in earlier.iter().filter(|_| !is_moved) {
-            let same = cells.share_in(other);
+        for &(name, other, other_step_m) in earlier.iter().filter(|_| !is_moved) {
+            let cell_m = SAME_M.max(step_m).max(other_step_m);
+            let same = Cells::of(&survey.points, cell_m).share_in(&Cells::of(other, cell_m));
             if same > TOO_MANY {
                 say(
                     Verdict::Doubt,
-                    SAME_POINTS.say(&[("share", percent(same).into()), ("first", (*name).into())]),
+                    SAME_POINTS.say(&[("share", percent(same).into()), ("first", name.into())]),
                 );
             }
         }
-        earlier.push((&epoch.name, cells));
+        earlier.push((&epoch.name, &survey.points, step_m));
     }
     found
 }
@@ -89,11 +89,13 @@ struct Cells {
 }
 
 impl Cells {
-    fn of(points: &[Point3<f64>]) -> Self {
+    /// Cells of this edge, in whose middles the points of coordinates with this step lie.
+    fn of(points: &[Point3<f64>], cell_m: f64) -> Self {
         // A power of two, so that the cells of one epoch are among those of another.
         let thinning = (points.len() / COMPARED + 1).next_power_of_two() as u64;
         let mut counts: HashMap<[i64; 3], u32> = HashMap::new();
-        let cells = points.iter().map(|p| cell_of(p, SAME_M));
+        let middle = Vector3::repeat(0.5 * cell_m);
+        let cells = points.iter().map(|p| cell_of(&(p + middle), cell_m));
         for cell in cells.filter(|cell| is_counted(cell, thinning)) {
             *counts.entry(cell).or_default() += 1;
         }
@@ -172,14 +174,23 @@ mod tests {
     #[test]
     fn shares_of_repeated_points_are_those_that_were_repeated() {
         let (one, other) = (wall(1), wall(2));
-        let cells = Cells::of(&one);
+        let cells = Cells::of(&one, SAME_M);
         assert!(cells.share_of_repeats() < 0.01);
-        assert!(Cells::of(&other).share_in(&cells) < 0.01);
-        assert!((Cells::of(&one[..40_000]).share_in(&cells) - 1.0).abs() < 1e-9);
+        assert!(Cells::of(&other, SAME_M).share_in(&cells) < 0.01);
+        assert!((Cells::of(&one[..40_000], SAME_M).share_in(&cells) - 1.0).abs() < 1e-9);
         let half: Vec<_> = one[..55_000].iter().chain(&other[..55_000]).copied().collect();
-        assert!((Cells::of(&half).share_in(&cells) - 0.5).abs() < 0.02);
+        assert!((Cells::of(&half, SAME_M).share_in(&cells) - 0.5).abs() < 0.02);
         let twice: Vec<_> = one.iter().chain(&one).copied().collect();
-        assert!((Cells::of(&twice).share_of_repeats() - 1.0).abs() < 1e-9);
+        assert!((Cells::of(&twice, SAME_M).share_of_repeats() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_survey_is_known_again_in_coarser_coordinates() {
+        let (one, other) = (wall(5), wall(6));
+        let coarse = |points: &[Point3<f64>]| Cells::of(&in_steps(points, 1e-3), 1e-3);
+        let cells = Cells::of(&one, 1e-3);
+        assert!(coarse(&one).share_in(&cells) > 0.99);
+        assert!(coarse(&other).share_in(&cells) < 0.05);
     }
 
     #[test]
@@ -189,10 +200,10 @@ mod tests {
             .flat_map(|i| wall(10 + i))
             .chain(one.iter().copied())
             .collect();
-        let cells = Cells::of(&many);
+        let cells = Cells::of(&many, SAME_M);
         assert!(cells.thinning > 1, "{}", cells.thinning);
-        assert!((Cells::of(&one).share_in(&cells) - 1.0).abs() < 1e-9);
-        assert!(Cells::of(&other).share_in(&cells) < 0.02);
+        assert!((Cells::of(&one, SAME_M).share_in(&cells) - 1.0).abs() < 1e-9);
+        assert!(Cells::of(&other, SAME_M).share_in(&cells) < 0.02);
         assert!(cells.share_of_repeats() < 0.03);
     }
 

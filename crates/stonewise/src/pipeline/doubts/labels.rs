@@ -3,7 +3,7 @@
 use super::fit::Fit;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::offsets::{LabelOffset, LabelOffsets};
-use crate::texts::notices::STONES_MISSED;
+use crate::texts::notices::{STONES_MISSED, STONES_MISSED_BY_VOTES};
 use crate::texts::{BESIDE, BESIDE_COMPARED, Message, Said, TORN};
 use stonewise_core::epoch::EpochId;
 use stonewise_core::statistics::upper_median;
@@ -29,15 +29,22 @@ const LEAST_STONES: usize = 8;
 
 /// Labels beside the stones: cameras and clouds do not fit each other.
 pub(super) fn beside(context: &Context, later: EpochId, offsets: &LabelOffsets) -> Vec<(String, Said)> {
-    let [first, second] = context.project.epochs.pair(later).map(|e| &e.name).into_array();
+    let epochs = context.project.epochs.pair(later);
+    let [first, second] = epochs.map(|e| &e.name).into_array();
+    // Views fit the clouds that they were made of.
+    let [of_photos, of_later_photos] = epochs.map(|e| e.photos.is_some()).into_array();
     // The first epoch takes part in every pair.
-    let of_first = offsets.first.filter(|_| later == EpochId::at(1));
-    let within = [(first, &of_first), (second, &offsets.second)]
+    let of_first = offsets.first.filter(|_| of_photos && later == EpochId::at(1));
+    let of_second = offsets.second.filter(|_| of_later_photos);
+    let within = [(first, &of_first), (second, &of_second)]
         .into_iter()
         .filter_map(|(name, offset)| Some((name.clone(), off_place(&BESIDE, offset.as_ref()?, first)?)));
     let within: Vec<(String, Said)> = within.collect();
     let between = || {
-        let offset = offsets.between.as_ref()?;
+        let offset = offsets
+            .between
+            .as_ref()
+            .filter(|_| of_photos && of_later_photos)?;
         Some((second.clone(), off_place(&BESIDE_COMPARED, offset, first)?))
     };
     match within.is_empty() {
@@ -112,8 +119,12 @@ impl Votes {
     }
 
     pub fn missed(self, fit: Fit) -> Said {
-        let ([share, best], [found, sought]) = (self.percent(), fit.values());
-        STONES_MISSED.say(&[("share", share), ("best", best), found, sought])
+        let [share, best] = self.percent();
+        let votes = [("share", share), ("best", best)];
+        match fit.holds() {
+            Some(_) => STONES_MISSED.say(&[votes, fit.values()].concat()),
+            None => STONES_MISSED_BY_VOTES.say(&votes),
+        }
     }
 
     fn percent(self) -> [Said; 2] {
@@ -168,6 +179,8 @@ mod tests {
             message.english.contains("62 %") && message.english.contains("100 %"),
             "{message}"
         );
+        let message = votes(&missed).missed(UNKNOWN);
+        assert!(!message.english.contains(" of "), "{message}");
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
         assert!(!votes(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })).are_few());
         assert!(Votes::of(&stones(21, 1, |_| 0.5)).is_none());

@@ -12,6 +12,7 @@ use crate::pipeline::graph::{About, Need, PartKind, Parts, Run, Step};
 use crate::pipeline::part::Part;
 use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::segment::{SEGMENT, Segmented};
+use crate::pipeline::steps::views::has_no_photos;
 use crate::pipeline::until::Until;
 use crate::settings::Align;
 use crate::storage::step::{Key, StepDir};
@@ -240,8 +241,13 @@ pub(super) fn tabulate(run: &Run, epoch: EpochId, name: &str, labels: Labels) ->
     })?;
     let stones: Vec<Stone> = read_json(&step.file("stones.json"))?;
     if stones.is_empty() {
+        let is_of_views = has_no_photos(context.project, epoch);
         let why = match context.project.part {
             Some(_) => "are there stones in the part of the wall that the run is limited to?",
+            None if is_of_views => {
+                "the views of its cloud show none: the wall is smooth, or its points lie too far apart (25 distances \
+                 between points across a stone are needed); give posed photos"
+            }
             None => "do its cameras and clouds share one frame?",
         };
         let name = &context.project.epochs[epoch].name;
