@@ -317,6 +317,12 @@ def no_sources(scene):
         cloud.source[:] = 0
 
 
+def copied(scene):
+    """The second epoch is the first's cloud, exported again in millimetres."""
+    scene.clouds[1] = dataclasses.replace(scene.clouds[0])
+    scene.clouds[1].places = scene.clouds[0].places.round(3)
+
+
 def half(scene):
     """The second epoch shows little more than half of the wall."""
     cloud = scene.clouds[1]
@@ -443,6 +449,7 @@ SURVEYS = [
     Survey("m_no_sources", 63, edits=[no_sources], expected="cannot tell"),
     Survey("s_one_station", 86, edits=[one_station], expected="cannot tell"),
     Survey("s_half", 85, edits=[half]),
+    Survey("m_copied", 51, edits=[copied], expected="cannot tell"),
     # Whole walls and large parts that move.
     Survey("s_tilt", 16, edits=[tilt(0.002)], expected="attention"),
     Survey("m_tilt", 53, edits=[tilt(0.002)], expected="attention"),
