@@ -147,6 +147,25 @@ struct RawHeader {
     geoid: Option<Spanned<PathBuf>>,
 }
 
+/// A date, with or without quotes.
+#[derive(Deserialize)]
+#[serde(try_from = "toml::Value")]
+struct SurveyDate(Datetime);
+
+impl TryFrom<toml::Value> for SurveyDate {
+    type Error = String;
+
+    fn try_from(value: toml::Value) -> std::result::Result<Self, String> {
+        let date = match &value {
+            toml::Value::Datetime(date) => Some(*date),
+            toml::Value::String(text) => text.parse().ok(),
+            _ => None,
+        };
+        date.map(Self)
+            .ok_or_else(|| format!("{value} is no date: write it as 2024-05-31"))
+    }
+}
+
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RawEpoch {
@@ -155,7 +174,7 @@ struct RawEpoch {
     name: Spanned<String>,
     /// Date of the survey.
     #[schemars(with = "Option<String>")]
-    date: Option<Spanned<Datetime>>,
+    date: Option<Spanned<SurveyDate>>,
     /// Conditions during the survey: any numbers by name, such as `reservoir_level_m`.
     #[serde(default)]
     conditions: BTreeMap<String, f64>,
@@ -406,7 +425,7 @@ impl Source<'_> {
         }
         Ok(Epoch {
             name: raw.name.into_inner(),
-            date: raw.date.map(|d| d.into_inner().to_string()),
+            date: raw.date.map(|d| d.into_inner().0.to_string()),
             conditions: raw.conditions,
             clouds,
             photos,
@@ -600,7 +619,7 @@ impl Source<'_> {
     fn check_dates(&self, epochs: &[RawEpoch]) -> Result<()> {
         let dated = epochs.iter().filter_map(|epoch| {
             let date = epoch.date.as_ref()?;
-            Some((epoch, date.span(), date.get_ref().date?))
+            Some((epoch, date.span(), date.get_ref().0.date?))
         });
         let dated: Vec<_> = dated.collect();
         for pair in dated.windows(2) {
@@ -791,6 +810,7 @@ mod tests {
                 "date = 2025-01-01T08:00:00",
             ],
             ["", "date = 2024-05-01", ""],
+            ["date = \"2024-05-01\"", "date = 2024-05-02", ""],
         ] {
             assert!(read(sound).is_ok(), "{sound:?}");
         }
@@ -800,6 +820,11 @@ mod tests {
             "{message}"
         );
         assert!(message.contains("stonewise.toml:17: "), "{message}");
+        let message = read(["date = \"May 2024\"", "", ""]).unwrap_err();
+        assert!(
+            message.contains("stonewise.toml:5: \"May 2024\" is no date: write it as 2024-05-31"),
+            "{message}"
+        );
     }
 
     #[test]
