@@ -54,7 +54,7 @@ pub fn run(words: &Words) -> Outcome {
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
         response: None,
     };
-    let found = epoch_errors(&pair, &EpochErrorParams::default());
+    let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent)?;
     println!("{:?} in {:.1} s", found.datum, started.elapsed().as_secs_f64());
     println!(
         "{:#?} significance {:.1} observations {:?}\nstretch {:?}\n",

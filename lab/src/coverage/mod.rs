@@ -25,6 +25,7 @@ use errors::{Kind, Sensor};
 use figures::{Wall, begin, cells};
 use rayon::prelude::*;
 use small_wall::{Case, Stable, simulate};
+use stonewise_core::progress::{Interrupted, Silent};
 use stonewise_core::registration::observers::{EpochErrorParams, EpochPair, epoch_errors};
 
 pub fn run(words: &Words) -> Outcome {
@@ -57,7 +58,7 @@ pub fn run(words: &Words) -> Outcome {
                     let found: Vec<Wall> = (first..first + walls)
                         .into_par_iter()
                         .map(|seed| measure(&case, seed, words.has("full"), kept))
-                        .collect();
+                        .collect::<Result<_, Interrupted>>()?;
                     let label = format!("{sensor_name} {sources} {stable} {kind_name}");
                     table.row(cells(&label, found, started.elapsed().as_secs_f64()));
                 }
@@ -77,7 +78,7 @@ fn stable_of(word: &str) -> Stable {
     }
 }
 
-fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
+fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Result<Wall, Interrupted> {
     let survey = match is_full {
         true => full::simulate(case, seed),
         false => simulate(case, seed),
@@ -93,12 +94,12 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Wall {
             sigma_m: survey.sigma_m,
             response: None,
         };
-        epoch_errors(&pair, &EpochErrorParams::default())
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
     };
-    let found = with(&survey.stable);
+    let found = with(&survey.stable)?;
     let without = match survey.stable.is_empty() {
         true => None,
-        false => Some(with(&[])),
+        false => Some(with(&[])?),
     };
-    Wall::new(&survey, &found, without.as_ref())
+    Ok(Wall::new(&survey, &found, without.as_ref()))
 }

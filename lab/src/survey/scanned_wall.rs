@@ -92,7 +92,7 @@ impl ScannedWall {
                 stones: &ids,
             }),
         };
-        let errors = epoch_errors(&pair, &EpochErrorParams::default());
+        let errors = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
         let errors = errors.joint.as_ref().map(|e| (e, ids.as_slice()));
         let found = deformation(self.report.joint.as_ref().unwrap(), errors, &Silent).unwrap();
         (found, seen)
