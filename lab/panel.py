@@ -737,7 +737,7 @@ def rigid_part(places, motions, weight):
 
 def face_axes(normals):
     """Directions along, up and out of the face for each normal."""
-    along = np.cross([0, 0, 1], normals)
+    along = np.cross([0.0, 0.0, 1.0], normals)
     along /= np.linalg.norm(along, axis=1)[:, None]
     return np.stack([along, np.cross(normals, along), normals], axis=1)
 

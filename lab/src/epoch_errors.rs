@@ -53,6 +53,7 @@ pub fn run(words: &Words) -> Outcome {
         offered: &[],
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
         response: None,
+        is_aligned: false,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent)?;
     println!("{:?} in {:.1} s", found.datum, started.elapsed().as_secs_f64());

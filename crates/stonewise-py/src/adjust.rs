@@ -229,6 +229,7 @@ fn relative_errors(
         offered: &[],
         sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
         response: None,
+        is_aligned: false,
     };
     let errors = epoch_errors(&pair, params, progress)?;
     Ok(stones.iter().map(|s| s.id).zip(errors.relative).collect())

@@ -93,6 +93,7 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Result<Wall, In
             offered: &[],
             sigma_m: survey.sigma_m,
             response: None,
+            is_aligned: false,
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
     };

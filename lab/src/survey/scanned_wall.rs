@@ -91,6 +91,7 @@ impl ScannedWall {
                 motions,
                 stones: &ids,
             }),
+            is_aligned: false,
         };
         let errors = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
         let errors = errors.joint.as_ref().map(|e| (e, ids.as_slice()));

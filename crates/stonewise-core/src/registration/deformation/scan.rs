@@ -28,8 +28,9 @@ const DIAMETERS_M: [f64; 15] = [
 ];
 /// Distance of the middles of bulges, as a share of their diameter.
 const STRIDE: f64 = 0.25;
-/// Fewest stones of a bulge.
+/// Fewest stones of a bulge, and the share of its amplitude from which a stone is one of them: what moves less is the rim.
 const LEAST_STONES: usize = 3;
+const RIM: f64 = 0.25;
 /// A bulge of which a rigid motion explains all but this share of the information is none.
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
@@ -100,7 +101,7 @@ impl Bulge {
         let (direction, sd, information) = (0..3)
             .filter_map(shown)
             .max_by(|a, b| size(a).total_cmp(&size(b)))?;
-        let stones = self.stones.iter().filter(|(_, share)| *share > 0.25);
+        let stones = self.stones.iter().filter(|(_, share)| *share > RIM);
         Some(MostLikely {
             stones: stones.copied().collect(),
             direction,
@@ -276,7 +277,8 @@ fn bulges(body: &Body, firm: &[usize], model: &Model) -> Vec<Bulge> {
                 (r < 0.5 * diameter_m).then(|| (i, (PI * r / diameter_m).cos().powi(2)))
             };
             let stones: Vec<(usize, f64)> = near.around(&middle).filter_map(share).collect();
-            (stones.len() >= LEAST_STONES).then(|| Bulge {
+            let inside = stones.iter().filter(|(_, share)| *share > RIM).count();
+            (inside >= LEAST_STONES).then(|| Bulge {
                 diameter_m,
                 directions: model.directions(&stones),
                 stones,

@@ -73,6 +73,7 @@ impl Sharpest {
             neighbours: of.neighbours,
             sigma_m: of.sigma_m,
             response: of.response,
+            is_aligned: of.is_aligned,
         }
     }
 }

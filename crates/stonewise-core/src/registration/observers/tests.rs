@@ -310,6 +310,7 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
             offered: &[],
             sigma_m: 0.002,
             response: None,
+            is_aligned: false,
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -409,6 +410,7 @@ fn an_area_that_moved_is_named_and_left_out() {
             offered: &[],
             sigma_m: 0.002,
             response: None,
+            is_aligned: false,
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -442,6 +444,7 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         offered: &[],
         sigma_m: 0.002,
         response: None,
+        is_aligned: false,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
@@ -449,6 +452,35 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
         let rest = at.mean - truth;
         assert!(rest.norm() < 3e-4, "{rest}");
     }
+}
+
+#[test]
+fn epochs_that_were_aligned_by_their_stones_keep_the_errors_of_stations() {
+    let (stones, sources) = (wall(&ERRORS, 0.002, 1), sources(2));
+    let found = |is_aligned| {
+        let pair = EpochPair {
+            sources: &sources,
+            stones: &stones,
+            neighbours: &[],
+            stable: &[],
+            offered: &[],
+            sigma_m: 0.002,
+            response: None,
+            is_aligned,
+        };
+        epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
+    };
+    assert_eq!(found(false).datum, Datum::Sources);
+    let aligned = found(true);
+    assert_eq!(aligned.datum, Datum::Unknown);
+    // Stations differ by one to three millimetres, and each stone has its own share of them.
+    assert_eq!(aligned.relative.len(), stones.len());
+    let largest = aligned
+        .relative
+        .iter()
+        .map(|c| c.trace().sqrt())
+        .fold(0.0, f64::max);
+    assert!(largest > 1e-5 && largest < 3e-3, "{largest}");
 }
 
 #[test]
@@ -473,6 +505,7 @@ fn an_error_that_one_stable_area_alone_shows_is_named() {
             offered: &[],
             sigma_m: 0.002,
             response: None,
+            is_aligned: false,
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
             .unwrap()
@@ -506,6 +539,7 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
             offered: if is_offered { &offered } else { &[] },
             sigma_m: 0.002,
             response: None,
+            is_aligned: false,
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -553,6 +587,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
         offered: &[],
         sigma_m: 0.002,
         response: None,
+        is_aligned: false,
     };
     // One survey: nothing else is uncertain where the same sources count alike.
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
@@ -580,6 +615,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
         offered: &[],
         sigma_m: 0.002,
         response: None,
+        is_aligned: false,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(
@@ -625,6 +661,7 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
         offered: &[],
         sigma_m: 0.002,
         response: None,
+        is_aligned: false,
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(

@@ -110,7 +110,9 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
     context.step(&format!("{STEP}-{id}"), key, |step, warnings| {
         let tiles = &ingested.tiles.surveyed;
         let surface = oriented_surface::<_, Error>(tiles, params.cell_m, outside, context.progress)?;
-        if outside.is_empty() && !surface.is_sure() {
+        // Stones of an epoch whose side is wrong do not align.
+        let is_aligned = !id.is_reference() && context.project.settings.registration.align == Align::Stones;
+        if outside.is_empty() && !surface.is_sure() && !is_aligned {
             warnings.doubt(STEP, &epoch.name, &SIDE_UNSURE);
         }
         let views = plan_views(&surface.cells, params);
