@@ -45,7 +45,7 @@ fn hostile_values_are_refused_with_their_line() {
         ),
         (
             "[registration]\nepoch_error_m = -0.001 # here",
-            "it must be 0 or more",
+            "it must be 0 to 1",
         ),
         (
             "[registration.observers]\nshared_error_m = nan # here",

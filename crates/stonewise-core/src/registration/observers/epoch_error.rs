@@ -183,11 +183,9 @@ fn of_sources(
     progress.check()?;
     let (mut stable, mut moved_areas) = standing(&unknowns, &within, stable, &judging);
     let observations = [within[0].len(), within[1].len(), stable.len()];
-    let datum = if pair.is_aligned {
-        Datum::Unknown
-    } else if stable.len() >= params.stable.min_cells {
+    let datum = if stable.len() >= params.stable.min_cells {
         Datum::Stable
-    } else if is_significant {
+    } else if is_significant && !pair.is_aligned {
         Datum::Sources
     } else {
         Datum::Unknown

@@ -58,7 +58,8 @@ pub struct EpochPair<'a> {
     pub sigma_m: f64,
     /// What the motions follow of errors of the points; `None`: each stone its own.
     pub response: Option<Response<'a>>,
-    /// Whether the later epoch was brought to the reference by the stones themselves: nothing then shows the datum.
+    /// Whether the later epoch was brought to the reference by the stones themselves: its sources then say nothing of the
+    /// datum.
     pub is_aligned: bool,
 }
 

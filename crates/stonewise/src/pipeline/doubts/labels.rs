@@ -180,7 +180,7 @@ mod tests {
             "{message}"
         );
         let message = votes(&missed).missed(UNKNOWN);
-        assert!(!message.english.contains(" of "), "{message}");
+        assert!(!message.english.contains("photos find"), "{message}");
         // A few bad stones on a sound wall, a wall of one photo each, and too few stones to tell.
         assert!(!votes(&stones(21, 3, |i| if i < 9 { 0.3 } else { 0.9 })).are_few());
         assert!(Votes::of(&stones(21, 1, |_| 0.5)).is_none());
