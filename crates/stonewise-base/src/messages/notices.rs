@@ -67,9 +67,9 @@ messages! {
 
         TOO_MANY_SOURCES = "too-many-sources":
             "the clouds name {n} sources, more than the 100 stations or strips that can be compared with each other; they count as one. \
-            Where they number scan lines or points, say so with sources = \"file\" or \"none\" under [[epochs]]",
+            Where they number scan lines or points, say so with sources = \"file\" or \"none\" in the epoch",
             "die Punktwolken nennen {n} Quellen, mehr als die 100 Standpunkte oder Streifen, die sich miteinander vergleichen lassen; sie \
-            gelten als eine. Nummerieren sie Scanzeilen oder Punkte, gehört sources = \"file\" oder \"none\" unter [[epochs]]";
+            gelten als eine. Nummerieren sie Scanzeilen oder Punkte, gehört sources = \"file\" oder \"none\" in die Epoche";
 
         NAMED_AREA:
             "[[registration.stable]] \"{name}\"",
