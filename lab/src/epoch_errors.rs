@@ -46,14 +46,8 @@ pub fn run(words: &Words) -> Outcome {
 
     let started = std::time::Instant::now();
     let pair = EpochPair {
-        sources: &sources.list,
-        stones: &stones,
-        neighbours: &[],
         stable: &stable,
-        offered: &[],
-        sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
-        response: None,
-        is_aligned: false,
+        ..EpochPair::new(&sources.list, &stones, report.sigma_m[0].max(report.sigma_m[1]))
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent)?;
     println!("{:?} in {:.1} s", found.datum, started.elapsed().as_secs_f64());

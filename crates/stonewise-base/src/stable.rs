@@ -1,5 +1,7 @@
 //! Areas that did not move between the epochs, as the project file names them.
 
+use crate::messages::Said;
+use crate::messages::notices::{NAMED_AREA, NUMBERED_AREA};
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -70,6 +72,14 @@ impl StableArea {
     /// What people call it.
     pub fn name(&self) -> Option<&str> {
         self.0.name.as_deref()
+    }
+
+    /// The area as a sentence names it; `number`: its place among those of the project, from 1.
+    pub fn said(&self, number: usize) -> Said {
+        match self.name() {
+            Some(name) => NAMED_AREA.say(&[("name", name.into())]),
+            None => NUMBERED_AREA.say(&[("n", number.to_string().into())]),
+        }
     }
 
     /// All its corners: of a box eight, of a polygon two above each other for each of its own.

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stonewise_base::error::Result;
 use stonewise_base::part::Part;
-use stonewise_base::settings::Settings;
+use stonewise_base::settings::{Align, Settings};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::epoch::{EpochId, Epochs};
 use stonewise_core::evaluate::MotionField;
@@ -122,6 +122,11 @@ impl Project {
         inputs.extend(self.conditions.as_ref().map(|file| file.path.clone()));
         inputs.extend(self.instruments.iter().map(|file| file.path.clone()));
         inputs
+    }
+
+    /// Whether the stones themselves bring an epoch to the frame of the reference.
+    pub fn is_aligned(&self, epoch: EpochId) -> bool {
+        !epoch.is_reference() && self.settings.registration.align == Align::Stones
     }
 
     /// Two clouds without photos, for comparisons of clouds alone.

@@ -221,16 +221,7 @@ fn relative_errors(
             sights: vec![sight(0, stone), sight(1, stone)],
         })
         .collect();
-    let pair = EpochPair {
-        sources: &sources,
-        stones: &seen,
-        neighbours: &[],
-        stable: &[],
-        offered: &[],
-        sigma_m: report.sigma_m[0].max(report.sigma_m[1]),
-        response: None,
-        is_aligned: false,
-    };
+    let pair = EpochPair::new(&sources, &seen, report.sigma_m[0].max(report.sigma_m[1]));
     let errors = epoch_errors(&pair, params, progress)?;
     Ok(stones.iter().map(|s| s.id).zip(errors.relative).collect())
 }

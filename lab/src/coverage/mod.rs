@@ -86,14 +86,8 @@ fn measure(case: &Case, seed: u64, is_full: bool, kept: Kept) -> Result<Wall, In
     let survey = kept.apply(survey);
     let with = |stable| {
         let pair = EpochPair {
-            sources: &survey.sources,
-            stones: &survey.stones,
-            neighbours: &[],
             stable,
-            offered: &[],
-            sigma_m: survey.sigma_m,
-            response: None,
-            is_aligned: false,
+            ..EpochPair::new(&survey.sources, &survey.stones, survey.sigma_m)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
     };

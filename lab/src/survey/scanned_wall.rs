@@ -81,17 +81,11 @@ impl ScannedWall {
         let stones: Vec<SeenStone> = seen.values().cloned().collect();
         let ids: Vec<StoneId> = seen.keys().copied().collect();
         let pair = EpochPair {
-            sources: &sources,
-            stones: &stones,
-            neighbours: &[],
-            stable: &[],
-            offered: &[],
-            sigma_m: self.sigma_m(),
             response: self.report.joint.as_ref().map(|motions| Response {
                 motions,
                 stones: &ids,
             }),
-            is_aligned: false,
+            ..EpochPair::new(&sources, &stones, self.sigma_m())
         };
         let errors = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
         let errors = errors.joint.as_ref().map(|e| (e, ids.as_slice()));

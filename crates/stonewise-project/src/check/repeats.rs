@@ -1,6 +1,7 @@
 //! Points that occur twice: within one epoch, where they count twice and make intervals of motions too small,
 //! or in two epochs, between which they seem to show that nothing moved.
 
+use std::cmp::Ordering;
 use std::collections::HashMap;
 
 use super::clouds::read;
@@ -37,7 +38,7 @@ const STEP_SDS: f64 = 3.464;
 /// Looks for repeated points and for coarse steps of the coordinates.
 pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding> {
     let mut found = Vec::new();
-    let mut earlier: Vec<(&str, &[Point3<f64>], f64)> = Vec::new();
+    let mut earlier: Vec<(&str, &[Point3<f64>], Cells)> = Vec::new();
     for (epoch, survey) in read(project, surveys) {
         let mut say =
             |verdict: Verdict, text: Said| found.push(Finding::new(&epoch.name, &CLOUDS, verdict, text));
@@ -62,17 +63,21 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         }
         // A known motion moves the points after this look.
         let is_moved = epoch.motion.is_some();
-        for &(name, other, other_step_m) in earlier.iter().filter(|_| !is_moved) {
-            let cell_m = SAME_M.max(step_m).max(other_step_m);
-            let same = Cells::of(&survey.points, cell_m).share_in(&Cells::of(other, cell_m));
+        let cells = Cells::of(&survey.points, SAME_M.max(step_m));
+        for (name, points, other) in earlier.iter().filter(|_| !is_moved) {
+            let same = match cells.cell_m.total_cmp(&other.cell_m) {
+                Ordering::Equal => cells.share_in(other),
+                Ordering::Less => Cells::of(&survey.points, other.cell_m).share_in(other),
+                Ordering::Greater => cells.share_in(&Cells::of(points, cells.cell_m)),
+            };
             if same > TOO_MANY {
                 say(
                     Verdict::Doubt,
-                    SAME_POINTS.say(&[("share", percent(same).into()), ("first", name.into())]),
+                    SAME_POINTS.say(&[("share", percent(same).into()), ("first", (*name).into())]),
                 );
             }
         }
-        earlier.push((&epoch.name, &survey.points, step_m));
+        earlier.push((&epoch.name, &survey.points, cells));
     }
     found
 }
@@ -83,6 +88,7 @@ fn percent(share: f64) -> String {
 
 /// How many points lie in each of some cells: the same cells for every epoch.
 struct Cells {
+    cell_m: f64,
     /// One cell in this many is counted.
     thinning: u64,
     counts: HashMap<[i64; 3], u32>,
@@ -99,7 +105,11 @@ impl Cells {
         for cell in cells.filter(|cell| is_counted(cell, thinning)) {
             *counts.entry(cell).or_default() += 1;
         }
-        Self { thinning, counts }
+        Self {
+            cell_m,
+            thinning,
+            counts,
+        }
     }
 
     fn share_of_repeats(&self) -> f64 {

@@ -4,9 +4,7 @@ use super::clouds::read;
 use super::finding::{Finding, Verdict};
 use super::sample::Sample;
 use crate::Project;
-use stonewise_base::messages::Said;
 use stonewise_base::messages::findings::{CLOUDS, STABLE_EMPTY};
-use stonewise_base::messages::notices::{NAMED_AREA, NUMBERED_AREA};
 use stonewise_base::stable::StableArea;
 
 /// Looks for stable areas in which an epoch has no points.
@@ -16,7 +14,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
     for (epoch, survey) in read(project, surveys) {
         for (number, area) in (1..).zip(areas) {
             if is_empty(area, survey) {
-                let text = STABLE_EMPTY.say(&[("area", named(area, number))]);
+                let text = STABLE_EMPTY.say(&[("area", area.said(number))]);
                 found.push(Finding::new(&epoch.name, &CLOUDS, Verdict::Doubt, text));
             }
         }
@@ -31,13 +29,6 @@ fn is_empty(area: &StableArea, survey: &Sample) -> bool {
         _ => true,
     };
     is_apart || survey.is_whole() && !survey.points.iter().any(|p| area.contains(p))
-}
-
-fn named(area: &StableArea, number: usize) -> Said {
-    match area.name() {
-        Some(name) => NAMED_AREA.say(&[("name", name.into())]),
-        None => NUMBERED_AREA.say(&[("n", number.to_string().into())]),
-    }
 }
 
 #[cfg(test)]

@@ -40,10 +40,9 @@ impl Adjustment {
         let stone = &self.stones[i];
         match &stone.on_own {
             Some(own) => Some(self.compared(i, self.observed(i, own, Moving::OnOwn, error_m))),
-            None => {
-                let is_in_photos = self.photos.as_ref().is_some_and(|p| p.stone(i).is_some());
-                is_in_photos.then(|| self.observed(i, &stone.with_field, Moving::OnOwn, error_m))
-            }
+            None => self
+                .is_in_photos(i)
+                .then(|| self.observed(i, &stone.with_field, Moving::OnOwn, error_m)),
         }
     }
 
@@ -62,6 +61,11 @@ impl Adjustment {
             sum += photos;
         }
         sum
+    }
+
+    /// Whether photos show how a stone moved.
+    pub fn is_in_photos(&self, i: usize) -> bool {
+        self.photos.as_ref().is_some_and(|p| p.stone(i).is_some())
     }
 
     /// What photos say of a stone, where they show it.

@@ -182,8 +182,7 @@ fn observable(motion: StoneMotion, max_sd_m: f64) -> Result<StoneMotion, MotionF
 fn reachable(adjustment: &Adjustment, i: usize, motion: StoneMotion) -> Result<StoneMotion, MotionFailure> {
     let face_from_world = &adjustment.prior.graph.nodes[i].face_from_world;
     let slid_m = (face_from_world * motion.relative).xy().norm();
-    let is_tracked = adjustment.photos.as_ref().is_some_and(|p| p.stone(i).is_some());
-    match slid_m > ROOM_M && !is_tracked {
+    match slid_m > ROOM_M && !adjustment.is_in_photos(i) {
         true => Err(MotionFailure::Disagreement),
         false => Ok(motion),
     }

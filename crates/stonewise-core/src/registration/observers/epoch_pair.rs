@@ -63,6 +63,22 @@ pub struct EpochPair<'a> {
     pub is_aligned: bool,
 }
 
+impl<'a> EpochPair<'a> {
+    /// Sources and stones alone; `sigma_m`: noise of single points.
+    pub fn new(sources: &'a [Source], stones: &'a [SeenStone], sigma_m: f64) -> Self {
+        Self {
+            sources,
+            stones,
+            neighbours: &[],
+            stable: &[],
+            offered: &[],
+            sigma_m,
+            response: None,
+            is_aligned: false,
+        }
+    }
+}
+
 /// All sights; they determine the blocks of the unknowns.
 pub(super) fn all_sights(pair: &EpochPair, stable: &[Observation]) -> Vec<Sight> {
     let of_stone = |stone: &SeenStone| {

@@ -303,14 +303,9 @@ fn stable_areas_take_the_error_of_the_epoch_off_within_its_uncertainty() {
     let sources = sources(2);
     let found = |stable: &[StablePoints]| {
         let pair = EpochPair {
-            sources: &sources,
-            stones: &stones,
             neighbours: &[[0, 1], [0, 4], [3, 3]],
             stable,
-            offered: &[],
-            sigma_m: 0.002,
-            response: None,
-            is_aligned: false,
+            ..EpochPair::new(&sources, &stones, 0.002)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -403,14 +398,8 @@ fn an_area_that_moved_is_named_and_left_out() {
         stable.extend(stable_area(1, &Vector3::new(0.0, 4.0, 0.0), &ERRORS, 0.002));
         stable.extend(stable_area(2, &Vector3::new(5.0, 4.0, 0.0), &ERRORS, 0.002));
         let pair = EpochPair {
-            sources: &sources,
-            stones: &stones,
-            neighbours: &[],
             stable: &stable,
-            offered: &[],
-            sigma_m: 0.002,
-            response: None,
-            is_aligned: false,
+            ..EpochPair::new(&sources, &stones, 0.002)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -437,14 +426,8 @@ fn stable_areas_correct_an_error_far_beyond_what_is_assumed() {
     ];
     let (stones, sources) = (wall(&errors, 0.002, 1), sources(2));
     let pair = EpochPair {
-        sources: &sources,
-        stones: &stones,
-        neighbours: &[],
         stable: &stable_points(&errors, 0.002),
-        offered: &[],
-        sigma_m: 0.002,
-        response: None,
-        is_aligned: false,
+        ..EpochPair::new(&sources, &stones, 0.002)
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     let truth = 0.5 * (errors[2] + errors[3] - errors[0] - errors[1]);
@@ -459,14 +442,8 @@ fn epochs_that_were_aligned_by_their_stones_keep_the_errors_of_stations() {
     let (stones, sources) = (wall(&ERRORS, 0.002, 1), sources(2));
     let found = |is_aligned| {
         let pair = EpochPair {
-            sources: &sources,
-            stones: &stones,
-            neighbours: &[],
-            stable: &[],
-            offered: &[],
-            sigma_m: 0.002,
-            response: None,
             is_aligned,
+            ..EpochPair::new(&sources, &stones, 0.002)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -497,15 +474,10 @@ fn an_error_that_one_stable_area_alone_shows_is_named() {
         let stable: Vec<StablePoints> = (0..areas)
             .flat_map(|area| stable_area(area, &beside(area), &of_area, 0.002))
             .collect();
+        let stones = wall(&errors, 0.002, 1);
         let pair = EpochPair {
-            sources: &sources,
-            stones: &wall(&errors, 0.002, 1),
-            neighbours: &[],
             stable: &stable,
-            offered: &[],
-            sigma_m: 0.002,
-            response: None,
-            is_aligned: false,
+            ..EpochPair::new(&sources, &stones, 0.002)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent)
             .unwrap()
@@ -531,15 +503,10 @@ fn surfaces_off_the_wall_show_an_error_that_the_sources_do_not() {
             of_area[2..].iter_mut().for_each(|e| e.z -= down_m);
             offered.extend(stable_area(area, &Vector3::new(x, 0.0, 0.0), &of_area, 0.002));
         }
+        let stones = wall(&errors, 0.002, 1);
         let pair = EpochPair {
-            sources: &sources,
-            stones: &wall(&errors, 0.002, 1),
-            neighbours: &[],
-            stable: &[],
             offered: if is_offered { &offered } else { &[] },
-            sigma_m: 0.002,
-            response: None,
-            is_aligned: false,
+            ..EpochPair::new(&sources, &stones, 0.002)
         };
         epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap()
     };
@@ -579,16 +546,7 @@ fn what_a_source_gets_wrong_on_single_stones_is_in_their_covariance() {
     }
     let mut sources = sources(2);
     (0..2).for_each(|s| sources[2 + s].same_as = Some(s));
-    let pair = EpochPair {
-        sources: &sources,
-        stones: &stones,
-        neighbours: &[],
-        stable: &[],
-        offered: &[],
-        sigma_m: 0.002,
-        response: None,
-        is_aligned: false,
-    };
+    let pair = EpochPair::new(&sources, &stones, 0.002);
     // One survey: nothing else is uncertain where the same sources count alike.
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     let [inside, across] = found.components.unwrap().nugget_m;
@@ -607,16 +565,7 @@ fn sources_without_errors_leave_the_datum_unknown() {
     let errors = [Vector3::zeros(); 4];
     let stones = wall(&errors, 0.002, 2);
     let sources = sources(2);
-    let pair = EpochPair {
-        sources: &sources,
-        stones: &stones,
-        neighbours: &[],
-        stable: &[],
-        offered: &[],
-        sigma_m: 0.002,
-        response: None,
-        is_aligned: false,
-    };
+    let pair = EpochPair::new(&sources, &stones, 0.002);
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(
         found.datum,
@@ -653,15 +602,10 @@ fn merged_points_are_as_uncertain_against_each_other_as_their_dense_covariance_l
         })
         .collect();
     let neighbours = [[4, 7], [0, 59]];
+    let sources = sources(1);
     let pair = EpochPair {
-        sources: &sources(1),
-        stones: &stones,
         neighbours: &neighbours,
-        stable: &[],
-        offered: &[],
-        sigma_m: 0.002,
-        response: None,
-        is_aligned: false,
+        ..EpochPair::new(&sources, &stones, 0.002)
     };
     let found = epoch_errors(&pair, &EpochErrorParams::default(), &Silent).unwrap();
     assert_eq!(

@@ -111,8 +111,7 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
         let tiles = &ingested.tiles.surveyed;
         let surface = oriented_surface::<_, Error>(tiles, params.cell_m, outside, context.progress)?;
         // Stones of an epoch whose side is wrong do not align.
-        let is_aligned = !id.is_reference() && context.project.settings.registration.align == Align::Stones;
-        if outside.is_empty() && !surface.is_sure() && !is_aligned {
+        if outside.is_empty() && !surface.is_sure() && !context.project.is_aligned(id) {
             warnings.doubt(STEP, &epoch.name, &SIDE_UNSURE);
         }
         let views = plan_views(&surface.cells, params);

@@ -14,7 +14,7 @@ use crate::pipeline::steps::ingest::{INGEST, Ingested};
 use crate::pipeline::steps::segment::{SEGMENT, Segmented};
 use crate::pipeline::steps::views::has_no_photos;
 use crate::pipeline::until::Until;
-use crate::settings::Align;
+use crate::project::Project;
 use crate::storage::step::{Key, StepDir};
 use batches::LabelBatches;
 pub use disk_labels::DiskLabels;
@@ -53,7 +53,7 @@ pub static ALIGN: Step = Step {
     about: About::Later,
     needs: &[Need::reference(&LABEL), Need::same(&LABEL)],
     wanted: |until| until >= Until::Labelled,
-    applies: |project, epoch| !epoch.is_reference() && project.settings.registration.align == Align::Stones,
+    applies: Project::is_aligned,
     cost: Some(|sizes, epoch| Cost::of(1, sizes.cloud_bytes(epoch))),
     make: |run, epoch| run.frame(epoch).map(drop),
     ..Step::PLAIN

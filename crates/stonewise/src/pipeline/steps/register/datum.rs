@@ -3,7 +3,6 @@
 use super::Registered;
 use crate::project::Project;
 use crate::results::records::{Datum, DatumState, SourceError};
-use crate::settings::Align;
 use crate::texts::Said;
 use crate::texts::notices::{
     DATUM_ALIGNED, DATUM_ONE_SURVEY, DATUM_SOURCES, DATUM_STABLE, DATUM_STATED, REGISTRATION_UNKNOWN,
@@ -56,7 +55,7 @@ fn of_errors(
         return known(DatumState::Stable, errors, note);
     }
     let centre = middle(stones);
-    if project.settings.registration.align == Align::Stones {
+    if project.is_aligned(epochs.later) {
         return Datum::unknown(&centre, &DATUM_ALIGNED);
     }
     if let Some(error_m) = project.settings.registration.epoch_error_m {

@@ -7,7 +7,6 @@ use super::sights::Sights;
 use crate::error::Result;
 use crate::pipeline::context::Context;
 use crate::pipeline::steps::label::Labelled;
-use crate::settings::Align;
 use crate::texts::notices::TOO_MANY_SOURCES;
 use stonewise_core::epoch::{EpochId, Pair};
 use stonewise_core::id::StoneId;
@@ -51,7 +50,7 @@ pub(super) fn add_epoch_error(
             motions,
             stones: &sights.stones,
         }),
-        is_aligned: params.align == Align::Stones,
+        is_aligned: project.is_aligned(epochs.later),
     };
     let observers = EpochErrorParams {
         shared_error_m: params.epoch_error_m.or(params.observers.shared_error_m),

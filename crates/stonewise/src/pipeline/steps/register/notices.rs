@@ -6,8 +6,8 @@ use crate::pipeline::context::Context;
 use crate::results::records::{Datum, DatumState, EstimatorRecord};
 use crate::texts::Said;
 use crate::texts::notices::{
-    AREA_OFF_WALL, AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, NAMED_AREA, NUMBERED_AREA,
-    OFF_WALL_TOO_FEW, STABLE_ALONE, STABLE_MOVED, STABLE_TOO_FEW,
+    AREA_OFF_WALL, AUTO_STABLE, COMPONENT_AT_BOUND, COULD_BE_STABLE, NUMBERED_AREA, OFF_WALL_TOO_FEW,
+    STABLE_ALONE, STABLE_MOVED, STABLE_TOO_FEW,
 };
 use nalgebra::Point3;
 use stonewise_core::epoch::EpochId;
@@ -110,8 +110,8 @@ fn report_datum(context: &Context, later: EpochId, registered: &Registered) {
 /// A stable area as a sentence names it: those of the project first, then those off the wall.
 fn name_of(context: &Context, registered: &Registered, area: usize) -> Said {
     let stable = &context.project.settings.registration.stable;
-    if let Some(name) = stable.get(area).and_then(|named| named.name()) {
-        return NAMED_AREA.say(&[("name", name.into())]);
+    if let Some(named) = stable.get(area) {
+        return named.said(area + 1);
     }
     let off_wall = area.checked_sub(stable.len());
     match off_wall.and_then(|k| registered.off_wall.get(k)) {
