@@ -2,9 +2,11 @@
 //! other in a circle.
 
 /// Modules from the bottom up; those on one line do not use each other.
-const LAYERS: [&[&str]; 4] = [
-    &["processor", "report_params", "stable", "thresholds"],
-    &["error", "messages", "settings"],
+const LAYERS: [&[&str]; 6] = [
+    &["processor", "report_params", "thresholds"],
+    &["error", "messages"],
+    &["stable"],
+    &["settings"],
     &["address_space", "files", "part", "warnings"],
     &["parameters"],
 ];

@@ -63,7 +63,7 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
         }
         // A known motion moves the points after this look.
         let is_moved = epoch.motion.is_some();
-        let cells = Cells::of(&survey.points, SAME_M.max(step_m));
+        let cells = Cells::of(&survey.points, cell_of_step(step_m));
         for (name, points, other) in earlier.iter().filter(|_| !is_moved) {
             let same = match cells.cell_m.total_cmp(&other.cell_m) {
                 Ordering::Equal => cells.share_in(other),
@@ -84,6 +84,13 @@ pub(super) fn look(project: &Project, surveys: &[Option<Sample>]) -> Vec<Finding
 
 fn percent(share: f64) -> String {
     format!("{:.0}", 100.0 * share)
+}
+
+/// Edge of the cells in which points of coordinates with this step are compared with those of another epoch: the step to
+/// a micrometre. In coordinates of millions of metres its last digits are those of the numbers, and cells of such an edge
+/// would not begin where the steps do.
+fn cell_of_step(step_m: f64) -> f64 {
+    SAME_M.max((1e6 * step_m).round() / 1e6)
 }
 
 /// How many points lie in each of some cells: the same cells for every epoch.
@@ -197,8 +204,10 @@ mod tests {
     #[test]
     fn a_survey_is_known_again_in_coarser_coordinates() {
         let (one, other) = (wall(5), wall(6));
-        let coarse = |points: &[Point3<f64>]| Cells::of(&in_steps(points, 1e-3), 1e-3);
-        let cells = Cells::of(&one, 1e-3);
+        // The wall lies millions of metres from the origin.
+        let cell_m = cell_of_step(step(&in_steps(&one, 1e-3)));
+        let coarse = |points: &[Point3<f64>]| Cells::of(&in_steps(points, 1e-3), cell_m);
+        let cells = Cells::of(&one, cell_m);
         assert!(coarse(&one).share_in(&cells) > 0.99);
         assert!(coarse(&other).share_in(&cells) < 0.05);
     }
