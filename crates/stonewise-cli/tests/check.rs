@@ -136,7 +136,7 @@ const CASES: [Case; 16] = [
             let text = fs::read_to_string(&path).unwrap();
             fs::write(path, text.replace(CLOUD_2, "epoch1/cloud_tls.laz")).unwrap();
         },
-        "like epoch",
+        "and so does epoch",
         false,
     ),
     (

@@ -11,8 +11,8 @@ messages! {
             ihre Bewegungen und deren Intervalle ist kein Verlass. {cause}";
 
         CAUSE_NOT_FIT:
-            "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them; so few speak for \
-            cameras and clouds that do not fit each other (frame, direction of an axis, focal length)",
+            "Photos find {found} of the {sought} stones that they should show where clouds and cameras put them; so few suggest that \
+            cameras and clouds do not fit each other (frame, direction of an axis, focal length)",
             "Die Fotos finden {found} der {sought} Steine, die sie zeigen müssten, dort, wo Punktwolken und Kameras sie vermuten lassen; so \
             wenige sprechen dafür, dass Kameras und Punktwolken nicht zueinander passen (System, Richtung einer Achse, Brennweite)";
 
@@ -23,10 +23,10 @@ messages! {
             und Punktwolken passen also zueinander. Wahrscheinlicher sind Masken, die keine Steine sind, oder veränderte Oberflächen";
 
         CAUSE_OPEN:
-            "Either the epochs' clouds do not fit each other or their masks, or the masks are of something else than stones: no photos \
-            tell these apart",
-            "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen anderes als \
-            Steine: keine Fotos unterscheiden das";
+            "Either the epochs' clouds do not fit each other or their masks, or the masks show something else than stones: without \
+            photos this cannot be decided",
+            "Entweder passen die Punktwolken der Epochen nicht zueinander oder nicht zu ihren Masken, oder die Masken zeigen etwas anderes \
+            als Steine: ohne Fotos lässt sich das nicht entscheiden";
 
         SIDE_UNSURE = "outside-unsure":
             "no camera or scanner position tells which side of the wall is outside, and the cloud alone does not show it clearly \
@@ -80,11 +80,12 @@ messages! {
         PART_REFUSED = "part-in-disagreement":
             "{stones} neighbouring stones of a part of the wall, around stone {stone}, have no motion: the clouds of the two epochs show \
             different surfaces there, or a motion unlike that of the rest which nothing confirms. Something covers the part (plants, snow, a \
-            banner), it moved, or its clouds or masks mislead. Nothing is said of it. Look at the part on site and in all that shows it",
+            banner), it moved, or its clouds or masks mislead. Its motion is unknown. Look at the part on site, \
+            and in the photos and clouds that show it",
             "{stones} benachbarte Steine eines Teils der Mauer um Stein {stone} haben keine Bewegung: die Punktwolken der beiden Epochen zeigen \
             dort verschiedene Oberflächen, oder eine Bewegung anders als die der übrigen Mauer, die nichts bestätigt. Etwas bedeckt den Teil \
-            (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Über ihn ist nichts gesagt. Den \
-            Teil vor Ort ansehen und in allem, was ihn zeigt";
+            (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Seine Bewegung ist \
+            unbekannt. Den Teil vor Ort ansehen, und in den Fotos und Punktwolken, die ihn zeigen";
 
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
@@ -97,7 +98,7 @@ messages! {
             changed least. Moisture and temperature change masonry by at most 1 mm per metre, so most likely the cloud of one epoch \
             has a wrong scale, and then motions, intervals and limits are wrong. Check the scale of scanner and photogrammetric \
             block, and the map projection with its scale factor, in both epochs",
-            "die Wand hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
+            "die Mauer hat ihre Größe um {strain} +- {half_width} mm je Meter geändert, in der Richtung der kleinsten Änderung um \
             {lesser} mm je Meter. Feuchte und Temperatur ändern Mauerwerk um höchstens 1 mm je Meter; wahrscheinlich hat also die \
             Punktwolke einer Epoche einen falschen Maßstab, und dann sind Bewegungen, Intervalle und Grenzen falsch. In beiden Epochen \
             den Maßstab von Scanner und Bildverband und die Kartenprojektion mit ihrem Maßstabsfaktor prüfen";
@@ -105,9 +106,9 @@ messages! {
         TURNED = "turned-epoch":
             "this epoch is turned by {angle} degrees against the first as a whole. Motions are computed for small rotations: here they \
             are wrong by up to {error} mm, and standard deviations of {sd} mm do not contain that. Register the clouds of this epoch to \
-            those of the first, with their photos, and run again",
+            those of the first, with their cameras, and run again",
             "diese Epoche ist als Ganzes um {angle} Grad gegen die erste gedreht. Bewegungen werden für kleine Drehungen berechnet: hier \
             sind sie um bis zu {error} mm falsch, was Standardabweichungen von {sd} mm nicht enthalten. Die Punktwolken dieser Epoche \
-            samt ihren Fotos auf die der ersten registrieren und neu rechnen";
+            samt ihren Kameras auf die der ersten registrieren und neu rechnen";
     }
 }

@@ -32,7 +32,7 @@ messages! {
                          registration.align = \"stones\" brings them together by their stones",
             "{share} % der kleineren Epoche mit {first}: sind beide in einem System? Wenn nicht, bringt registration.align = \"stones\" \
              sie anhand der Steine zusammen";
-        SAME_FILE = "same-cloud": "reads {file} like epoch {first}", "liest {file} wie die Epoche {first}";
+        SAME_FILE = "same-cloud": "reads {file}, and so does epoch {first}", "liest {file}, ebenso wie die Epoche {first}";
         SAME_POINTS = "same-cloud": "{share} % of the points are those of epoch {first}: is one epoch's cloud a copy of the other's?",
             "{share} % der Punkte sind die der Epoche {first}: ist die Punktwolke einer Epoche eine Kopie der anderen?";
         STABLE_EMPTY = "stable-empty": "{area} holds no point of this epoch: give its place in the frame of the clouds, in metres",
@@ -54,8 +54,8 @@ messages! {
             "es fehlen in {folder}: {photos} ({missing} von {total} orientierten Fotos); sie dorthin kopieren oder ihre Kameras aus der Kameradatei nehmen";
         BROKEN_PHOTOS = "broken-photos": "cannot be read or are cut off: {photos}; copy them again",
             "nicht zu lesen oder abgeschnitten: {photos}; sie noch einmal kopieren";
-        PHOTO_SIZES = "photo-size": "the photos are not as large as their cameras say: {photos}; give them as they were posed",
-            "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie so geben, wie sie orientiert wurden";
+        PHOTO_SIZES = "photo-size": "the photos are not as large as their cameras say: {photos}; use them at the size of their cameras",
+            "die Fotos sind nicht so groß, wie ihre Kameras sagen: {photos}; sie in der Größe ihrer Kameras verwenden";
         FLAT_PHOTOS = "unlike-photos": "of one colour: {photos}; copy them again, or take their cameras out of the camera file",
             "einfarbig: {photos}; sie noch einmal kopieren oder ihre Kameras aus der Kameradatei nehmen";
         UNLIKE_PHOTOS = "unlike-photos": "show something else than the other photos do where they see the same points: {photos} (correlation {most} or less); is the photo under another's \

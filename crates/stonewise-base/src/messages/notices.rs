@@ -89,13 +89,13 @@ messages! {
 
         STABLE_ALONE = "stable-alone":
             "{area} alone shows that the registration is off by {shift_mm} mm, {sds} times the standard deviation expected without it. \
-            Nothing tells whether the registration is off or the area moved; if the area moved, all motions are wrong by as much. \
+            Nothing tells whether the registration is off or the area moved; if the area moved, all motions are wrong by that amount. \
             Name a second stable area that shows the same directions, or look at this one on site. The deformation of the wall does \
             not depend on it",
             "{area} allein zeigt einen Registrierungsfehler von {shift_mm} mm, das {sds}-Fache der Standardabweichung, die ohne sie zu \
             erwarten ist. Nichts zeigt, ob die Registrierung falsch ist oder sich die Fläche bewegt hat; hat sie sich bewegt, sind alle \
-            Bewegungen um so viel falsch. Eine zweite stabile Fläche nennen, die dieselben Richtungen zeigt, oder diese vor Ort ansehen. \
-            Die Verformung der Mauer hängt nicht davon ab";
+            Bewegungen um diesen Betrag falsch. Eine zweite stabile Fläche nennen, die dieselben Richtungen zeigt, oder diese vor Ort \
+            ansehen. Die Verformung der Mauer hängt nicht davon ab";
 
         STABLE_TOO_FEW = "stable-too-few":
             "[[registration.stable]] does not show the epochs' registration: too few plane cells ({cells}) are seen in both epochs; it is \
@@ -117,9 +117,11 @@ messages! {
 
         ALIGNED = "aligned":
             "aligned by {stones} of {covered} stones: turned by {degrees} degrees and moved by {metres} m at the middle of the wall, \
-            centroids agree within {rms_mm} mm; the motion of the wall as a whole is not known, its deformation is",
+            centroids agree within {rms_mm} mm; the motion of the wall as a whole is unknown unless stable areas or \
+            instruments show it; its deformation does not depend on it",
             "an {stones} von {covered} Steinen ausgerichtet: um {degrees} Grad gedreht und in der Mitte der Mauer um {metres} m bewegt, \
-            Schwerpunkte stimmen auf {rms_mm} mm überein; die Bewegung der Mauer als Ganzes ist nicht bekannt, ihre Verformung ist es";
+            Schwerpunkte stimmen auf {rms_mm} mm überein; die Bewegung der Mauer als Ganzes ist unbekannt, wenn weder stabile \
+            Flächen noch Instrumente sie zeigen; ihre Verformung hängt nicht davon ab";
 
         DATUM_ALIGNED = "datum":
             "the epochs were aligned by their stones: how the wall moved as a whole is not known; limits, intervals and significance hold \
@@ -159,7 +161,7 @@ messages! {
 
         INSTRUMENTS_DISAGREE = "instruments-disagree":
             "instruments that disagree with the stones around them: {names}",
-            "Instrumente, die mit den Steinen um sie nicht übereinstimmen: {names}";
+            "Instrumente, die mit den umliegenden Steinen nicht übereinstimmen: {names}";
 
         INSTRUMENTS_CONTRADICTED = "instruments-not-used":
             "instruments with use = true contradict each other or what else is known of the datum, and are not used: look at their differences \
@@ -194,15 +196,15 @@ messages! {
             "Kamera nicht verwendet: {reason}";
 
         PHOTO_NOT_TRACKED = "photo-not-tracked":
-            "{error}: it does not help to measure stones",
-            "{error}: es hilft nicht, Steine zu messen";
+            "{error}: the photo is not used to measure stones",
+            "{error}: das Foto wird nicht zum Messen verwendet";
 
         PHOTO_NOT_SHOWN = "photo-not-shown":
             "the photo cannot be shown in the report: {error}",
-            "das Foto ist im Bericht nicht zu zeigen: {error}";
+            "das Foto kann im Bericht nicht gezeigt werden: {error}";
 
         PHOTO_SIZE = "photo-size":
-            "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: give the photo as it was posed",
-            "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: das Foto so geben, wie es orientiert wurde";
+            "the photo is {width}x{height} px, its camera {camera_width}x{camera_height} px: use it at the size of its camera",
+            "das Foto hat {width}x{height} px, seine Kamera {camera_width}x{camera_height} px: es in der Größe seiner Kamera verwenden";
     }
 }

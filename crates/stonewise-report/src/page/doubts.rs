@@ -50,6 +50,9 @@ mod tests {
         );
         let html = doubts(&warnings.sorted(), german);
         assert!(html.contains("<li>2027: die Ausgleichung ist in 30 Iterationen nicht konvergiert"));
-        assert!(html.contains("keine Fotos unterscheiden das"), "{html}");
+        assert!(
+            html.contains("ohne Fotos lässt sich das nicht entscheiden"),
+            "{html}"
+        );
     }
 }
