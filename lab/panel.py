@@ -481,6 +481,7 @@ SURVEYS = [
     Survey("s_own", 45, [{"kind": "own", "shift_m": 0.0005, "rotation_rad": 0.0005}]),
     # Coarse, noisy and rounded clouds.
     Survey("s_coarse", 25, spacing=0.012),
+    *[Survey(f"s_sparse_{seed}", seed, spacing=0.019) for seed in range(201, 207)],
     Survey("s_noise5", 26, noise=0.005),
     Survey("m_noise10", 58, noise=0.01),
     Survey("s_1cm_still", 34, scale=0.01),

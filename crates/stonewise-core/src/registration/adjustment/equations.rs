@@ -2,7 +2,7 @@
 
 use super::candidate::{CandidateMotion, Moving};
 use super::observation::NormalEquations;
-use super::observation::surface::{Equations, with_shift_error};
+use super::observation::surface::{Equations, Inflation, with_shift_error};
 use super::state::Adjustment;
 use crate::geometry::Bounds;
 use crate::statistics::upper_median;
@@ -112,7 +112,8 @@ impl Adjustment {
         let own = stone.on_own.as_ref().and_then(|c| c.surface.equations());
         if let (Some(with_field), Some(own)) = (stone.with_field.surface.equations(), own) {
             let on_its_own_points = 0.5 * (with_field.deviance - own.deviance);
-            let inflation = self.surface.inflation_of_all(stone.surface());
+            let Inflation { all, in_face } = self.surface.inflation(stone.surface());
+            let inflation = all.max(in_face);
             equations.constant += (stone.ratio.log_ratio - on_its_own_points) / inflation;
         }
         equations

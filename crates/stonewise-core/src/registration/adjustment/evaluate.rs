@@ -4,7 +4,9 @@ use super::candidate::CandidateMotion;
 use super::covered::covered;
 use super::error::AdjustError;
 use super::hypothesis::{LikelihoodRatio, LikelihoodRatioTest, Placed, Probe};
-use super::observation::surface::{Correlation, Equations, LocalPair, estimate_noise};
+use super::observation::surface::{
+    Correlation, Equations, LocalPair, NoiseFactors, deviance, estimate_noise,
+};
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::StoneVector;
 use super::survey::Points;
@@ -12,11 +14,19 @@ use crate::progress::Interrupted;
 use crate::registration::points::{PairPoints, PairSource};
 use rayon::prelude::*;
 
+/// Standard deviation of the logarithm of a stone's roughness over that of most stones: between smooth plaster and
+/// rubble lie a factor of a hundred, four standard deviations.
+const ROUGHNESS_SD: f64 = 1.2;
+/// Step and range of the roughness.
+const ROUGHNESS_STEP: f64 = 2.0;
+const ROUGHEST: f64 = 100.0;
+
 /// What a stone's points say where it moved since the last evaluation.
 struct Evaluation {
     with_field: Option<Equations>,
     on_own: Option<Equations>,
     ratio: Option<LikelihoodRatio>,
+    roughness: f64,
 }
 
 impl Adjustment {
@@ -33,6 +43,7 @@ impl Adjustment {
         let views: Vec<(&LocalPair, StoneVector)> = sample.iter().map(|(p, x)| (p, *x)).collect();
         self.surface.noise = estimate_noise(&views, &self.surface.noise, &self.surface.layout);
         for stone in &mut self.stones {
+            stone.is_roughness_due = true;
             stone.with_field.surface.invalidate();
             if let Some(own) = &mut stone.on_own {
                 own.surface.invalidate();
@@ -43,7 +54,12 @@ impl Adjustment {
     /// The points of a stone in its frame.
     pub fn local_pair(&self, i: usize, pair: &PairPoints) -> LocalPair {
         let face_from_world = &self.prior.graph.nodes[i].face_from_world;
-        LocalPair::new(pair, face_from_world, self.stones[i].info.noise_factors)
+        let stone = &self.stones[i];
+        let noise = NoiseFactors {
+            points: stone.info.noise_factors,
+            roughness: stone.roughness,
+        };
+        LocalPair::new(pair, face_from_world, noise)
     }
 
     /// Normal equations of all stones that moved since they were last evaluated.
@@ -94,7 +110,11 @@ impl Adjustment {
         if !self.is_due(stone) {
             return None;
         }
-        let local = self.local_pair(i, pair);
+        let mut local = self.local_pair(i, pair);
+        if stone.is_roughness_due {
+            local.noise.roughness = self.likely_roughness(stone, &local);
+        }
+        let roughness = local.noise.roughness;
         let anew = |candidate: &CandidateMotion| {
             let window = candidate.surface.window(&candidate.motion);
             self.surface.equations(&local, &candidate.motion, &window)
@@ -116,7 +136,40 @@ impl Adjustment {
                 .map(anew),
             on_own: own.filter(|c| self.is_candidate_due(c)).map(anew),
             ratio: own.map(compare),
+            roughness,
         })
+    }
+
+    /// The roughness of a stone over that of most under which its points are most likely where it is, found in steps of
+    /// two from the present one.
+    fn likely_roughness(&self, stone: &StoneState, pair: &LocalPair) -> f64 {
+        let motion = &stone.more_probable().motion;
+        let inflation = self.surface.inflation_of_all(stone.surface());
+        let counting = pair.counting(motion, |_| true);
+        let value = |roughness: f64| {
+            let noise = self.surface.noise.on_surface(roughness / pair.noise.roughness);
+            let prior = (roughness.ln() / ROUGHNESS_SD).powi(2);
+            deviance(&counting, motion, &noise, &self.surface.layout) / inflation + prior
+        };
+        let start = (stone.roughness, value(stone.roughness));
+        let descend = |factor: f64| {
+            let mut best = start;
+            loop {
+                let next = factor * best.0;
+                if !(ROUGHEST.recip()..=ROUGHEST).contains(&next) {
+                    return best;
+                }
+                match value(next) {
+                    found if found < best.1 => best = (next, found),
+                    _ => return best,
+                }
+            }
+        };
+        let smoother = descend(ROUGHNESS_STEP.recip());
+        match smoother.1 < start.1 {
+            true => smoother.0,
+            false => descend(ROUGHNESS_STEP).0,
+        }
     }
 
     /// Tries stones whose points leave their motion open at a distance, and follows each from the best place
@@ -170,6 +223,8 @@ impl Adjustment {
 impl Evaluation {
     fn store(self, stone: &mut StoneState) {
         stone.ratio = self.ratio.unwrap_or_default();
+        stone.roughness = self.roughness;
+        stone.is_roughness_due = false;
         if let Some(equations) = self.with_field {
             let at = stone.with_field.motion;
             stone.with_field.surface.set(at, equations);
@@ -191,8 +246,11 @@ fn placed(candidate: &CandidateMotion) -> Placed {
 mod tests {
     use super::super::testing::{begun, wall};
     use super::*;
+    use crate::cloud::Cloud;
     use crate::registration::points::MemoryPairs;
     use nalgebra::Vector3;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
     use std::convert::Infallible;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -276,7 +334,7 @@ mod tests {
         assert_eq!([0, 71].map(|i| gradient(&adjustment, i)), [before[0], before[2]]);
         // Brute force: the stone's points alone at its new motion.
         let frame = &adjustment.prior.graph.nodes[70].face_from_world;
-        let local = LocalPair::new(&source.pairs.pairs()[70], frame, [1.0; 2]);
+        let local = LocalPair::new(&source.pairs.pairs()[70], frame, NoiseFactors::USUAL);
         let alone = adjustment.surface.equations(&local, &moved, &moved);
         assert_eq!(gradient(&adjustment, 70), alone.gradient);
         assert_ne!(alone.gradient, before[1]);
@@ -296,6 +354,36 @@ mod tests {
         for (found, truth) in adjustment.surface.noise.sigma_m.iter().zip(noise) {
             assert!((found / truth - 1.0).abs() < 0.1, "{found} instead of {truth}");
         }
+    }
+
+    #[test]
+    fn a_plane_shows_no_motion_in_itself() {
+        let noise_m = 0.001;
+        let mut pairs = wall(8, [noise_m; 2], |_| Vector3::zeros());
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut flat = |cloud: &Cloud| {
+            let points = (0..cloud.len()).map(|i| {
+                let p = cloud.local(i);
+                let noise = noise_m * stonewise_testing::normal(&mut rng);
+                [noise as f32, p.y as f32, p.z as f32]
+            });
+            Cloud::new(cloud.origin(), points.collect())
+        };
+        let plane = &mut pairs[20];
+        plane.points_first = flat(&plane.points_first);
+        plane.points_second = flat(&plane.points_second);
+        let pairs = MemoryPairs::new(pairs);
+        let (mut adjustment, points) = begun(&pairs);
+        for _ in 0..3 {
+            adjustment.estimate_noise(&points.sample);
+            adjustment.evaluate(&points).unwrap();
+        }
+        let sd = |i: usize| {
+            let equations = adjustment.stones[i].with_field.surface.equations().unwrap();
+            let covariance = equations.information.try_inverse().unwrap();
+            covariance[(0, 0)].min(covariance[(1, 1)]).sqrt()
+        };
+        assert!(sd(20) > 0.05 && sd(21) < 0.001, "{} {}", sd(20), sd(21));
     }
 
     #[test]

@@ -36,6 +36,10 @@ pub(crate) struct StoneState {
     pub on_own: Option<CandidateMotion>,
     /// What the stone's points say between the two.
     pub ratio: LikelihoodRatio,
+    /// Roughness of its surface over that of most stones.
+    pub roughness: f64,
+    /// Whether that is to be estimated anew.
+    pub is_roughness_due: bool,
     /// Probability that the stone moves with the field.
     pub p_with_field: f64,
     /// Probability that the clouds show it at a wrong place, if they show it away from its neighbours.
@@ -102,6 +106,8 @@ impl StoneState {
             with_field: CandidateMotion::new(StoneVector::from_translation(translation)),
             on_own: None,
             ratio: LikelihoodRatio::default(),
+            roughness: 1.0,
+            is_roughness_due: false,
             p_with_field: 1.0,
             doubt: 0.0,
             is_undecided: false,

@@ -3,7 +3,7 @@
 use super::error::AdjustError;
 use super::field::{Graph, Place};
 use super::params::AdjustmentParams;
-use super::partial_view::hidden;
+use super::partial_view::{hidden, missing};
 use crate::id::StoneId;
 use crate::progress::Progress;
 use crate::registration::points::{NOISES_ALIKE, PairPoints, PairSource, Window, face_spacing};
@@ -25,7 +25,7 @@ pub(crate) struct StoneInfo {
     pub usable: bool,
     /// Noise of each epoch's points over that of most stones: 1 unless another sensor measured the stone.
     pub noise_factors: [f64; 2],
-    /// How much less of its face one epoch shows than is usual, as a share.
+    /// How much less of its face one epoch shows than is usual, or than points show well, as a share.
     pub hidden: f64,
 }
 
@@ -103,7 +103,7 @@ pub(crate) fn survey<'a, S: PairSource>(
         .map(|w| w.as_deref().map_or(1.0, Window::shared))
         .collect();
     for (stone, hidden) in stones.iter_mut().zip(hidden(&shared)) {
-        stone.hidden = hidden;
+        stone.hidden = hidden.max(missing(stone.counts));
     }
     sample.retain(|(i, _)| stones[*i].noise_factors == [1.0; 2]);
     let keep = sample.len().div_ceil(SAMPLE).max(1);

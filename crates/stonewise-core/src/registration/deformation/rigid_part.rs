@@ -29,19 +29,18 @@ pub(super) struct RigidPart {
 }
 
 impl RigidPart {
-    /// Adds to the covariances of the stones of a bulge what the field has smoothed of it, where that is more than chance.
+    /// Adds to the covariances of the stones of a bulge what the field has smoothed of it in each direction, where that is
+    /// more than chance: a wall that moves horizontally moves along a battered face as well as out of it.
     pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
-        if bulge.smoothed_m.abs() < SMOOTHED_SD * bulge.amplitude_m.1 {
-            return;
-        }
-        for (i, share) in &bulge.stones {
-            let direction = body.stones[*i]
-                .joint
-                .face_from_world
-                .row(bulge.direction)
-                .transpose();
-            let missed = direction * (bulge.smoothed_m * share);
-            self.deformations[*i].1 += missed * missed.transpose();
+        for (k, smoothed) in bulge.smoothed_m.iter().enumerate() {
+            let Some((smoothed_m, _)) = smoothed.filter(|(m, sd)| m.abs() >= SMOOTHED_SD * sd) else {
+                continue;
+            };
+            for (i, share) in &bulge.stones {
+                let direction = body.stones[*i].joint.face_from_world.row(k).transpose();
+                let missed = direction * (smoothed_m * share);
+                self.deformations[*i].1 += missed * missed.transpose();
+            }
         }
     }
 }

@@ -53,6 +53,8 @@ pub(super) struct Scan {
     pub p: f64,
     /// The most likely bulge.
     pub most_likely: MostLikely,
+    /// Standard deviations that the most likely bulge of a still wall exceeds in 5 of 100 cases.
+    pub limit: f64,
     /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
 }
@@ -65,8 +67,9 @@ pub(super) struct MostLikely {
     pub direction: usize,
     /// Amplitude and its standard deviation, metres.
     pub amplitude_m: (f64, f64),
-    /// What the motions show less of it than the stones' own observations, metres.
-    pub smoothed_m: f64,
+    /// What the motions show less of a bulge there than the stones' own observations, and the standard deviation of its
+    /// amplitude, metres: along, up and out. `None` where nothing shows it.
+    pub smoothed_m: [Option<(f64, f64)>; 3],
 }
 
 /// A bulge of some place and size in three directions: along, up and out.
@@ -106,7 +109,10 @@ impl Bulge {
             stones: stones.copied().collect(),
             direction,
             amplitude_m: (score[direction] / information, sd / information),
-            smoothed_m: smoothed[direction] / information,
+            smoothed_m: std::array::from_fn(|k| {
+                let (sd, information) = self.directions[k]?;
+                Some((smoothed[k] / information, sd / information))
+            }),
         })
     }
 }
@@ -146,6 +152,7 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     Some(Scan {
         p: simulated.min(sum),
         most_likely,
+        limit,
         detection_limits_m: ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, limit)),
     })
 }

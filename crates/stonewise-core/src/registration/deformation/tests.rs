@@ -226,6 +226,25 @@ fn a_bulge_is_found_where_it_is_and_the_rest_stands_still() {
 }
 
 #[test]
+fn what_the_field_smoothed_along_the_face_is_in_the_intervals() {
+    // The wall bulged and sank by as much; the motions show the first alone.
+    let noise = errors(13);
+    let sank = |k: usize| Vector3::new(0.0, 0.0, -bulge(k).x);
+    let mut wall = wall(bulge, |k| noise[k]);
+    for (k, stone) in wall.stones.iter_mut().enumerate() {
+        let stone = stone.as_mut().unwrap();
+        stone.observed.1 += stone.observed.0 * sank(k);
+    }
+    for (k, stone) in found(&wall).stones.iter().enumerate() {
+        let apart = stone.deformation - bulge(k) - sank(k);
+        for axis in 0..3 {
+            let sd = stone.covariance[(axis, axis)].sqrt();
+            assert!(apart[axis].abs() < 4.0 * sd, "{k}, {axis}: {apart:?}, {sd}");
+        }
+    }
+}
+
+#[test]
 fn the_larger_part_is_the_one_that_kept_its_shape() {
     // A third of the wall moved as one body, farther than any error.
     let noise = errors(8);

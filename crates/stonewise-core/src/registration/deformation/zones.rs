@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::found::{DeformationZone, ZoneKind};
 use super::rigid_part::RigidPart;
-use super::scan::{MostLikely, Scan};
+use super::scan::Scan;
 use crate::components::components;
 use crate::geometry::FaceFrame;
 use crate::statistics::discoveries;
@@ -15,8 +15,6 @@ use std::collections::BTreeSet;
 const FALSE_DISCOVERY_RATE: f64 = 0.05;
 /// Fewer connected stones are no zone: one or two that differ from their surroundings are judged as loose stones are.
 const LEAST_STONES: usize = 3;
-/// Standard deviations on either side of an interval of 95 %.
-const QUANTILE: f64 = 1.96;
 /// Share of cases that lies outside of it.
 const OUTSIDE: f64 = 0.05;
 /// Share of the variance of the motion across a zone that a plane must explain to call it a tilt.
@@ -54,18 +52,20 @@ pub(super) fn zones(body: &Body, rigid: &RigidPart, scan: &Scan) -> Vec<Deformat
         .filter(|part| part.len() >= LEAST_STONES)
         .collect();
     match parts.is_empty() {
-        true => vec![bulge(body, &scan.most_likely)],
+        true => vec![bulge(body, scan)],
         false => parts.iter().map(|stones| zone(body, rigid, stones)).collect(),
     }
 }
 
-/// The zone of a bulge.
-fn bulge(body: &Body, found: &MostLikely) -> DeformationZone {
+/// The zone of the most likely bulge. Its interval holds with 95 % although the bulge was chosen from all places, sizes
+/// and directions.
+fn bulge(body: &Body, scan: &Scan) -> DeformationZone {
+    let found = &scan.most_likely;
     let (amplitude_m, sd_m) = found.amplitude_m;
     let moved = |(_, share): &(usize, f64)| Vector3::ith(found.direction, amplitude_m * share);
     let in_face: Vec<Vector3<f64>> = found.stones.iter().map(moved).collect();
     let largest = found.stones.iter().map(|s| s.1).fold(0.0, f64::max);
-    let (largest_m, half_m) = (largest * amplitude_m.abs(), QUANTILE * largest * sd_m);
+    let (largest_m, half_m) = (largest * amplitude_m.abs(), scan.limit * largest * sd_m);
     let interval_m = [(largest_m - half_m).max(0.0), largest_m + half_m];
     let stones: Vec<usize> = found.stones.iter().map(|s| s.0).collect();
     described(body, &stones, &in_face, largest_m, interval_m)

@@ -7,7 +7,7 @@ use crate::geometry::FaceFrame;
 use crate::id::StoneId;
 use crate::params::{Params, Range, Ranged, with_ranges};
 use crate::registration::adjustment::observation::surface::{
-    Equations, Layout, LocalPair, SurfaceNoise, equations::equations, estimate_noise,
+    Equations, Layout, LocalPair, NoiseFactors, SurfaceNoise, equations::equations, estimate_noise,
 };
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, face_spacing};
@@ -140,7 +140,7 @@ impl Comparison {
                 nearby_second: Cloud::new(stone.centroid, Vec::new()),
                 window: None,
             };
-            LocalPair::new(&pair, &frame, [1.0; 2])
+            LocalPair::new(&pair, &frame, NoiseFactors::USUAL)
         };
         let sight = |s: &&SourcePoints| {
             let sight = Sight {

@@ -86,6 +86,7 @@ mod tests {
     use crate::cloud::Cloud;
     use crate::geometry::FaceFrame;
     use crate::id::StoneId;
+    use crate::registration::adjustment::observation::surface::NoiseFactors;
     use crate::registration::adjustment::observation::surface::equations::equations;
     use crate::registration::points::PairPoints;
     use crate::registration::points::{NearPoint, stone_points};
@@ -149,7 +150,7 @@ mod tests {
         LocalPair::new(
             &pair,
             &FaceFrame::from_normal(&normal).face_from_world(),
-            [1.0; 2],
+            NoiseFactors::USUAL,
         )
     }
 

@@ -76,7 +76,7 @@ pub(crate) fn equations(
     noise: &SurfaceNoise,
     layout: &Layout,
 ) -> Equations {
-    let noise = &noise.scaled(pair.noise_factors);
+    let noise = &noise.of_stone(&pair.noise);
     let motion = InverseMotion::new(motion);
     let patches = pool_into_patches(pair, &motion, &InverseMotion::new(window), noise, layout);
     let mut sum = Equations::zeros(patches.overlap);
@@ -92,9 +92,9 @@ pub(crate) fn equations(
 
 /// [`Equations::deviance`] alone, at `motion`, of all of these points.
 pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNoise, layout: &Layout) -> f64 {
-    let noise = &noise.scaled(pair.noise_factors);
+    let noise = &noise.of_stone(&pair.noise);
     let motion = InverseMotion::new(motion);
-    let of_patch = |PatchPoints { grid, mut epochs }| {
+    let of_patch = |PatchPoints { grid, mut epochs, .. }| {
         robust_fit(grid, &mut epochs, noise, layout).map_or(0.0, |fit| {
             let of_points = |(observations, sigma): (&Vec<WeightedPoint>, f64)| -> f64 {
                 fit.squares(observations, sigma).map(|square| square - 1.0).sum()
@@ -111,7 +111,7 @@ pub(crate) fn deviance(pair: &LocalPair, motion: &StoneVector, noise: &SurfaceNo
 
 /// Adds what a patch says to the equations; the sum of the second epoch's weighted squared residuals, in units of sigma.
 fn add_patch(
-    PatchPoints { grid, mut epochs }: PatchPoints,
+    PatchPoints { grid, mut epochs, .. }: PatchPoints,
     motion: &InverseMotion,
     noise: &SurfaceNoise,
     layout: &Layout,

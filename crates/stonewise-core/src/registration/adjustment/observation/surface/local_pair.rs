@@ -1,6 +1,7 @@
 //! The points of a matched stone in the stone's frame.
 
 use super::inverse_motion::InverseMotion;
+use super::surface_noise::NoiseFactors;
 use crate::cloud::Cloud;
 use crate::registration::adjustment::stone_vector::StoneVector;
 use crate::registration::points::{PairPoints, Window};
@@ -16,8 +17,8 @@ pub(crate) struct LocalPair {
     labelled: usize,
     /// Where points count, and from the stone's frame to the window's.
     window: Option<(Arc<Window>, Matrix3<f64>)>,
-    /// Noise of each epoch's points over that of most stones.
-    pub noise_factors: [f64; 2],
+    /// Its noise over that of most stones.
+    pub noise: NoiseFactors,
 }
 
 impl LocalPair {
@@ -29,12 +30,12 @@ impl LocalPair {
             labelled: second.len(),
             second,
             window: None,
-            noise_factors: [1.0; 2],
+            noise: NoiseFactors::USUAL,
         }
     }
 
-    /// `noise_factors`: noise of each epoch's points over that of most stones.
-    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>, noise_factors: [f64; 2]) -> Self {
+    /// `noise`: that of the stone over that of most.
+    pub fn new(pair: &PairPoints, face_from_world: &Matrix3<f64>, noise: NoiseFactors) -> Self {
         let local = |cloud: &Cloud| {
             let shift = cloud.origin() - pair.centroid;
             (0..cloud.len())
@@ -52,7 +53,7 @@ impl LocalPair {
                 .window
                 .as_ref()
                 .map(|w| (w.clone(), w.face_from_world() * face_from_world.transpose())),
-            noise_factors,
+            noise,
         }
     }
 
@@ -70,7 +71,7 @@ impl LocalPair {
             labelled: second.len(),
             second,
             window: None,
-            noise_factors: self.noise_factors,
+            noise: self.noise,
         }
     }
 
@@ -128,7 +129,7 @@ mod tests {
             nearby_second: cloud(chosen.nearby_second),
             window: chosen.window.map(Arc::new),
         };
-        let local = LocalPair::new(&pair, &frame, [1.0; 2]);
+        let local = LocalPair::new(&pair, &frame, NoiseFactors::USUAL);
         let moved = InverseMotion::new(&StoneVector::from_translation(frame * shift));
         let counted: Vec<[f64; 3]> = local.second_moved_back(&moved, &moved).collect();
         assert_eq!(counted.len(), local.first.len());

@@ -25,8 +25,8 @@ pub(crate) use equations::{Equations, deviance};
 pub(crate) use layout::Layout;
 pub(crate) use linearisation::Linearisation;
 pub(crate) use local_pair::LocalPair;
-pub(crate) use model::{StoneSurface, SurfaceModel};
+pub(crate) use model::{Inflation, StoneSurface, SurfaceModel};
 pub(crate) use noise_estimate::estimate_noise;
-pub(crate) use surface_noise::SurfaceNoise;
+pub(crate) use surface_noise::{NoiseFactors, SurfaceNoise};
 #[cfg(test)]
 pub(crate) use testing::without_points;

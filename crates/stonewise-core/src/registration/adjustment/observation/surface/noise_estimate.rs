@@ -140,7 +140,12 @@ fn without_foreign(patches: Vec<PatchPoints>, noise: &SurfaceNoise, layout: &Lay
 /// Median distance of a patch's points of each epoch from the surface of both, metres; zero where they determine none.
 fn scatter(patch: &PatchPoints, noise: &SurfaceNoise, layout: &Layout) -> [f64; 2] {
     let mut epochs = patch.epochs.clone();
-    let Some(fit) = robust_fit(patch.grid, &mut epochs, noise, layout) else {
+    let Some(fit) = robust_fit(
+        patch.grid,
+        &mut epochs,
+        &noise.on_surface(patch.roughness),
+        layout,
+    ) else {
         return [0.0; 2];
     };
     epochs.map(|points| {
@@ -155,8 +160,8 @@ fn reweighted(patches: &[PatchPoints], noise: &SurfaceNoise, layout: &Layout) ->
         .par_iter()
         .map(|p| {
             let mut epochs = p.epochs.clone();
-            robust_fit(p.grid, &mut epochs, noise, layout);
-            PatchPoints { grid: p.grid, epochs }
+            robust_fit(p.grid, &mut epochs, &noise.on_surface(p.roughness), layout);
+            PatchPoints { epochs, ..*p }
         })
         .collect()
 }
@@ -166,6 +171,7 @@ fn deviance(patches: &[PatchPoints], noise: &SurfaceNoise) -> f64 {
         .par_iter()
         .map(|p| {
             let epochs = [p.epochs[0].as_slice(), p.epochs[1].as_slice()];
+            let noise = &noise.on_surface(p.roughness);
             PatchFit::new(p.grid, epochs, noise).map_or(UNSOLVABLE, |fit| fit.deviance(epochs, noise))
         })
         .collect();

@@ -24,6 +24,8 @@ const LEAST_CELLS: usize = 4;
 pub(crate) struct PatchPoints {
     pub grid: PatchGrid,
     pub epochs: [Vec<WeightedPoint>; 2],
+    /// Roughness of the stone over that of most.
+    pub roughness: f64,
 }
 
 pub(crate) struct Patches {
@@ -56,6 +58,7 @@ pub(crate) fn pool_into_patches(
         .map(|patch| PatchPoints {
             grid: cuts.grid(patch, layout.cell_m),
             epochs: [Vec::new(), Vec::new()],
+            roughness: pair.noise.roughness,
         })
         .collect();
     let mut compare = CellSums::new(cuts.low, cuts.high, COMPARE_CELLS * layout.cell_m);
@@ -63,7 +66,7 @@ pub(crate) fn pool_into_patches(
         for p in points {
             compare.count(epoch, p);
             if let Some(patch) = cuts.patch_at(p) {
-                let PatchPoints { grid, epochs } = &mut list[patch];
+                let PatchPoints { grid, epochs, .. } = &mut list[patch];
                 epochs[epoch].push(grid.point(*p));
             }
         }

@@ -9,11 +9,36 @@ pub(crate) struct SurfaceNoise {
     pub tau_m: f64,
 }
 
+/// How a stone's noise departs from that of most stones, as factors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct NoiseFactors {
+    /// Of the points, per epoch.
+    pub points: [f64; 2],
+    /// Of the surface's roughness.
+    pub roughness: f64,
+}
+
+impl NoiseFactors {
+    /// Those of most stones.
+    pub const USUAL: Self = Self {
+        points: [1.0; 2],
+        roughness: 1.0,
+    };
+}
+
 impl SurfaceNoise {
-    /// With the points' noise times a factor for each epoch.
-    pub fn scaled(&self, factors: [f64; 2]) -> Self {
+    /// The noise of a stone.
+    pub fn of_stone(&self, factors: &NoiseFactors) -> Self {
         Self {
-            sigma_m: [0, 1].map(|e| factors[e] * self.sigma_m[e]),
+            sigma_m: [0, 1].map(|e| factors.points[e] * self.sigma_m[e]),
+            ..self.on_surface(factors.roughness)
+        }
+    }
+
+    /// With the roughness of a surface, as a factor.
+    pub fn on_surface(&self, roughness: f64) -> Self {
+        Self {
+            tau_m: roughness * self.tau_m,
             ..*self
         }
     }
