@@ -2,7 +2,7 @@
 //! appearance.
 #![allow(clippy::unwrap_used, clippy::panic)] // tests stop where something is missing
 
-use nalgebra::{Matrix2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix2, Point3, Rotation3, Translation3, UnitQuaternion, Vector2, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::convert::Infallible;
@@ -223,16 +223,17 @@ fn pairs() -> MemoryPairs {
     MemoryPairs::new(pairs.collect())
 }
 
-/// Error of a stone's motion against the mean error of all, in the face, metres.
+/// Error of a stone's motion in the face, metres, less the translation and the gradient that the errors of all stones
+/// share: of these the photos' poses leave millimetres open.
 fn errors(report: &AdjustmentReport) -> Vec<Vector3<f64>> {
-    let error = |k: usize| {
-        let found = report.results[k].motion.as_ref().unwrap().displacement;
-        let d = found - motion(k);
-        Vector3::new(0.0, d.y, d.z)
-    };
-    let all: Vec<Vector3<f64>> = (0..COLUMNS * ROWS).map(error).collect();
-    let mean = all.iter().sum::<Vector3<f64>>() / all.len() as f64;
-    all.iter().map(|e| e - mean).collect()
+    let error = |k: usize| report.results[k].motion.as_ref().unwrap().displacement - motion(k);
+    let found = DMatrix::from_fn(COLUMNS * ROWS, 2, |k, axis| error(k)[1 + axis]);
+    let linear = DMatrix::from_fn(COLUMNS * ROWS, 3, |k, c| [1.0, centre(k).y, centre(k).z][c]);
+    let fit = linear.clone().svd(true, true).solve(&found, 1e-12).unwrap();
+    let rest = found - linear * fit;
+    rest.row_iter()
+        .map(|row| Vector3::new(0.0, row[0], row[1]))
+        .collect()
 }
 
 fn rms(errors: &[Vector3<f64>]) -> f64 {

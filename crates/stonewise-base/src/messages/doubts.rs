@@ -80,12 +80,12 @@ messages! {
         PART_REFUSED = "part-in-disagreement":
             "{stones} neighbouring stones of a part of the wall, around stone {stone}, have no motion: the clouds of the two epochs show \
             different surfaces there, or a motion unlike that of the rest which nothing confirms. Something covers the part (plants, snow, a \
-            banner), it moved, or its clouds or masks mislead. Its motion is unknown. Look at the part on site, \
-            and in the photos and clouds that show it",
+            banner), it moved, or its clouds or masks mislead. Its motion is unknown. Look at the part on site \
+            and in the clouds of both epochs",
             "{stones} benachbarte Steine eines Teils der Mauer um Stein {stone} haben keine Bewegung: die Punktwolken der beiden Epochen zeigen \
             dort verschiedene Oberflächen, oder eine Bewegung anders als die der übrigen Mauer, die nichts bestätigt. Etwas bedeckt den Teil \
             (Pflanzen, Schnee, ein Banner), er hat sich bewegt, oder seine Punktwolken oder Masken täuschen. Seine Bewegung ist \
-            unbekannt. Den Teil vor Ort ansehen, und in den Fotos und Punktwolken, die ihn zeigen";
+            unbekannt. Den Teil vor Ort und in den Punktwolken beider Epochen ansehen";
 
         BLIND = "insensitive":
             "motions below about {limit} mm cannot be detected in the weakest direction, {excess} times what the spacing and the noise \
