@@ -144,7 +144,8 @@ impl Adjustment {
     /// two from the present one.
     fn likely_roughness(&self, stone: &StoneState, pair: &LocalPair) -> f64 {
         let motion = &stone.more_probable().motion;
-        let inflation = self.surface.inflation_of_all(stone.surface());
+        // Equations from which the stone's own factor could follow are yet to be evaluated.
+        let inflation = self.surface.correlation.factor();
         let counting = pair.counting(motion, |_| true);
         let value = |roughness: f64| {
             let noise = self.surface.noise.on_surface(roughness / pair.noise.roughness);
