@@ -306,6 +306,18 @@ fn photos_of_cameras_that_epochs_share_are_not_missing() {
 }
 
 #[test]
+fn photos_that_are_not_there_are_not_said_to_see_nothing() {
+    let survey = copy_of(sharp_survey());
+    for photo in photos(survey.path()) {
+        fs::remove_file(photo).unwrap();
+    }
+    let (code, table, log) = check(survey.path());
+    assert_eq!(code, 3, "{table}{log}");
+    assert!(table.contains("none of the photos"), "{table}");
+    assert!(!table.contains("no photo sees"), "{table}");
+}
+
+#[test]
 fn broken_surveys_are_named_and_a_run_stops_where_they_cannot_be_right() {
     for (what, spoil, word, stops) in CASES {
         let survey = copy_of(sharp_survey());

@@ -57,6 +57,10 @@ pub(super) fn look(
     survey: &Sample,
     depth: Depth,
 ) -> Result<(Vec<Finding>, Option<Picture>)> {
+    // Photos that are not there are named elsewhere.
+    if photos.is_empty() {
+        return Ok((Vec::new(), None));
+    }
     let finding = |verdict, text: Said| vec![Finding::new(&epoch.name, &CAMERAS, verdict, text)];
     let candidates = candidates(photos, survey);
     if candidates.is_empty() {
