@@ -39,7 +39,12 @@ fn assert_outside(file: &str, normal: Vector3<f64>) {
     let cosines = found.cells.iter().map(|c| c.normal.dot(&normal));
     let facing: Vec<f64> = cosines.filter(|c| c.abs() > 0.7).collect();
     let right = facing.iter().filter(|c| **c > 0.0).count();
-    println!("{file}: {right} of {} cells, {:?}", facing.len(), found.evidence);
+    println!(
+        "{file}: {right} of {} cells, {:?}, log-odds of the side {:.1}",
+        facing.len(),
+        found.evidence,
+        found.odds
+    );
     assert!(facing.len() > 200);
     assert!(right as f64 > 0.95 * facing.len() as f64 && found.is_sure());
 }

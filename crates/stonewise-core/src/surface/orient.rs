@@ -2,12 +2,13 @@
 
 use super::SurfaceCell;
 use super::outside::Outside;
-use super::signs::{consistent_groups, neighbours};
+use super::signs::{PART_COSINE, Ties, contracted, neighbours, smooth_parts};
 use super::surface_cells;
 use crate::cloud::{GridIndex, TileSource};
 use crate::components::components;
 use crate::progress::{Interrupted, Progress};
 use nalgebra::Point3;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Cosine of the angle to the vertical below which a cell is a wall, and above which it is level.
 const STEEP: f64 = 0.5;
@@ -22,16 +23,32 @@ const LEAST_BATTER: f64 = 0.05;
 const LEVEL_ODDS: f64 = 2.2;
 const JOINTS_ODDS: f64 = 0.5;
 const BATTER_ODDS: f64 = 0.4;
-/// Evidence from which on the outside is known: odds of 99 to 1.
-pub const SURE_OF_OUTSIDE: f64 = 4.6;
+/// The same for a piece of an edge: where two parts meet, both are before the other or both behind.
+const EDGE_ODDS: f64 = 1.1;
+/// The same for a part that lies beside others and is parallel to them: all of them are seen from the same side,
+/// but in one of fifty cases.
+const BESIDE_ODDS: f64 = 3.9;
+/// Part of the cells of one that may lie before or behind the other.
+const OVERLAP: f64 = 0.25;
+/// Distance up to which scanners show a side, as a factor of that of the nearest.
+const NEAR: f64 = 1.5;
+/// Distance up to which parts lie beside each other, metres.
+const BESIDE_M: f64 = 1.5;
+/// Evidence from which on the outside is known: odds of 20 to 1.
+pub const SURE_OF_OUTSIDE: f64 = 3.0;
 /// Height above the lowest surfaces up to which level ones are seen from above, metres: eyes and scanners on
 /// tripods are higher. Above, soffits are seen from below.
 const EYE_M: f64 = 1.5;
+/// Part of the cells that may lie lower than any surface.
+const STRAY: f64 = 0.02;
 /// Area that counts as one independent piece of evidence, square metres: neighbours share what the surface
 /// looks like.
 const INDEPENDENT_M2: f64 = 0.6;
 /// A ledge, however small, is at least this part of an independent piece: treads of one flight are alike.
 const LEDGE: f64 = 1.0 / 3.0;
+/// Part of the walls that may be less sure than the whole is said to be: railings, sides of buttresses, stray
+/// pieces.
+const UNSURE: f64 = 0.4;
 /// Edge of the cells that decide about signs, as a part of those that are asked for: edges and treads show in
 /// small cells.
 const FINE: f64 = 0.6;
@@ -62,6 +79,15 @@ impl Evidence {
         }
     }
 
+    fn plus(self, other: Self) -> Self {
+        Self {
+            scanners: self.scanners + other.scanners,
+            level: self.level + other.level,
+            joints: self.joints + other.joints,
+            batter: self.batter + other.batter,
+        }
+    }
+
     fn reversed(self) -> Self {
         Self {
             scanners: -self.scanners,
@@ -77,14 +103,17 @@ impl Evidence {
 pub struct Orientation {
     /// The cells.
     pub cells: Vec<SurfaceCell>,
-    /// What decided about the largest connected surface.
+    /// What all parts say together about the outside that was chosen.
     pub evidence: Evidence,
+    /// Natural logarithm of the odds that the outside is right, at least of three fifths of the walls (of all
+    /// cells where there are none).
+    pub odds: f64,
 }
 
 impl Orientation {
     /// Whether the outside is beyond doubt.
     pub fn is_sure(&self) -> bool {
-        self.evidence.total() >= SURE_OF_OUTSIDE
+        self.odds >= SURE_OF_OUTSIDE
     }
 }
 
@@ -112,87 +141,152 @@ pub fn oriented_surface<T: TileSource, E: From<T::Error> + From<Interrupted>>(
     };
     Ok(Orientation {
         cells: cells.into_iter().map(turned).collect(),
-        evidence: found.evidence,
+        ..found
     })
 }
 
 /// Turns the normals of all cells of an edge of `cell_m` metres outside; `scanners`: positions from which the
 /// surface was measured, world frame, none where they are not known.
 ///
-/// Cells that touch each other get consistent signs first. Then each connected surface is turned to the side
-/// that the evidence favours; a small one whose own evidence is weak follows the nearest cell of the largest.
+/// Cells of smooth parts get consistent signs first. Then all evidence is added up, as logarithms of odds: what
+/// each part says itself, ties between parts that meet at an edge, and ties between parallel parts that lie beside
+/// each other.
 ///
 /// Cost: 26 neighbours a cell, sorted.
 pub fn orient(mut cells: Vec<SurfaceCell>, cell_m: f64, scanners: &[Point3<f64>]) -> Orientation {
-    let groups = consistent_groups(&mut cells);
-    let mut decided = Evidence::default();
-    let Some((largest, others)) = groups.split_first() else {
-        return Orientation {
-            cells,
-            evidence: decided,
-        };
-    };
-    let found = evidence_of(&cells, largest, cell_m, scanners);
-    decided = turn(&mut cells, largest, found, found.total() < 0.0);
-    let centroids: Vec<Point3<f64>> = largest.iter().map(|&i| cells[i].centroid).collect();
-    let index = GridIndex::for_nearest(&centroids);
-    for group in others {
-        let found = evidence_of(&cells, group, cell_m, scanners);
-        let is_inward = match found.total().abs() >= SURE_OF_OUTSIDE {
-            true => found.total() < 0.0,
-            false => opposes(&cells, group, largest, &index),
-        };
-        turn(&mut cells, group, found, is_inward);
+    let (parts, mut ties) = smooth_parts(&mut cells);
+    // The sum of the ties along an edge is about its length in cells.
+    let a_tie = EDGE_ODDS * cell_m / INDEPENDENT_M2.sqrt();
+    for of_part in &mut ties {
+        of_part.values_mut().for_each(|tie| *tie *= a_tie);
+    }
+    let scene = Scene::of(&cells, cell_m, scanners);
+    let evidence: Vec<Evidence> = parts.iter().map(|part| scene.evidence_of(part)).collect();
+    scene.add_beside(&parts, &mut ties);
+    // One node more stands for what points outside.
+    let outside = parts.len();
+    ties.push(BTreeMap::new());
+    for (part, own) in evidence.iter().enumerate().filter(|(_, own)| own.total() != 0.0) {
+        ties[part].insert(outside, own.total());
+        ties[outside].insert(part, own.total());
+    }
+    let forest = contracted(ties);
+    let (_, of_outside) = forest.root(outside);
+    let (mut sum, mut odds) = (Evidence::default(), Vec::new());
+    let shows_walls = cells.iter().any(is_wall);
+    for (i, (part, own)) in parts.iter().zip(evidence).enumerate() {
+        let is_inward = forest.root(i).1 != of_outside;
+        sum = sum.plus(if is_inward { own.reversed() } else { own });
+        let own_odds = forest.strength(i, outside).unwrap_or(0.0);
+        let counts = |i: &&usize| !shows_walls || is_wall(&cells[**i]);
+        odds.extend(part.iter().filter(counts).map(|_| own_odds));
+        if is_inward {
+            part.iter().for_each(|&i| cells[i] = cells[i].flipped());
+        }
     }
     Orientation {
         cells,
-        evidence: decided,
+        evidence: sum,
+        odds: low_end(odds, UNSURE),
     }
 }
 
-/// Turns all cells of a group round where their normals point inward; the evidence after that.
-fn turn(cells: &mut [SurfaceCell], group: &[usize], found: Evidence, is_inward: bool) -> Evidence {
-    if !is_inward {
-        return found;
-    }
-    for &i in group {
-        cells[i] = cells[i].flipped();
-    }
-    found.reversed()
+/// What evidence is drawn from.
+struct Scene<'a> {
+    cells: &'a [SurfaceCell],
+    cell_m: f64,
+    scanners: &'a [Point3<f64>],
+    /// Height of the lowest surfaces.
+    lowest_m: f64,
 }
 
-/// Whether most normals of a group oppose those of the nearest cells of the largest group; `index`: of its
-/// centroids.
-fn opposes(cells: &[SurfaceCell], group: &[usize], largest: &[usize], index: &GridIndex) -> bool {
-    // A few cells of the group say what all would.
-    let step = group.len().div_ceil(50);
-    let cosines = group.iter().step_by(step).filter_map(|&i| {
-        let (nearest, _) = index.nearest(&cells[i].centroid, f64::INFINITY)?;
-        Some(cells[i].normal.dot(&cells[largest[nearest]].normal))
-    });
-    cosines.sum::<f64>() < 0.0
+impl<'a> Scene<'a> {
+    fn of(cells: &'a [SurfaceCell], cell_m: f64, scanners: &'a [Point3<f64>]) -> Self {
+        Self {
+            cells,
+            cell_m,
+            scanners,
+            lowest_m: low_end(cells.iter().map(|c| c.centroid.z).collect(), STRAY),
+        }
+    }
+
+    /// What a part says itself.
+    fn evidence_of(&self, part: &[usize]) -> Evidence {
+        let all = || part.iter().map(|&i| &self.cells[i]);
+        let walls = || all().filter(|c| is_wall(c));
+        let is_low = |c: &&SurfaceCell| c.centroid.z < self.lowest_m + EYE_M && c.normal.z.abs() > LEVEL;
+        let level: Vec<SurfaceCell> = all().filter(is_low).copied().collect();
+        let a_cell = self.cell_m * self.cell_m / INDEPENDENT_M2;
+        let skewness = walls().map(|c| -c.skewness).filter(|s| s.abs() > LEAST_SKEWNESS);
+        let rise = walls().map(|c| c.normal.z).filter(|z| z.abs() > LEAST_BATTER);
+        Evidence {
+            scanners: LEVEL_ODDS * majority(all().map(|c| self.facing(c))),
+            level: LEVEL_ODDS * ledges_upward(&level, a_cell),
+            joints: JOINTS_ODDS * a_cell * majority(skewness),
+            batter: BATTER_ODDS * a_cell * majority(rise),
+        }
+    }
+
+    /// On which side of a cell the scanners near it stand, those up to half as far again as the nearest: positive where
+    /// its normal points, 0 where they stand on both sides, as before the flanks of a buttress.
+    fn facing(&self, cell: &SurfaceCell) -> f64 {
+        let to = || self.scanners.iter().map(|s| s - cell.centroid);
+        let nearest_m = to().map(|to| to.norm()).fold(f64::INFINITY, f64::min);
+        let near = to().filter(|to| to.norm() <= NEAR * nearest_m);
+        let mut sides = near.map(|to| cell.normal.dot(&to).signum());
+        match sides.next() {
+            Some(side) if sides.all(|other| other == side) => side,
+            _ => 0.0,
+        }
+    }
+
+    /// Adds ties between parts that lie beside each other: parallel ones are seen from the same side, unless one
+    /// lies behind the other, as the two faces of a railing or the flanks of a buttress do.
+    fn add_beside(&self, parts: &[Vec<usize>], ties: &mut Ties) {
+        let centroids: Vec<Point3<f64>> = self.cells.iter().map(|c| c.centroid).collect();
+        let index = GridIndex::new(&centroids, BESIDE_M);
+        let mut part_of = vec![0; self.cells.len()];
+        for (part, members) in parts.iter().enumerate() {
+            members.iter().for_each(|&i| part_of[i] = part);
+        }
+        for (part, members) in parts.iter().enumerate() {
+            let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
+            let mut behind: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
+            // A few cells of the part say what all would.
+            let some = || members.iter().step_by(members.len().div_ceil(50));
+            let mut count = 0.0;
+            for &i in some() {
+                let cell = &self.cells[i];
+                index.within(&cell.centroid, BESIDE_M, |j, _| {
+                    let other = &self.cells[j];
+                    let (apart, cosine) = (other.centroid - cell.centroid, cell.normal.dot(&other.normal));
+                    if part_of[j] == part || cosine.abs() <= PART_COSINE {
+                        return;
+                    }
+                    let across_m = cell.normal.dot(&apart).abs();
+                    let beside_m = (apart.norm_squared() - across_m * across_m).max(0.0).sqrt();
+                    if beside_m < self.cell_m {
+                        behind.entry(part_of[j]).or_default().insert(i);
+                    } else if beside_m > across_m {
+                        *sums.entry(part_of[j]).or_default() += cosine;
+                        count += 1.0;
+                    }
+                });
+            }
+            let overlaps = |other: &usize| {
+                let cells = behind.get(other).map_or(0, BTreeSet::len);
+                cells as f64 > OVERLAP * some().count() as f64
+            };
+            for (other, sum) in sums.into_iter().filter(|(other, _)| !overlaps(other)) {
+                *ties[part].entry(other).or_default() += BESIDE_ODDS * sum / count;
+                *ties[other].entry(part).or_default() += BESIDE_ODDS * sum / count;
+            }
+        }
+    }
 }
 
-fn evidence_of(cells: &[SurfaceCell], group: &[usize], cell_m: f64, scanners: &[Point3<f64>]) -> Evidence {
-    let all = || group.iter().map(|&i| &cells[i]);
-    let walls = || all().filter(|c| c.normal.z.abs() < STEEP);
-    let facing = |c: &SurfaceCell| {
-        let to = scanners.iter().map(|s| s - c.centroid);
-        let nearest = to.min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()));
-        nearest.map_or(0.0, |to| c.normal.dot(&to))
-    };
-    let lowest_m = low_end(all().map(|c| c.centroid.z).collect());
-    let is_low = |c: &&SurfaceCell| c.centroid.z < lowest_m + EYE_M && c.normal.z.abs() > LEVEL;
-    let level: Vec<SurfaceCell> = all().filter(is_low).copied().collect();
-    let a_cell = cell_m * cell_m / INDEPENDENT_M2;
-    let skewness = walls().map(|c| -c.skewness).filter(|s| s.abs() > LEAST_SKEWNESS);
-    let rise = walls().map(|c| c.normal.z).filter(|z| z.abs() > LEAST_BATTER);
-    Evidence {
-        scanners: LEVEL_ODDS * majority(all().map(facing)),
-        level: LEVEL_ODDS * ledges_upward(&level, a_cell),
-        joints: JOINTS_ODDS * a_cell * majority(skewness),
-        batter: BATTER_ODDS * a_cell * majority(rise),
-    }
+fn is_wall(cell: &SurfaceCell) -> bool {
+    cell.normal.z.abs() < STEEP
 }
 
 /// How many more pieces of level surfaces are seen from above than from below; `a_cell`: pieces in a cell.
@@ -205,10 +299,11 @@ fn ledges_upward(level: &[SurfaceCell], a_cell: f64) -> f64 {
     components(&neighbours(level)).into_iter().map(ledge).sum()
 }
 
-/// The fiftieth part from below: stray points lie lower than anything.
-fn low_end(mut values: Vec<f64>) -> f64 {
+/// The value below which a part of all values lies; 0 without values.
+fn low_end(mut values: Vec<f64>, part: f64) -> f64 {
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 50).copied().unwrap_or(0.0)
+    let at = (part * values.len() as f64) as usize;
+    values.get(at).copied().unwrap_or(0.0)
 }
 
 /// How many more values are positive than negative.
@@ -224,6 +319,7 @@ mod tests {
     use crate::progress::Silent;
     use crate::surface::surface_cells;
     use nalgebra::{Rotation3, Vector3};
+    use rand::{RngExt, SeedableRng};
 
     /// A wall of 6 x 3 m in the plane y = 0 that faces -y, with joints 2 cm deep and 4 cm wide every 50 cm,
     /// which may lean back.
@@ -287,6 +383,38 @@ mod tests {
         }
     }
 
+    /// Two buttresses 80 cm apart stand before a wall that leans back; as deep as one to three cells, they show
+    /// edges badly.
+    #[test]
+    fn buttresses_face_as_the_wall_between_them() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        for depth in [0.1, 0.15, 0.2, 0.3, 0.35] {
+            let mut points = Vec::new();
+            for _ in 0..60_000 {
+                let [x, z] = [random.random_range(0.0..3.0), random.random_range(0.0..2.0)];
+                let is_buttress = (x - 1.5_f64).abs() > 0.4 && (x - 1.5_f64).abs() < 1.2;
+                let before = if is_buttress { depth } else { 0.0 };
+                points.push([x, 0.2 * z - before + random.random_range(-0.01..0.01), z]);
+                let sides = [0.3, 1.1, 1.9, 2.7];
+                let at = random.random_range(0.0..depth);
+                if random.random_range(0.0..1.5) < depth {
+                    points.push([sides[random.random_range(0..4)], 0.2 * z - at, z]);
+                }
+                let [x, y] = [random.random_range(-1.0..4.0), random.random_range(-4.0..0.0)];
+                points.push([x, y, random.random_range(-0.02..0.02)]);
+            }
+            let points = points.into_iter().map(Point3::from);
+            let tiles = MemoryTiles::new([Cloud::from_world(Point3::origin(), points.collect::<Vec<_>>())]);
+            let found =
+                oriented_surface::<_, Box<dyn std::error::Error + Send + Sync>>(&tiles, 0.25, &[], &Silent);
+            let found = found.unwrap();
+            let faces = found.cells.iter().filter(|c| c.normal.y.abs() > 0.8);
+            let faces: Vec<bool> = faces.map(|c| c.normal.y < 0.0).collect();
+            assert!(faces.len() > 60 && faces.iter().all(|f| *f), "{depth}");
+            assert!(found.is_sure(), "{depth}: {}", found.odds);
+        }
+    }
+
     /// Eight steps, 20 cm high and 40 cm deep, go down towards -y; nothing else says where outside is.
     #[test]
     fn treads_are_seen_from_above() {
@@ -303,6 +431,38 @@ mod tests {
         assert!(found.is_sure(), "{:?}", found.evidence);
         let outside = Vector3::new(0.0, -1.0, 1.0);
         assert!(found.cells.iter().all(|c| c.normal.dot(&outside) > 0.0));
+    }
+
+    /// Two buttresses before a wall: their inner flanks face each other and not the scanner that is nearer.
+    #[test]
+    fn flanks_face_away_from_their_buttress() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(8);
+        let mut points = Vec::new();
+        for _ in 0..80_000 {
+            let [x, z] = [random.random_range(-5.0..5.0_f64), random.random_range(0.0..2.0)];
+            let y = if (2.0..3.0).contains(&x.abs()) { -1.5 } else { 0.0 };
+            points.push(Point3::new(x, y + random.random_range(-0.005..0.005), z));
+            let flank = [-3.0, -2.0, 2.0, 3.0][random.random_range(0..4)];
+            let [y, z] = [random.random_range(-1.5..0.0), random.random_range(0.0..2.0)];
+            points.push(Point3::new(flank, y, z));
+        }
+        let found = oriented(
+            points,
+            &[Point3::new(-6.0, -8.0, 1.0), Point3::new(6.0, -8.0, 1.0)],
+        );
+        let is_flank = |c: &&SurfaceCell| c.normal.x.abs() > 0.95;
+        let flanks: Vec<bool> = found
+            .cells
+            .iter()
+            .filter(is_flank)
+            .map(|c| c.normal.x * c.centroid.x * (c.centroid.x.abs() - 2.5) > 0.0)
+            .collect();
+        assert!(
+            flanks.len() > 20 && flanks.iter().all(|right| *right),
+            "{flanks:?}"
+        );
+        let mut faces = found.cells.iter().filter(|c| c.normal.y.abs() > 0.95);
+        assert!(faces.all(|c| c.normal.y < 0.0) && found.is_sure());
     }
 
     #[test]

@@ -5,26 +5,62 @@ use crate::geometry::{CellMap, cells_between};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
-/// Above this cosine, two neighbouring cells belong to one smooth surface and have like normals; below, they
-/// meet at an edge.
+/// Above this cosine, the normals of two neighbouring cells are nearly parallel; below, the cells meet at an edge.
 const SMOOTH_COSINE: f64 = 0.5;
+/// Above this one, both lie on one smooth part of a surface.
+pub(super) const PART_COSINE: f64 = 0.8;
 /// Strength of the tie across an edge against that on a smooth surface: where a cell lies before or behind
 /// another is less sure than how it lies.
 const EDGE: f64 = 0.5;
 
-/// Groups of cells that touch each other, with normals of consistent signs within each group.
+/// Ties of some things to others: positive where the signs of both are right or both are wrong.
+pub(super) type Ties = Vec<BTreeMap<usize, f64>>;
+
+/// Smooth parts of a surface, with normals of consistent signs within each part: the cells of each, and the ties
+/// between the parts.
 ///
 /// Neighbouring cells are tied, the more strongly the more parallel their normals are (Hoppe, DeRose, Duchamp,
 /// McDonald & Stuetzle 1992, section 3.3); across an edge both cells have the other in front, or both have it
-/// behind. The two groups with the strongest ties are joined first, and all ties between two groups add up
-/// (greedy additive contraction, Keuper et al. 2015), so that one false tie at an edge decides nothing.
-pub(super) fn consistent_groups(cells: &mut [SurfaceCell]) -> Vec<Vec<usize>> {
-    let mut ties = ties_of(cells);
+/// behind.
+pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> (Vec<Vec<usize>>, Ties) {
+    let neighbours = neighbours(cells);
+    let mut smooth: Ties = vec![BTreeMap::new(); cells.len()];
+    for (i, others) in neighbours.iter().enumerate() {
+        let cosines = others.iter().map(|&j| (j, cells[i].normal.dot(&cells[j].normal)));
+        smooth[i].extend(cosines.filter(|(_, cosine)| cosine.abs() > PART_COSINE));
+    }
+    let forest = contracted(smooth);
+    let mut parts: CellMap<usize, Vec<usize>> = CellMap::default();
+    for (i, cell) in cells.iter_mut().enumerate() {
+        let (root, is_opposite) = forest.root(i);
+        if is_opposite {
+            *cell = cell.flipped();
+        }
+        parts.entry(root).or_default().push(i);
+    }
+    let mut parts: Vec<Vec<usize>> = parts.into_values().collect();
+    parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
+    let mut part_of = vec![0; cells.len()];
+    for (part, members) in parts.iter().enumerate() {
+        members.iter().for_each(|&i| part_of[i] = part);
+    }
+    let mut ties: Ties = vec![BTreeMap::new(); parts.len()];
+    for (i, others) in neighbours.iter().enumerate() {
+        for &j in others.iter().filter(|&&j| part_of[j] != part_of[i]) {
+            *ties[part_of[i]].entry(part_of[j]).or_default() += tie_of(&cells[i], &cells[j]);
+        }
+    }
+    (parts, ties)
+}
+
+/// Joins all that is tied. The two groups with the strongest tie are joined first, and all ties between two groups
+/// add up (greedy additive contraction, Keuper et al. 2015), so that one false tie decides nothing.
+pub(super) fn contracted(mut ties: Ties) -> Forest {
     let mut queue: BinaryHeap<Tie> = BinaryHeap::new();
     for (a, of_a) in ties.iter().enumerate() {
         queue.extend(of_a.range(a..).map(|(b, tie)| Tie::new([a, *b], *tie)));
     }
-    let mut forest = Forest::new(cells.len());
+    let mut forest = Forest::new(ties.len());
     while let Some(Tie {
         strength,
         ends: [a, b],
@@ -50,28 +86,9 @@ pub(super) fn consistent_groups(cells: &mut [SurfaceCell]) -> Vec<Vec<usize>> {
             ties[other].insert(kept, sum);
             queue.push(Tie::new([kept, other], sum));
         }
-        forest.join([kept, taken], is_opposite);
+        forest.join([kept, taken], is_opposite, strength);
     }
-    let mut groups: CellMap<usize, Vec<usize>> = CellMap::default();
-    for (i, cell) in cells.iter_mut().enumerate() {
-        let (root, is_opposite) = forest.root(i);
-        if is_opposite {
-            *cell = cell.flipped();
-        }
-        groups.entry(root).or_default().push(i);
-    }
-    let mut groups: Vec<Vec<usize>> = groups.into_values().collect();
-    groups.sort_by_key(|group| (std::cmp::Reverse(group.len()), group[0]));
-    groups
-}
-
-/// The ties of each cell to others: positive where both normals are right or both are wrong.
-fn ties_of(cells: &[SurfaceCell]) -> Vec<BTreeMap<usize, f64>> {
-    let mut ties = vec![BTreeMap::new(); cells.len()];
-    for (i, others) in neighbours(cells).into_iter().enumerate() {
-        ties[i].extend(others.into_iter().map(|j| (j, tie_of(&cells[i], &cells[j]))));
-    }
-    ties
+    forest
 }
 
 fn tie_of(a: &SurfaceCell, b: &SurfaceCell) -> f64 {
@@ -134,42 +151,123 @@ impl PartialEq for Tie {
 
 impl Eq for Tie {}
 
-/// Disjoint sets, each member with its sign relative to the root of its set.
-struct Forest {
-    parents: Vec<usize>,
-    is_opposite: Vec<bool>,
+/// Things that were joined, one after the other, with their signs relative to each other.
+pub(super) struct Forest {
+    nodes: Vec<Node>,
+    joins: usize,
+}
+
+/// A thing, and its way to the root of its set.
+struct Node {
+    parent: usize,
+    is_opposite: bool,
+    /// When it was joined to its parent, and how strongly.
+    joined: (usize, f64),
+    size: usize,
 }
 
 impl Forest {
     fn new(count: usize) -> Self {
+        let node = |parent| Node {
+            parent,
+            is_opposite: false,
+            joined: (0, f64::INFINITY),
+            size: 1,
+        };
         Self {
-            parents: (0..count).collect(),
-            is_opposite: vec![false; count],
+            nodes: (0..count).map(node).collect(),
+            joins: 0,
         }
     }
 
     /// The root of a member, and whether the member opposes it.
-    fn root(&mut self, member: usize) -> (usize, bool) {
-        let mut path = Vec::new();
-        let mut at = member;
-        while self.parents[at] != at {
-            path.push(at);
-            at = self.parents[at];
+    pub(super) fn root(&self, member: usize) -> (usize, bool) {
+        let way = self.way(member);
+        let is_opposite = way
+            .iter()
+            .fold(false, |sign, at| sign ^ self.nodes[*at].is_opposite);
+        (
+            way.last().map_or(member, |at| self.nodes[*at].parent),
+            is_opposite,
+        )
+    }
+
+    /// The strength of the tie that joined the groups of two members; none where nothing joins them.
+    pub(super) fn strength(&self, a: usize, b: usize) -> Option<f64> {
+        let [of_a, of_b] = [a, b].map(|member| self.way(member));
+        if self.root(a).0 != self.root(b).0 {
+            return None;
         }
-        let mut is_opposite = false;
-        for &i in path.iter().rev() {
-            is_opposite ^= self.is_opposite[i];
-            (self.parents[i], self.is_opposite[i]) = (at, is_opposite);
-        }
-        (at, is_opposite)
+        // What both have in common was joined to the rest, not to each other.
+        let common = of_a
+            .iter()
+            .rev()
+            .zip(of_b.iter().rev())
+            .take_while(|(a, b)| a == b)
+            .count();
+        let own = |way: &[usize]| way[..way.len() - common].to_vec();
+        let joined = [own(&of_a), own(&of_b)]
+            .concat()
+            .into_iter()
+            .map(|at| self.nodes[at].joined);
+        Some(
+            joined
+                .max_by_key(|(time, _)| *time)
+                .map_or(f64::INFINITY, |(_, strength)| strength),
+        )
+    }
+
+    /// A member and what lies between it and the root.
+    fn way(&self, member: usize) -> Vec<usize> {
+        let up = |at: &usize| Some(self.nodes[*at].parent);
+        let way = std::iter::successors(Some(member), up);
+        way.take_while(|at| self.nodes[*at].parent != *at).collect()
     }
 
     /// Joins the sets of two members, unless they are one already.
-    fn join(&mut self, [a, b]: [usize; 2], is_opposite: bool) {
+    fn join(&mut self, [a, b]: [usize; 2], is_opposite: bool, strength: f64) {
         let ((root_a, from_a), (root_b, from_b)) = (self.root(a), self.root(b));
-        if root_a != root_b {
-            self.parents[root_b] = root_a;
-            self.is_opposite[root_b] = from_a ^ from_b ^ is_opposite;
+        if root_a == root_b {
+            return;
         }
+        self.joins += 1;
+        let size = self.nodes[root_a].size + self.nodes[root_b].size;
+        let [low, high] = match self.nodes[root_a].size < self.nodes[root_b].size {
+            true => [root_a, root_b],
+            false => [root_b, root_a],
+        };
+        self.nodes[high].size = size;
+        self.nodes[low] = Node {
+            parent: high,
+            is_opposite: from_a ^ from_b ^ is_opposite,
+            joined: (self.joins, strength),
+            size,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_are_joined_by_the_sum_of_their_ties() {
+        // 0 and 1 agree, 2 and 3 oppose each other; 0 and 2 seem to agree, two weaker ties say the opposite.
+        let mut ties: Ties = vec![BTreeMap::new(); 5];
+        for (a, b, tie) in [(0, 1, 9.0), (2, 3, -8.0), (0, 2, 3.0), (1, 2, -2.0), (1, 3, 2.5)] {
+            ties[a].insert(b, tie);
+            ties[b].insert(a, tie);
+        }
+        let forest = contracted(ties);
+        let signs = [0, 1, 2, 3].map(|i| forest.root(i).1 != forest.root(0).1);
+        assert_eq!(signs, [false, false, true, false]);
+        assert_eq!(forest.strength(0, 1), Some(9.0));
+        assert_eq!(forest.strength(3, 2), Some(8.0));
+        assert!(
+            [(0, 2), (1, 3), (3, 0)]
+                .iter()
+                .all(|&(a, b)| forest.strength(a, b) == Some(1.5))
+        );
+        assert_eq!(forest.strength(4, 0), None);
     }
 }

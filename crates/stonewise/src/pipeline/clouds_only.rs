@@ -122,8 +122,8 @@ fn outside_of(context: &Context, first: &Ingested) -> Result<Outside> {
     let reason = match scanners.len() {
         0 => format!(
             "no camera or scanner position says which side is outside; level surfaces, joints and batter do by {:.1}, {:.1} and \
-             {:.1} (logarithms of the odds; {SURE_OF_OUTSIDE} together is sure)",
-            evidence.level, evidence.joints, evidence.batter
+             {:.1}, and three fifths of the walls are turned by {:.1} at least (logarithms of the odds; {SURE_OF_OUTSIDE} is sure)",
+            evidence.level, evidence.joints, evidence.batter, found.odds
         ),
         1 => "normals point to the side of the scanner".to_owned(),
         n => format!("normals point to the side of the {n} scanner positions"),
