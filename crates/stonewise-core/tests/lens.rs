@@ -47,6 +47,7 @@ fn cases() -> Vec<Case> {
                 center_px: numbers(&case["center_px"]),
                 skew_px: case["skew_px"].as_f64().unwrap(),
                 distortion,
+                near: None,
             },
             points: points.collect(),
         }

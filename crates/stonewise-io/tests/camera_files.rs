@@ -1,11 +1,11 @@
 //! Camera files of every format against pixels computed elsewhere, and back through the writers.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
 
-use nalgebra::{Point3, Translation3, UnitQuaternion};
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stonewise_core::geometry::{Camera, Distortion, Rigid3, View};
+use stonewise_core::geometry::{Camera, Distortion, NearPlane, Rigid3, View};
 use stonewise_core::id::ImageId;
 use stonewise_io::cameras::{
     CameraError, CameraFile, MapFrame, Remark, find_photos, read_cameras, read_cameras_on_map, write_colmap,
@@ -536,15 +536,25 @@ fn written_metashape_files_read_back() {
         Distortion::fisheye([0.03, -0.01, 0.0, 0.0], [0.001, -0.002]),
         Distortion::None,
     ];
-    let written = views(&lenses, -1.25);
+    let mut written = views(&lenses, -1.25);
+    written[3].camera.near = Some(NearPlane {
+        normal: Vector3::new(0.1, -0.2, 0.95).normalize(),
+        distance_m: 11.0 / 3.0,
+    });
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cameras.xml");
     write_metashape(&path, &written, None).unwrap();
     let read = read_cameras(&path).unwrap();
     assert_same(&written, &read.views);
+    assert!(
+        written
+            .iter()
+            .zip(&read.views)
+            .all(|(a, b)| a.camera.near == b.camera.near)
+    );
     assert!(read.warnings.is_empty() && read.skipped.is_empty());
     let text = std::fs::read_to_string(&path).unwrap();
-    assert_eq!(text.matches("<sensor ").count(), 3);
+    assert_eq!(text.matches("<sensor ").count(), 4);
     let rational = views(&[Distortion::brown([0.1; 4], [0.1; 3], [0.0; 2])], 0.0);
     assert!(write_metashape(&path, &rational, None).is_err());
     assert_eq!(std::fs::read_to_string(&path).unwrap(), text);

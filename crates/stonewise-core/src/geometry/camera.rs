@@ -21,6 +21,26 @@ pub struct Camera {
     pub skew_px: f64,
     /// Lens distortion, applied to normalised coordinates.
     pub distortion: Distortion,
+    /// Before this plane nothing is shown: views of a cloud leave out what stands before the wall. None: all is
+    /// shown, as photos do.
+    pub near: Option<NearPlane>,
+}
+
+/// A plane in the frame of a camera, before which it shows nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearPlane {
+    /// Unit normal, away from the camera.
+    pub normal: Vector3<f64>,
+    /// Distance of the plane from the camera along the normal, metres.
+    pub distance_m: f64,
+}
+
+impl NearPlane {
+    /// Whether a point in the frame of the camera lies before the plane.
+    #[inline]
+    pub fn hides(&self, point: &Point3<f64>) -> bool {
+        self.normal.dot(&point.coords) < self.distance_m
+    }
 }
 
 impl Camera {
@@ -33,16 +53,20 @@ impl Camera {
             center_px: [f64::from(width) / 2.0, f64::from(height) / 2.0],
             skew_px: 0.0,
             distortion: Distortion::None,
+            near: None,
         }
     }
 
     /// Pixel of a point in the camera frame, which may lie outside the image.
     ///
-    /// `None` behind the camera and where the distortion folds over, that is, where a point outside the field
+    /// `None` behind the camera, before the near plane and where the distortion folds over, that is, where a point outside the field
     /// of view would seem to be inside it.
     #[inline]
     pub fn project_camera_point(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         if point.z.is_nan() || point.z <= 0.0 {
+            return None;
+        }
+        if self.near.is_some_and(|near| near.hides(point)) {
             return None;
         }
         let [x, y] = self.distortion.distort([point.x / point.z, point.y / point.z])?;

@@ -5,6 +5,7 @@
 
 mod fill;
 mod hidden;
+mod obstacles;
 mod params;
 mod picture;
 mod plan;

@@ -2,8 +2,9 @@
 
 use super::ViewParams;
 use super::hidden::Nearest;
+use super::obstacles::{BEFORE_M, Bodies};
 use super::walls::Walls;
-use crate::geometry::{Camera, FaceFrame, Rigid3, View};
+use crate::geometry::{Camera, FaceFrame, NearPlane, Rigid3, View};
 use crate::id::ImageId;
 use crate::surface::SurfaceCell;
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -45,14 +46,21 @@ pub struct PlannedView {
 /// directions turned to the left, to the right, upwards and downwards.
 ///
 /// `cells`: with normals that point outside. Views are numbered and named in their order. A camera comes nearer
-/// where something hides the wall from it; a part that is hidden from near, too, has no views.
+/// where something hides the wall from it; a part that is hidden from near, too, has no views. Views leave out
+/// what stands more than 20 cm before their part of the wall, and small bodies that stand there have none of
+/// their own.
 pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams) -> Vec<PlannedView> {
     let walls = Walls::among(cells, params.cell_m).cells;
     let least_cells = MANY_CELLS
         .min((LEAST_PART * walls.len() as f64) as usize)
         .max(LEAST_CELLS);
     let faces = faces_of(&walls, params);
-    let views_of = |coarser: f64| views_of(&faces, cells, least_cells, coarser, params);
+    let scene = Scene {
+        cells,
+        bodies: Bodies::of(&walls),
+        least_cells,
+    };
+    let views_of = |coarser: f64| views_of(&faces, &scene, coarser, params);
     let pixels = |views: &[PlannedView]| -> f64 {
         let cameras = views.iter().map(|planned| &planned.view.camera);
         cameras.map(|c| f64::from(c.width) * f64::from(c.height)).sum()
@@ -69,6 +77,16 @@ pub fn plan_views(cells: &[SurfaceCell], params: &ViewParams) -> Vec<PlannedView
         views = views_of(coarser);
     }
     views
+}
+
+/// What is there.
+struct Scene<'a> {
+    /// All cells.
+    cells: &'a [SurfaceCell],
+    /// Of the walls.
+    bodies: Bodies,
+    /// Of a target.
+    least_cells: usize,
 }
 
 /// Cells of walls that face in one direction.
@@ -111,18 +129,12 @@ fn faces_of<'a>(walls: &[&'a SurfaceCell], params: &ViewParams) -> Vec<Face<'a>>
     faces
 }
 
-/// `least_cells`: of a target; `coarser`: factor of all pixels.
-fn views_of(
-    faces: &[Face],
-    cells: &[SurfaceCell],
-    least_cells: usize,
-    coarser: f64,
-    params: &ViewParams,
-) -> Vec<PlannedView> {
+/// `coarser`: factor of all pixels.
+fn views_of(faces: &[Face], scene: &Scene, coarser: f64, params: &ViewParams) -> Vec<PlannedView> {
     let mut views = Vec::new();
     for face in faces {
-        for target in targets_of(face, least_cells, coarser, params) {
-            let Some(distance_m) = target.distance(&face.frame.out, cells, params) else {
+        for target in targets_of(face, scene, coarser, params) {
+            let Some(distance_m) = target.distance(&face.frame.out, scene.cells, params) else {
                 continue;
             };
             for direction in directions(&face.frame, params.turn_rad) {
@@ -157,15 +169,18 @@ struct Target<'a> {
     size_m: [f64; 2],
     spacing_m: f64,
     pixel_m: f64,
+    /// Mean normal, and how far out along it views show anything, metres from the origin of the world.
+    out: Vector3<f64>,
+    limit_m: f64,
 }
 
-/// The targets of a face: its rectangle, halved until each part fits a view and is filled.
-fn targets_of<'a>(face: &Face<'a>, least_cells: usize, coarser: f64, params: &ViewParams) -> Vec<Target<'a>> {
+/// The targets of a face: its rectangle, halved until each part fits a view and is filled, without obstacles.
+fn targets_of<'a>(face: &Face<'a>, scene: &Scene, coarser: f64, params: &ViewParams) -> Vec<Target<'a>> {
     let axes = face.frame.face_from_world();
     let mut targets = Vec::new();
     let mut left = vec![face.cells.clone()];
     while let Some(cells) = left.pop() {
-        if cells.len() < least_cells {
+        if cells.len() < scene.least_cells {
             continue;
         }
         let places: Vec<Vector3<f64>> = cells.iter().map(|c| axes * c.centroid.coords).collect();
@@ -192,13 +207,23 @@ fn targets_of<'a>(face: &Face<'a>, least_cells: usize, coarser: f64, params: &Vi
             left.extend([half(true), half(false)]);
             continue;
         }
+        let remaining = scene.bodies.without_obstacles(&cells, &places, params.cell_m);
+        if remaining.len() < cells.len() {
+            left.push(remaining);
+            continue;
+        }
         let middle = Vector3::new(middle[0], middle[1], median(along(2)));
+        let out = FaceFrame::from_normal(&cells.iter().map(|c| c.normal).sum()).out;
+        let heights_m = cells.iter().map(|c| out.dot(&c.centroid.coords));
+        let limit_m = heights_m.fold(f64::NEG_INFINITY, f64::max) + BEFORE_M;
         targets.push(Target {
             cells,
             middle: Point3::from(axes.transpose() * middle),
             size_m,
             spacing_m,
             pixel_m,
+            out,
+            limit_m,
         });
     }
     targets
@@ -231,10 +256,17 @@ impl Target<'_> {
         ]);
         let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn));
         let centre = self.middle + frame.out * distance_m;
+        let near = NearPlane {
+            normal: turn * -self.out,
+            distance_m: self.out.dot(&centre.coords) - self.limit_m,
+        };
         View {
             image,
             name: format!("view_{:03}.png", image.0 + 1),
-            camera: Camera::pinhole(width, height, distance_m / self.pixel_m),
+            camera: Camera {
+                near: Some(near),
+                ..Camera::pinhole(width, height, distance_m / self.pixel_m)
+            },
             cam_from_world: Rigid3::from_parts(Translation3::from(-(turn * centre.coords)), turn),
         }
     }
@@ -276,6 +308,7 @@ mod tests {
         assert_eq!(views[3].name, "view_004.png");
         // Points 8 mm apart are drawn in pixels of 4.8 mm.
         assert!(planned.iter().all(|p| (p.spacing_px - 8.0 / 4.8).abs() < 1e-9));
+        let (mut all, mut before_it) = (0, 0);
         for cell in &cells {
             let sees = |view: &&&View| {
                 let to_camera = (view.centre() - cell.centroid).normalize();
@@ -291,7 +324,15 @@ mod tests {
                 views.len(),
                 cell.centroid
             );
+            // The wall bulges by 37 cm over the width of a view.
+            let before = cell.centroid + cell.normal;
+            let shows = |view: &&&View| sees(view) && view.project(&before).is_some();
+            all += seen;
+            before_it += views.iter().filter(shows).count();
         }
+        // What stands a metre before the wall is hardly in any picture of the wall behind it: beside the target of a view,
+        // the wall falls back.
+        assert!(100 * before_it < all, "{before_it} of {all}");
         let sizes = views.iter().map(|v| v.view_gsd(&cells));
         assert!(
             sizes.clone().all(|gsd| (gsd / 0.0048 - 1.0).abs() < 0.15),

@@ -162,5 +162,6 @@ fn camera(frame: &Frame, shared: &RawCamera, path: &Path) -> Result<Camera, Came
         ],
         skew_px: 0.0,
         distortion,
+        near: None,
     })
 }

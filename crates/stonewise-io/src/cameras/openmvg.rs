@@ -117,5 +117,6 @@ fn camera(value: &Value, photo: &str, path: &Path) -> Result<Camera, CameraError
         center_px,
         skew_px: 0.0,
         distortion: distortion.ok_or_else(|| bad("its lens has a wrong number of parameters"))?,
+        near: None,
     })
 }

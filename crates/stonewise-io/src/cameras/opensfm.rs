@@ -125,5 +125,6 @@ fn camera(raw: &RawCamera, id: &str, photo: &str, path: &Path) -> Result<Camera,
         ],
         skew_px: 0.0,
         distortion,
+        near: None,
     })
 }

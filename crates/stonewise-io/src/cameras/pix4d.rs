@@ -98,6 +98,7 @@ fn view(
             center_px: [calibration[(0, 2)], calibration[(1, 2)]],
             skew_px: calibration[(0, 1)],
             distortion: Distortion::brown([k1, k2, k3, 0.0], [0.0; 3], [p1, p2]),
+            near: None,
         },
         cam_from_world: camera_at(centre, &rotation(&turn)?),
     })

@@ -393,6 +393,7 @@ fn camera(params: &PhotoParams) -> Camera {
         ],
         skew_px: 0.0,
         distortion: Distortion::brown([k1, k2, k3, 0.0], [0.0; 3], params.tangential),
+        near: None,
     }
 }
 

@@ -74,5 +74,6 @@ pub fn camera(raw: &RawCamera, photo: &str, path: &Path) -> Result<Camera, Camer
         center_px: center,
         skew_px: 0.0,
         distortion,
+        near: None,
     })
 }

@@ -3,8 +3,12 @@
 use super::super::xml::Element;
 use super::super::{CameraError, malformed};
 use super::numbers::{child_number, parse_numbers};
+use nalgebra::Vector3;
 use std::path::Path;
-use stonewise_core::geometry::{Camera, Distortion};
+use stonewise_core::geometry::{Camera, Distortion, NearPlane};
+
+/// The property of a sensor that holds its near plane: the normal and the distance, metres.
+pub(super) const NEAR_PLANE: &str = "near_plane";
 
 /// The camera of a `<sensor>`: its adjusted calibration, else the initial one, else the nominal focal length.
 ///
@@ -63,7 +67,31 @@ pub fn camera(sensor: &Element, photo: &str, path: &Path) -> Result<Camera, Came
         } else {
             Distortion::brown(radial, [0.0; 3], tangential)
         },
+        near: near_plane(sensor, path)?,
     })
+}
+
+/// The near plane of a view of a cloud; cameras of photos have none.
+fn near_plane(sensor: &Element, path: &Path) -> Result<Option<NearPlane>, CameraError> {
+    let found = property::<4>(sensor, NEAR_PLANE, path)?;
+    Ok(found.map(|[x, y, z, distance_m]| NearPlane {
+        normal: Vector3::new(x, y, z),
+        distance_m,
+    }))
+}
+
+/// The numbers of a property of a sensor.
+fn property<const N: usize>(
+    sensor: &Element,
+    name: &str,
+    path: &Path,
+) -> Result<Option<[f64; N]>, CameraError> {
+    let element = sensor.all("property").find(|p| p.attribute("name") == Some(name));
+    let Some(element) = element else {
+        return Ok(None);
+    };
+    let text = element.attribute("value").unwrap_or(&element.text);
+    Ok(Some(parse_numbers::<N>(text, element, path)?))
 }
 
 /// Whether the model is a fisheye; an error where it is neither that nor a frame camera.
@@ -120,16 +148,9 @@ fn resolution(
 
 /// Focal length in pixels from the nominal one in millimetres.
 fn nominal_focal(sensor: &Element, path: &Path) -> Result<f64, CameraError> {
-    let property = |name: &str| -> Result<Option<f64>, CameraError> {
-        let element = sensor.all("property").find(|p| p.attribute("name") == Some(name));
-        let Some(element) = element else {
-            return Ok(None);
-        };
-        let text = element.attribute("value").unwrap_or(&element.text);
-        Ok(Some(parse_numbers::<1>(text, element, path)?[0]))
-    };
-    match (property("focal_length")?, property("pixel_width")?) {
-        (Some(focal), Some(pixel)) if focal > 0.0 && pixel > 0.0 => Ok(focal / pixel),
+    let number = |name: &str| property::<1>(sensor, name, path);
+    match (number("focal_length")?, number("pixel_width")?) {
+        (Some([focal]), Some([pixel])) if focal > 0.0 && pixel > 0.0 => Ok(focal / pixel),
         _ => Err(malformed(
             path,
             sensor.place(),

@@ -1,10 +1,11 @@
 //! Writing of Metashape's camera XML.
 
 use super::super::CameraError;
+use super::sensor::NEAR_PLANE;
 use crate::atomic::write_atomically;
 use std::fmt::Write as _;
 use std::path::Path;
-use stonewise_core::geometry::{Camera, Distortion, View};
+use stonewise_core::geometry::{Camera, Distortion, NearPlane, View};
 
 /// Writes views as a chunk in local coordinates whose frame is the world, one sensor per distinct camera.
 ///
@@ -109,6 +110,14 @@ fn sensor(id: usize, camera: &Camera, path: &Path) -> Result<String, CameraError
             let _ = writeln!(text, "          <{name}>{value:.16e}</{name}>");
         }
     }
-    text.push_str("        </calibration>\n      </sensor>\n");
+    text.push_str("        </calibration>\n");
+    if let Some(NearPlane { normal, distance_m }) = &camera.near {
+        let [x, y, z] = [normal.x, normal.y, normal.z].map(|v| format!("{v:.16e}"));
+        let _ = writeln!(
+            text,
+            "        <property name=\"{NEAR_PLANE}\" value=\"{x} {y} {z} {distance_m:.16e}\"/>"
+        );
+    }
+    text.push_str("      </sensor>\n");
     Ok(text)
 }

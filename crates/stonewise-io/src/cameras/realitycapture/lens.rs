@@ -33,6 +33,7 @@ impl Lens {
             skew_px: 0.0,
             // The order of the tangential terms is the reverse of OpenCV's.
             distortion: Distortion::brown([k1, k2, k3, k4], [0.0; 3], [t2, t1]),
+            near: None,
         }
     }
 

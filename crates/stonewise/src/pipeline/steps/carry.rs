@@ -20,6 +20,7 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use stonewise_core::epoch::{EpochId, Pair};
+use stonewise_core::geometry::View;
 use stonewise_core::id::StoneId;
 use stonewise_core::matching::MatchReport;
 use stonewise_core::stone::{MatchOutcome, Stone, UnmatchedReason};
@@ -135,8 +136,9 @@ struct Wish {
 }
 
 impl Wish {
-    /// `from`: the epoch that shows the stone; `to`: the other.
-    fn new(run: &Run, stone: &Stone, [from, to]: [EpochId; 2], shift: Vector3<f64>) -> Result<Self> {
+    /// `from`: the epoch that shows the stone; `to`: the other. None where the views of the other show the place
+    /// nowhere, because it lies before the wall.
+    fn new(run: &Run, stone: &Stone, [from, to]: [EpochId; 2], shift: Vector3<f64>) -> Result<Option<Self>> {
         let steepest = run.context.project.settings.label.max_incidence_rad;
         let facing = |epoch: EpochId, shift: Vector3<f64>| {
             let place = stone.centroid + shift;
@@ -144,14 +146,23 @@ impl Wish {
             Result::Ok(photos_facing(views, &place, &stone.normal, steepest) as u32)
         };
         let facing = [facing(from, Vector3::zeros())?, facing(to, shift)?];
-        Ok(Self {
+        let place = stone.centroid + shift;
+        let leaves_out = |view: &View| {
+            view.camera
+                .near
+                .is_some_and(|near| near.hides(&(view.cam_from_world * place)))
+        };
+        if facing[1] == 0 && run.posed(to)?.views.iter().any(leaves_out) {
+            return Ok(None);
+        }
+        Ok(Some(Self {
             from,
             stone: stone.id,
             outward: stone.normal,
             shift,
             photos: stone.photos,
             missed: facing[0].saturating_sub(stone.photos) + facing[1],
-        })
+        }))
     }
 
     /// Whether the photos of both epochs together accept the stone, by the rule of the vote in one epoch.
@@ -168,7 +179,7 @@ fn forwards(run: &Run, first: &Labelled, later: EpochId, report: &MatchReport) -
     });
     missing
         .filter_map(|((id, _), shift)| Some((*stones.get(id)?, shift)))
-        .map(|(stone, shift)| Wish::new(run, stone, [EpochId::REFERENCE, later], *shift))
+        .filter_map(|(stone, shift)| Wish::new(run, stone, [EpochId::REFERENCE, later], *shift).transpose())
         .collect()
 }
 
@@ -184,7 +195,7 @@ fn backwards(
     let missing = stones.later.iter().filter(is_missing);
     missing
         .filter_map(|stone| Some((stone, shift_back(stones.first, report, stone)?)))
-        .map(|(stone, shift)| Wish::new(run, stone, [later, EpochId::REFERENCE], shift))
+        .filter_map(|(stone, shift)| Wish::new(run, stone, [later, EpochId::REFERENCE], shift).transpose())
         .collect()
 }
 
