@@ -41,6 +41,12 @@ impl<'a> Walls<'a> {
         }
     }
 
+    /// Their area, square metres: each cell holds a piece of a plane.
+    pub fn area_m2(&self) -> f64 {
+        let share = |cell: &&SurfaceCell| 1.0 / cell.normal.amax().max(f64::MIN_POSITIVE);
+        self.cell_m * self.cell_m * self.cells.iter().map(share).sum::<f64>()
+    }
+
     /// Whether a point lies on the ground or another level surface, which views leave black.
     pub fn is_level(&self, point: &Point3<f64>) -> bool {
         let cell = cell_of(point, self.cell_m);

@@ -19,7 +19,7 @@ use crate::settings::Align;
 use crate::texts::Said;
 use fit::Fit;
 use labels::{Votes, beside};
-use motions::{blind, few_measured, refused, unsettled};
+use motions::{blind, few_measured, refused, uncovered, unsettled};
 use scale::stretched;
 use stonewise_core::epoch::EpochId;
 use turn::turned;
@@ -62,6 +62,8 @@ fn note_doubts(run: &Run, later: EpochId) -> Result<()> {
     let of_motions = [
         unsettled(&registered, fit),
         few_measured(rows, fit),
+        run.walls_m2(EpochId::REFERENCE)?
+            .and_then(|walls_m2| uncovered(rows, walls_m2)),
         refused(rows),
         blind(&registered, rows, fit),
         turned(rows),

@@ -4,13 +4,15 @@ use super::fit::Fit;
 use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
-use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, PART_REFUSED, Said};
+use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, PART_REFUSED, Said, UNCOVERED};
 use std::collections::BTreeMap;
 use stonewise_core::stone::StoneMotion;
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
 /// something other than noise hides the motions.
 const LIMIT_EXCESS: f64 = 100.0;
+/// Part of the walls below which the measured stones say nothing about them.
+const LEAST_COVERED: f64 = 0.1;
 /// Stones of a part without a motion that is no mistake of single masks.
 const PART_STONES: usize = 10;
 /// Half width of a 95 % interval, in standard deviations.
@@ -45,6 +47,23 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
             ("cause", fit.cause()),
         ];
         FEW_MEASURED.say(&values)
+    })
+}
+
+/// The measured stones cover little of the walls that the clouds show; `walls_m2`: their area.
+pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Said> {
+    let measured: Vec<f64> = rows
+        .iter()
+        .filter(|r| r.status == Status::Ok)
+        .map(|r| r.area_m2)
+        .collect();
+    let area_m2: f64 = measured.iter().sum();
+    (area_m2 < LEAST_COVERED * walls_m2).then(|| {
+        UNCOVERED.say(&[
+            ("measured", measured.len().to_string().into()),
+            ("area", Said::numbers(format!("{area_m2:.1}"))),
+            ("walls", Said::numbers(format!("{walls_m2:.1}"))),
+        ])
     })
 }
 
@@ -176,6 +195,16 @@ mod tests {
             assert!(message.english.contains(part), "{part}: {message}");
         }
         assert!(!message.english.contains("unmatched"), "{message}");
+    }
+
+    #[test]
+    fn stones_that_cover_less_than_a_tenth_of_the_walls_are_a_doubt() {
+        let rows = rows();
+        let measured = rows.iter().filter(|r| r.status == Status::Ok);
+        let area_m2: f64 = measured.map(|r| r.area_m2).sum();
+        assert_eq!(uncovered(&rows, 9.9 * area_m2), None);
+        let message = uncovered(&rows, 10.1 * area_m2).unwrap();
+        assert!(message.english.contains("the 20 measured stones"), "{message}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Views of the clouds of an epoch without photos.
 
 use crate::error::{Error, Result};
+use crate::files::{read_json, write_json};
 use crate::pipeline::context::Context;
 use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
@@ -39,6 +40,8 @@ const STEP: &str = "views";
 /// The pictures and their cameras, in the step's folder.
 const IMAGES: &str = "images";
 const CAMERAS: &str = "cameras.xml";
+/// The area of the walls, square metres.
+const WALLS: &str = "walls.json";
 /// Memory for the pictures that are drawn at a time.
 const PICTURE_BYTES: u64 = 512 << 20;
 
@@ -69,6 +72,19 @@ impl Run<'_> {
 }
 
 impl Run<'_> {
+    /// The area of the walls that the clouds of an epoch without photos show, square metres; none with photos.
+    pub fn walls_m2(&self, epoch: EpochId) -> Result<Option<f64>> {
+        if !has_no_photos(self.context.project, epoch) {
+            return Ok(None);
+        }
+        let pictured = self.pictured(epoch)?;
+        let views = pictured
+            .photos
+            .as_ref()
+            .and_then(|photos| photos.cameras.parent());
+        views.map(|views| read_json(&views.join(WALLS))).transpose()
+    }
+
     /// Places from which the wall of an epoch is seen: that which the project names, else those of its scanners, else
     /// of cameras: of photos, or of the views of the reference, so that all epochs have the same outside. None
     /// where nothing is known.
@@ -118,6 +134,7 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
         if views.is_empty() {
             return Err(no_walls(epoch));
         }
+        let walls = Walls::among(&surface.cells, params.cell_m);
         let tones = tones(context, tiles)?;
         let toning = match params.show {
             Some(shade) => tones.toning(shade),
@@ -130,9 +147,9 @@ fn draw(context: &Context, id: EpochId, ingested: &Ingested, outside: &[Point3<f
         };
         let count = views.len().to_string();
         warnings.notice(STEP, &epoch.name, notice.say(&[("n", count.into())]));
+        write_json(&step.file(WALLS), &walls.area_m2())?;
         let images = step.file(IMAGES);
         fs::create_dir_all(&images).map_err(Error::io("making a folder", &images))?;
-        let walls = Walls::among(&surface.cells, params.cell_m);
         let drawing = Drawing {
             context,
             tiles,
