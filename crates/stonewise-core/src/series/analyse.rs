@@ -120,6 +120,7 @@ pub fn analyse(
     let only_dated = |s: &StoneSeries| StoneSeries {
         stone: s.stone,
         looks: dated.iter().map(|&e| s.looks[e]).collect(),
+        smoothed: s.smoothed,
     };
     let stones: Vec<StoneSeries> = stones.iter().map(only_dated).collect();
     let Some(model) = choose(&models, &stones) else {
@@ -128,7 +129,7 @@ pub fn analyse(
     let settled = settle(model, &stones, zones);
     found.basis = Some(model.basis.clone());
     found.factors = Some(settled.factors);
-    found.stones = described(&settled, model, &dated);
+    found.stones = described(&settled, model, &dated, &stones);
     if epochs.len() < LEAST_EPOCHS {
         return found;
     }
@@ -198,21 +199,30 @@ fn choose<'a>(models: &'a [Model], stones: &[StoneSeries]) -> Option<&'a Model> 
     by_criterion.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(m, _)| m)
 }
 
-/// `places`: of the epochs that take part among all.
-fn described(settled: &Settled, model: &Model, places: &[usize]) -> Vec<StoneTrend> {
+/// `places`: of the epochs that take part among all; `stones`: all that were given.
+fn described(settled: &Settled, model: &Model, places: &[usize], stones: &[StoneSeries]) -> Vec<StoneTrend> {
     let factors = &settled.factors;
+    let smoothed: BTreeMap<StoneId, Vector3<f64>> = stones.iter().map(|s| (s.stone, s.smoothed)).collect();
     let describe = |f: &Fitted| {
         let term = |term: Term| of_term(&f.fits, factors, model, term);
         let season = model.place(Term::Season);
         let of_axis = |axis: usize| AxisModel::of(&f.fits[axis], &factors[axis]);
-        let axes = [of_axis(0), of_axis(1), of_axis(2)];
+        let mut axes = [of_axis(0), of_axis(1), of_axis(2)];
+        let mut velocity = match f.instead {
+            Some(left) => Coefficient { p: 1.0, ..left },
+            None => term(Term::Trend)?,
+        };
+        let smoothed = smoothed.get(&f.stone).copied().unwrap_or_default();
+        for axis in 0..3 {
+            velocity.sd[axis] = velocity.sd[axis].hypot(smoothed[axis]);
+            if let Some(trend) = model.place(Term::Trend) {
+                axes[axis].covariance[(trend, trend)] += smoothed[axis].powi(2);
+            }
+        }
         Some(StoneTrend {
             stone: f.stone,
             epochs: f.seen.epochs.len(),
-            velocity: match f.instead {
-                Some(left) => Coefficient { p: 1.0, ..left },
-                None => term(Term::Trend)?,
-            },
+            velocity,
             velocity_q: 1.0,
             level: term(Term::Level),
             temperature: term(Term::Temperature),

@@ -30,6 +30,9 @@ pub struct StoneSeries {
     pub stone: StoneId,
     /// One for each epoch; `None`: not measured.
     pub looks: Vec<Option<Look>>,
+    /// Standard deviations of the velocity that no look shows, as all epochs smooth it alike: along the wall, up and
+    /// out, metres a year.
+    pub smoothed: Vector3<f64>,
 }
 
 impl StoneSeries {
@@ -55,6 +58,7 @@ impl StoneSeries {
         Self {
             stone,
             looks: pairs.iter().enumerate().map(look).collect(),
+            smoothed: Vector3::zeros(),
         }
     }
 }

@@ -132,6 +132,32 @@ fn the_reference_does_not_matter_to_velocities() {
 }
 
 #[test]
+fn what_all_epochs_smooth_alike_is_in_the_velocity_however_many_there_are() {
+    let smoothed = Vector3::new(0.0, 0.3e-3, 0.0);
+    for count in [4, 8] {
+        let truth = |_, k| Vector3::z() * 1e-4 * k as f64;
+        let plain = measured(&mut Draw(3), 20, count, 0, truth);
+        let found = analyse(&epochs(count), &plain, &[]);
+        let doubted: Vec<StoneSeries> = plain
+            .into_iter()
+            .map(|stone| StoneSeries { smoothed, ..stone })
+            .collect();
+        let doubted = analyse(&epochs(count), &doubted, &[]);
+        let ends = |axis: &AxisModel, row: [f64; 2]| axis.at(&row, false).1.powi(2);
+        for (a, b) in found.stones.iter().zip(&doubted.stones) {
+            assert_eq!((a.velocity.value, a.velocity.p), (b.velocity.value, b.velocity.p));
+            for axis in 0..3 {
+                let expected = a.velocity.sd[axis].hypot(smoothed[axis]);
+                assert!((b.velocity.sd[axis] - expected).abs() < 1e-12);
+                // What the model says of a date has the same doubt, in proportion to time.
+                let apart = ends(&b.model[axis], [1.0, 2.0]) - ends(&a.model[axis], [1.0, 2.0]);
+                assert!((apart - (2.0 * smoothed[axis]).powi(2)).abs() < 1e-15);
+            }
+        }
+    }
+}
+
+#[test]
 fn intervals_of_velocities_hold_the_truth_and_zones_that_creep_are_found() {
     let (mut held, mut all) = ([0; 3], 0);
     for seed in 0..20 {

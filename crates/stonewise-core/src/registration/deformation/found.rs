@@ -39,6 +39,9 @@ pub struct StoneDeformation {
     pub deformation: Vector3<f64>,
     /// Its covariance, m^2.
     pub covariance: Matrix3<f64>,
+    /// The part of it that allows for what the field of motions has smoothed of a zone, m^2; it errs alike in epochs
+    /// that show the same motion.
+    pub smoothed: Matrix3<f64>,
     /// Number of its zone, 0 for none.
     pub zone: u32,
 }

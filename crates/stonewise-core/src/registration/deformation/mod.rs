@@ -70,11 +70,13 @@ pub fn deformation(
         if is_shown {
             rigid.doubt_smoothed(body, &scan.most_likely);
         }
-        for (stone, (deformation, covariance)) in body.stones.iter().zip(&rigid.deformations) {
+        let found_of = rigid.deformations.iter().zip(&rigid.smoothed);
+        for (stone, ((deformation, covariance), smoothed)) in body.stones.iter().zip(found_of) {
             let row = StoneDeformation {
                 stone: stone.id,
                 deformation: *deformation,
                 covariance: *covariance,
+                smoothed: *smoothed,
                 zone: 0,
             };
             by_stone.insert(stone.id, row);

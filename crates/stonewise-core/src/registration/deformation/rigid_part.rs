@@ -17,30 +17,33 @@ const AS_LARGE: f64 = 0.9;
 /// Least information of a rigid motion, as a share of the largest: below it the stones do not show it.
 const LEAST: f64 = 1e-9;
 
-/// Standard deviations by which a bulge in the stones' own observations must exceed that of their motions to be smoothed.
-const SMOOTHED_SD: f64 = 1.0;
-
 /// The deformation of each stone of a body.
 pub(super) struct RigidPart {
     /// Deformation and covariance of each stone, world.
     pub deformations: Vec<(Vector3<f64>, Matrix3<f64>)>,
     /// Squared standardised deformation of each stone.
     pub squares: Vec<f64>,
+    /// The part of the covariance that allows for what the field has smoothed.
+    pub smoothed: Vec<Matrix3<f64>>,
 }
 
 impl RigidPart {
-    /// Adds to the covariances of the stones of a bulge what the field has smoothed of it in each direction, where that is
-    /// more than chance: a wall that moves horizontally moves along a battered face as well as out of it.
+    /// Adds to the covariances of the stones of a bulge what the field may have smoothed of it in each direction: a wall
+    /// that moves horizontally moves along a battered face as well as out of it. What the rest of the wall did says
+    /// nothing about that, so it is known no better than the stones' own observations show it.
     pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
         for (k, smoothed) in bulge.smoothed_m.iter().enumerate() {
-            let Some((smoothed_m, _)) = smoothed.filter(|(m, sd)| m.abs() >= SMOOTHED_SD * sd) else {
+            let Some((smoothed_m, sd_m)) = smoothed else {
                 continue;
             };
             for (i, share) in &bulge.stones {
                 let direction = body.stones[*i].joint.face_from_world.row(k).transpose();
-                let missed = direction * (smoothed_m * share);
-                self.deformations[*i].1 += missed * missed.transpose();
+                let missed = direction * (smoothed_m.hypot(*sd_m) * share);
+                self.smoothed[*i] += missed * missed.transpose();
             }
+        }
+        for ((_, covariance), smoothed) in self.deformations.iter_mut().zip(&self.smoothed) {
+            *covariance += smoothed;
         }
     }
 }
@@ -133,6 +136,7 @@ impl Fit<'_> {
         let deformations: Vec<_> = (0..stones.len()).into_par_iter().map(of_stone).collect();
         RigidPart {
             squares: deformations.iter().map(|(d, c)| chi_square(d, c)).collect(),
+            smoothed: vec![Matrix3::zeros(); deformations.len()],
             deformations,
         }
     }

@@ -211,6 +211,7 @@ fn pair_deformations(run: &Run, pair: &TrackedPair) -> Result<BTreeMap<StoneId, 
             stone,
             deformation,
             covariance,
+            smoothed: Matrix3::zeros(),
             zone: 0,
         };
         (stone, row)

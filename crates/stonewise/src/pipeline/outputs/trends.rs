@@ -7,7 +7,7 @@ use crate::files::write_readable_json;
 use crate::pipeline::graph::{Need, Run, Step};
 use crate::pipeline::steps::tracks::{TRACKS, Tracked};
 use crate::pipeline::until::Until;
-use crate::project::DAYS_A_YEAR;
+use crate::project::{DAYS_A_YEAR, Project};
 use crate::results::StoneRow;
 use crate::results::names::{TRENDS as FILE, TRENDS_TABLE};
 use crate::results::records::{InseparableRecord, TRENDS_VERSION, TrendsRecord, ZoneTrend};
@@ -140,6 +140,7 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
     };
     let mut places: Vec<SeriesPlace> = stones.iter().map(place).collect();
     let mut shares = vec![vec![0.5; order.len()]; stones.len()];
+    let mut smoothed = vec![Vector3::zeros(); stones.len()];
     for (time, id) in order
         .iter()
         .enumerate()
@@ -150,23 +151,35 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
         for found in registered.deformation.iter().flat_map(|d| &d.stones) {
             let row = rows.get(&found.stone.0).filter(|row| row.motion.is_some());
             if let (Some(&i), Some(row)) = (place_of.get(&found.stone), row) {
-                places[i].deformations[time] = Some((found.deformation, found.covariance));
+                places[i].deformations[time] = Some((found.deformation, found.covariance - found.smoothed));
+                if let Some(years) = years_apart(run.context.project, *id) {
+                    let face = FaceFrame::from_normal(&stones[i].normal).face_from_world();
+                    let own = (face * found.smoothed * face.transpose()).diagonal();
+                    // The latest epoch that shows a zone there says the most about its velocity.
+                    if own.max() > 0.0 {
+                        smoothed[i] = own.map(|v| v.max(0.0).sqrt()) / years;
+                    }
+                }
                 shares[i][time] = reference_share(&registered.estimator, row);
             }
         }
     }
     keep_congruent(&mut places);
     let reference = order.iter().position(|id| *id == EpochId::REFERENCE).unwrap_or(0);
-    let one = |((stone, place), shares): ((&Stone, &SeriesPlace), &Vec<f64>)| {
+    let one = |(((stone, place), shares), smoothed): (((&Stone, &SeriesPlace), &Vec<f64>), &Vector3<f64>)| {
         let pairs: Vec<Option<PairLook>> = place
             .deformations
             .iter()
             .zip(shares)
             .map(|(found, share)| Some(look(stone, &(*found)?, *share)))
             .collect();
-        StoneSeries::of_pairs(stone.id, reference, &pairs)
+        StoneSeries {
+            smoothed: *smoothed,
+            ..StoneSeries::of_pairs(stone.id, reference, &pairs)
+        }
     };
-    let mut all: Vec<StoneSeries> = stones.iter().zip(&places).zip(&shares).map(one).collect();
+    let of_stones = stones.iter().zip(&places).zip(&shares).zip(&smoothed);
+    let mut all: Vec<StoneSeries> = of_stones.map(one).collect();
     all.extend(tracked_series(
         order,
         tracked,
@@ -176,6 +189,12 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
         },
     ));
     Ok(all)
+}
+
+/// Years between the reference and an epoch; `None` where a date is missing, or both are of one day.
+fn years_apart(project: &Project, epoch: EpochId) -> Option<f64> {
+    let days = day(project, epoch)? - day(project, EpochId::REFERENCE)?;
+    (days != 0.0).then(|| days.abs() / DAYS_A_YEAR)
 }
 
 /// The stones that the reference does not show. `deformation`: of a stone of the reference at a time, in the frame of the
