@@ -265,20 +265,25 @@ def snow(scene):
 
 
 def block(along, up, out, shift=(0.0, 0.0, 0.0)):
-    """A buttress, or a recess where `out` is negative, that moves by the shift."""
+    """A buttress, or a recess where `out` is negative, that moves by the shift.
+
+    Not to be combined with motions of the simulator, which it does not follow.
+    """
 
     def edit(scene):
         for epoch, cloud in enumerate(scene.clouds):
-            part = scene.on_wall(cloud) & within(cloud.places, along, up)
+            wall = scene.on_wall(cloud)
+            low, high = max(up[0], 0.0), min(up[1], cloud.places[wall, 2].max())
+            part = wall & within(cloud.places, along, up)
+            intensity = np.median(cloud.intensity[part])
             cloud.places[part] += np.array([out, 0, 0]) + epoch * np.array(shift)
             inner = cloud.places[:, 0] - scene.face(cloud.places) < out - 0.01
             cloud.keep(part | ~within(cloud.places, along, up) | ~inner)
             for y in along:
-                height = up[1] - up[0]
-                places = scene.random.random((int(abs(out) * height / SPACING_M**2), 3))
-                places = [out, 0, height] * places + [0, y, up[0]]
+                places = scene.random.random((int(abs(out) * (high - low) / SPACING_M**2), 3))
+                places = [out, 0, high - low] * places + [0, y, low] + epoch * np.array(shift)
                 places[:, 0] += scene.face(places)
-                cloud.add(places, 20000, NO_STONE, scene.random)
+                cloud.add(places, intensity, NO_STONE, scene.random)
         scene.moved.append(lambda places: np.outer(within(places, along, up), shift))
 
     return edit
@@ -292,6 +297,11 @@ def recess(shift):
 def buttress(centimetres):
     """A buttress of this depth, which moves out by 4 mm."""
     return block((-0.45, 0.45), (-0.1, 3.0), centimetres / 100, (0.004, 0.0, 0.0))
+
+
+def two_buttresses(centimetres):
+    """Two buttresses of this depth, 80 cm apart, which stand still."""
+    return [block(along, (-0.1, 3.0), centimetres / 100) for along in [(-1.2, -0.4), (0.4, 1.2)]]
 
 
 def turned(scene):
@@ -514,6 +524,15 @@ SURVEYS = [
     # Parts before or behind the face.
     Survey("s_recess", 42, edits=[recess(0.0)]),
     Survey("m_recess_moves", 62, edits=[recess(0.005)], expected="attention"),
+    *(
+        Survey(
+            f"s_two_buttresses_{centimetres}cm",
+            seed,
+            edits=two_buttresses(centimetres),
+            surroundings=NO_ANNEX,
+        )
+        for seed, centimetres in [(302, 15), (304, 30), (305, 35)]
+    ),
     *(
         Survey(f"s_buttress_{centimetres}cm", seed, edits=[buttress(centimetres)], **MOVING)
         for seed, centimetres in [(73, 15), (71, 25), (72, 40)]
