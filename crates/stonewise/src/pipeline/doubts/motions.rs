@@ -5,7 +5,7 @@ use crate::pipeline::steps::register::Registered;
 use crate::results::records::EstimatorRecord;
 use crate::results::{Status, StoneRow};
 use crate::texts::{BLIND, FEW_MEASURED, NOT_CONVERGED, PART_REFUSED, Said, UNCOVERED};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use stonewise_core::stone::StoneMotion;
 
 /// Median 95 % limit of detection, in units of what spacing and noise of the points allow, beyond which
@@ -13,6 +13,9 @@ use stonewise_core::stone::StoneMotion;
 const LIMIT_EXCESS: f64 = 100.0;
 /// Part of the walls below which the measured stones say nothing about them.
 const LEAST_COVERED: f64 = 0.1;
+/// Distance from a stone within which the wall should show others, and the size of the squares that are counted, metres.
+const AROUND_M: f64 = 2.0;
+const SQUARE_M: f64 = 0.5;
 /// Stones of a part without a motion that is no mistake of single masks.
 const PART_STONES: usize = 10;
 /// Half width of a 95 % interval, in standard deviations.
@@ -50,14 +53,12 @@ pub(super) fn few_measured(rows: &[StoneRow], fit: Fit) -> Option<Said> {
     })
 }
 
-/// The measured stones cover little of the walls that the clouds show; `walls_m2`: their area.
+/// The measured stones cover little of the walls that the clouds show around them; `walls_m2`: area of all walls. Farther
+/// away there may be rock or other buildings.
 pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Said> {
-    let measured: Vec<f64> = rows
-        .iter()
-        .filter(|r| r.status == Status::Ok)
-        .map(|r| r.area_m2)
-        .collect();
-    let area_m2: f64 = measured.iter().sum();
+    let measured: Vec<&StoneRow> = rows.iter().filter(|r| r.status == Status::Ok).collect();
+    let area_m2: f64 = measured.iter().map(|r| r.area_m2).sum();
+    let walls_m2 = walls_m2.min(around_m2(&measured));
     (area_m2 < LEAST_COVERED * walls_m2).then(|| {
         UNCOVERED.say(&[
             ("measured", measured.len().to_string().into()),
@@ -65,6 +66,19 @@ pub(super) fn uncovered(rows: &[StoneRow], walls_m2: f64) -> Option<Said> {
             ("walls", Said::numbers(format!("{walls_m2:.1}"))),
         ])
     })
+}
+
+/// Area of the face around stones.
+fn around_m2(stones: &[&StoneRow]) -> f64 {
+    let squares = |stone: &&StoneRow| {
+        let (along, up) = (stone.along_m / SQUARE_M, stone.up_m / SQUARE_M);
+        let reach = (AROUND_M / SQUARE_M) as i64;
+        let near = (-reach..=reach).flat_map(move |x| (-reach..=reach).map(move |y| [x, y]));
+        near.filter(move |[x, y]| x * x + y * y <= reach * reach)
+            .map(move |[x, y]| [along as i64 + x, up as i64 + y])
+    };
+    let all: BTreeSet<[i64; 2]> = stones.iter().flat_map(squares).collect();
+    SQUARE_M * SQUARE_M * all.len() as f64
 }
 
 /// A part of the wall that is too large to be a mistake of some masks has no motion because nothing confirms it.
@@ -199,12 +213,24 @@ mod tests {
 
     #[test]
     fn stones_that_cover_less_than_a_tenth_of_the_walls_are_a_doubt() {
-        let rows = rows();
-        let measured = rows.iter().filter(|r| r.status == Status::Ok);
-        let area_m2: f64 = measured.map(|r| r.area_m2).sum();
-        assert_eq!(uncovered(&rows, 9.9 * area_m2), None);
-        let message = uncovered(&rows, 10.1 * area_m2).unwrap();
-        assert!(message.english.contains("the 20 measured stones"), "{message}");
+        // Twenty stones at one place, with two metres of the face around them: 12.25 m2 in squares of half a metre.
+        let with_area = |area_m2: f64| -> Vec<StoneRow> {
+            let place = |row: StoneRow| StoneRow {
+                area_m2: area_m2 / 20.0,
+                along_m: 5.2,
+                up_m: 1.3,
+                ..row
+            };
+            rows().into_iter().map(place).collect()
+        };
+        assert_eq!(uncovered(&with_area(1.01), 10.0), None);
+        let message = uncovered(&with_area(0.99), 10.0).unwrap();
+        for part in ["the 20 measured stones", "1.0 m2 of the 10.0 m2"] {
+            assert!(message.english.contains(part), "{part}: {message}");
+        }
+        // Of the walls of a valley, those around the stones count.
+        assert_eq!(uncovered(&with_area(1.23), 1000.0), None);
+        assert!(uncovered(&with_area(1.22), 1000.0).is_some());
     }
 
     #[test]
