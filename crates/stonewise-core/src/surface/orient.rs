@@ -46,8 +46,7 @@ const STRAY: f64 = 0.02;
 const INDEPENDENT_M2: f64 = 0.6;
 /// A ledge, however small, is at least this part of an independent piece: treads of one flight are alike.
 const LEDGE: f64 = 1.0 / 3.0;
-/// Part of the walls that may be less sure than the whole is said to be: railings, sides of buttresses, stray
-/// pieces.
+/// Part of the walls whose side may be less sure: railings, sides of buttresses, stray pieces.
 const UNSURE: f64 = 0.4;
 /// Edge of the cells that decide about signs, as a part of those that are asked for: edges and treads show in
 /// small cells.
@@ -103,7 +102,7 @@ impl Evidence {
 pub struct Orientation {
     /// The cells.
     pub cells: Vec<SurfaceCell>,
-    /// What all parts say together about the outside that was chosen.
+    /// The evidence of all parts for the outside that was chosen.
     pub evidence: Evidence,
     /// Natural logarithm of the odds that the outside is right, at least of three fifths of the walls (of all
     /// cells where there are none).
@@ -148,9 +147,9 @@ pub fn oriented_surface<T: TileSource, E: From<T::Error> + From<Interrupted>>(
 /// Turns the normals of all cells of an edge of `cell_m` metres outside; `scanners`: positions from which the
 /// surface was measured, world frame, none where they are not known.
 ///
-/// Cells of smooth parts get consistent signs first. Then all evidence is added up, as logarithms of odds: what
-/// each part says itself, ties between parts that meet at an edge, and ties between parallel parts that lie beside
-/// each other.
+/// Cells of smooth parts get consistent signs first. Then all evidence is added up, as logarithms of odds: that of
+/// each part alone, ties between parts that meet at an edge, and ties between parallel parts that lie beside each
+/// other.
 ///
 /// Cost: 26 neighbours a cell, sorted.
 pub fn orient(mut cells: Vec<SurfaceCell>, cell_m: f64, scanners: &[Point3<f64>]) -> Orientation {
@@ -210,7 +209,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// What a part says itself.
+    /// The evidence of a part alone.
     fn evidence_of(&self, part: &[usize]) -> Evidence {
         let all = || part.iter().map(|&i| &self.cells[i]);
         let walls = || all().filter(|c| is_wall(c));
@@ -252,7 +251,7 @@ impl<'a> Scene<'a> {
         for (part, members) in parts.iter().enumerate() {
             let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
             let mut behind: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
-            // A few cells of the part say what all would.
+            // A few cells of the part stand for all.
             let some = || members.iter().step_by(members.len().div_ceil(50));
             let mut count = 0.0;
             for &i in some() {
@@ -366,7 +365,7 @@ mod tests {
 
     #[test]
     fn the_ground_lies_before_a_wall() {
-        // A wall without joints says nothing itself.
+        // A wall without joints gives no evidence itself.
         let plain = masonry(0.0).into_iter().map(|p| Point3::new(p.x, 0.0, p.z));
         let found = oriented(plain.chain(ground()).collect(), &[]);
         assert!(found.evidence.level > 2.0);

@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn groups_are_joined_by_the_sum_of_their_ties() {
-        // 0 and 1 agree, 2 and 3 oppose each other; 0 and 2 seem to agree, two weaker ties say the opposite.
+        // 0 and 1 agree, 2 and 3 oppose each other; 0 and 2 seem to agree, two weaker ties are against it.
         let mut ties: Ties = vec![BTreeMap::new(); 5];
         for (a, b, tie) in [(0, 1, 9.0), (2, 3, -8.0), (0, 2, 3.0), (1, 2, -2.0), (1, 3, 2.5)] {
             ties[a].insert(b, tie);

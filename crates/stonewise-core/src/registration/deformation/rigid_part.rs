@@ -29,8 +29,8 @@ pub(super) struct RigidPart {
 
 impl RigidPart {
     /// Adds to the covariances of the stones of a bulge what the field may have smoothed of it in each direction: a wall
-    /// that moves horizontally moves along a battered face as well as out of it. What the rest of the wall did says
-    /// nothing about that, so it is known no better than the stones' own observations show it.
+    /// that moves horizontally moves along a battered face as well as out of it. The rest of the wall, which the field
+    /// follows, is no evidence of that: it is known no better than the stones' own observations show it.
     pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
         for (k, smoothed) in bulge.smoothed_m.iter().enumerate() {
             let Some((smoothed_m, sd_m)) = smoothed else {
