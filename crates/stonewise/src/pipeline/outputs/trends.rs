@@ -166,20 +166,19 @@ fn series(run: &Run, order: &[EpochId], stones: &[Stone], tracked: &Tracked) -> 
     }
     keep_congruent(&mut places);
     let reference = order.iter().position(|id| *id == EpochId::REFERENCE).unwrap_or(0);
-    let one = |(((stone, place), shares), smoothed): (((&Stone, &SeriesPlace), &Vec<f64>), &Vector3<f64>)| {
-        let pairs: Vec<Option<PairLook>> = place
+    let one = |i: usize| {
+        let pairs: Vec<Option<PairLook>> = places[i]
             .deformations
             .iter()
-            .zip(shares)
-            .map(|(found, share)| Some(look(stone, &(*found)?, *share)))
+            .zip(&shares[i])
+            .map(|(found, share)| Some(look(&stones[i], &(*found)?, *share)))
             .collect();
         StoneSeries {
-            smoothed: *smoothed,
-            ..StoneSeries::of_pairs(stone.id, reference, &pairs)
+            smoothed: smoothed[i],
+            ..StoneSeries::of_pairs(stones[i].id, reference, &pairs)
         }
     };
-    let of_stones = stones.iter().zip(&places).zip(&shares).zip(&smoothed);
-    let mut all: Vec<StoneSeries> = of_stones.map(one).collect();
+    let mut all: Vec<StoneSeries> = (0..stones.len()).map(one).collect();
     all.extend(tracked_series(
         order,
         tracked,
