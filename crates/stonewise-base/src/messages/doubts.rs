@@ -78,11 +78,11 @@ messages! {
             anderen keine Bewegung gezeigt wird, heißt nicht, dass sie sich nicht bewegt haben. {cause}";
 
         UNCOVERED = "uncovered-wall":
-            "the {measured} measured stones cover {area} m2 of the {walls} m2 of walls that the clouds show: nothing is known of the \
-            rest. Look at the views in the report: if the wall is seen from behind, give a point in front of it, \
+            "the {measured} measured stones cover {area} m2 of the {walls} m2 of walls that the clouds show around them: nothing is \
+            known of the rest. Look at the views in the report: if the wall is seen from behind, give a point in front of it, \
             `[views] outside = [x, y, z]`; if its stones do not show, give photos, or clouds with more points",
-            "die {measured} gemessenen Steine bedecken {area} m2 der {walls} m2 Mauern, die die Punktwolken zeigen: über den Rest ist \
-            nichts bekannt. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu sehen, einen Punkt vor ihr angeben, \
+            "die {measured} gemessenen Steine bedecken {area} m2 der {walls} m2 Mauern, die die Punktwolken um sie herum zeigen: über \
+            den Rest ist nichts bekannt. Die Ansichten im Bericht ansehen: ist die Mauer von hinten zu sehen, einen Punkt vor ihr angeben, \
             `[views] outside = [x, y, z]`; sind ihre Steine nicht zu erkennen, Fotos angeben oder Punktwolken mit mehr Punkten";
 
         PART_REFUSED = "part-in-disagreement":

@@ -59,8 +59,8 @@ impl Camera {
 
     /// Pixel of a point in the camera frame, which may lie outside the image.
     ///
-    /// `None` behind the camera, before the near plane and where the distortion folds over, that is, where a point outside the field
-    /// of view would seem to be inside it.
+    /// `None` behind the camera, before the near plane and where the distortion folds over, that is, where a point
+    /// outside the field of view would seem to be inside it.
     #[inline]
     pub fn project_camera_point(&self, point: &Point3<f64>) -> Option<[f64; 2]> {
         if point.z.is_nan() || point.z <= 0.0 {

@@ -2,7 +2,7 @@
 
 use super::SurfaceCell;
 use super::outside::Outside;
-use super::signs::{PART_COSINE, Ties, contracted, neighbours, smooth_parts};
+use super::signs::{PART_COSINE, Parts, contracted, neighbours, smooth_parts};
 use super::surface_cells;
 use crate::cloud::{GridIndex, TileSource};
 use crate::components::components;
@@ -153,15 +153,20 @@ pub fn oriented_surface<T: TileSource, E: From<T::Error> + From<Interrupted>>(
 ///
 /// Cost: 26 neighbours a cell, sorted.
 pub fn orient(mut cells: Vec<SurfaceCell>, cell_m: f64, scanners: &[Point3<f64>]) -> Orientation {
-    let (parts, mut ties) = smooth_parts(&mut cells);
+    let mut parts = smooth_parts(&mut cells);
     // The sum of the ties along an edge is about its length in cells.
     let a_tie = EDGE_ODDS * cell_m / INDEPENDENT_M2.sqrt();
-    for of_part in &mut ties {
+    for of_part in &mut parts.ties {
         of_part.values_mut().for_each(|tie| *tie *= a_tie);
     }
     let scene = Scene::of(&cells, cell_m, scanners);
-    let evidence: Vec<Evidence> = parts.iter().map(|part| scene.evidence_of(part)).collect();
-    scene.add_beside(&parts, &mut ties);
+    let evidence: Vec<Evidence> = parts.members.iter().map(|part| scene.evidence_of(part)).collect();
+    scene.add_beside(&mut parts);
+    let Parts {
+        members: parts,
+        mut ties,
+        ..
+    } = parts;
     // One node more stands for what points outside.
     let outside = parts.len();
     ties.push(BTreeMap::new());
@@ -241,14 +246,15 @@ impl<'a> Scene<'a> {
 
     /// Adds ties between parts that lie beside each other: parallel ones are seen from the same side, unless one
     /// lies behind the other, as the two faces of a railing or the flanks of a buttress do.
-    fn add_beside(&self, parts: &[Vec<usize>], ties: &mut Ties) {
+    fn add_beside(&self, parts: &mut Parts) {
+        let Parts {
+            members,
+            of_cell,
+            ties,
+        } = parts;
         let centroids: Vec<Point3<f64>> = self.cells.iter().map(|c| c.centroid).collect();
         let index = GridIndex::new(&centroids, BESIDE_M);
-        let mut part_of = vec![0; self.cells.len()];
-        for (part, members) in parts.iter().enumerate() {
-            members.iter().for_each(|&i| part_of[i] = part);
-        }
-        for (part, members) in parts.iter().enumerate() {
+        for (part, members) in members.iter().enumerate() {
             let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
             let mut behind: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
             // A few cells of the part stand for all.
@@ -259,15 +265,15 @@ impl<'a> Scene<'a> {
                 index.within(&cell.centroid, BESIDE_M, |j, _| {
                     let other = &self.cells[j];
                     let (apart, cosine) = (other.centroid - cell.centroid, cell.normal.dot(&other.normal));
-                    if part_of[j] == part || cosine.abs() <= PART_COSINE {
+                    if of_cell[j] == part || cosine.abs() <= PART_COSINE {
                         return;
                     }
                     let across_m = cell.normal.dot(&apart).abs();
                     let beside_m = (apart.norm_squared() - across_m * across_m).max(0.0).sqrt();
                     if beside_m < self.cell_m {
-                        behind.entry(part_of[j]).or_default().insert(i);
+                        behind.entry(of_cell[j]).or_default().insert(i);
                     } else if beside_m > across_m {
-                        *sums.entry(part_of[j]).or_default() += cosine;
+                        *sums.entry(of_cell[j]).or_default() += cosine;
                         count += 1.0;
                     }
                 });

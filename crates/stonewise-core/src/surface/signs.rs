@@ -16,13 +16,22 @@ const EDGE: f64 = 0.5;
 /// Ties of some things to others: positive where the signs of both are right or both are wrong.
 pub(super) type Ties = Vec<BTreeMap<usize, f64>>;
 
-/// Smooth parts of a surface, with normals of consistent signs within each part: the cells of each, and the ties
-/// between the parts.
+/// Smooth parts of a surface, with normals of consistent signs within each part.
+pub(super) struct Parts {
+    /// The cells of each, the largest part first.
+    pub members: Vec<Vec<usize>>,
+    /// The part of each cell.
+    pub of_cell: Vec<usize>,
+    /// Between the parts.
+    pub ties: Ties,
+}
+
+/// Divides a surface into smooth parts.
 ///
 /// Neighbouring cells are tied, the more strongly the more parallel their normals are (Hoppe, DeRose, Duchamp,
 /// McDonald & Stuetzle 1992, section 3.3); across an edge both cells have the other in front, or both have it
 /// behind.
-pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> (Vec<Vec<usize>>, Ties) {
+pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> Parts {
     let neighbours = neighbours(cells);
     let mut smooth: Ties = vec![BTreeMap::new(); cells.len()];
     for (i, others) in neighbours.iter().enumerate() {
@@ -30,27 +39,31 @@ pub(super) fn smooth_parts(cells: &mut [SurfaceCell]) -> (Vec<Vec<usize>>, Ties)
         smooth[i].extend(cosines.filter(|(_, cosine)| cosine.abs() > PART_COSINE));
     }
     let forest = contracted(smooth);
-    let mut parts: CellMap<usize, Vec<usize>> = CellMap::default();
+    let mut members: CellMap<usize, Vec<usize>> = CellMap::default();
     for (i, cell) in cells.iter_mut().enumerate() {
         let (root, is_opposite) = forest.root(i);
         if is_opposite {
             *cell = cell.flipped();
         }
-        parts.entry(root).or_default().push(i);
+        members.entry(root).or_default().push(i);
     }
-    let mut parts: Vec<Vec<usize>> = parts.into_values().collect();
-    parts.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
-    let mut part_of = vec![0; cells.len()];
-    for (part, members) in parts.iter().enumerate() {
-        members.iter().for_each(|&i| part_of[i] = part);
+    let mut members: Vec<Vec<usize>> = members.into_values().collect();
+    members.sort_by_key(|part| (std::cmp::Reverse(part.len()), part[0]));
+    let mut of_cell = vec![0; cells.len()];
+    for (part, own) in members.iter().enumerate() {
+        own.iter().for_each(|&i| of_cell[i] = part);
     }
-    let mut ties: Ties = vec![BTreeMap::new(); parts.len()];
+    let mut ties: Ties = vec![BTreeMap::new(); members.len()];
     for (i, others) in neighbours.iter().enumerate() {
-        for &j in others.iter().filter(|&&j| part_of[j] != part_of[i]) {
-            *ties[part_of[i]].entry(part_of[j]).or_default() += tie_of(&cells[i], &cells[j]);
+        for &j in others.iter().filter(|&&j| of_cell[j] != of_cell[i]) {
+            *ties[of_cell[i]].entry(of_cell[j]).or_default() += tie_of(&cells[i], &cells[j]);
         }
     }
-    (parts, ties)
+    Parts {
+        members,
+        of_cell,
+        ties,
+    }
 }
 
 /// Joins all that is tied. The two groups with the strongest tie are joined first, and all ties between two groups
@@ -205,11 +218,8 @@ impl Forest {
             .zip(of_b.iter().rev())
             .take_while(|(a, b)| a == b)
             .count();
-        let own = |way: &[usize]| way[..way.len() - common].to_vec();
-        let joined = [own(&of_a), own(&of_b)]
-            .concat()
-            .into_iter()
-            .map(|at| self.nodes[at].joined);
+        let [own_a, own_b] = [&of_a, &of_b].map(|way| &way[..way.len() - common]);
+        let joined = own_a.iter().chain(own_b).map(|at| self.nodes[*at].joined);
         Some(
             joined
                 .max_by_key(|(time, _)| *time)

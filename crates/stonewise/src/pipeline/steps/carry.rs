@@ -15,7 +15,7 @@ use crate::pipeline::cost::Cost;
 use crate::pipeline::graph::{About, Need, Run, Step};
 use crate::pipeline::until::Until;
 use crate::storage::step::Key;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -140,13 +140,12 @@ impl Wish {
     /// nowhere, because it lies before the wall.
     fn new(run: &Run, stone: &Stone, [from, to]: [EpochId; 2], shift: Vector3<f64>) -> Result<Option<Self>> {
         let steepest = run.context.project.settings.label.max_incidence_rad;
-        let facing = |epoch: EpochId, shift: Vector3<f64>| {
-            let place = stone.centroid + shift;
+        let facing = |epoch: EpochId, place: &Point3<f64>| {
             let views = &run.posed(epoch)?.views;
-            Result::Ok(photos_facing(views, &place, &stone.normal, steepest) as u32)
+            Result::Ok(photos_facing(views, place, &stone.normal, steepest) as u32)
         };
-        let facing = [facing(from, Vector3::zeros())?, facing(to, shift)?];
         let place = stone.centroid + shift;
+        let facing = [facing(from, &stone.centroid)?, facing(to, &place)?];
         let leaves_out = |view: &View| {
             view.camera
                 .near
