@@ -3,7 +3,8 @@
 //!
 //! `cargo run --release -p stonewise-lab -- deformation [WORD ...]`. Words: sensors `tls uav` (default both),
 //! `walls=N` (of a row, default 100), `first=N` (seed of the first wall), `depth=0,1` (of the bulge, mm, default 0),
-//! `across=2` (its diameter, m, default 2), `size=4x3` (of the wall, m). Every wall has stones, stations or strips and
+//! `across=2` (its diameter, m, default 2), `toward=out,up,along,level` (its direction, default out; level: horizontally out of the
+//! battered wall), `size=4x3` (of the wall, m). Every wall has stones, stations or strips and
 //! errors of its own; it is scanned twice and adjusted with true labels.
 //!
 //! Columns: walls of which a deformation is claimed; coverage of the 95 % intervals of `def_*` along, up and out;
@@ -38,6 +39,7 @@ pub fn run(words: &Words) -> Outcome {
             .map(|w| w.parse().unwrap())
             .collect()
     };
+    let toward = words.list("toward=", "out");
     let table = Table::begin([
         "survey",
         "walls",
@@ -60,12 +62,13 @@ pub fn run(words: &Words) -> Outcome {
             } else {
                 numbers("across=", "2")
             };
-            for across_m in diameters {
+            for (across_m, toward) in diameters.iter().flat_map(|d| toward.iter().map(move |t| (d, t))) {
                 let case = Case {
                     is_tls: sensor == "tls",
                     size: [size[0], size[1]],
                     depth_m: depth_mm / 1e3,
-                    across_m,
+                    across_m: *across_m,
+                    toward: toward.clone(),
                 };
                 let started = std::time::Instant::now();
                 let found: Vec<Wall> = (first..first + walls)
@@ -74,7 +77,7 @@ pub fn run(words: &Words) -> Outcome {
                     .collect();
                 let label = match depth_mm == 0.0 {
                     true => format!("{sensor}, still"),
-                    false => format!("{sensor}, {depth_mm} mm over {across_m} m"),
+                    false => format!("{sensor}, {depth_mm} mm {toward} over {across_m} m"),
                 };
                 table.row(cells(&label, &found, started.elapsed().as_secs_f64()));
             }
@@ -88,6 +91,7 @@ struct Case {
     size: [f64; 2],
     depth_m: f64,
     across_m: f64,
+    toward: String,
 }
 
 /// What was found of a wall.
@@ -106,17 +110,26 @@ impl Case {
     }
 
     fn params(&self, seed: u64) -> SceneParams {
-        let bulge = WallMotion::Bulge {
+        let wall = WallParams {
+            width_m: self.size[0],
+            height_m: self.size[1],
+            ..WallParams::default()
+        };
+        let (sin, cos) = wall.batter.atan().sin_cos();
+        let direction = match self.toward.as_str() {
+            "out" => [0.0, 0.0, 1.0],
+            "up" => [0.0, 1.0, 0.0],
+            "along" => [1.0, 0.0, 0.0],
+            "level" => [0.0, -sin, cos],
+            other => panic!("toward={other} is none of out, up, along, level"),
+        };
+        let bulge = WallMotion::Zone {
             centre_m: self.middle(),
-            depth_m: self.depth_m,
+            d_m: direction.map(|d| d * self.depth_m),
             diameter_m: self.across_m,
         };
         SceneParams {
-            wall: WallParams {
-                width_m: self.size[0],
-                height_m: self.size[1],
-                ..WallParams::default()
-            },
+            wall,
             motions: if self.depth_m > 0.0 {
                 vec![bulge]
             } else {

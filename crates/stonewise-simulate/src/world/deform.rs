@@ -28,6 +28,15 @@ pub enum WallMotion {
         /// Where the bulge ends, metres.
         diameter_m: f64,
     },
+    /// A part of the wall creeps in one direction: `d_m cos^2(pi r / diameter)`.
+    Zone {
+        /// Centre on the face, along and up, metres.
+        centre_m: [f64; 2],
+        /// Displacement of the centre: along, up, out, metres.
+        d_m: [f64; 3],
+        /// Where the zone ends, metres.
+        diameter_m: f64,
+    },
     /// The foundation gives way on one side: down, linearly from nothing at `from_m` to `depth_m` at `to_m`.
     Settlement {
         /// Where it starts, metres along the face.
@@ -131,15 +140,14 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
             depth_m,
             diameter_m,
         } => {
-            let r = (a - centre_m[0]).hypot(u - centre_m[1]);
-            let inside = r < diameter_m / 2.0;
-            let size = if inside {
-                (PI * r / diameter_m).cos().powi(2)
-            } else {
-                0.0
-            };
-            frame.out * (depth_m * size)
+            frame.out * (depth_m * cosine_squared(*centre_m, *diameter_m, [a, u]))
         }
+        WallMotion::Zone {
+            centre_m,
+            d_m,
+            diameter_m,
+        } => (frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2])
+            * cosine_squared(*centre_m, *diameter_m, [a, u]),
         WallMotion::Settlement {
             from_m,
             to_m,
@@ -160,6 +168,16 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
             }
         }
         WallMotion::Loose { .. } | WallMotion::Own { .. } => Vector3::zeros(),
+    }
+}
+
+/// 1 at the centre, 0 from half the diameter on.
+fn cosine_squared(centre_m: [f64; 2], diameter_m: f64, place: [f64; 2]) -> f64 {
+    let r = (place[0] - centre_m[0]).hypot(place[1] - centre_m[1]);
+    if r < diameter_m / 2.0 {
+        (PI * r / diameter_m).cos().powi(2)
+    } else {
+        0.0
     }
 }
 
