@@ -4,6 +4,7 @@
 //! way: every stone by itself, with its surroundings.
 
 pub(crate) mod adjustment;
+mod bulges;
 mod deformation;
 mod gicp;
 mod moved;

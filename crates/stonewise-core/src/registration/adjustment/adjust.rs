@@ -14,8 +14,8 @@ use crate::registration::points::PairSource;
 /// neighbours, with weights estimated from the survey; stones and ties that do not fit are released. World
 /// frame, metres.
 ///
-/// survey -> align -> probe -> track, where there are photos -> weigh -> settle -> part along a crack, then
-/// weigh and settle again, until none is left -> report.
+/// survey -> align -> probe -> track, where there are photos -> weigh -> settle -> part along a crack or let a
+/// creeping zone move, then weigh and settle again, until none is left -> report.
 ///
 /// Cost: about ten evaluations of all points and ten sparse factorisations.
 ///
@@ -82,7 +82,7 @@ pub fn adjust_with_photos<S: PairSource>(
         return Ok(surveyed.report());
     }
     let mut settled = surveyed.align()?.probe()?.track(photos)?.weigh()?.settle()?;
-    while settled.part_along_crack() {
+    while settled.part_along_crack() || settled.loosen_zone() {
         settled = settled.weigh()?.settle()?;
     }
     Ok(settled.report())

@@ -52,9 +52,10 @@ fn is_broken(adjustment: &Adjustment, edge: &Edge, tie: &Tie, jump: &Vector3<f64
         });
     }
     let local = edge.face_from_world * jump;
-    let [inside, outside] = adjustment
-        .prior
-        .components
+    let prior = &adjustment.prior;
+    let around = prior.least[edge.low].larger(&prior.least[edge.high]);
+    let [inside, outside] = around
+        .of(&prior.components)
         .drift
         .map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
     let excess = local.xy().norm_squared() / inside.powi(2) + (local.z / outside).powi(2);

@@ -80,6 +80,18 @@ impl<'a, S: PairSource> Run<'a, S> {
         found
     }
 
+    /// Lets a creeping zone move as its stones show, where there is one and fewer than `most` were found; whether it
+    /// did. As many iterations as at the start are then left.
+    pub fn loosen_zone(&mut self, most: usize) -> bool {
+        let is_open = self.adjustment.prior.zones < most;
+        let last = self.last.as_ref().filter(|_| is_open);
+        let found = last.is_some_and(|solution| self.adjustment.loosen_zone(solution));
+        if found {
+            self.allowed = self.iterations + self.adjustment.params.max_iterations;
+        }
+        found
+    }
+
     /// Results of the last iteration.
     pub fn report(&self, converged: bool) -> AdjustmentReport {
         outcome::report(&self.adjustment, self.last.as_ref(), self.iterations, converged)

@@ -4,19 +4,14 @@ use super::candidate::Moving;
 use super::estimate::{Estimate, widening};
 use super::field::{information, stone_from_field};
 use super::joint_motions::{JointMotions, JointStone, Pull};
-use super::observation::NormalEquations;
 use super::octaves::Octaves;
 use super::solution::Solution;
 use super::state::Adjustment;
 use super::stone_vector::Vector9;
 use crate::linalg::without_negative;
 use crate::stone::{MotionFailure, PairResult};
-use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
-
-/// Information that keeps a rotation or bending solvable which no point determines; far below any that
-/// counts.
-const RIDGE: f64 = 1e-9;
 
 /// The joint distribution as the last solution has it.
 pub(super) fn joint_motions(
@@ -58,7 +53,7 @@ pub(super) fn joint_motions(
         let common = adjustment.prior.common_in(i);
         let own_motion = Vector9::from(adjustment.prior.own_variances());
         let noise = octave + Matrix3::from_diagonal(&own_motion.fixed_rows::<3>(0));
-        let observed = observed(&solution.equations[i].with_field, &noise);
+        let observed = solution.equations[i].with_field.of_displacement(&noise);
         let vector = observed.1 + observed.0 * common.translation();
         Some(JointStone {
             id: results[i].first,
@@ -104,32 +99,6 @@ pub(super) fn joint_motions(
             .map_or_else(|| DMatrix::zeros(0, 0), |p| p.of_poses().clone()),
         octaves: adjustment.octaves(),
         step_m: adjustment.step_m().unwrap_or(f64::INFINITY),
-    }
-}
-
-/// What a stone's observations say of its displacement about the common one, in its frame, with rotation and
-/// bending free. `noise`: covariance of what the stone does and errs on its own besides.
-fn observed(equations: &NormalEquations, noise: &Matrix3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
-    let h = &equations.information;
-    let rest = h.fixed_view::<6, 6>(3, 3).into_owned();
-    // Unknowns have different units.
-    let scale = rest.diagonal().map(|v| 1.0 / v.max(RIDGE).sqrt());
-    let scaled = Matrix6::from_fn(|r, c| rest[(r, c)] * scale[r] * scale[c]) + Matrix6::identity() * RIDGE;
-    let Some(factor) = scaled.cholesky() else {
-        return (Matrix3::zeros(), Vector3::zeros());
-    };
-    let cross = SMatrix::<f64, 6, 3>::from_fn(|r, c| h[(3 + r, c)] * scale[r]);
-    let pull = nalgebra::Vector6::from_fn(|r, _| equations.vector[3 + r] * scale[r]);
-    let information = h.fixed_view::<3, 3>(0, 0) - cross.transpose() * factor.solve(&cross);
-    let vector = equations.vector.fixed_rows::<3>(0) - cross.transpose() * factor.solve(&pull);
-    // (I^-1 + N)^-1 = (1 + I N)^-1 I, which holds for a singular I too.
-    let information = 0.5 * (information + information.transpose());
-    match (Matrix3::identity() + information * noise).try_inverse() {
-        Some(share) => {
-            let with_noise = share * information;
-            (0.5 * (with_noise + with_noise.transpose()), share * vector)
-        }
-        None => (Matrix3::zeros(), Vector3::zeros()),
     }
 }
 

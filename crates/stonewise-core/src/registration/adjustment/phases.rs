@@ -20,6 +20,8 @@ const WEIGHINGS: usize = 5;
 const COMPONENTS_IN: [usize; 2] = [0, 2];
 /// Most cracks of the whole wall that are sought; each costs another adjustment.
 const MAX_CRACKS: usize = 8;
+/// Most creeping zones; each costs another adjustment.
+const MAX_ZONES: usize = 4;
 
 type Phase<Next, S> = Result<Next, AdjustError<<S as PairSource>::Error>>;
 
@@ -142,7 +144,13 @@ impl<'a, S: PairSource> Settled<'a, S> {
         self.converged && self.run.part_along_crack(MAX_CRACKS)
     }
 
-    /// As [`Tracked::weigh`], now that the wall is parted.
+    /// Lets a creeping zone move as its stones show, if the stones came to rest; whether there is one. What settled
+    /// before must then be weighed again.
+    pub fn loosen_zone(&mut self) -> bool {
+        self.converged && self.run.loosen_zone(MAX_ZONES)
+    }
+
+    /// As [`Tracked::weigh`], now that the wall is parted or a zone is loose.
     pub fn weigh(self) -> Phase<Weighed<'a, S>, S> {
         Tracked(self.run).weigh()
     }

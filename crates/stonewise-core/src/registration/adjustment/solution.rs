@@ -2,15 +2,15 @@
 
 use super::equations::StoneEquations;
 use super::field::{
-    Displacement, Field, FieldProblem, FieldStone, PhotoTerms, Prediction, Subgraph, VarianceComponents,
-    estimated_share, find_crack, most_likely_components, posterior, probabilities_with_field, reweight_ties,
-    solve,
+    Displacement, Field, FieldProblem, FieldStone, LeftOver, PhotoTerms, Prediction, Subgraph,
+    VarianceComponents, creeping_zone, estimated_share, find_crack, most_likely_components, posterior,
+    probabilities_with_field, reweight_ties, solve,
 };
 use super::observation::NormalEquations;
 use super::partial_view::estimated_rate;
 use super::state::{Adjustment, StoneState};
 use crate::progress::{Interrupted, Progress};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Rounds in which weights and field follow each other within an iteration; one for large walls, where each
 /// is expensive.
@@ -37,6 +37,16 @@ impl Adjustment {
     /// # Errors
     /// The caller stopped the work.
     pub fn components_of_wall(&self, progress: &dyn Progress) -> Result<VarianceComponents, Interrupted> {
+        let equations = self.without_error();
+        let problem = self.likelihood(&equations);
+        match Subgraph::new(&self.prior.graph, &self.displacements()) {
+            None => most_likely_components(&problem, progress),
+            Some(part) => most_likely_components(&part.restrict(&problem), progress),
+        }
+    }
+
+    /// Equations of the stones' points for any error in the face.
+    pub fn without_error(&self) -> Vec<NormalEquations> {
         let mut equations = match &self.photos {
             None => self.equations_with_field(0.0),
             Some(_) => self.cloud_equations(0.0),
@@ -44,6 +54,12 @@ impl Adjustment {
         for i in self.unconfirmed() {
             equations[i] = NormalEquations::nothing();
         }
+        equations
+    }
+
+    /// The problem whose likelihood tells of the variance components; `equations` as
+    /// [without error](Self::without_error).
+    pub fn likelihood<'a>(&'a self, equations: &'a [NormalEquations]) -> FieldProblem<'a> {
         let mut problem = self.problem(equations.iter());
         problem.photos = self.photos.as_ref().map(|photos| PhotoTerms {
             stones: (0..self.stones.len())
@@ -53,10 +69,7 @@ impl Adjustment {
                 })
                 .collect(),
         });
-        match Subgraph::new(&self.prior.graph, &self.displacements()) {
-            None => most_likely_components(&problem, progress),
-            Some(part) => most_likely_components(&part.restrict(&problem), progress),
-        }
+        problem
     }
 
     /// Stones that photos do not find, where they find most: what their clouds show may be no motion, and a few
@@ -120,6 +133,7 @@ impl Adjustment {
                 &field,
                 self.params.tie_freedom,
                 &mut self.prior.components,
+                &self.prior.least,
                 &mut self.prior.ties,
             );
             field = self.solve(equations)?;
@@ -145,6 +159,41 @@ impl Adjustment {
         true
     }
 
+    /// Finds a zone that creeps and lets its motion change as its stones show; whether there is one.
+    pub fn loosen_zone(&mut self, solution: &Solution) -> bool {
+        let equations = self.without_error();
+        let left_over = self.left_over(solution);
+        let Some((stones, least)) = creeping_zone(&self.likelihood(&equations), &left_over) else {
+            return false;
+        };
+        for i in stones {
+            self.prior.least[i] = self.prior.least[i].larger(&least);
+            // Stones that left the field as it was may move with it now.
+            self.stones[i].p_with_field = 1.0;
+        }
+        self.prior.zones += 1;
+        true
+    }
+
+    /// What the points of each stone show beyond the field.
+    fn left_over(&self, solution: &Solution) -> Vec<Option<LeftOver>> {
+        let of_clouds = self.cloud_equations(self.prior.components.error_m);
+        let shared = self.shared_variances(1.0);
+        let own = self.prior.own_variances();
+        let noise = Matrix3::from_diagonal(&Vector3::from_fn(|k, _| own[k] + shared[k]));
+        let of_stone = |(i, equations): (usize, &NormalEquations)| {
+            let frame = self.prior.graph.nodes[i].face_from_world;
+            let (information, vector) = equations.of_displacement(&noise);
+            let displacement = frame * solution.field.state[i].displacement();
+            let vector = vector - information * displacement;
+            self.stones[i]
+                .info
+                .usable
+                .then_some(LeftOver { information, vector })
+        };
+        of_clouds.iter().enumerate().map(of_stone).collect()
+    }
+
     pub(super) fn problem<'a>(
         &'a self,
         equations: impl Iterator<Item = &'a NormalEquations>,
@@ -159,6 +208,7 @@ impl Adjustment {
                 })
                 .collect(),
             ties: self.prior.ties.clone(),
+            least: self.prior.least.clone(),
             components: self.prior.components,
             loose: self.prior.loose,
             photos: None,

@@ -11,26 +11,14 @@
 use super::body::{Body, BodyStone};
 use super::found::ZONE_EXTENTS_M;
 use super::random::Random;
-use crate::geometry::Bounds;
+use crate::registration::bulges::{RIM, Shape, shapes};
 use crate::statistics::upper_median;
-use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, Point3, SMatrix, Vector3, Vector6};
+use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
 
 /// Simulations of a wall that moved as one rigid body.
 const SIMULATIONS: usize = 999;
-/// Diameters of the bulges, metres. The longest that count are twice as long as the wall: half of such a bulge bends
-/// the wall from one end to the other.
-const DIAMETERS_M: [f64; 15] = [
-    0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 120.0,
-];
-/// Distance of the middles of bulges, as a share of their diameter.
-const STRIDE: f64 = 0.25;
-/// Fewest stones of a bulge, and the share of its amplitude from which a stone is one of them: what moves less is the rim.
-const LEAST_STONES: usize = 3;
-const RIM: f64 = 0.25;
 /// A bulge of which a rigid motion explains all but this share of the information is none.
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
@@ -272,61 +260,13 @@ fn weight(body: &Body, stone: usize) -> Matrix3<f64> {
 
 /// All bulges of a body.
 fn bulges(body: &Body, firm: &[usize], model: &Model) -> Vec<Bulge> {
-    let place = |i: usize| body.stones[i].joint.place;
-    let extent_m = Bounds::of(firm.iter().map(|&i| place(i))).map_or(0.0, |b| (b.max - b.min).norm());
-    let mut bulges = Vec::new();
-    for diameter_m in DIAMETERS_M.into_iter().filter(|d| *d < 2.0 * extent_m) {
-        let near = Cells::new(firm, 0.5 * diameter_m, place);
-        let of_middle = |cell: &Vec<usize>| {
-            let middle = place(*cell.first()?);
-            let share = |i: usize| {
-                let r = (place(i) - middle).norm();
-                (r < 0.5 * diameter_m).then(|| (i, (PI * r / diameter_m).cos().powi(2)))
-            };
-            let stones: Vec<(usize, f64)> = near.around(&middle).filter_map(share).collect();
-            let inside = stones.iter().filter(|(_, share)| *share > RIM).count();
-            (inside >= LEAST_STONES).then(|| Bulge {
-                diameter_m,
-                directions: model.directions(&stones),
-                stones,
-            })
-        };
-        // One middle in each small cell that has stones.
-        let middles: Vec<Vec<usize>> = Cells::new(firm, STRIDE * diameter_m, place)
-            .cells
-            .into_values()
-            .collect();
-        bulges.extend(middles.par_iter().filter_map(of_middle).collect::<Vec<_>>());
-    }
-    bulges
-}
-
-/// Stones by the cube that they lie in.
-struct Cells {
-    side_m: f64,
-    cells: BTreeMap<[i64; 3], Vec<usize>>,
-}
-
-impl Cells {
-    fn new(stones: &[usize], side_m: f64, place: impl Fn(usize) -> Point3<f64>) -> Self {
-        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
-        for &i in stones {
-            cells.entry(Self::key(side_m, &place(i))).or_default().push(i);
-        }
-        Self { side_m, cells }
-    }
-
-    fn key(side_m: f64, place: &Point3<f64>) -> [i64; 3] {
-        place.coords.map(|x| (x / side_m).floor() as i64).into()
-    }
-
-    /// The stones in the cube of a place and in those that touch it: all within the side, and some beyond.
-    fn around(&self, place: &Point3<f64>) -> impl Iterator<Item = usize> + '_ {
-        let [x, y, z] = Self::key(self.side_m, place);
-        let keys = (-1..=1)
-            .flat_map(move |a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
-        keys.filter_map(|key| self.cells.get(&key)).flatten().copied()
-    }
+    let bulge = |shape: Shape| Bulge {
+        directions: model.directions(&shape.stones),
+        diameter_m: shape.diameter_m,
+        stones: shape.stones,
+    };
+    let shapes = shapes(firm, |i| body.stones[i].joint.place);
+    shapes.into_par_iter().map(bulge).collect()
 }
 
 /// Symmetric root of an information matrix.

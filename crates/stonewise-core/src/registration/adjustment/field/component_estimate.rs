@@ -96,7 +96,7 @@ fn clamp(log: [f64; COUNT]) -> [f64; COUNT] {
 ///
 /// The equations are those of the observations alone: the error in the face is among what is estimated.
 pub(crate) fn deviance(problem: &FieldProblem, components: &VarianceComponents) -> Option<f64> {
-    let prior = prior(problem.graph, components, &problem.ties);
+    let prior = prior(problem.graph, components, &problem.ties, &problem.least);
     let prior_log_det = problem.graph.pattern.factor(&prior)?.log_det();
     let own = [
         components.own_variances(),
@@ -190,7 +190,10 @@ mod tests {
         };
         // Observed motions scatter about zero with the covariance of field, own motion, error and noise.
         let by_definition = |components: &VarianceComponents| {
-            let field = dense(&prior(problem.graph, components, &problem.ties), &problem);
+            let field = dense(
+                &prior(problem.graph, components, &problem.ties, &problem.least),
+                &problem,
+            );
             let own = components.with_error(components.own_variances());
             let mut covariance = &a * field.try_inverse().unwrap() * a.transpose();
             let mut observed = DVector::zeros(9 * n);
@@ -256,7 +259,10 @@ mod tests {
             ..start
         };
         let by_definition = |components: &VarianceComponents| {
-            let field = dense(&prior(problem.graph, components, &problem.ties), &problem);
+            let field = dense(
+                &prior(problem.graph, components, &problem.ties, &problem.least),
+                &problem,
+            );
             let mut motion = &a * field.try_inverse().unwrap() * a.transpose();
             let mut observe = DMatrix::<f64>::zeros(12 * n, 9 * n);
             let mut noise = DMatrix::<f64>::zeros(12 * n, 12 * n);
@@ -309,7 +315,10 @@ mod tests {
         };
         let mut wall = SmallWall::new(14, 10, 1);
         let problem = wall.problem(1.0);
-        let field = dense(&prior(problem.graph, &truth, &problem.ties), &problem);
+        let field = dense(
+            &prior(problem.graph, &truth, &problem.ties, &problem.least),
+            &problem,
+        );
         let root = field.cholesky().unwrap();
         let white = DVector::from_fn(9 * 140, |_, _| gauss());
         let drawn = frames(&problem) * root.l().transpose().solve_upper_triangular(&white).unwrap();

@@ -138,7 +138,7 @@ mod tests {
         let problem = wall.problem(0.9);
         let side: Vec<bool> = (0..12).map(|k| k % 4 >= 2).collect();
         let found = test_jumps(&problem, std::slice::from_ref(&side)).unwrap()[0];
-        let mut matrix = prior(&wall.graph, &problem.components, &problem.ties);
+        let mut matrix = prior(&wall.graph, &problem.components, &problem.ties, &problem.least);
         let of_stone: Vec<(Matrix9, Vector9)> = eliminate_own_motions(&problem, &problem.own_variances())
             .iter()
             .zip(&wall.graph.nodes)

@@ -2,6 +2,7 @@
 
 mod component_estimate;
 mod cracks;
+mod creep;
 mod eliminate;
 mod field_vector;
 mod graph;
@@ -23,6 +24,7 @@ pub(crate) use component_estimate::most_likely_components;
 #[cfg(test)]
 pub(crate) use cracks::Crack;
 pub(crate) use cracks::find_crack;
+pub(crate) use creep::{LeftOver, creeping_zone};
 pub(crate) use field_vector::{FieldVector, stone_from_field};
 pub(crate) use graph::{Edge, Graph, Node, Place};
 pub(crate) use loose_prior::{LoosePrior, estimated_share};

@@ -3,7 +3,7 @@
 use super::cracks::Crack;
 use super::graph::{Graph, Place};
 use super::loose_prior::LoosePrior;
-use super::prior::Tie;
+use super::prior::{Least, Tie};
 use super::variance_components::VarianceComponents;
 use crate::registration::adjustment::stone_vector::StoneVector;
 use nalgebra::Vector3;
@@ -13,9 +13,13 @@ pub(crate) struct MotionPrior {
     pub graph: Graph,
     /// One per edge of the graph.
     pub ties: Vec<Tie>,
+    /// Of zones that creep, one per node of the graph.
+    pub least: Vec<Least>,
     pub components: VarianceComponents,
     pub loose: LoosePrior,
     pub cracks: Vec<Crack>,
+    /// Number of zones that were found to creep.
+    pub zones: usize,
     /// Common translation about which the field is solved, world.
     pub common: Vector3<f64>,
 }
@@ -27,10 +31,12 @@ impl MotionPrior {
         let graph = Graph::new(places, neighbours_per_side)?;
         Some(Self {
             ties: vec![Tie::WHOLE; graph.edges.len()],
+            least: vec![Least::default(); graph.nodes.len()],
             graph,
             components: VarianceComponents::start(),
             loose,
             cracks: Vec::new(),
+            zones: 0,
             common: Vector3::zeros(),
         })
     }

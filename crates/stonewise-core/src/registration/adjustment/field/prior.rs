@@ -26,6 +26,34 @@ impl Tie {
     };
 }
 
+/// The least that is assumed of how the motion changes around a stone, as [`VarianceComponents`] has it: in the face,
+/// out of it. More than none where a zone creeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Least {
+    pub drift: [f64; 2],
+    pub strain: [f64; 2],
+}
+
+impl Least {
+    /// The larger of both, each by itself: of the tie between two stones, that of either.
+    pub fn larger(&self, other: &Self) -> Self {
+        let larger = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|k| a[k].max(b[k]));
+        Self {
+            drift: larger(self.drift, other.drift),
+            strain: larger(self.strain, other.strain),
+        }
+    }
+
+    /// These components, or the least where they are smaller.
+    pub fn of(&self, components: &VarianceComponents) -> VarianceComponents {
+        VarianceComponents {
+            drift: [0, 1].map(|k| components.drift[k].max(self.drift[k])),
+            strain: [0, 1].map(|k| components.strain[k].max(self.strain[k])),
+            ..*components
+        }
+    }
+}
+
 /// Prior standard deviation of a displacement about the common motion, metres. It keeps the datum of the
 /// field solvable; 0.3 m is ten times any motion that stones are matched over, so it does not pull.
 const LEVEL_M: f64 = 0.3;
@@ -33,18 +61,25 @@ const LEVEL_M: f64 = 0.3;
 /// can factor beside ties of a metre.
 const STIFFEST: f64 = 1e12;
 
-/// Information matrix of the prior.
-pub(crate) fn prior(graph: &Graph, components: &VarianceComponents, ties: &[Tie]) -> BlockMatrix<9> {
+/// Information matrix of the prior. `least`: around each stone.
+pub(crate) fn prior(
+    graph: &Graph,
+    components: &VarianceComponents,
+    ties: &[Tie],
+    least: &[Least],
+) -> BlockMatrix<9> {
     let mut matrix = graph.pattern.zeros();
     for (e, (edge, tie)) in graph.edges.iter().zip(ties).enumerate() {
-        let [ll, hl, hh] = tie_blocks(edge, components, tie.is_parted);
+        let around = least[edge.low].larger(&least[edge.high]).of(components);
+        let [ll, hl, hh] = tie_blocks(edge, &around, tie.is_parted);
         let w = tie.weight;
         matrix.diagonal[edge.low] += ll * w;
         matrix.diagonal[edge.high] += hh * w;
         matrix.edges[e] += hl * w;
     }
-    for (node, block) in graph.nodes.iter().zip(&mut matrix.diagonal) {
-        let strain = in_and_out(&node.face_from_world, components.strain.map(|s| s * s));
+    for ((node, least), block) in graph.nodes.iter().zip(least).zip(&mut matrix.diagonal) {
+        let strain = least.of(components).strain.map(|s| s * s);
+        let strain = in_and_out(&node.face_from_world, strain);
         for c in 0..3 {
             block[(c, c)] += 1.0 / (LEVEL_M * LEVEL_M);
         }
@@ -98,4 +133,31 @@ pub(crate) fn tie_blocks(edge: &Edge, components: &VarianceComponents, is_parted
 fn in_and_out(face_from_world: &Matrix3<f64>, variance: [f64; 2]) -> Matrix3<f64> {
     let [i, o] = variance.map(|v| (1.0 / v).min(STIFFEST));
     face_from_world.transpose() * Matrix3::from_diagonal(&Vector3::new(i, i, o)) * face_from_world
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::adjustment::field::testing::SmallWall;
+
+    #[test]
+    fn a_least_around_all_stones_is_as_components_of_that_size() {
+        let wall = SmallWall::new(4, 3, 1);
+        let ties = vec![Tie::WHOLE; wall.graph.edges.len()];
+        let small = VarianceComponents::start();
+        let large = VarianceComponents {
+            drift: [0.02, small.drift[1]],
+            strain: [small.strain[0], 0.05],
+            ..small
+        };
+        let everywhere = Least {
+            drift: [0.02, 1e-3],
+            strain: [1e-3, 0.05],
+        };
+        let stones = wall.graph.nodes.len();
+        let found = prior(&wall.graph, &small, &ties, &vec![everywhere; stones]);
+        let expected = prior(&wall.graph, &large, &ties, &vec![Least::default(); stones]);
+        assert_eq!(found.diagonal, expected.diagonal);
+        assert_eq!(found.edges, expected.edges);
+    }
 }

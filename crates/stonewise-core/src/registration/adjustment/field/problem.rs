@@ -2,7 +2,7 @@
 
 use super::graph::Graph;
 use super::loose_prior::LoosePrior;
-use super::prior::Tie;
+use super::prior::{Least, Tie};
 use super::variance_components::VarianceComponents;
 use crate::registration::adjustment::candidate::Moving;
 use crate::registration::adjustment::observation::NormalEquations;
@@ -18,6 +18,8 @@ pub(crate) struct FieldProblem<'a> {
     pub stones: Vec<FieldStone<'a>>,
     /// One per edge of the graph.
     pub ties: Vec<Tie>,
+    /// One per node of the graph.
+    pub least: Vec<Least>,
     pub components: VarianceComponents,
     pub loose: LoosePrior,
     /// What photos say, where the variance components are to be estimated from them too; the stones'
@@ -75,6 +77,7 @@ impl<'a> FieldProblem<'a> {
                 .map(|(stone, equations)| FieldStone { equations, ..*stone })
                 .collect(),
             ties: self.ties.clone(),
+            least: self.least.clone(),
             components: self.components,
             loose: self.loose,
             photos: None,

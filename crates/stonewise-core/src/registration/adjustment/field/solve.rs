@@ -36,14 +36,14 @@ pub(crate) struct Normal<'a> {
 /// Of stones that do beside the field what the problem's components and loose prior say.
 pub(crate) fn normal_equations<'a>(problem: &FieldProblem<'a>) -> Option<Normal<'a>> {
     let eliminated = eliminate_own_motions(problem, &problem.own_variances());
-    let prior = prior(problem.graph, &problem.components, &problem.ties);
+    let prior = prior(problem.graph, &problem.components, &problem.ties, &problem.least);
     assemble(problem, prior, eliminated)
 }
 
 /// The matrix of these equations: the information of prior and stones together, and that of each stone.
 pub(crate) fn information(problem: &FieldProblem) -> (BlockMatrix<9>, Vec<Matrix9>) {
     let eliminated = eliminate_own_motions(problem, &problem.own_variances());
-    let mut matrix = prior(problem.graph, &problem.components, &problem.ties);
+    let mut matrix = prior(problem.graph, &problem.components, &problem.ties, &problem.least);
     let of_stones = of_stones(problem, &eliminated);
     add_stones(&mut matrix, &of_stones);
     (matrix, of_stones)

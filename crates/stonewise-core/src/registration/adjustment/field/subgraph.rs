@@ -47,7 +47,11 @@ impl Subgraph {
         if !Self::is_needed(graph) {
             return None;
         }
-        let stones = chosen(graph, displacements);
+        Self::of(graph, chosen(graph, displacements))
+    }
+
+    /// These stones, ascending, with the ties between them. `None` where memory does not suffice.
+    pub fn of(graph: &Graph, stones: Vec<usize>) -> Option<Self> {
         let place = |i: usize| stones.binary_search(&i).ok();
         let mut edges = Vec::new();
         let mut inner = Vec::new();
@@ -69,12 +73,18 @@ impl Subgraph {
         })
     }
 
+    /// Number of a stone of the whole in the subgraph.
+    pub fn place(&self, stone: usize) -> Option<usize> {
+        self.stones.binary_search(&stone).ok()
+    }
+
     /// The problem on the subgraph alone.
     pub fn restrict<'a>(&'a self, whole: &FieldProblem<'a>) -> FieldProblem<'a> {
         FieldProblem {
             graph: &self.graph,
             stones: self.stones.iter().map(|&i| whole.stones[i]).collect(),
             ties: self.edges.iter().map(|&e| whole.ties[e]).collect(),
+            least: self.stones.iter().map(|&i| whole.least[i]).collect(),
             components: whole.components,
             loose: whole.loose,
             photos: whole.photos.as_ref().map(|photos| PhotoTerms {

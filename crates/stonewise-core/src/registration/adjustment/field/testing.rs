@@ -2,7 +2,7 @@
 
 use super::graph::{Graph, Place};
 use super::loose_prior::LoosePrior;
-use super::prior::Tie;
+use super::prior::{Least, Tie};
 use super::problem::{FieldProblem, FieldStone};
 use super::variance_components::VarianceComponents;
 use crate::registration::adjustment::observation::NormalEquations;
@@ -66,6 +66,7 @@ impl SmallWall {
             graph: &self.graph,
             stones: self.equations.iter().map(stone).collect(),
             ties: vec![Tie::WHOLE; self.graph.edges.len()],
+            least: vec![Least::default(); self.graph.nodes.len()],
             components: VarianceComponents::start(),
             loose: LOOSE,
             photos: None,

@@ -1,7 +1,12 @@
 //! What observations hand over to the adjustment: a quadratic in a stone's motion.
 
 use crate::registration::adjustment::stone_vector::{Matrix9, Vector9};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 use std::ops::AddAssign;
+
+/// Information that keeps a rotation or bending solvable which no point determines; far below any that
+/// counts.
+const RIDGE: f64 = 1e-9;
 
 /// Log likelihood of a stone's observations as a quadratic in its motion x, in the stone's frame:
 /// constant + vector' x - x' information x / 2.
@@ -22,6 +27,33 @@ impl NormalEquations {
             information: Matrix9::zeros(),
             vector: Vector9::zeros(),
             constant: 0.0,
+        }
+    }
+
+    /// What is observed of the displacement alone, information and vector, with rotation and bending free. `noise`:
+    /// covariance of what the stone does and errs on its own besides.
+    pub fn of_displacement(&self, noise: &Matrix3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+        let h = &self.information;
+        let rest = h.fixed_view::<6, 6>(3, 3).into_owned();
+        // Unknowns have different units.
+        let scale = rest.diagonal().map(|v| 1.0 / v.max(RIDGE).sqrt());
+        let scaled =
+            Matrix6::from_fn(|r, c| rest[(r, c)] * scale[r] * scale[c]) + Matrix6::identity() * RIDGE;
+        let Some(factor) = scaled.cholesky() else {
+            return (Matrix3::zeros(), Vector3::zeros());
+        };
+        let cross = SMatrix::<f64, 6, 3>::from_fn(|r, c| h[(3 + r, c)] * scale[r]);
+        let pull = Vector6::from_fn(|r, _| self.vector[3 + r] * scale[r]);
+        let information = h.fixed_view::<3, 3>(0, 0) - cross.transpose() * factor.solve(&cross);
+        let vector = self.vector.fixed_rows::<3>(0) - cross.transpose() * factor.solve(&pull);
+        // (I^-1 + N)^-1 = (1 + I N)^-1 I, which holds for a singular I too.
+        let information = 0.5 * (information + information.transpose());
+        match (Matrix3::identity() + information * noise).try_inverse() {
+            Some(share) => {
+                let with_noise = share * information;
+                (0.5 * (with_noise + with_noise.transpose()), share * vector)
+            }
+            None => (Matrix3::zeros(), Vector3::zeros()),
         }
     }
 }

@@ -1,0 +1,119 @@
+//! Bulges of every place and size: which stones take part in each, and by how much.
+
+use crate::geometry::Bounds;
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+/// Diameters of the bulges, metres. The longest that count are twice as long as the wall: half of such a bulge bends
+/// the wall from one end to the other.
+const DIAMETERS_M: [f64; 15] = [
+    0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0, 60.0, 120.0,
+];
+/// Distance of the middles of bulges, as a share of their diameter.
+const STRIDE: f64 = 0.25;
+/// Fewest stones of a bulge, and the share of its amplitude from which a stone is one of them: what moves less is the rim.
+const LEAST_STONES: usize = 3;
+pub(crate) const RIM: f64 = 0.25;
+
+/// A bulge of some place and size.
+pub(crate) struct Shape {
+    /// Where it is largest.
+    pub middle: Point3<f64>,
+    pub diameter_m: f64,
+    /// Stones and by how much of the amplitude they move, cos^2(pi r / diameter).
+    pub stones: Vec<(usize, f64)>,
+}
+
+/// All bulges of these stones, with one middle in each small cell that has stones.
+pub(crate) fn shapes(stones: &[usize], place: impl Fn(usize) -> Point3<f64>) -> Vec<Shape> {
+    let extent_m = Bounds::of(stones.iter().map(|&i| place(i))).map_or(0.0, |b| (b.max - b.min).norm());
+    let mut shapes = Vec::new();
+    for diameter_m in DIAMETERS_M.into_iter().filter(|d| *d < 2.0 * extent_m) {
+        let near = Cells::new(stones, 0.5 * diameter_m, &place);
+        let of_middle = |cell: &Vec<usize>| {
+            let middle = place(*cell.first()?);
+            let share = |i: usize| {
+                let r = (place(i) - middle).norm();
+                (r < 0.5 * diameter_m).then(|| (i, (PI * r / diameter_m).cos().powi(2)))
+            };
+            let stones: Vec<(usize, f64)> = near.around(&middle).filter_map(share).collect();
+            let inside = stones.iter().filter(|(_, share)| *share > RIM).count();
+            (inside >= LEAST_STONES).then_some(Shape {
+                middle,
+                diameter_m,
+                stones,
+            })
+        };
+        let middles = Cells::new(stones, STRIDE * diameter_m, &place);
+        shapes.extend(middles.cells.values().filter_map(of_middle));
+    }
+    shapes
+}
+
+/// Stones by the cube that they lie in.
+struct Cells {
+    side_m: f64,
+    cells: BTreeMap<[i64; 3], Vec<usize>>,
+}
+
+impl Cells {
+    fn new(stones: &[usize], side_m: f64, place: impl Fn(usize) -> Point3<f64>) -> Self {
+        let mut cells: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+        for &i in stones {
+            cells.entry(Self::key(side_m, &place(i))).or_default().push(i);
+        }
+        Self { side_m, cells }
+    }
+
+    fn key(side_m: f64, place: &Point3<f64>) -> [i64; 3] {
+        place.coords.map(|x| (x / side_m).floor() as i64).into()
+    }
+
+    /// The stones in the cube of a place and in those that touch it: all within the side, and some beyond.
+    fn around(&self, place: &Point3<f64>) -> impl Iterator<Item = usize> + '_ {
+        let [x, y, z] = Self::key(self.side_m, place);
+        let keys = (-1..=1)
+            .flat_map(move |a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
+        keys.filter_map(|key| self.cells.get(&key)).flatten().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stone_within_a_bulge_takes_part_by_its_distance_from_the_middle() {
+        let places: Vec<Point3<f64>> = (0..60)
+            .map(|k| {
+                Point3::new(
+                    0.01 * f64::from(k % 3),
+                    0.31 * f64::from(k % 10),
+                    0.22 * f64::from(k / 10),
+                )
+            })
+            .collect();
+        let all: Vec<usize> = (0..60).collect();
+        let shapes = shapes(&all, |i| places[i]);
+        // At 0.5 m no three stones count, and 6 m are more than twice the diagonal of 2.999 m.
+        let smallest = shapes.iter().map(|s| s.diameter_m).fold(f64::INFINITY, f64::min);
+        let largest = shapes.iter().map(|s| s.diameter_m).fold(0.0, f64::max);
+        assert_eq!((smallest, largest), (0.75, 4.0));
+        for shape in &shapes {
+            let mut expected: Vec<(usize, f64)> = Vec::new();
+            for (i, place) in places.iter().enumerate() {
+                let r = (place - shape.middle).norm() / shape.diameter_m;
+                if r < 0.5 {
+                    expected.push((i, 0.5 + 0.5 * (2.0 * PI * r).cos()));
+                }
+            }
+            let mut found = shape.stones.clone();
+            found.sort_by_key(|s| s.0);
+            assert_eq!(found.len(), expected.len());
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!(found.0 == expected.0 && (found.1 - expected.1).abs() < 1e-12);
+            }
+        }
+    }
+}
