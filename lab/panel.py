@@ -354,6 +354,11 @@ def bulge(depth):
     return {"kind": "bulge", "centre_m": [0.0, 1.1], "depth_m": depth, "diameter_m": 1.5}
 
 
+def zone(along, up, out):
+    """A zone of 1.5 m amid the wall creeps."""
+    return {"kind": "zone", "centre_m": [0.0, 1.1], "d_m": [along, up, out], "diameter_m": 1.5}
+
+
 def crack(*motion):
     """What lies beyond an oblique crack moves along, up and out."""
     return {"kind": "crack", "along_m": 0.0, "slope": 0.15, "d_m": motion}
@@ -480,6 +485,11 @@ SURVEYS = [
     Survey("s_dent3", 99, [bulge(-0.003)]),
     Survey("s_bulge3_convex", 96, [bulge(0.003)], wall=CONVEX),
     Survey("s_bulge3_loose", 20, [bulge(0.003), loose(1, 0.012)]),
+    # Zones that creep along the face, or horizontally on a wall with batter.
+    Survey("s_zone_up", 311, [zone(0.0, 0.002, 0.0)]),
+    Survey("s_zone_along", 312, [zone(0.003, 0.0, 0.0)]),
+    Survey("s_zone_level", 313, [zone(0.0, -0.00118, 0.00588)]),
+    Survey("m_zone_up", 314, [zone(0.0, 0.002, 0.0)]),
     # Single stones.
     Survey("s_loose5", 22, [loose(1, 0.005)]),
     Survey("s_loose5_no_sources", 22, [loose(1, 0.005)], [no_sources]),

@@ -139,15 +139,15 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
             centre_m,
             depth_m,
             diameter_m,
-        } => {
-            frame.out * (depth_m * cosine_squared(*centre_m, *diameter_m, [a, u]))
-        }
+        } => frame.out * (depth_m * cosine_squared(*centre_m, *diameter_m, [a, u])),
         WallMotion::Zone {
             centre_m,
             d_m,
             diameter_m,
-        } => (frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2])
-            * cosine_squared(*centre_m, *diameter_m, [a, u]),
+        } => {
+            (frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2])
+                * cosine_squared(*centre_m, *diameter_m, [a, u])
+        }
         WallMotion::Settlement {
             from_m,
             to_m,

@@ -32,11 +32,16 @@ pub(crate) struct Solution {
 }
 
 impl Adjustment {
-    /// The variance components that the stones' equations show; of large walls, those that parts of it show.
+    /// The variance components that the stones' equations show; of large walls, those that parts of it show. Where
+    /// zones creep, those of the wall with its zones: how far a zone reaches is not known, and beside it the motion
+    /// changes more than far from it.
     ///
     /// # Errors
     /// The caller stopped the work.
     pub fn components_of_wall(&self, progress: &dyn Progress) -> Result<VarianceComponents, Interrupted> {
+        if self.prior.zones > 0 {
+            return Ok(self.prior.components);
+        }
         let equations = self.without_error();
         let problem = self.likelihood(&equations);
         match Subgraph::new(&self.prior.graph, &self.displacements()) {
@@ -128,14 +133,18 @@ impl Adjustment {
         };
         for _ in 0..rounds {
             self.reweight_stones(equations, &field);
+            let mut components = self.prior.components;
             reweight_ties(
                 &self.prior.graph,
                 &field,
                 self.params.tie_freedom,
-                &mut self.prior.components,
+                &mut components,
                 &self.prior.least,
                 &mut self.prior.ties,
             );
+            if self.prior.zones == 0 {
+                self.prior.components = components;
+            }
             field = self.solve(equations)?;
         }
         Some(field)

@@ -9,7 +9,7 @@
 //! and there (Huber 1964), so that no single stone is called a deformation of the wall.
 
 use super::body::{Body, BodyStone};
-use super::found::ZONE_EXTENTS_M;
+use super::found::{LEVEL, ZONE_EXTENTS_M};
 use super::random::Random;
 use crate::registration::bulges::{RIM, Shape, shapes};
 use crate::statistics::upper_median;
@@ -32,8 +32,8 @@ const ROUNDS: usize = 6;
 const REGULARISATION: f64 = 1e-9;
 /// Number of the direction out of the wall.
 const OUT: usize = 2;
-/// Share of still walls that are called deformed.
-const LEVEL: f64 = 0.05;
+/// What intervals leave outside.
+const OUTSIDE: f64 = 0.05;
 
 /// What the test found.
 pub(super) struct Scan {
@@ -42,7 +42,7 @@ pub(super) struct Scan {
     /// The most likely bulge.
     pub most_likely: MostLikely,
     /// Standard deviations that the most likely bulge of a still wall exceeds in 5 of 100 cases.
-    pub limit: f64,
+    pub reach: f64,
     /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
 }
@@ -136,11 +136,12 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     // Beyond what simulations resolve: the sum of the probabilities of all bulges (Bonferroni).
     let tested: usize = bulges.iter().map(|b| b.directions.iter().flatten().count()).sum();
     let sum = 2.0 * tested as f64 * Normal::standard().sf(largest);
-    let limit = still[((1.0 - LEVEL) * SIMULATIONS as f64) as usize];
+    let exceeded_in = |share: f64| still[((1.0 - share) * SIMULATIONS as f64) as usize];
+    let limit = exceeded_in(LEVEL);
     Some(Scan {
         p: simulated.min(sum),
         most_likely,
-        limit,
+        reach: exceeded_in(OUTSIDE),
         detection_limits_m: ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, limit)),
     })
 }

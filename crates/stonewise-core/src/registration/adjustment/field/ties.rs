@@ -6,8 +6,6 @@ use super::solve::Field;
 use super::variance_components::{BOUNDS, VarianceComponents};
 use rayon::prelude::*;
 
-/// Components of the strain of a tie in the face, and out of it.
-const FREEDOMS: [f64; 2] = [6.0, 3.0];
 /// A drift so large that a tie of it says nothing, per square root metre.
 const NO_TIE: f64 = 1e9;
 
@@ -23,34 +21,24 @@ pub(crate) fn reweight_ties(
     least: &[Least],
     ties: &mut [Tie],
 ) {
-    let around: Vec<Least> = graph
-        .edges
-        .iter()
-        .map(|edge| least[edge.low].larger(&least[edge.high]))
-        .collect();
-    let strain = tie_strain(graph, field, components, &around);
+    let strain = tie_strain(graph, field, components, least);
     // Ties outnumber stones: each holds a share of the field's nine freedoms, six of them in the face.
     let share = graph.nodes.len() as f64 / strain.len().max(1) as f64;
-    let mut sums = [[0.0; 2]; 2];
-    for ((tie, s), least) in ties.iter_mut().zip(&strain).zip(&around) {
+    let mut sums = [0.0; 3];
+    for (tie, s) in ties.iter_mut().zip(&strain) {
         if tie.is_parted {
             tie.weight = 1.0;
             continue;
         }
         tie.weight = (freedom + 9.0 * share) / (freedom + s[0] + s[1]);
-        for k in 0..2 {
-            // Ties of a creeping zone say nothing of the drift of the others.
-            if least.drift[k] <= components.drift[k] {
-                sums[k][0] += tie.weight * s[k] / (FREEDOMS[k] * share);
-                sums[k][1] += tie.weight;
-            }
-        }
+        sums[0] += tie.weight * s[0] / (6.0 * share);
+        sums[1] += tie.weight * s[1] / (3.0 * share);
+        sums[2] += tie.weight;
     }
-    for k in 0..2 {
-        let [strain, weight] = sums[k];
-        if weight > 0.0 {
+    if sums[2] > 0.0 {
+        for k in 0..2 {
             components.drift[k] =
-                (components.drift[k] * (strain / weight).sqrt()).clamp(BOUNDS[k][0], BOUNDS[k][1]);
+                (components.drift[k] * (sums[k] / sums[2]).sqrt()).clamp(BOUNDS[k][0], BOUNDS[k][1]);
         }
     }
 }
@@ -61,14 +49,15 @@ fn tie_strain(
     graph: &Graph,
     field: &Field,
     components: &VarianceComponents,
-    around: &[Least],
+    least: &[Least],
 ) -> Vec<[f64; 2]> {
     graph
         .edges
         .par_iter()
         .enumerate()
         .map(|(e, edge)| {
-            let [inside, outside] = around[e].of(components).drift;
+            let around = least[edge.low].larger(&least[edge.high]);
+            let [inside, outside] = around.of(components).drift;
             [[inside, NO_TIE], [NO_TIE, outside]].map(|drift| {
                 let part = VarianceComponents { drift, ..*components };
                 let blocks = tie_blocks(edge, &part, false);
