@@ -3,9 +3,9 @@
 //!
 //! `cargo run --release -p stonewise-lab -- deformation [WORD ...]`. Words: sensors `tls uav` (default both),
 //! `walls=N` (of a row, default 100), `first=N` (seed of the first wall), `depth=0,1` (of the bulge, mm, default 0),
-//! `across=2` (its diameter, m, default 2), `toward=out,up,along,level` (its direction, default out; level: horizontally out of the
-//! battered wall), `size=4x3` (of the wall, m). Every wall has stones, stations or strips and
-//! errors of its own; it is scanned twice and adjusted with true labels.
+//! `across=2` (its diameter, m, default 2), `toward=out,up,along,level` (its direction, default out; level: horizontally
+//! out of the battered wall), `size=4x3` (of the wall, m). Every wall has stones, stations or strips and errors of its
+//! own; it is scanned twice and adjusted with true labels.
 //!
 //! Columns: walls of which a deformation is claimed; coverage of the 95 % intervals of `def_*` along, up and out;
 //! root mean square of their errors and standard deviations, mm; walls whose bulge has a zone over its middle, and the

@@ -2,6 +2,7 @@
 
 use crate::geometry::Bounds;
 use nalgebra::Point3;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
@@ -15,6 +16,11 @@ const STRIDE: f64 = 0.25;
 /// Fewest stones of a bulge, and the share of its amplitude from which a stone is one of them: what moves less is the rim.
 const LEAST_STONES: usize = 3;
 pub(crate) const RIM: f64 = 0.25;
+/// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
+/// three degrees of freedom; Huber 1964), so that no single stone makes a bulge.
+pub(crate) const LARGEST_RESIDUAL: f64 = 3.368;
+/// Number of the direction out of the wall.
+pub(crate) const OUT: usize = 2;
 
 /// A bulge of some place and size.
 pub(crate) struct Shape {
@@ -26,7 +32,7 @@ pub(crate) struct Shape {
 }
 
 /// All bulges of these stones, with one middle in each small cell that has stones.
-pub(crate) fn shapes(stones: &[usize], place: impl Fn(usize) -> Point3<f64>) -> Vec<Shape> {
+pub(crate) fn shapes(stones: &[usize], place: impl Fn(usize) -> Point3<f64> + Sync) -> Vec<Shape> {
     let extent_m = Bounds::of(stones.iter().map(|&i| place(i))).map_or(0.0, |b| (b.max - b.min).norm());
     let mut shapes = Vec::new();
     for diameter_m in DIAMETERS_M.into_iter().filter(|d| *d < 2.0 * extent_m) {
@@ -46,7 +52,7 @@ pub(crate) fn shapes(stones: &[usize], place: impl Fn(usize) -> Point3<f64>) -> 
             })
         };
         let middles = Cells::new(stones, STRIDE * diameter_m, &place);
-        shapes.extend(middles.cells.values().filter_map(of_middle));
+        shapes.par_extend(middles.cells.par_iter().filter_map(|(_, cell)| of_middle(cell)));
     }
     shapes
 }

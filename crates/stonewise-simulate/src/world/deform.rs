@@ -133,6 +133,7 @@ pub fn shared_displacement(wall: &Wall, motions: &[WallMotion], a: f64, u: f64) 
 
 fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks: bool) -> Vector3<f64> {
     let frame = wall.face.frame(a);
+    let in_world = |d: [f64; 3]| frame.along * d[0] + frame.up * d[1] + frame.out * d[2];
     match motion {
         WallMotion::Translation { d_m } => Vector3::from(*d_m),
         WallMotion::Bulge {
@@ -144,10 +145,7 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
             centre_m,
             d_m,
             diameter_m,
-        } => {
-            (frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2])
-                * cosine_squared(*centre_m, *diameter_m, [a, u])
-        }
+        } => in_world(*d_m) * cosine_squared(*centre_m, *diameter_m, [a, u]),
         WallMotion::Settlement {
             from_m,
             to_m,
@@ -164,7 +162,7 @@ fn displacement(wall: &Wall, motion: &WallMotion, a: f64, u: f64, without_breaks
             if without_breaks || a < along_m + slope * u {
                 Vector3::zeros()
             } else {
-                frame.along * d_m[0] + frame.up * d_m[1] + frame.out * d_m[2]
+                in_world(*d_m)
             }
         }
         WallMotion::Loose { .. } | WallMotion::Own { .. } => Vector3::zeros(),
@@ -249,6 +247,27 @@ mod tests {
             plan_radius_m: 50.0,
             ..WallParams::default()
         })
+    }
+
+    #[test]
+    fn a_zone_that_creeps_out_of_the_wall_is_a_bulge() {
+        let wall = wall();
+        let (centre_m, depth_m, diameter_m) = ([0.2, 1.4], 0.05, 2.25);
+        let bulge = WallMotion::Bulge {
+            centre_m,
+            depth_m,
+            diameter_m,
+        };
+        let zone = WallMotion::Zone {
+            centre_m,
+            d_m: [0.0, 0.0, depth_m],
+            diameter_m,
+        };
+        let moved = [zone, bulge].map(|motion| move_stones(&wall, &[motion], 1));
+        for (zone, bulge) in moved[0].iter().zip(&moved[1]) {
+            let apart = zone.second_from_first.to_homogeneous() - bulge.second_from_first.to_homogeneous();
+            assert!(apart.norm() < 1e-12 && (zone.shared - bulge.shared).norm() < 1e-12);
+        }
     }
 
     #[test]

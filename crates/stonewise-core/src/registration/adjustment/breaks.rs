@@ -1,6 +1,6 @@
 //! Neighbours between which the field of motion is broken.
 
-use super::field::{Edge, FieldVector, Tie};
+use super::field::{Edge, FieldVector, Tie, of_tie};
 use super::params::Break;
 use super::state::Adjustment;
 use nalgebra::Vector3;
@@ -53,9 +53,7 @@ fn is_broken(adjustment: &Adjustment, edge: &Edge, tie: &Tie, jump: &Vector3<f64
     }
     let local = edge.face_from_world * jump;
     let prior = &adjustment.prior;
-    let around = prior.least[edge.low].larger(&prior.least[edge.high]);
-    let [inside, outside] = around
-        .of(&prior.components)
+    let [inside, outside] = of_tie(edge, &prior.components, &prior.least)
         .drift
         .map(|q| q * (edge.length_m.powi(3) / 12.0).sqrt());
     let excess = local.xy().norm_squared() / inside.powi(2) + (local.z / outside).powi(2);

@@ -72,20 +72,20 @@ impl<'a, S: PairSource> Run<'a, S> {
     /// did. As many iterations as at the start are then left.
     pub fn part_along_crack(&mut self, most: usize) -> bool {
         let is_open = self.adjustment.prior.cracks.len() < most;
-        let last = self.last.as_ref().filter(|_| is_open);
-        let found = last.is_some_and(|solution| self.adjustment.add_crack(solution));
-        if found {
-            self.allowed = self.iterations + self.adjustment.params.max_iterations;
-        }
-        found
+        self.release(is_open, Adjustment::add_crack)
     }
 
     /// Lets a creeping zone move as its stones show, where there is one and fewer than `most` were found; whether it
     /// did. As many iterations as at the start are then left.
     pub fn loosen_zone(&mut self, most: usize) -> bool {
         let is_open = self.adjustment.prior.zones < most;
+        self.release(is_open, Adjustment::loosen_zone)
+    }
+
+    /// Finds something to release by the last iteration, if it may be sought; whether there is something.
+    fn release(&mut self, is_open: bool, find: impl FnOnce(&mut Adjustment, &Solution) -> bool) -> bool {
         let last = self.last.as_ref().filter(|_| is_open);
-        let found = last.is_some_and(|solution| self.adjustment.loosen_zone(solution));
+        let found = last.is_some_and(|solution| find(&mut self.adjustment, solution));
         if found {
             self.allowed = self.iterations + self.adjustment.params.max_iterations;
         }

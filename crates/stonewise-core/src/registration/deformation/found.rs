@@ -6,9 +6,11 @@ use serde::{Deserialize, Serialize};
 
 /// Extents of zones for which detection limits are given, metres.
 pub const ZONE_EXTENTS_M: [f64; 3] = [1.0, 3.0, 10.0];
-/// Probability of a still wall to be called deformed. 0.01: at 0.05, errors that the model does
-/// not know (masks, few points) made it 0.12 on simulated surveys (3 of 25).
+/// Probability of a still wall to be called deformed. 0.01: at 0.05, errors outside the model
+/// (masks, few points) made it 0.12 on simulated surveys (3 of 25).
 pub(super) const LEVEL: f64 = 0.01;
+/// What intervals leave outside.
+pub(super) const OUTSIDE: f64 = 0.05;
 
 /// How the wall deformed between two epochs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -9,9 +9,9 @@
 //! and there (Huber 1964), so that no single stone is called a deformation of the wall.
 
 use super::body::{Body, BodyStone};
-use super::found::{LEVEL, ZONE_EXTENTS_M};
+use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
 use super::random::Random;
-use crate::registration::bulges::{RIM, Shape, shapes};
+use crate::registration::bulges::{LARGEST_RESIDUAL, OUT, RIM, Shape, shapes};
 use crate::statistics::upper_median;
 use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
@@ -23,17 +23,10 @@ const SIMULATIONS: usize = 999;
 const LEAST_SHARE: f64 = 0.02;
 /// Standard deviations by which a bulge must exceed the limit of the test to be found in 95 of 100 cases.
 const POWER: f64 = 1.645;
-/// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
-/// three degrees of freedom).
-const LARGEST_RESIDUAL: f64 = 3.368;
 /// Rounds in which the rigid motion and what counts of the residuals follow each other.
 const ROUNDS: usize = 6;
 /// Share of its trace that is added to a covariance in its null directions.
 const REGULARISATION: f64 = 1e-9;
-/// Number of the direction out of the wall.
-const OUT: usize = 2;
-/// What intervals leave outside.
-const OUTSIDE: f64 = 0.05;
 
 /// What the test found.
 pub(super) struct Scan {

@@ -1,7 +1,7 @@
 //! Zones that deformed: connected stones whose deformation is not zero.
 
 use super::body::Body;
-use super::found::{DeformationZone, ZoneKind};
+use super::found::{DeformationZone, OUTSIDE, ZoneKind};
 use super::rigid_part::RigidPart;
 use super::scan::Scan;
 use crate::components::components;
@@ -15,8 +15,6 @@ use std::collections::BTreeSet;
 const FALSE_DISCOVERY_RATE: f64 = 0.05;
 /// Fewer connected stones are no zone: one or two that differ from their surroundings are judged as loose stones are.
 const LEAST_STONES: usize = 3;
-/// Share of cases that lies outside of it.
-const OUTSIDE: f64 = 0.05;
 /// Share of the variance of the motion across a zone that a plane must explain to call it a tilt.
 const TILTED: f64 = 0.8;
 /// Least standard deviation of the motion across a tilted zone, as a share of its mean: half of what a tilt about one

@@ -9,16 +9,13 @@ use super::graph::Node;
 use super::prior::Least;
 use super::problem::FieldProblem;
 use super::subgraph::Subgraph;
-use crate::registration::bulges::{Shape, shapes};
+use crate::registration::bulges::{LARGEST_RESIDUAL, OUT, Shape, shapes};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Probability of a zone, anywhere, in a wall that moves as its field says.
 const FALSE_ALARM: f64 = 0.2;
-/// Standard deviations up to which a stone counts: one in a hundred shows more by chance (chi-square, three degrees of
-/// freedom; Huber 1964), so that no single stone makes a zone.
-const LARGEST: f64 = 3.368;
 /// Deviance that a drift and a strain of its own must gain: odds of 150 to 1.
 const LEAST_GAIN: f64 = 10.0;
 /// Drifts per square root metre and strains that are tried, up to their bounds.
@@ -29,8 +26,6 @@ const STRAINS: [f64; 4] = [1e-3, 3e-3, 1e-2, 3e-2];
 const RADII: [f64; 3] = [0.5, 0.75, 1.0];
 /// Radius of the zone and its surroundings whose likelihood decides, in diameters of the bulge.
 const REACH: f64 = 1.5;
-/// Number of the direction out of the face.
-const OUT: usize = 2;
 
 /// What a stone's own observations show of its displacement beyond the field, in its frame: information and vector.
 pub(crate) struct LeftOver {
@@ -43,7 +38,7 @@ impl LeftOver {
     fn share(&self) -> f64 {
         let covariance = self.information.try_inverse().unwrap_or_else(Matrix3::zeros);
         let squared = self.vector.dot(&(covariance * self.vector)).max(0.0);
-        (LARGEST / squared.sqrt().max(LARGEST)).min(1.0)
+        LARGEST_RESIDUAL / squared.sqrt().max(LARGEST_RESIDUAL)
     }
 }
 
@@ -104,13 +99,12 @@ fn loosened(
             |i: &usize| (graph.nodes[*i].centroid - shape.middle).norm() < radius * shape.diameter_m;
         (0..graph.nodes.len()).filter(is_near).collect()
     };
-    let part = Subgraph::of(graph, within(REACH))?;
-    let mut problem = part.restrict(problem);
-    for i in within(REACH) {
-        if let Some(place) = part.place(i) {
-            problem.stones[place].p_with_field = shares[i];
-        }
+    let mut weighed = problem.clone();
+    for (stone, share) in weighed.stones.iter_mut().zip(shares) {
+        stone.p_with_field = *share;
     }
+    let part = Subgraph::of(graph, within(REACH))?;
+    let problem = part.restrict(&weighed);
     let likelihood = |stones: &[usize], least: &Least| {
         let mut problem = problem.clone();
         for place in stones.iter().filter_map(|i| part.place(*i)) {
@@ -119,12 +113,13 @@ fn loosened(
         deviance(&problem, &problem.components)
     };
     let now = likelihood(&[], &Least::default())?;
+    let zones = RADII.map(within);
     let mut tried = Vec::new();
-    for stones in RADII.map(within) {
+    for stones in &zones {
         for (drift, strain) in DRIFTS.into_iter().flat_map(|d| STRAINS.map(|s| (d, s))) {
             let mut least = Least::default();
             (least.drift[across], least.strain[across]) = (drift, strain);
-            tried.push((stones.clone(), least));
+            tried.push((stones, least));
         }
     }
     let found: Vec<Option<f64>> = tried
@@ -136,7 +131,7 @@ fn loosened(
         .zip(found)
         .filter_map(|(zone, deviance)| Some((zone, deviance?)))
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (now - deviance > LEAST_GAIN).then_some(zone)
+    (now - deviance > LEAST_GAIN).then(|| (zone.0.clone(), zone.1))
 }
 
 #[cfg(test)]

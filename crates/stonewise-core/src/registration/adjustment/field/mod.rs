@@ -31,7 +31,7 @@ pub(crate) use loose_prior::{LoosePrior, estimated_share};
 pub(crate) use mixture::{log_odds_of_loose, probabilities_with_field};
 pub(crate) use motion_prior::MotionPrior;
 pub(crate) use posterior::{Posterior, Prediction, covariance_against, posterior};
-pub(crate) use prior::Tie;
+pub(crate) use prior::{Tie, of_tie};
 pub(crate) use problem::{FieldProblem, FieldStone, PhotoTerms};
 pub(crate) use solve::{Field, information, solve};
 pub(crate) use subgraph::{Displacement, Subgraph};

@@ -35,7 +35,7 @@ pub(crate) struct Least {
 }
 
 impl Least {
-    /// The larger of both, each by itself: of the tie between two stones, that of either.
+    /// The larger of both, each by itself.
     pub fn larger(&self, other: &Self) -> Self {
         let larger = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|k| a[k].max(b[k]));
         Self {
@@ -54,6 +54,11 @@ impl Least {
     }
 }
 
+/// The components of the tie between two stones: the larger of both.
+pub(crate) fn of_tie(edge: &Edge, components: &VarianceComponents, least: &[Least]) -> VarianceComponents {
+    least[edge.low].larger(&least[edge.high]).of(components)
+}
+
 /// Prior standard deviation of a displacement about the common motion, metres. It keeps the datum of the
 /// field solvable; 0.3 m is ten times any motion that stones are matched over, so it does not pull.
 const LEVEL_M: f64 = 0.3;
@@ -70,7 +75,7 @@ pub(crate) fn prior(
 ) -> BlockMatrix<9> {
     let mut matrix = graph.pattern.zeros();
     for (e, (edge, tie)) in graph.edges.iter().zip(ties).enumerate() {
-        let around = least[edge.low].larger(&least[edge.high]).of(components);
+        let around = of_tie(edge, components, least);
         let [ll, hl, hh] = tie_blocks(edge, &around, tie.is_parted);
         let w = tie.weight;
         matrix.diagonal[edge.low] += ll * w;

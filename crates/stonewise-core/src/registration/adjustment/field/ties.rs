@@ -1,7 +1,7 @@
 //! The weights of the ties between neighbours, and the drift that goes with them.
 
 use super::graph::Graph;
-use super::prior::{Least, Tie, tie_blocks};
+use super::prior::{Least, Tie, of_tie, tie_blocks};
 use super::solve::Field;
 use super::variance_components::{BOUNDS, VarianceComponents};
 use rayon::prelude::*;
@@ -56,8 +56,7 @@ fn tie_strain(
         .par_iter()
         .enumerate()
         .map(|(e, edge)| {
-            let around = least[edge.low].larger(&least[edge.high]);
-            let [inside, outside] = around.of(components).drift;
+            let [inside, outside] = of_tie(edge, components, least).drift;
             [[inside, NO_TIE], [NO_TIE, outside]].map(|drift| {
                 let part = VarianceComponents { drift, ..*components };
                 let blocks = tie_blocks(edge, &part, false);
