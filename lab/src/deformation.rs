@@ -10,7 +10,7 @@
 //! Columns: walls of which a deformation is claimed; coverage of the 95 % intervals of `def_*` along, up and out;
 //! root mean square of their errors and standard deviations, mm; walls whose bulge has a zone over its middle, and the
 //! mean overlap (IoU) of that zone with the stones that moved by more than a quarter of the bulge; detection limit of a
-//! zone of 1 and 3 m, mm.
+//! zone of 1 and 3 m out of the wall, and of 1 m in its face, mm.
 
 use crate::Outcome;
 use crate::figures::{coverage, rms_of_axes};
@@ -53,6 +53,7 @@ pub fn run(words: &Words) -> Outcome {
         "IoU",
         "limit 1 m",
         "3 m",
+        "in face 1 m",
         "s",
     ]);
     for sensor in words.chosen(&["tls", "uav"]) {
@@ -102,6 +103,7 @@ struct Wall {
     /// Overlap of the zone over the middle of the bulge with the stones that moved; `None`: no such zone.
     overlap: Option<f64>,
     limits_m: [Option<f64>; 3],
+    limits_in_face_m: [Option<f64>; 3],
 }
 
 impl Case {
@@ -186,6 +188,7 @@ impl Case {
             stones: found.stones.iter().map(stone).collect(),
             overlap,
             limits_m: found.detection_limits_m,
+            limits_in_face_m: found.limits_in_face_m,
         }
     }
 }
@@ -202,8 +205,8 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
     let held = |axis: usize| coverage(&stones, axis);
     let of_axes = |part: usize| rms_of_axes(&stones, part);
     let overlaps: Vec<f64> = walls.iter().filter_map(|w| w.overlap).collect();
-    let limit = |k: usize| {
-        let known: Vec<f64> = walls.iter().filter_map(|w| w.limits_m[k]).collect();
+    let limit = |of: &dyn Fn(&Wall) -> Option<f64>| {
+        let known: Vec<f64> = walls.iter().filter_map(of).collect();
         format!(
             "{:.2}",
             1e3 * known.iter().sum::<f64>() / known.len().max(1) as f64
@@ -223,8 +226,9 @@ fn cells(label: &str, walls: &[Wall], seconds: f64) -> Vec<String> {
             "{:.2}",
             overlaps.iter().sum::<f64>() / overlaps.len().max(1) as f64
         ),
-        limit(0),
-        limit(1),
+        limit(&|w| w.limits_m[0]),
+        limit(&|w| w.limits_m[1]),
+        limit(&|w| w.limits_in_face_m[0]),
         format!("{seconds:.0}"),
     ]
 }

@@ -19,6 +19,8 @@ pub(crate) const RIM: f64 = 0.25;
 /// Standard deviations up to which the residual of a stone counts: one stone in a hundred has more by chance (chi-square,
 /// three degrees of freedom; Huber 1964), so that no single stone makes a bulge.
 pub(crate) const LARGEST_RESIDUAL: f64 = 3.368;
+/// Numbers of the directions along the wall and up.
+pub(crate) const IN_FACE: [usize; 2] = [0, 1];
 /// Number of the direction out of the wall.
 pub(crate) const OUT: usize = 2;
 

@@ -114,6 +114,7 @@ fn deformation(results: &ResultSet) -> Option<DeformationVerdict> {
         largest_mm: zones.first().map(|z| z.largest_mm),
         interval_mm: zones.first().map(|z| z.interval_mm),
         detection_limit_mm: record.detection_limits_m.map(|limit| limit.map(millimetres)),
+        detection_limit_in_face_mm: record.limits_in_face_m.map(|limit| limit.map(millimetres)),
         zones,
     })
 }

@@ -207,14 +207,21 @@ impl Speaker<'_> {
         let mm = |millimetres: f64| self.texts.mm(millimetres / 1e3);
         let Some(zone) = found.zones.first() else {
             found.p?;
-            let limits = found.detection_limit_mm.iter().zip(ZONE_EXTENTS_M);
+            let limits = found
+                .detection_limit_mm
+                .iter()
+                .zip(found.detection_limit_in_face_mm);
             let known = limits
-                .filter_map(|(limit, extent_m)| Some(((*limit)?, extent_m)))
-                .next();
-            return Some(known.map_or(c.shape_kept.to_owned(), |(limit, extent_m)| {
+                .zip(ZONE_EXTENTS_M)
+                .find_map(|((out, in_face), extent_m)| Some(((*out)?, in_face, extent_m)));
+            return Some(known.map_or(c.shape_kept.to_owned(), |(out, in_face, extent_m)| {
                 fill(
                     c.shape_kept_within,
-                    &[("limit", &mm(limit)), ("extent", &self.texts.threshold(extent_m))],
+                    &[
+                        ("extent", &*self.texts.threshold(extent_m)),
+                        ("out", &*mm(out)),
+                        ("in_face", &*self.texts.mm_or_dash(in_face.map(|mm| mm / 1e3))),
+                    ],
                 )
             }));
         };

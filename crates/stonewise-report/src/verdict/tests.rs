@@ -384,6 +384,7 @@ fn bulged(is_bulged: bool) -> Case {
             largest_mm: is_bulged.then_some(1.9),
             interval_mm: is_bulged.then_some([1.7, 2.1]),
             detection_limit_mm: [Some(0.6), Some(0.4), None],
+            detection_limit_in_face_mm: [Some(1.2), Some(0.7), None],
             zones,
         }),
         ..wall(0, 0.0, 1)
@@ -395,7 +396,7 @@ fn fine_needs_the_shape_too() {
     let none = Thresholds::default();
     let kept = judge(&bulged(false), &none);
     assert_eq!(kept.state, State::Fine, "{}", kept.sentence);
-    let words = "no change of the shape of the wall is shown (detection limit 0.60 mm for a bulge of 1 m)";
+    let words = "no change of the shape of the wall is shown (detection limits for a zone of 1 m: 0.60 mm out of the wall, 1.20 mm in its face)";
     assert!(kept.sentence.contains(words), "{}", kept.sentence);
     let changed = judge(&bulged(true), &none);
     assert_eq!(codes(&changed), [ReasonCode::DeformationShown]);

@@ -160,6 +160,7 @@ mod tests {
         record.deformation = Some(DeformationRecord {
             p: Some(0.001),
             detection_limits_m: [None; 3],
+            limits_in_face_m: [None; 3],
             zones: vec![DeformationZone {
                 number: 1,
                 largest_m: 0.02,

@@ -35,6 +35,9 @@ pub struct DeformationRecord {
     /// Bulge that is found in 95 of 100 cases, of a zone of 1, 3 and 10 m, metres; absent where the wall is
     /// smaller.
     pub detection_limits_m: [Option<f64>; 3],
+    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    #[serde(default)]
+    pub limits_in_face_m: [Option<f64>; 3],
     /// The zones, the one of the largest deformation first.
     pub zones: Vec<DeformationZone>,
 }
@@ -44,6 +47,7 @@ impl From<&Deformation> for DeformationRecord {
         Self {
             p: found.p,
             detection_limits_m: found.detection_limits_m,
+            limits_in_face_m: found.limits_in_face_m,
             zones: found.zones.clone(),
         }
     }

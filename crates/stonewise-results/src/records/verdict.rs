@@ -321,6 +321,9 @@ pub struct DeformationVerdict {
     pub interval_mm: Option<[f64; 2]>,
     /// Bulge out of the wall that is found in 95 of 100 cases, of a zone of 1, 3 and 10 m; null where the wall is smaller.
     pub detection_limit_mm: [Option<f64>; 3],
+    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    #[serde(default)]
+    pub detection_limit_in_face_mm: [Option<f64>; 3],
     /// The zones, the one of the largest deformation first.
     pub zones: Vec<DeformedZone>,
 }

@@ -26,7 +26,7 @@ use stonewise_core::epoch::EpochId;
 use stonewise_core::geometry::FaceFrame;
 use stonewise_core::id::StoneId;
 use stonewise_core::progress::Progress;
-use stonewise_core::registration::ZONE_EXTENTS_M;
+use stonewise_core::registration::{Deformation, ZONE_EXTENTS_M};
 use stonewise_core::statistics::{median, split_mix};
 use stonewise_io::cloud::{Observed, cloud_crs, measure_cloud, read_cloud, stream_points_laz};
 use stonewise_io::table::{Table, write_csv, write_parquet};
@@ -60,6 +60,8 @@ pub struct Design {
     /// Smallest bulge of 1, 3 and 10 m that is found in 95 of 100 cases, in the median over the wall; absent where the
     /// wall is smaller.
     pub zones_mm: [Option<f64>; 3],
+    /// The same of a zone that moves in the face, along it or up, whichever is seen worse.
+    pub zones_in_face_mm: [Option<f64>; 3],
     /// Number of stations or strips of the epoch; 1 where its files keep none apart.
     pub sources: usize,
     /// `sd_mm` with one more station or strip that sees what the others see on average.
@@ -147,10 +149,10 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
             median(&mut values).map(|sd| 1e3 * sd)
         })
     };
-    let limits = registered
-        .deformation
-        .as_ref()
-        .map_or([None; 3], |d| d.detection_limits_m);
+    let limits_mm = |of: &dyn Fn(&Deformation) -> [Option<f64>; 3]| {
+        let limits_m = registered.deformation.as_ref().map_or([None; 3], of);
+        limits_m.map(|limit| limit.map(|m| 1e3 * m))
+    };
     let design = Design {
         epoch: project.epochs.reference().name.clone(),
         seed,
@@ -165,7 +167,8 @@ pub fn design(project: &Project, seed: u64, out: &Path, progress: &dyn Progress)
         datum: measured.datum.state,
         sd_mm: medians(&|e, axis| Some(e.sd[axis])),
         sd_deformation_mm: medians(&|e, axis| e.deformation[axis]),
-        zones_mm: limits.map(|limit| limit.map(|m| 1e3 * m)),
+        zones_mm: limits_mm(&|d| d.detection_limits_m),
+        zones_in_face_mm: limits_mm(&|d| d.limits_in_face_m),
         sources,
         sd_with_one_more_mm: medians(&|e, axis| Some(e.one_more[axis])),
         sd_without_registration_mm: medians(&|e, axis| Some(e.without_registration[axis])),
@@ -384,11 +387,16 @@ fn page(design: &Design, places: &[[f64; 2]], all: &[Option<Expected>]) -> Strin
         &rows,
         None,
     ));
-    let zones: Vec<Vec<String>> = { ZONE_EXTENTS_M.iter().zip(design.zones_mm) }
-        .map(|(extent, limit)| vec![format!("{extent} m"), number(limit)])
+    let limits = design.zones_mm.iter().zip(design.zones_in_face_mm);
+    let zones: Vec<Vec<String>> = { ZONE_EXTENTS_M.iter().zip(limits) }
+        .map(|(extent, (out, in_face))| vec![format!("{extent} m"), number(*out), number(in_face)])
         .collect();
-    page.heading("Smallest bulge that is found in 95 of 100 cases")
-        .html(&table(&["extent", "mm"], &zones, None));
+    page.heading("Smallest motion of a zone that is found in 95 of 100 cases")
+        .html(&table(
+            &["extent", "out of the wall, mm", "in the face, mm"],
+            &zones,
+            None,
+        ));
     let bounds = |axis: usize| {
         let values = places.iter().map(|p| p[axis]);
         values.fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(v), high.max(v)])

@@ -13,6 +13,7 @@ mod random;
 mod rigid_part;
 mod scan;
 mod shared_errors;
+mod smoothed;
 #[cfg(test)]
 mod tests;
 mod zones;
@@ -63,6 +64,7 @@ pub fn deformation(
     found.p = least.map(|p| (p * count).min(1.0));
     if let Some((_, _, scan)) = judged.first() {
         found.detection_limits_m = scan.detection_limits_m;
+        found.limits_in_face_m = scan.limits_in_face_m;
     }
     let mut by_stone: BTreeMap<StoneId, StoneDeformation> = BTreeMap::new();
     for (body, rigid, scan) in &mut judged {
@@ -70,6 +72,7 @@ pub fn deformation(
         if is_shown {
             rigid.doubt_smoothed(body, &scan.most_likely);
         }
+        rigid.widen(&scan.smoothed);
         let found_of = rigid.deformations.iter().zip(&rigid.smoothed);
         for (stone, ((deformation, covariance), smoothed)) in body.stones.iter().zip(found_of) {
             let row = StoneDeformation {

@@ -32,6 +32,7 @@ impl RigidPart {
     /// that moves horizontally moves along a battered face as well as out of it. The rest of the wall, which the field
     /// follows, is no evidence of that: it is known no better than the stones' own observations show it.
     pub fn doubt_smoothed(&mut self, body: &Body, bulge: &MostLikely) {
+        let mut covariances = vec![Matrix3::zeros(); body.stones.len()];
         for (k, smoothed) in bulge.smoothed_m.iter().enumerate() {
             let Some((smoothed_m, sd_m)) = smoothed else {
                 continue;
@@ -39,11 +40,17 @@ impl RigidPart {
             for (i, share) in &bulge.stones {
                 let direction = body.stones[*i].joint.face_from_world.row(k).transpose();
                 let missed = direction * (smoothed_m.hypot(*sd_m) * share);
-                self.smoothed[*i] += missed * missed.transpose();
+                covariances[*i] += missed * missed.transpose();
             }
         }
-        for ((_, covariance), smoothed) in self.deformations.iter_mut().zip(&self.smoothed) {
-            *covariance += smoothed;
+        self.widen(&covariances);
+    }
+
+    /// Adds to the covariance of each stone what the field may have smoothed there.
+    pub fn widen(&mut self, covariances: &[Matrix3<f64>]) {
+        for (i, covariance) in covariances.iter().enumerate() {
+            self.deformations[i].1 += covariance;
+            self.smoothed[i] += covariance;
         }
     }
 }

@@ -11,7 +11,8 @@
 use super::body::{Body, BodyStone};
 use super::found::{LEVEL, OUTSIDE, ZONE_EXTENTS_M};
 use super::random::Random;
-use crate::registration::bulges::{LARGEST_RESIDUAL, OUT, RIM, Shape, shapes};
+use super::smoothed::smoothed;
+use crate::registration::bulges::{IN_FACE, LARGEST_RESIDUAL, OUT, RIM, Shape, shapes};
 use crate::statistics::upper_median;
 use nalgebra::{Const, Dyn, Matrix3, Matrix6, OMatrix, SMatrix, Vector3, Vector6};
 use rayon::prelude::*;
@@ -34,10 +35,14 @@ pub(super) struct Scan {
     pub p: f64,
     /// The most likely bulge.
     pub most_likely: MostLikely,
+    /// Covariance of what the motions may have smoothed at each stone, world, m^2.
+    pub smoothed: Vec<Matrix3<f64>>,
     /// Standard deviations that the most likely bulge of a still wall exceeds in 5 of 100 cases.
     pub reach: f64,
     /// See [`super::found::Deformation::detection_limits_m`].
     pub detection_limits_m: [Option<f64>; 3],
+    /// See [`super::found::Deformation::limits_in_face_m`].
+    pub limits_in_face_m: [Option<f64>; 3],
 }
 
 /// The bulge of the largest score.
@@ -54,18 +59,18 @@ pub(super) struct MostLikely {
 }
 
 /// A bulge of some place and size in three directions: along, up and out.
-struct Bulge {
+pub(super) struct Bulge {
     diameter_m: f64,
     /// Stones and by how much of the amplitude they move.
-    stones: Vec<(usize, f64)>,
+    pub stones: Vec<(usize, f64)>,
     /// Of each direction: standard deviation of the score, and information on the amplitude; `None` where nothing
     /// shows it.
-    directions: [Option<(f64, f64)>; 3],
+    pub directions: [Option<(f64, f64)>; 3],
 }
 
 impl Bulge {
     /// The score of each direction. `rest`: what a rigid motion leaves over of each stone.
-    fn scores(&self, rest: &[Vector3<f64>]) -> Vector3<f64> {
+    pub fn scores(&self, rest: &[Vector3<f64>]) -> Vector3<f64> {
         self.stones.iter().map(|(i, share)| rest[*i] * *share).sum()
     }
 
@@ -107,9 +112,9 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let bulges = bulges(body, &firm, &model);
     let observed: Vec<Vector3<f64>> = body.stones.iter().map(|s| s.vector).collect();
     let (largest, place) = model.largest(&bulges, &observed)?;
-    let smoothed = |s: &BodyStone| s.vector - s.information * s.displacement;
-    let smoothed: Vec<Vector3<f64>> = body.stones.iter().map(smoothed).collect();
-    let left_over = [observed, smoothed].map(|vectors| model.left_over(&vectors));
+    let beyond = |s: &BodyStone| s.vector - s.information * s.displacement;
+    let beyond: Vec<Vector3<f64>> = body.stones.iter().map(beyond).collect();
+    let left_over = [observed, beyond].map(|vectors| model.left_over(&vectors));
     let most_likely = bulges[place].most_likely(&left_over)?;
     let roots: Vec<Matrix3<f64>> = body.stones.iter().map(|s| root(&s.information)).collect();
     let simulate = |k: usize| {
@@ -131,19 +136,26 @@ pub(super) fn scan(body: &Body) -> Option<Scan> {
     let sum = 2.0 * tested as f64 * Normal::standard().sf(largest);
     let exceeded_in = |share: f64| still[((1.0 - share) * SIMULATIONS as f64) as usize];
     let limit = exceeded_in(LEVEL);
+    let limits_m = |directions: &[usize]| {
+        ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, directions, limit))
+    };
     Some(Scan {
         p: simulated.min(sum),
         most_likely,
+        smoothed: smoothed(body, &bulges, &left_over[1]),
         reach: exceeded_in(OUTSIDE),
-        detection_limits_m: ZONE_EXTENTS_M.map(|extent_m| detection_limit_m(&bulges, extent_m, limit)),
+        detection_limits_m: limits_m(&[OUT]),
+        limits_in_face_m: limits_m(&IN_FACE),
     })
 }
 
-/// The smallest bulge out of the wall of this diameter that is found in 95 of 100 cases, in the median over the wall.
-fn detection_limit_m(bulges: &[Bulge], extent_m: f64, limit: f64) -> Option<f64> {
+/// The smallest bulge of this diameter that is found in 95 of 100 cases, in the median over the wall, in the direction of
+/// these in which it must be largest.
+fn detection_limit_m(bulges: &[Bulge], extent_m: f64, directions: &[usize], limit: f64) -> Option<f64> {
     let of_bulge = |bulge: &Bulge| {
-        let (sd, information) = bulge.directions[OUT]?;
-        Some((limit + POWER) * sd / information)
+        let in_direction = |&k: &usize| bulge.directions[k].map(|(sd, information)| sd / information);
+        let sds: Option<Vec<f64>> = directions.iter().map(in_direction).collect();
+        Some((limit + POWER) * sds?.into_iter().fold(0.0, f64::max))
     };
     let of_extent = bulges.iter().filter(|b| b.diameter_m == extent_m);
     let mut limits: Vec<f64> = of_extent.filter_map(of_bulge).collect();

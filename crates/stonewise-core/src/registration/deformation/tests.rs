@@ -226,6 +226,21 @@ fn a_bulge_is_found_where_it_is_and_the_rest_stands_still() {
 }
 
 #[test]
+fn what_is_seen_four_times_worse_in_the_face_has_four_times_the_limit() {
+    let noise = errors(7);
+    let mut wall = wall(still, |k| noise[k]);
+    let of_axes = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0 / 16.0, 1.0 / 16.0));
+    for stone in wall.stones.iter_mut().flatten() {
+        let information = of_axes / (SD_M * SD_M);
+        stone.observed = (information, information * stone.displacement);
+    }
+    let found = found(&wall);
+    let [out, in_face] = [found.detection_limits_m[0], found.limits_in_face_m[0]].map(Option::unwrap);
+    // A rigid motion takes up somewhat unlike shares of the three directions.
+    assert!((in_face / out - 4.0).abs() < 0.4, "{out} {in_face}");
+}
+
+#[test]
 fn what_the_field_smoothed_along_the_face_is_in_the_intervals() {
     // The wall bulged and sank by as much; the motions show the first alone.
     let noise = errors(13);
@@ -388,4 +403,34 @@ fn what_the_field_smooths_of_a_bulge_widens_its_intervals() {
     }
     // By the covariance of the motions alone the largest are five to six standard deviations.
     assert!(missed.iter().all(|m| *m < 3.0), "{missed:?}");
+}
+
+#[test]
+fn what_the_field_smooths_of_a_bulge_that_is_not_shown_widens_its_intervals_too() {
+    let noise = errors(12);
+    // Four tenths of the bulge are not shown; a field that follows the stones leaves nothing out.
+    let faint = |k: usize| 0.4 * bulge(k);
+    let sd_of = |follows: bool| {
+        let mut wall = wall(faint, |k| noise[k]);
+        for (k, stone) in wall.stones.iter_mut().flatten().enumerate() {
+            stone.displacement = if follows {
+                faint(k) + noise[k]
+            } else {
+                Vector3::zeros()
+            };
+        }
+        let found = found(&wall);
+        assert!(found.zones.is_empty() && found.p.unwrap() > 0.01, "{:?}", found.p);
+        let sd: Vec<f64> = found.stones.iter().map(|s| s.covariance[(0, 0)].sqrt()).collect();
+        sd
+    };
+    let [smoothed, followed] = [false, true].map(sd_of);
+    for (k, (smoothed, followed)) in smoothed.iter().zip(&followed).enumerate() {
+        let is_widened = *smoothed > 1.1 * followed;
+        assert!(is_widened || bulge(k).x < 0.6e-3, "{k}: {smoothed} {followed}");
+        assert!(
+            *followed < 1.05 * SD_M && (bulge(k).x > 0.0 || *smoothed < 1.3 * SD_M),
+            "{k}"
+        );
+    }
 }
