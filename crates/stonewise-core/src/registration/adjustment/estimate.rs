@@ -1,16 +1,19 @@
 //! A stone's motion, and how it departs from its neighbours', with looseness averaged out.
 
 use super::candidate::Moving;
-use super::field::{covariance_against, posterior};
+use super::field::{Prediction, covariance_against, posterior};
 use super::observation::NormalEquations;
 use super::solution::Solution;
 use super::state::{Adjustment, StoneState};
 use super::stone_vector::{Matrix9, StoneVector, Vector9};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Share of the results that intervals of 1.96 standard deviations leave outside.
 const OUTSIDE: f64 = 0.05;
+/// Probability, before its observations, that a stone beside a crack moves with the other side: cracks follow joints, and
+/// the line that stands for one cuts off the corners.
+const ACROSS: f64 = 0.1;
 
 /// A stone's motion with its looseness averaged out, in its frame.
 pub(crate) struct Estimate {
@@ -40,16 +43,26 @@ impl Adjustment {
     /// Where the stone is not followed on its own, it moves with its neighbours, and its covariance is
     /// widened for the chance that it does not ([`widening`]). Otherwise mean and covariance are those of the
     /// mixture of three cases: it moves with the field, it is loose, or its clouds show it at a wrong place, and
-    /// only photos and neighbours say where it is.
+    /// only photos and neighbours say where it is. Beside a crack, the field is a mixture of that of either side.
     ///
     /// `shared`: variances of errors that a stone's points share, against its neighbours; they are in the
-    /// relative covariance.
-    pub fn estimate(&self, i: usize, solution: &Solution, shared: &[f64; 9]) -> Estimate {
+    /// relative covariance. `across_m`: by how much the stones beyond a crack beside it moved more, in its frame.
+    pub fn estimate(
+        &self,
+        i: usize,
+        solution: &Solution,
+        shared: &[f64; 9],
+        across_m: Option<&Vector3<f64>>,
+    ) -> Estimate {
         let (stone, equations) = (&self.stones[i], &solution.equations[i]);
         let prediction = &solution.field.from_others[i];
         // What counts as an error might be a motion after all.
         let slide_m2 = self.undetected_slide_m(i).powi(2);
-        let case = |probability: f64, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
+        let case_of = |probability: f64,
+                       prediction: &Prediction,
+                       equations: &NormalEquations,
+                       own: &[f64; 9],
+                       slide_m2: f64| {
             let found = posterior(equations, prediction, own);
             let mut covariance = found.covariance;
             let mut relative_covariance = covariance_against(&found, prediction, own, shared);
@@ -65,28 +78,63 @@ impl Adjustment {
                 by_field: by_field(equations, own),
             }
         };
+        let case = |probability: f64, equations: &NormalEquations, own: &[f64; 9], slide_m2: f64| {
+            case_of(probability, prediction, equations, own, slide_m2)
+        };
         let own = self.prior.own_variances();
+        let tied = |probability: f64| {
+            let equations = &equations.with_field;
+            let Some(across_m) = across_m else {
+                return vec![case(probability, equations, &own, slide_m2)];
+            };
+            let beyond = prediction.moved(across_m);
+            let log_evidence = |prediction| posterior(equations, prediction, &own).log_evidence;
+            let log_odds = log_evidence(&beyond) - log_evidence(prediction) + (ACROSS / (1.0 - ACROSS)).ln();
+            let p_across = 1.0 / (1.0 + (-log_odds).exp());
+            vec![
+                case(probability * (1.0 - p_across), equations, &own, slide_m2),
+                case_of(probability * p_across, &beyond, equations, &own, slide_m2),
+            ]
+        };
         let p_loose = self.p_loose(stone);
         let Some(at_own) = equations.on_own.as_ref().filter(|_| stone.on_own.is_some()) else {
-            let tied = case(1.0, &equations.with_field, &own, slide_m2);
+            let tied = Estimate::of(&tied(1.0));
             let factor = widening(p_loose);
             return Estimate {
-                mean: tied.mean,
                 covariance: tied.covariance * factor,
                 relative_covariance: tied.relative_covariance * factor,
                 missed: p_loose,
-                by_field: tied.by_field,
+                ..tied
             };
         };
         let p_wrong = stone.p_wrong();
         let p_tied = 1.0 - p_loose - p_wrong;
         let photos = self.observed_by_photos(i, Moving::WithField);
         let without_clouds = photos.unwrap_or_else(NormalEquations::nothing);
-        Estimate::of(&[
-            case(p_tied, &equations.with_field, &own, slide_m2),
-            case(p_loose, at_own, &self.prior.loose_variances(), 0.0),
-            case(p_wrong, &without_clouds, &own, slide_m2),
-        ])
+        let mut cases = tied(p_tied);
+        cases.push(case(p_loose, at_own, &self.prior.loose_variances(), 0.0));
+        cases.push(case(p_wrong, &without_clouds, &own, slide_m2));
+        Estimate::of(&cases)
+    }
+
+    /// By how much the stones beyond a crack beside each stone moved more than it, in its frame; `None` for a stone with
+    /// no crack beside it.
+    pub fn moved_across(&self, solution: &Solution) -> Vec<Option<Vector3<f64>>> {
+        let (graph, state) = (&self.prior.graph, &solution.field.state);
+        let mut sums = vec![(Vector3::zeros(), 0.0); self.stones.len()];
+        for (edge, tie) in graph.edges.iter().zip(&self.prior.ties) {
+            if tie.is_parted {
+                for (i, j) in [(edge.low, edge.high), (edge.high, edge.low)] {
+                    let weight = self.stones[j].p_with_field;
+                    sums[i].0 += (state[j].displacement() - state[i].displacement()) * weight;
+                    sums[i].1 += weight;
+                }
+            }
+        }
+        let mean = |(i, (sum, weight)): (usize, (Vector3<f64>, f64))| {
+            (weight > 0.0).then(|| graph.nodes[i].face_from_world * sum / weight)
+        };
+        sums.into_iter().enumerate().map(mean).collect()
     }
 
     /// Probability that a stone is loose; what is expected of any stone where its own observations cannot
@@ -150,7 +198,102 @@ pub(crate) fn widening(p_loose: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::equations::StoneEquations;
+    use super::super::field::VarianceComponents;
+    use super::super::testing::{COLUMNS, begun, wall};
     use super::*;
+    use crate::registration::points::MemoryPairs;
+
+    /// A stone in the first column right of the middle.
+    const BESIDE: usize = 20;
+    /// Standard deviation of what a stone shows of its motion, metres.
+    const SD_M: f64 = 1e-3;
+
+    /// A wall that is parted in the middle: what each stone shows of its motion, and the field.
+    fn cracked(motion: impl Fn(usize) -> Vector3<f64>) -> (Adjustment, Solution) {
+        let source = MemoryPairs::new(wall(8, [0.001; 2], |_| Vector3::zeros()));
+        let (mut adjustment, _) = begun(&source);
+        let prior = &mut adjustment.prior;
+        for (edge, tie) in prior.graph.edges.iter().zip(&mut prior.ties) {
+            tie.is_parted = is_right(edge.low) != is_right(edge.high);
+        }
+        prior.components = VarianceComponents {
+            drift: [1e-4; 2],
+            strain: [1e-4; 2],
+            own_m: 2e-6,
+            error_m: 2e-6,
+            ..VarianceComponents::start()
+        };
+        let of_stone = |i: usize| {
+            let moved = motion(i) - adjustment.prior.common_in(i).translation();
+            let weight = SD_M.powi(-2);
+            let weights = Vector9::from([weight, weight, weight, 1e4, 1e4, 1e4, 1e2, 1e2, 1e2]);
+            let information = Matrix9::from_diagonal(&weights);
+            let with_field = NormalEquations {
+                vector: information * StoneVector::from_translation(moved).unknowns(),
+                information,
+                constant: 0.0,
+            };
+            StoneEquations {
+                with_field,
+                on_own: None,
+            }
+        };
+        let equations: Vec<StoneEquations> = (0..adjustment.stones.len()).map(of_stone).collect();
+        let field = adjustment.solve(&equations).unwrap();
+        (adjustment, Solution { equations, field })
+    }
+
+    fn is_right(stone: usize) -> bool {
+        stone as u32 % COLUMNS >= COLUMNS / 2
+    }
+
+    /// The right half sank by 4 mm, all but one stone of it.
+    fn sank(stone: usize) -> Vector3<f64> {
+        let has_sunk = is_right(stone) && stone != BESIDE;
+        Vector3::new(0.0, if has_sunk { -0.004 } else { 0.0 }, 0.0)
+    }
+
+    #[test]
+    fn a_stone_beside_a_crack_that_moved_with_its_other_side_is_shown_there() {
+        let (adjustment, solution) = cracked(sank);
+        let across = adjustment.moved_across(&solution);
+        let shared = adjustment.shared_variances(1.0);
+        for (i, across_m) in across.iter().enumerate() {
+            let column = i as u32 % COLUMNS;
+            assert_eq!(across_m.is_some(), [3, 4].contains(&column), "{i}");
+            let estimate = adjustment.estimate(i, &solution, &shared, across_m.as_ref());
+            let up = (estimate.mean + adjustment.prior.common_in(i)).translation().y;
+            let error = up - sank(i).y;
+            let sd = estimate.covariance[(1, 1)].sqrt();
+            assert!(error.abs() < 3.0 * sd && error.abs() < 1e-3, "{i}: {error} {sd}");
+        }
+        let alone = adjustment.estimate(BESIDE, &solution, &shared, None);
+        let up = (alone.mean + adjustment.prior.common_in(BESIDE)).translation().y;
+        assert!(up < -0.002, "{up}");
+    }
+
+    #[test]
+    fn a_stone_beside_a_crack_that_nothing_shows_is_on_its_other_side_in_one_case_of_ten() {
+        let (adjustment, mut solution) = cracked(sank);
+        let stone = COLUMNS as usize * 3 + 3;
+        solution.equations[stone].with_field = NormalEquations::nothing();
+        let shared = adjustment.shared_variances(1.0);
+        let across_m = Vector3::new(0.001, -0.004, 0.002);
+        let estimate = |across_m| adjustment.estimate(stone, &solution, &shared, across_m);
+        let (without, with) = (estimate(None), estimate(Some(&across_m)));
+        let moved = (with.mean - without.mean).translation();
+        assert!((moved - across_m * 0.1).norm() < 1e-9, "{moved}");
+        let added = (with.covariance - without.covariance)
+            .fixed_view::<3, 3>(0, 0)
+            .into_owned();
+        let factor = widening(with.missed);
+        let expected = across_m * across_m.transpose() * (0.09 * factor);
+        assert!(
+            (added - expected).norm() < 1e-6 * expected.norm(),
+            "{added} {expected}"
+        );
+    }
 
     #[test]
     fn widened_intervals_hold_their_share_of_a_mixture() {

@@ -125,10 +125,11 @@ fn estimates(
     shared: &[f64; 9],
     covered: &[bool],
 ) -> Vec<Result<Estimate, MotionFailure>> {
+    let across = adjustment.moved_across(solution);
     let estimate = |i: usize| match failure(adjustment, i) {
         Some(failure) => Err(failure),
         None if covered[i] => Err(MotionFailure::Disagreement),
-        None => Ok(adjustment.estimate(i, solution, shared)),
+        None => Ok(adjustment.estimate(i, solution, shared, across[i].as_ref())),
     };
     (0..adjustment.stones.len())
         .into_par_iter()

@@ -349,7 +349,7 @@ mod tests {
                 adjustment.step(&solution);
                 last = Some(solution);
             }
-            let estimate = adjustment.estimate(20, &last.unwrap(), &adjustment.shared_variances(1.0));
+            let estimate = adjustment.estimate(20, &last.unwrap(), &adjustment.shared_variances(1.0), None);
             let along = estimate.mean + adjustment.prior.common_in(20);
             let sd = estimate.covariance[(0, 0)].sqrt();
             let p_loose = adjustment.p_loose(&adjustment.stones[20]);

@@ -2,13 +2,23 @@
 
 use crate::registration::adjustment::observation::NormalEquations;
 use crate::registration::adjustment::stone_vector::{Matrix9, StoneVector, Vector9};
-use nalgebra::{Matrix3, Matrix6, Vector6};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 /// A stone's motion as all other stones predict it, in its frame: translation and rotation.
 #[derive(Clone, Debug)]
 pub(crate) struct Prediction {
     pub mean: Vector6<f64>,
     pub covariance: Matrix6<f64>,
+}
+
+impl Prediction {
+    /// The same of a stone that moved by so much more, in its frame.
+    pub fn moved(&self, by_m: &Vector3<f64>) -> Self {
+        let mut moved = self.clone();
+        let mut translation = moved.mean.fixed_rows_mut::<3>(0);
+        translation += by_m;
+        moved
+    }
 }
 
 /// A stone's posterior in its frame.
