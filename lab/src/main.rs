@@ -7,6 +7,7 @@ mod detector;
 mod epoch_errors;
 mod figures;
 mod photo_curves;
+mod projjson;
 mod sample_report;
 mod series;
 mod speed;
@@ -22,7 +23,7 @@ type Outcome = Result<(), Box<dyn std::error::Error>>;
 /// Name and start of a program.
 type Program = (&'static str, fn(&Words) -> Outcome);
 
-const PROGRAMS: [Program; 17] = [
+const PROGRAMS: [Program; 18] = [
     ("adjustment", adjustment::run),
     ("coverage", coverage::run),
     ("deformation", deformation::run),
@@ -30,6 +31,7 @@ const PROGRAMS: [Program; 17] = [
     ("series-time", speed::series_time::run),
     ("epoch-errors", epoch_errors::run),
     ("photo-curves", photo_curves::run),
+    ("projjson", projjson::run),
     ("kept-walls", detector::kept_walls::run),
     ("masonry-sheet", detector::masonry_sheet::run),
     ("overfit", detector::overfit::run),

@@ -5,7 +5,7 @@ Lines of cells between tabs, deflated (zlib). A cell is a number of an earlier l
 names one:
     S  name, semi-major axis (m), inverse flattening
     G  code less that of the line before, name, datum, spheroid, prime meridian (name, degrees), unit (name, size in radians)
-    U  name, size in metres
+    U  name, size in metres, order of the axes (EN, NE, or nothing where an axis points elsewhere, as about a pole)
     M  projection, names of its parameters
     P  code less that of the line before, name behind that of the geographic system, G, M, U, parameters
 """
@@ -22,6 +22,7 @@ from pyproj.exceptions import CRSError, ProjError
 warnings.filterwarnings("ignore")
 QUOTED = r'"([^"]*)"'
 NUMBER = r"([-+.0-9eE]+)"
+AXES = {("east", "north"): "EN", ("north", "east"): "NE"}
 HORIZONTAL = [{"east", "north"}, {"north"}, {"south"}]
 
 
@@ -96,8 +97,8 @@ for code in codes(PJType.PROJECTED_CRS):
     crs = CRS.from_epsg(code)
     base = re.search(r'AUTHORITY\["EPSG","(\d+)"\]\],PROJECTION', text)
     found = re.search(rf"^PROJCS\[{QUOTED},.*PROJECTION\[{QUOTED}\](.*)$", text)
-    directions = {axis.direction for axis in crs.axis_info[:2]}
-    if not found or not base or int(base[1]) not in geographic or directions not in HORIZONTAL or not is_expressed(text, crs):
+    directions = tuple(axis.direction for axis in crs.axis_info[:2])
+    if not found or not base or int(base[1]) not in geographic or set(directions) not in HORIZONTAL or not is_expressed(text, crs):
         skipped += 1
         continue
     name, method, rest = found.groups()
@@ -110,7 +111,7 @@ for code in codes(PJType.PROJECTED_CRS):
         name,
         geographic[int(base[1])],
         methods.of(method, *[p for p, _ in parameters]),
-        units.of(unit, number(size)),
+        units.of(unit, number(size), AXES.get(directions, "")),
         *[number(v) for _, v in parameters],
     ]
     projected.append("\t".join(["P", *map(str, cells)]))

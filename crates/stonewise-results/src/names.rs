@@ -30,6 +30,8 @@ pub const EVALUATION_TRUTH: &str = "evaluation_truth.json";
 pub const GEOPACKAGE: &str = "stones.gpkg";
 /// The stones as polygons for any program that reads GeoJSON.
 pub const GEOJSON: &str = "stones.geojson";
+/// The stones as a table with their polygons.
+pub const GEOPARQUET: &str = "stones.geo.parquet";
 /// The stones' faces for ParaView.
 pub const FACES_VTP: &str = "stones.vtp";
 /// The stones' centroids with their displacements for ParaView.

@@ -23,16 +23,85 @@ static REGISTER: LazyLock<Register> = LazyLock::new(|| Register::of(&TEXT));
 
 /// The definition of a system as WKT 1; `None` where the table does not have it.
 pub fn definition(code: u32) -> Option<String> {
-    REGISTER.definition(code)
+    match REGISTER.projected(code) {
+        Some(system) => Some(system.wkt()),
+        None => REGISTER.geographic(code).map(|system| system.wkt()),
+    }
+}
+
+/// A projected system.
+pub fn projected(code: u32) -> Option<Projected> {
+    REGISTER.projected(code)
 }
 
 /// The size of the unit of a projected system, metres.
 pub fn unit_m(code: u32) -> Option<f64> {
-    let projected = REGISTER.projected.get(&code)?;
-    let [_, _, _, unit, ..] = cells(projected)[..] else {
-        return None;
-    };
-    cells(REGISTER.at(&REGISTER.units, unit)?).last()?.parse().ok()
+    projected(code)?.metres.parse().ok()
+}
+
+/// A geographic system; numbers are texts, as the table has them.
+pub struct Geographic {
+    pub code: u32,
+    pub name: &'static str,
+    /// In WKT 1, with underscores.
+    pub datum: &'static str,
+    pub spheroid: &'static str,
+    pub semi_major_m: &'static str,
+    pub inverse_flattening: &'static str,
+    pub meridian: &'static str,
+    /// Of the prime meridian, from Greenwich, degrees.
+    pub meridian_degrees: &'static str,
+    pub unit: &'static str,
+    pub radians: &'static str,
+}
+
+/// A projected system; numbers are texts, as the table has them.
+pub struct Projected {
+    pub code: u32,
+    pub name: String,
+    pub base: Geographic,
+    /// In WKT 1.
+    pub method: &'static str,
+    /// Names in WKT 1 and values, in units of the system and of its base.
+    pub parameters: Vec<(&'static str, &'static str)>,
+    pub unit: &'static str,
+    pub metres: &'static str,
+    /// Order of the axes in the register: `EN`, `NE`, or empty where one points elsewhere.
+    pub axes: &'static str,
+}
+
+impl Geographic {
+    fn wkt(&self) -> String {
+        format!(
+            "GEOGCS[\"{}\",DATUM[\"{}\",SPHEROID[\"{}\",{},{}]],PRIMEM[\"{}\",{}],UNIT[\"{}\",{}],AUTHORITY[\"EPSG\",\"{}\"]]",
+            self.name,
+            self.datum,
+            self.spheroid,
+            self.semi_major_m,
+            self.inverse_flattening,
+            self.meridian,
+            self.meridian_degrees,
+            self.unit,
+            self.radians,
+            self.code
+        )
+    }
+}
+
+impl Projected {
+    fn wkt(&self) -> String {
+        let (name, base, method) = (&self.name, self.base.wkt(), self.method);
+        let mut text = format!("PROJCS[\"{name}\",{base},PROJECTION[\"{method}\"]");
+        for (parameter, value) in &self.parameters {
+            let _ = write!(text, ",PARAMETER[\"{parameter}\",{value}]");
+        }
+        let _ = write!(
+            text,
+            ",UNIT[\"{}\",{}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH],AUTHORITY[\"EPSG\",\"{}\"]]",
+            self.unit, self.metres, self.code
+        );
+        text
+    }
 }
 
 /// The lines of the table, without their kind and code.
@@ -76,58 +145,60 @@ impl Register {
         lines.get(number.parse::<usize>().ok()?).copied()
     }
 
-    fn definition(&self, code: u32) -> Option<String> {
-        match self.projected.get(&code) {
-            Some(line) => self.projected(code, line),
-            None => self.geographic(code),
-        }
-    }
-
-    fn geographic(&self, code: u32) -> Option<String> {
-        let line = self.geographic.get(&code)?;
-        let [name, datum, spheroid, meridian, degrees, unit, radians] = cells(line)[..] else {
+    fn geographic(&self, code: u32) -> Option<Geographic> {
+        let [name, datum, spheroid, meridian, meridian_degrees, unit, radians] =
+            cells(self.geographic.get(&code)?)[..]
+        else {
             return None;
         };
-        let [spheroid, semi_major, inverse] = cells(self.at(&self.spheroids, spheroid)?)[..] else {
+        let [spheroid, semi_major_m, inverse_flattening] = cells(self.at(&self.spheroids, spheroid)?)[..]
+        else {
             return None;
         };
-        Some(format!(
-            "GEOGCS[\"{name}\",DATUM[\"{datum}\",SPHEROID[\"{spheroid}\",{semi_major},{inverse}]],\
-             PRIMEM[\"{meridian}\",{degrees}],UNIT[\"{unit}\",{radians}],AUTHORITY[\"EPSG\",\"{code}\"]]"
-        ))
+        Some(Geographic {
+            code,
+            name,
+            datum,
+            spheroid,
+            semi_major_m,
+            inverse_flattening,
+            meridian,
+            meridian_degrees,
+            unit,
+            radians,
+        })
     }
 
-    fn projected(&self, code: u32, line: &str) -> Option<String> {
-        let line = cells(line);
+    fn projected(&self, code: u32) -> Option<Projected> {
+        let line = cells(self.projected.get(&code)?);
         let [name, base, method, unit, ref values @ ..] = line[..] else {
             return None;
         };
-        let base = *self.bases.get(base.parse::<usize>().ok()?)?;
+        let base = self.geographic(*self.bases.get(base.parse::<usize>().ok()?)?)?;
         let name = match name.strip_prefix('/') {
-            Some(rest) => format!("{} / {rest}", cells(self.geographic.get(&base)?).first()?),
+            Some(rest) => format!("{} / {rest}", base.name),
             None => name.to_owned(),
         };
         let method = cells(self.at(&self.methods, method)?);
         let (method, parameters) = method.split_first()?;
-        let [unit, metres] = cells(self.at(&self.units, unit)?)[..] else {
+        let [unit, metres, axes] = cells(self.at(&self.units, unit)?)[..] else {
             return None;
         };
-        let mut text = format!(
-            "PROJCS[\"{name}\",{},PROJECTION[\"{method}\"]",
-            self.geographic(base)?
-        );
-        for (parameter, value) in parameters.iter().zip(values) {
-            let _ = write!(text, ",PARAMETER[\"{parameter}\",{value}]");
-        }
-        let _ = write!(
-            text,
-            ",UNIT[\"{unit}\",{metres}],AXIS[\"Easting\",EAST],AXIS[\"Northing\",NORTH],AUTHORITY[\"EPSG\",\"{code}\"]]"
-        );
-        Some(text)
+        let parameters = parameters.iter().copied().zip(values.iter().copied());
+        Some(Projected {
+            code,
+            name,
+            base,
+            method,
+            parameters: parameters.collect(),
+            unit,
+            metres,
+            axes,
+        })
     }
 }
 
-fn cells(line: &str) -> Vec<&str> {
+fn cells(line: &'static str) -> Vec<&'static str> {
     line.split('\t').collect()
 }
 

@@ -8,6 +8,7 @@ mod feet;
 mod geoid;
 mod map_system;
 mod projection;
+mod projjson;
 mod system;
 mod wkt;
 
@@ -16,4 +17,5 @@ pub use feet::is_in_feet;
 pub use geoid::{Geoid, GeoidError};
 pub use map_system::{Coordinates, MapSystem};
 pub use projection::{MapOrigin, Projection};
+pub use projjson::projjson;
 pub use system::Crs;

@@ -1,5 +1,5 @@
-//! Features as GeoPackage geometry blobs: a header with the envelope, then ISO well-known binary,
-//! little-endian.
+//! Features as ISO well-known binary, little-endian, and as GeoPackage geometry blobs, which put a header with the
+//! envelope before it.
 
 use super::Geometry;
 use nalgebra::Point3;
@@ -37,10 +37,7 @@ impl Geometry {
 /// A feature's blob and its envelope (min x, max x, min y, max y); `None` where it has too few finite
 /// vertices.
 pub(super) fn encode(kind: Geometry, srs: i32, vertices: &[Point3<f64>]) -> Option<(Vec<u8>, [f64; 4])> {
-    let finite = vertices.iter().all(|p| p.iter().all(|v| v.is_finite()));
-    if vertices.len() < kind.least() || !finite {
-        return None;
-    }
+    let binary = well_known_binary(kind, vertices)?;
     let fold = |of: fn(f64, f64) -> f64, axis: usize| vertices.iter().map(|p| p[axis]).reduce(of);
     let envelope = [
         fold(f64::min, 0)?,
@@ -52,19 +49,29 @@ pub(super) fn encode(kind: Geometry, srs: i32, vertices: &[Point3<f64>]) -> Opti
     let mut blob = vec![b'G', b'P', 0, 0b0000_0011];
     blob.extend(srs.to_le_bytes());
     blob.extend(envelope.iter().flat_map(|v| v.to_le_bytes()));
-    blob.push(1);
-    blob.extend(kind.code().to_le_bytes());
+    blob.extend(binary);
+    Some((blob, envelope))
+}
+
+/// A feature as ISO well-known binary; `None` where it has too few finite vertices.
+pub(super) fn well_known_binary(kind: Geometry, vertices: &[Point3<f64>]) -> Option<Vec<u8>> {
+    let finite = vertices.iter().all(|p| p.iter().all(|v| v.is_finite()));
+    if vertices.len() < kind.least() || !finite {
+        return None;
+    }
+    let mut binary = vec![1];
+    binary.extend(kind.code().to_le_bytes());
     let closing = kind.is_ring().then(|| vertices[0]);
     if kind.is_ring() {
-        blob.extend(1u32.to_le_bytes());
+        binary.extend(1u32.to_le_bytes());
     }
     let count = vertices.len() + usize::from(closing.is_some());
-    blob.extend(u32::try_from(count).ok()?.to_le_bytes());
+    binary.extend(u32::try_from(count).ok()?.to_le_bytes());
     for p in vertices.iter().chain(&closing) {
         let axes = if kind.has_z() { 3 } else { 2 };
-        blob.extend(p.iter().take(axes).flat_map(|v| v.to_le_bytes()));
+        binary.extend(p.iter().take(axes).flat_map(|v| v.to_le_bytes()));
     }
-    Some((blob, envelope))
+    Some(binary)
 }
 
 #[cfg(test)]

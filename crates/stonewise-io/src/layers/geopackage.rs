@@ -4,9 +4,9 @@ use super::geometry::encode;
 use super::schema::{APPLICATION_ID, TABLES, USER_VERSION, rtree, rtree_triggers};
 use super::{Layer, LayerStyle};
 use crate::atomic::write_atomically;
-use crate::table::Column;
 #[cfg(doc)]
 use crate::table::Table;
+use crate::table::{Column, TableError};
 use rusqlite::types::Value;
 use rusqlite::{Connection, params, params_from_iter};
 use std::path::{Path, PathBuf};
@@ -50,6 +50,9 @@ pub enum LayerError {
     /// The file could not be written.
     #[error(transparent)]
     Io(#[from] std::io::Error),
+    /// The table could not be written.
+    #[error(transparent)]
+    Table(#[from] TableError),
 }
 
 /// Writes layers into a new GeoPackage; replaces the file at `path` when all is written.
@@ -232,6 +235,8 @@ fn sql_type(column: &Column) -> &'static str {
         "DOUBLE"
     } else if column.values::<bool>().is_some() {
         "BOOLEAN"
+    } else if column.values::<Vec<u8>>().is_some() {
+        "BLOB"
     } else {
         "INTEGER"
     }
@@ -268,9 +273,9 @@ pub(super) fn cell(column: &Column, row: usize) -> Value {
     } else if let Some(v) = column.values::<f32>() {
         real(f64::from(v[row]))
     } else {
-        column
-            .values::<String>()
-            .map_or(Value::Null, |v| Value::Text(v[row].clone()))
+        let text = column.values::<String>().map(|v| Value::Text(v[row].clone()));
+        text.or_else(|| column.values::<Vec<u8>>().map(|v| Value::Blob(v[row].clone())))
+            .unwrap_or(Value::Null)
     }
 }
 

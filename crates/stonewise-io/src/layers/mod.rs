@@ -1,9 +1,10 @@
-//! Layers of features for other programs: GeoPackage and GeoJSON for geographic information systems, VTK for
-//! ParaView. Polygons of a GeoPackage are read back, too.
+//! Layers of features for other programs: GeoPackage, GeoJSON and GeoParquet for geographic information systems, VTK
+//! for ParaView. Polygons of a GeoPackage are read back, too.
 
 mod geojson;
 mod geometry;
 mod geopackage;
+mod geoparquet;
 mod layer;
 mod polygon_blob;
 mod read_polygons;
@@ -12,6 +13,7 @@ mod vtk;
 
 pub use geojson::write_geojson;
 pub use geopackage::{LayerError, write_geopackage};
+pub use geoparquet::write_geoparquet;
 pub use layer::{Geometry, Layer, LayerStyle};
 pub use read_polygons::{PolygonFeature, read_polygons};
 pub use vtk::{PolyData, write_vtp};

@@ -10,7 +10,8 @@ pub struct Column {
     is_list: bool,
 }
 
-/// A type that cells can have: `f64`, `f32`, `i64`, `u64`, `u32`, `u16`, `u8`, `bool` or `String`.
+/// A type that cells can have: `f64`, `f32`, `i64`, `u64`, `u32`, `u16`, `u8`, `bool`, `String` or
+/// `Vec<u8>`.
 pub trait Cell: Clone + Default + sealed::Typed {}
 
 pub(super) mod sealed {
@@ -71,6 +72,7 @@ cells! {
     U8 u8, "8-bit unsigned integers";
     Bool bool, "booleans";
     Text String, "text";
+    Bytes Vec<u8>, "bytes";
 }
 
 /// A list of integers in each cell, written as text with spaces between them.

@@ -81,6 +81,7 @@ fn write_cell(out: &mut impl Write, column: &Column, row: usize, unit: &str) -> 
         Values::U8(v) => write!(out, "{}", v[row]),
         Values::Bool(v) => write!(out, "{}", u8::from(v[row])),
         Values::Text(v) => write_text(out, &v[row]),
+        Values::Bytes(v) => v[row].iter().try_for_each(|byte| write!(out, "{byte:02x}")),
     }
 }
 

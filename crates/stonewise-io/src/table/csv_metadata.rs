@@ -68,6 +68,7 @@ fn datatype(column: &Column) -> &'static str {
         Values::Bool(_) => "boolean",
         Values::Text(_) if column.is_list() => "integer",
         Values::Text(_) => "string",
+        Values::Bytes(_) => "hexBinary",
     }
 }
 

@@ -121,6 +121,9 @@ fn read_column(
         (Physical::INT32, (16, _)) => source.read::<Int32Type, _>(narrow, Values::U16),
         (Physical::INT32, _) => source.read::<Int32Type, _>(|v| Ok(v.cast_unsigned()), Values::U32),
         (Physical::BYTE_ARRAY, _) if text => source.read::<ByteArrayType, _>(utf8, Values::Text),
+        (Physical::BYTE_ARRAY, _) if descriptor.logical_type_ref().is_none() => {
+            source.read::<ByteArrayType, _>(|v| Ok(v.data().to_vec()), Values::Bytes)
+        }
         _ => Err(unsupported(descriptor)),
     }
 }
@@ -178,7 +181,7 @@ fn utf8(bytes: ByteArray) -> Result<String, ParquetError> {
 
 fn unsupported(descriptor: &ColumnDescriptor) -> ParquetError {
     ParquetError::NYI(format!(
-        "column {} is neither a number, nor a boolean, nor text",
+        "column {} is neither a number, nor a boolean, nor text, nor bytes",
         descriptor.path()
     ))
 }

@@ -60,6 +60,7 @@ fn schema(table: &Table) -> Result<Type, ParquetError> {
             Values::U8(_) => (Physical::INT32, Some(LogicalType::integer(8, false))),
             Values::Bool(_) => (Physical::BOOLEAN, None),
             Values::Text(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            Values::Bytes(_) => (Physical::BYTE_ARRAY, None),
         };
         let repetition = match column.filled() {
             Some(_) => Repetition::OPTIONAL,
@@ -109,6 +110,7 @@ fn write_column(
         Values::U8(v) => write_values::<Int32Type, _>(out, &v[rows], filled, |x| i32::from(*x)),
         Values::Bool(v) => write_values::<BoolType, _>(out, &v[rows], filled, |x| *x),
         Values::Text(v) => write_values::<ByteArrayType, _>(out, &v[rows], filled, |x| x.as_str().into()),
+        Values::Bytes(v) => write_values::<ByteArrayType, _>(out, &v[rows], filled, |x| x.clone().into()),
     }
 }
 

@@ -4,15 +4,15 @@ use super::face_mesh::face_mesh;
 use super::layers::layers;
 use super::polygons::{centroids, face_polygons};
 use crate::ResultSet;
-use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE};
+use crate::names::{DISPLACEMENTS_VTP, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, GEOPARQUET};
 use crate::records::Timestamp;
 use std::path::Path;
 use stonewise_base::error::Error;
-use stonewise_io::layers::{write_geojson, write_geopackage, write_vtp};
+use stonewise_io::layers::{write_geojson, write_geopackage, write_geoparquet, write_vtp};
 use stonewise_io::mesh_ply::write_coloured_mesh;
 
-/// Makes `stones.gpkg`, `stones.geojson`, `stones.vtp`, `displacements.vtp` and `stones.ply` from the result
-/// files in `dir`.
+/// Makes `stones.gpkg`, `stones.geojson`, `stones.geo.parquet`, `stones.vtp`, `displacements.vtp` and `stones.ply`
+/// from the result files in `dir`.
 ///
 /// The GeoPackage has the stones in the world frame (`stones`), unrolled (`stones_facade`), their
 /// displacements as exaggerated lines in both (`displacements`, `displacements_facade`), and the joints
@@ -37,6 +37,7 @@ pub fn write_layers(dir: &Path) -> Result<(), Error> {
     write_geopackage(&dir.join(GEOPACKAGE), &layers, &surveyed(&results).to_string())?;
     if let Some(world) = layers.first() {
         write_geojson(&dir.join(GEOJSON), world)?;
+        write_geoparquet(&dir.join(GEOPARQUET), world)?;
     }
     for (name, data) in [
         (FACES_VTP, face_polygons(&results)),
@@ -74,6 +75,7 @@ mod tests {
         let names = [
             "stones.gpkg",
             "stones.geojson",
+            "stones.geo.parquet",
             "stones.ply",
             "stones.csv-metadata.json",
             "stones.vtp",
@@ -89,7 +91,7 @@ mod tests {
         assert_eq!(json["features"].as_array().unwrap().len(), 24);
         assert_eq!(json["features"][2]["properties"]["status"], "unmatched_lost");
         assert_eq!(json["features"][2]["properties"]["d_out"], Value::Null);
-        let notes: Value = serde_json::from_slice(&first[3]).unwrap();
+        let notes: Value = serde_json::from_slice(&first[4]).unwrap();
         assert_eq!(
             notes["tableSchema"]["columns"].as_array().unwrap().len(),
             STONE_COLUMNS.len()

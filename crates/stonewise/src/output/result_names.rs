@@ -2,8 +2,8 @@
 
 use crate::project::Project;
 use crate::results::names::{
-    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, REPORT_DIR,
-    WORK_DIR,
+    DISPLACEMENTS_VTP, EVALUATION_TRUTH, EVIDENCE_DIR, FACES_PLY, FACES_VTP, GEOJSON, GEOPACKAGE, GEOPARQUET,
+    REPORT_DIR, WORK_DIR,
 };
 use std::path::{Path, PathBuf};
 
@@ -97,7 +97,14 @@ pub(super) fn is_result(file: &Path) -> bool {
 /// Whether a command makes this result anew from others after the run: the report, the layers, and scores
 /// against a truth of the user's.
 pub(super) fn is_made_anew(file: &Path) -> bool {
-    let layers = [GEOPACKAGE, GEOJSON, FACES_VTP, DISPLACEMENTS_VTP, FACES_PLY];
+    let layers = [
+        GEOPACKAGE,
+        GEOJSON,
+        GEOPARQUET,
+        FACES_VTP,
+        DISPLACEMENTS_VTP,
+        FACES_PLY,
+    ];
     file.starts_with(REPORT_DIR) || file == EVALUATION_TRUTH || layers.iter().any(|layer| file == *layer)
 }
 
@@ -126,6 +133,7 @@ mod tests {
         for name in [
             "stones.csv",
             "stones_2.parquet",
+            "stones.geo.parquet",
             "stones.csv-metadata.json",
             "m3c2.laz",
             "m3c2_3.csv",

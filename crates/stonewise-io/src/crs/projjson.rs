@@ -1,0 +1,216 @@
+//! Projected systems as PROJJSON (version 0.7), which GeoParquet takes.
+
+use super::epsg::{Projected, projected};
+use serde_json::{Value, json};
+
+/// The definition of a projected system in metres, feet or other units; `None` where the table lacks it or its method
+/// has no place here.
+pub fn projjson(code: u32) -> Option<Value> {
+    let system = projected(code)?;
+    let (method, names) = method(system.method)?;
+    let base = &system.base;
+    let angle = unit("AngularUnit", "degree", base.unit, base.radians)?;
+    let length = unit("LinearUnit", "metre", system.unit, system.metres)?;
+    let mut parameters = Vec::new();
+    for (name, (_, value)) in names.iter().zip(&system.parameters) {
+        let unit = match name {
+            _ if name.starts_with("Scale") => &json!("unity"),
+            _ if name.contains("asting") || name.contains("orthing") => &length,
+            _ => &angle,
+        };
+        parameters.push(json!({ "name": name, "value": number(value)?, "unit": unit }));
+    }
+    let axis = |name: &str, abbreviation: &str, direction: &str, unit: &Value| json!({ "name": name, "abbreviation": abbreviation, "direction": direction, "unit": unit });
+    let mut axes = [
+        axis("Easting", "E", "east", &length),
+        axis("Northing", "N", "north", &length),
+    ];
+    match system.axes {
+        "EN" => {}
+        "NE" => axes.reverse(),
+        _ => return None,
+    }
+    Some(json!({
+        "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
+        "type": "ProjectedCRS",
+        "name": system.name,
+        "base_crs": {
+            "name": base.name,
+            "datum": datum(&system)?,
+            "coordinate_system": {
+                "subtype": "ellipsoidal",
+                "axis": [
+                    axis("Geodetic latitude", "Lat", "north", &angle),
+                    axis("Geodetic longitude", "Lon", "east", &angle),
+                ],
+            },
+            "id": { "authority": "EPSG", "code": base.code },
+        },
+        "conversion": { "name": system.name, "method": { "name": method }, "parameters": parameters },
+        "coordinate_system": { "subtype": "Cartesian", "axis": axes },
+        "id": { "authority": "EPSG", "code": code },
+    }))
+}
+
+fn datum(system: &Projected) -> Option<Value> {
+    let base = &system.base;
+    let mut ellipsoid = json!({ "name": base.spheroid, "semi_major_axis": number(base.semi_major_m)? });
+    let inverse = number(base.inverse_flattening)?;
+    if inverse == 0.0 {
+        ellipsoid["semi_minor_axis"] = ellipsoid["semi_major_axis"].clone();
+    } else {
+        ellipsoid["inverse_flattening"] = json!(inverse);
+    }
+    let name = base.datum.replace('_', " ");
+    let mut datum = json!({ "type": "GeodeticReferenceFrame", "name": name, "ellipsoid": ellipsoid });
+    if base.meridian != "Greenwich" {
+        datum["prime_meridian"] =
+            json!({ "name": base.meridian, "longitude": number(base.meridian_degrees)? });
+    }
+    Some(datum)
+}
+
+/// A unit by its name where the format has one, else with its size.
+fn unit(kind: &str, known: &str, name: &str, size: &str) -> Option<Value> {
+    if name == known {
+        return Some(json!(name));
+    }
+    Some(json!({ "type": kind, "name": name, "conversion_factor": number(size)? }))
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.parse().ok()
+}
+
+const NATURAL: [&str; 5] = [
+    "Latitude of natural origin",
+    "Longitude of natural origin",
+    "Scale factor at natural origin",
+    "False easting",
+    "False northing",
+];
+const PLAIN: [&str; 4] = [NATURAL[0], NATURAL[1], NATURAL[3], NATURAL[4]];
+const CONE: [&str; 6] = [
+    "Latitude of false origin",
+    "Longitude of false origin",
+    "Latitude of 1st standard parallel",
+    "Latitude of 2nd standard parallel",
+    "Easting at false origin",
+    "Northing at false origin",
+];
+const OBLIQUE: [&str; 7] = [
+    "Latitude of projection centre",
+    "Longitude of projection centre",
+    "Azimuth at projection centre",
+    "Angle from Rectified to Skew Grid",
+    "Scale factor at projection centre",
+    "Easting at projection centre",
+    "Northing at projection centre",
+];
+const OBLIQUE_AT_EQUATOR: [&str; 7] = [
+    OBLIQUE[0], OBLIQUE[1], OBLIQUE[2], OBLIQUE[3], OBLIQUE[4], NATURAL[3], NATURAL[4],
+];
+const KROVAK: [&str; 7] = [
+    "Latitude of projection centre",
+    "Longitude of origin",
+    "Co-latitude of cone axis",
+    "Latitude of pseudo standard parallel",
+    "Scale factor on pseudo standard parallel",
+    "False easting",
+    "False northing",
+];
+
+/// The register's names of a method of WKT 1 and of its parameters, which the table has in this order. Methods that the
+/// register divides, such as those of the sphere, are left out.
+fn method(wkt: &str) -> Option<(&'static str, &'static [&'static str])> {
+    Some(match wkt {
+        "Transverse_Mercator" => ("Transverse Mercator", &NATURAL),
+        "Lambert_Conformal_Conic_1SP" => ("Lambert Conic Conformal (1SP)", &NATURAL),
+        "Lambert_Conformal_Conic_2SP" => ("Lambert Conic Conformal (2SP)", &CONE),
+        "Oblique_Stereographic" => ("Oblique Stereographic", &NATURAL),
+        "Hotine_Oblique_Mercator_Azimuth_Center" => ("Hotine Oblique Mercator (variant B)", &OBLIQUE),
+        "Hotine_Oblique_Mercator" => ("Hotine Oblique Mercator (variant A)", &OBLIQUE_AT_EQUATOR),
+        "Krovak" => ("Krovak (North Orientated)", &KROVAK),
+        "Lambert_Azimuthal_Equal_Area" => ("Lambert Azimuthal Equal Area", &PLAIN),
+        "Albers_Conic_Equal_Area" => ("Albers Equal Area", &CONE),
+        "Cassini_Soldner" => ("Cassini-Soldner", &PLAIN),
+        "Mercator_1SP" => ("Mercator (variant A)", NATURAL.get(1..)?),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Systems of every method as PROJ writes them (`testdata/crs/projjson.py`).
+    #[test]
+    fn definitions_have_the_numbers_and_names_of_proj() {
+        let text = include_str!("../../../../testdata/crs/projjson.json");
+        let expected: Value = serde_json::from_str(text).unwrap();
+        let systems = expected.as_array().unwrap();
+        assert!(systems.len() > 20);
+        for system in systems {
+            let code = system["id"]["code"].as_u64().unwrap() as u32;
+            let found = projjson(code).unwrap();
+            for key in ["type", "name", "id"] {
+                assert_eq!(found[key], system[key], "EPSG:{code}");
+            }
+            assert_eq!(found["base_crs"]["id"], system["base_crs"]["id"]);
+            let method = found["conversion"]["method"]["name"].as_str().unwrap();
+            assert_eq!(method, system["conversion"]["method"]["name"], "EPSG:{code}");
+            let directions = |of: &Value| {
+                let axes = of["coordinate_system"]["axis"].as_array().unwrap().iter();
+                axes.map(|axis| axis["direction"].clone()).collect::<Vec<_>>()
+            };
+            assert_eq!(directions(&found), directions(system), "EPSG:{code}");
+            for expected in system["conversion"]["parameters"].as_array().unwrap() {
+                let own = found["conversion"]["parameters"].as_array().unwrap().iter();
+                let Some(own) = own.clone().find(|p| p["name"] == expected["name"]) else {
+                    // The table leaves out the equator, about which every Mercator projection is.
+                    assert_eq!(
+                        (method, expected["value"].as_f64()),
+                        ("Mercator (variant A)", Some(0.0))
+                    );
+                    continue;
+                };
+                let value = |of: &Value| of["value"].as_f64().unwrap();
+                assert!(
+                    (value(own) - value(expected)).abs() < 1e-9,
+                    "EPSG:{code}: {own} {expected}"
+                );
+                assert!(
+                    is_same_unit(&own["unit"], &expected["unit"]),
+                    "EPSG:{code}: {own} {expected}"
+                );
+            }
+            let datum = system["base_crs"].get("datum_ensemble");
+            let datum = datum.unwrap_or(&system["base_crs"]["datum"]);
+            let ellipsoid = &found["base_crs"]["datum"]["ellipsoid"];
+            for key in ["semi_major_axis", "inverse_flattening"] {
+                assert_eq!(
+                    ellipsoid[key].as_f64(),
+                    datum["ellipsoid"][key].as_f64(),
+                    "EPSG:{code}"
+                );
+            }
+        }
+    }
+
+    /// Both by name, or of one size.
+    fn is_same_unit(a: &Value, b: &Value) -> bool {
+        let size = |unit: &Value| unit.get("conversion_factor").and_then(Value::as_f64);
+        match (size(a), size(b)) {
+            (Some(a), Some(b)) => (a / b - 1.0).abs() < 1e-12,
+            _ => a == b,
+        }
+    }
+
+    #[test]
+    fn systems_about_a_pole_and_rare_methods_have_none() {
+        // Polar stereographic, azimuthal about the pole, American polyconic, and a code that nobody gave.
+        for code in [3031, 3571, 5880, 999_999] {
+            assert_eq!(projjson(code), None, "EPSG:{code}");
+        }
+    }
+}
