@@ -16,6 +16,8 @@ from ._motion import Motion, adjust
 from ._native import Error, View, __version__
 from ._results import Pair, Results, Warning, open  # noqa: A004
 from ._run import run
+from ._simulate import simulate
+from ._studio import Studio, studio
 from ._transfer import read_cameras, transfer
 
 # Before any work: steps are done again by another build of it.
@@ -29,6 +31,7 @@ __all__ = [
     "Motion",
     "Pair",
     "Results",
+    "Studio",
     "View",
     "Warning",
     "__version__",
@@ -37,5 +40,7 @@ __all__ = [
     "open",
     "read_cameras",
     "run",
+    "simulate",
+    "studio",
     "transfer",
 ]

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Optional, Union
 
 import numpy as np
@@ -74,6 +75,7 @@ def run(
     progress: _Progress,
     note: Optional[Callable[[str], Any]],
 ) -> None: ...
+def simulate(out: _Path, parameters: str, force: bool, progress: _Progress) -> Path: ...
 def m3c2(
     points_1: NDArray[np.float64],
     points_2: NDArray[np.float64],

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
+import html
 import json
 import os
-import sqlite3
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ import pyarrow as pa
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from . import _tables
+from . import _map, _tables
 from ._native import Error
 
 __all__ = ["Pair", "Results", "Warning", "open"]
@@ -163,7 +163,7 @@ class Pair:
         if not layers.is_file():
             return None
         name = self._numbered(stem)
-        with closing(sqlite3.connect(f"{layers.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+        with closing(_map.opened(layers)) as base:
             columns = [(row[1], row[2]) for row in base.execute(f'PRAGMA table_info("{name}")')]
             columns = [(column, kind) for column, kind in columns if column not in ("fid", "geom")]
             if not columns:
@@ -205,6 +205,11 @@ class Results(Pair):
     def __repr__(self) -> str:
         stones = _counted(self.stones_arrow.num_rows, "stone")
         return f"Results({str(self.path)!r}: {stones}, {_counted(len(self.pairs) + 1, 'epoch')})"
+
+    def _repr_html_(self) -> str:
+        """The verdict's sentence and a map of the motion out of the wall, for Jupyter."""
+        sentence = (self.verdict or {}).get("sentence") or repr(self)
+        return f"<div><p>{html.escape(sentence)}</p>{_map.svg(self.path / 'stones.gpkg')}</div>"
 
     @functools.cached_property
     def record(self) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import json
 import shutil
 import subprocess
 import sys
+import xml.etree.ElementTree
 from collections import Counter
 
 import numpy as np
@@ -133,3 +134,42 @@ def test_a_folder_without_results(command, tmp_path):
         stonewise.open(tmp_path)
     said = command("report", tmp_path, expect=1).stderr.strip()
     assert said == f"error: {raised.value} [no-results]"
+
+
+def test_a_result_shows_itself_as_a_map(results, rows):
+    page = xml.etree.ElementTree.fromstring(results._repr_html_())
+    assert page.find("p").text == results.verdict["sentence"]
+    shapes = page.iter("{http://www.w3.org/2000/svg}polygon")
+    fills = {shape[0].text.split(":")[0]: shape.get("fill") for shape in shapes}
+    assert len(fills) == len(rows)
+    for row in rows:
+        fill = fills[f"stone {row['stone_id']}"]
+        if not row["d_out"]:
+            assert fill == "#ddd"
+            continue
+        red, blue = int(fill[1:3], 16), int(fill[5:7], 16)
+        assert red >= blue if float(row["d_out"]) > 0 else red <= blue, row
+
+
+def test_the_map_has_the_shape_of_the_wall(results):
+    geopandas = pytest.importorskip("geopandas")
+    page = xml.etree.ElementTree.fromstring(results._repr_html_())
+    drawn = {}
+    for shape in page.iter("{http://www.w3.org/2000/svg}polygon"):
+        points = [tuple(map(float, point.split(","))) for point in shape.get("points").split()]
+        drawn[int(shape[0].text.split(":")[0].split()[1])] = np.array(points)
+    wall = geopandas.read_file(results.path / "stones.gpkg", layer="stones_facade")
+    left, low, right, high = wall.total_bounds
+    for stone, outline in zip(wall["stone_id"], wall.geometry):
+        expected = (np.array(outline.exterior.coords) - [left, high]) * [720 / (right - left), -720 / (right - left)]
+        np.testing.assert_allclose(drawn[stone], expected, rtol=0, atol=0.051)
+
+
+def test_geoparquet_holds_the_rows_and_the_polygons_of_the_geopackage(results):
+    geopandas = pytest.importorskip("geopandas")
+    table = geopandas.read_parquet(results.path / "stones.geo.parquet")
+    layer = geopandas.read_file(results.path / "stones.gpkg", layer="stones").set_crs(None, allow_override=True)
+    assert table.crs is None
+    assert table["stone_id"].tolist() == layer["stone_id"].tolist() == results.stones_arrow["stone_id"].to_pylist()
+    assert table.geometry.has_z.all() and (table.geometry.geom_equals_exact(layer.geometry, 0.0)).all()
+    np.testing.assert_array_equal(table["dx"].to_numpy(), results.displacement[:, 0])

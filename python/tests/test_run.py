@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
+import urllib.parse
 from functools import partial
 from pathlib import Path
 
@@ -166,3 +168,38 @@ def test_the_command_answers_as_commands_do(command):
     assert command("--version").stdout.strip() == f"stonewise {stonewise.__version__}"
     assert "Usage: stonewise run" in command("run", "--help").stdout
     assert "unexpected argument" in command("run", "--nonsense", expect=2).stderr
+
+
+def test_simulated_surveys_have_the_bytes_of_the_command(command, tmp_path):
+    parameters = {
+        "scene": {"seed": 5, "wall": {"width_m": 1.2, "height_m": 0.8}, "tls": {"spacing_m": 0.02}},
+        "photos": {"columns": 1, "rows": 1, "width": 400, "height": 300, "focal_px": 550.0, "distance_m": 5.0},
+    }
+    heard = []
+    project = stonewise.simulate(tmp_path / "python", progress=lambda *told: heard.append(told), **parameters)
+    assert project == tmp_path / "python" / "stonewise.toml" and heard
+    command("simulate", "--quiet", "--params", project.with_name("simulation.toml"), "--out", tmp_path / "command")
+    for name in ("stonewise.toml", "epoch2/cloud_tls.laz", "epoch1/images/IMG_1001.jpg", "truth/stones.csv"):
+        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "command" / name).read_bytes(), name
+
+
+def test_a_wrong_parameter_of_a_simulation_is_named(tmp_path):
+    with pytest.raises(stonewise.Error, match="unknown field `hight_m`"):
+        stonewise.simulate(tmp_path / "out", scene={"wall": {"hight_m": 1.0}})
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_studio_runs_until_it_is_closed(survey):
+    with stonewise.studio(survey, browser=False) as page:
+        assert page.is_running and page.address in page._repr_html_()
+        host, port = urllib.parse.urlsplit(page.address).netloc.split(":")
+        with socket.create_connection((host, int(port)), timeout=10):
+            pass
+    assert not page.is_running
+
+
+def test_a_studio_that_cannot_open_says_why(command, tmp_path):
+    said = command("studio", "--no-browser", tmp_path / "missing", expect=None).stderr.strip().splitlines()[-1]
+    with pytest.raises(stonewise.Error) as raised:
+        stonewise.studio(tmp_path / "missing", browser=False)
+    assert str(raised.value) in said and "missing" in str(raised.value)

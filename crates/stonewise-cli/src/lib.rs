@@ -11,7 +11,7 @@ mod screen;
 mod steps;
 
 use clap::error::ErrorKind;
-pub use commands::measure;
+pub use commands::{measure, simulate_survey};
 use std::ffi::OsString;
 use std::io::Write;
 

@@ -1,4 +1,4 @@
-//! The command, and the run of a project.
+//! The command, the run of a project, and simulated surveys.
 
 use crate::attended::{Listeners, attended};
 use crate::error::{error, explained};
@@ -7,6 +7,7 @@ use serde_json::{Map, Value};
 use std::ffi::OsString;
 use std::path::PathBuf;
 use stonewise::{OutputFolder, Project, Until};
+use stonewise_simulate::SurveyParams;
 
 /// Runs the command line of these arguments, the first of which is the program's name; returns the exit code.
 #[pyfunction]
@@ -34,6 +35,23 @@ pub fn run(
         Ok(())
     })?;
     outcome.map_err(explained)
+}
+
+/// Simulates a survey into a folder and returns its project file; `parameters`: JSON of the file of parameters.
+#[pyfunction]
+pub fn simulate(
+    py: Python<'_>,
+    out: PathBuf,
+    parameters: &str,
+    force: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<PathBuf> {
+    let params: SurveyParams =
+        serde_json::from_str(parameters).map_err(|e| error(format!("parameters: {e}")))?;
+    let summary = attended(py, &Listeners::progress(progress), |progress| {
+        stonewise_cli::simulate_survey(&out, &params, force, progress)
+    })?;
+    Ok(summary.map_err(explained)?.project)
 }
 
 /// Parameters from JSON.

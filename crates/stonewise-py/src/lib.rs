@@ -23,7 +23,7 @@ mod _native {
     #[pymodule_export]
     use crate::adjust::adjust;
     #[pymodule_export]
-    use crate::command::{command, run};
+    use crate::command::{command, run, simulate};
     #[pymodule_export]
     use crate::detector::Detector;
     #[pymodule_export]

@@ -33,6 +33,7 @@ use crate::printer::Printer;
 use anyhow::{Context, Result};
 pub use outcome::Outcome;
 pub use run::measure;
+pub use simulate::simulate_survey;
 use std::error::Error;
 use std::num::NonZero;
 use stonewise::{Until, require_start};

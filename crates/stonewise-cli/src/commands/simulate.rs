@@ -8,7 +8,8 @@ use anyhow::{Context, Result};
 use std::path::Path;
 use stonewise::segmentation;
 use stonewise::{OutputFolder, Owner, Project, Until, require_memory};
-use stonewise_simulate::{SurveyParams, write_survey};
+use stonewise_core::progress::Progress;
+use stonewise_simulate::{SurveyParams, SurveySummary, write_survey};
 
 /// The work in messages about memory.
 const THIS: &str = "this simulation";
@@ -53,6 +54,24 @@ fn claim(path: &Path, params: &SurveyParams, force: bool) -> Result<OutputFolder
     Ok(OutputFolder::of_inputs(path, &owner, &[], &[], force)?)
 }
 
+/// Writes the survey with these parameters into a folder; `force`: also if the folder holds other files or memory
+/// is short.
+///
+/// # Errors
+/// The folder holds other files, memory is short, or [`write_survey`] fails.
+pub fn simulate_survey(
+    out: &Path,
+    params: &SurveyParams,
+    force: bool,
+    progress: &dyn Progress,
+) -> Result<SurveySummary> {
+    if !force {
+        require_memory(params.memory_bytes(), THIS)?;
+    }
+    let folder = claim(out, params, force)?;
+    Ok(write_survey(folder.path(), params, progress)?)
+}
+
 /// Makes a simulated survey.
 pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<Outcome> {
     let mut params = match &args.params {
@@ -67,11 +86,7 @@ pub fn simulate(args: &SimulateArgs, force: bool, printer: &Printer) -> Result<O
     if let Some(seed) = args.seed {
         params = params.seeded(seed);
     }
-    if !force {
-        require_memory(params.memory_bytes(), THIS)?;
-    }
-    let folder = claim(&args.out, &params, force)?;
-    let summary = write_survey(folder.path(), &params, printer)?;
+    let summary = simulate_survey(&args.out, &params, force, printer)?;
     printer.log(&format!(
         "{}, {}, {}: {}",
         counted(summary.stones, "stone"),
