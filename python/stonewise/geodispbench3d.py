@@ -97,11 +97,11 @@ def stone_motions(*, outputs: TrialOutputs, ground_truth: Iterable[Any], options
 def m3c2_motions(*, outputs: TrialOutputs, ground_truth: Iterable[Any], options: Mapping[str, Any], **_: Any) -> dict[str, Any]:
     """The same of M3C2, which the run computes beside the stones: the distance of the nearest core point along its normal."""
     with (Path(outputs.run_dir) / "m3c2.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    column = lambda name: np.array([float(row[name] or "nan") for row in rows])  # noqa: E731
-    normals = np.column_stack([column(name) for name in ("NormalX", "NormalY", "NormalZ")])
-    motions = column("m3c2_distance")[:, None] * normals
-    places = np.column_stack([column(name) for name in ("x", "y", "z")])
+        names = ("x", "y", "z", "NormalX", "NormalY", "NormalZ", "m3c2_distance")
+        rows = [[float(row[name] or "nan") for name in names] for row in csv.DictReader(file)]
+    table = np.array(rows, dtype=np.float64).reshape(-1, len(names))
+    places, normals, distances = table[:, :3], table[:, 3:6], table[:, 6:]
+    motions = distances * normals
     return _nearest(places, motions, None, ground_truth, options)
 
 
