@@ -8,6 +8,7 @@ import { Backdrop } from "../src/views/backdrop.ts";
 import type { Photos } from "../src/views/photos.ts";
 import type { StoneChange, Edit } from "./api.ts";
 import { tx } from "./texts.ts";
+import { type Box, Tiles } from "./tiles.ts";
 
 export type Point = [number, number];
 
@@ -31,6 +32,8 @@ interface Drawing {
 /** Colours of stones that come, go or change. */
 const FATES = { new: "#18b26b", gone: "#e0402f", changed: "#ff8a1f" } as const;
 
+/** From this scale on outlines lie on a dark line, pixels in a metre; below, they are as thin as a pixel, which is drawn fifteen times as fast. */
+const CASED = 120;
 /** Pixels that a pointer may move between pressing and letting go and still click. */
 const STILL_PX = 4;
 /** A click this near to the first vertex closes a polygon, pixels. */
@@ -49,14 +52,16 @@ export class Face {
   stable: readonly Area[] = [];
   /** Stones that another detector would change. */
   changes: readonly StoneChange[] = [];
-  epoch: 0 | 1 = 0;
+  #epoch: 0 | 1 = 0;
   readonly #report: Report;
   readonly #canvas: HTMLCanvasElement;
   readonly #pen: CanvasRenderingContext2D;
   readonly #paths: Path2D[] = [];
   readonly #rings: Float64Array[] = [];
+  readonly #boxes: Box[] = [];
   readonly #squares = new Squares(1);
   readonly #backdrop: Backdrop;
+  readonly #still: Tiles;
   readonly #box: [number, number, number, number] = [Infinity, Infinity, -Infinity, -Infinity];
   #view = { scale: 100, x: 0, y: 0 };
   #size = { width: 0, height: 0 };
@@ -64,6 +69,7 @@ export class Face {
   #pointer: Point | null = null;
   #hover = -1;
   #asked = false;
+  #hasBackdrop = false;
 
   constructor(report: Report, photos: Photos) {
     this.#report = report;
@@ -82,15 +88,23 @@ export class Face {
       path.closePath();
       this.#paths.push(path);
       this.#rings.push(ring);
+      this.#boxes.push(box);
       if (ring.length < 6) continue;
       this.#squares.add(i, ...box);
       [this.#box[0], this.#box[1]] = [Math.min(this.#box[0], box[0]), Math.min(this.#box[1], box[1])];
       [this.#box[2], this.#box[3]] = [Math.max(this.#box[2], box[2]), Math.max(this.#box[3], box[3])];
     }
-    this.#backdrop = new Backdrop(report, photos, this.#paths, () => this.redraw());
+    this.#still = new Tiles((pen, box) => this.#paintStill(pen, box), () => this.redraw());
+    this.#backdrop = new Backdrop(report, photos, this.#paths, () => this.#still.forget());
     new ResizeObserver(() => this.#resize()).observe(this.element);
     this.#listen();
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.redraw());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#still.forget());
+  }
+
+  /** The epoch whose photos are shown. */
+  set epoch(epoch: 0 | 1) {
+    this.#epoch = epoch;
+    this.#still.forget();
   }
 
   /** Begins a drawing; `done` gets its vertices, of a box its two corners. */
@@ -311,26 +325,35 @@ export class Face {
     return true;
   }
 
+  /** Photos and outlines in a part of the wall. */
+  #paintStill(pen: CanvasRenderingContext2D, [left, low, right, high]: Box): void {
+    const ratio = window.devicePixelRatio || 1, scale = pen.getTransform().a / ratio;
+    pen.fillStyle = css("--ground");
+    pen.fillRect(left, low, right - left, high - low);
+    this.#hasBackdrop = this.#backdrop.draw(pen, this.#epoch);
+    pen.lineJoin = "round";
+    const margin = 2 / scale;
+    for (let i = 0; i < this.#paths.length; i++) {
+      const [west, south, east, north] = this.#boxes[i]!;
+      if (west > right + margin || east < left - margin || south > high + margin || north < low - margin) continue;
+      if (scale > CASED) {
+        stroke(pen, this.#paths[i]!, "#0008", 2.6 / scale);
+        stroke(pen, this.#paths[i]!, "#ffe25a", 1.1 / scale);
+      } else stroke(pen, this.#paths[i]!, "#ffe25a", 1 / (ratio * scale));
+    }
+  }
+
   #paint(): void {
     const pen = this.#pen, ratio = window.devicePixelRatio || 1, { scale, x, y } = this.#view;
-    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    const { width, height } = this.#canvas;
     pen.fillStyle = css("--ground");
-    pen.fillRect(0, 0, this.#size.width, this.#size.height);
+    pen.fillRect(0, 0, width, height);
+    const isPainted = this.#still.draw(pen, { scale: scale * ratio, x: x * ratio, y: y * ratio }, width, height);
+    this.#canvas.dataset["backdrop"] = String(this.#hasBackdrop && isPainted);
     pen.setTransform(ratio * scale, 0, 0, -ratio * scale, ratio * x, ratio * y);
-    this.#canvas.dataset["backdrop"] = String(this.#backdrop.draw(pen, this.epoch));
-    const line = (path: Path2D, colour: string, px: number) => {
-      pen.strokeStyle = colour;
-      pen.lineWidth = px / scale;
-      pen.stroke(path);
-    };
-    const [left, low] = this.#toWall(0, this.#size.height), [right, high] = this.#toWall(this.#size.width, 0);
-    const { a, u } = this.#report.stones, margin = 2;
+    const line = (path: Path2D, colour: string, px: number) => stroke(pen, path, colour, px / scale);
     pen.lineJoin = "round";
-    for (let i = 0; i < this.#paths.length; i++) {
-      if (a[i]! < left - margin || a[i]! > right + margin || u[i]! < low - margin || u[i]! > high + margin) continue;
-      if (scale > 60) line(this.#paths[i]!, "#0008", 2.6);
-      line(this.#paths[i]!, "#ffe25a", 1.1);
-    }
     if (this.#hover >= 0 && this.#hover < this.#paths.length) line(this.#paths[this.#hover]!, "#fff", 2.4);
     for (const i of this.selected) {
       pen.fillStyle = "#2f9bff55";
@@ -442,6 +465,12 @@ export class Face {
     pen.fillText(text, x + 4, y - 6);
     pen.restore();
   }
+}
+
+function stroke(pen: CanvasRenderingContext2D, path: Path2D, colour: string, width: number): void {
+  pen.strokeStyle = colour;
+  pen.lineWidth = width;
+  pen.stroke(path);
 }
 
 /** The corners of a box, of which two opposite ones are given. */
