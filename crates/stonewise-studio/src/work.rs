@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use stonewise::{PartShown, StepShown, Steps};
 use stonewise_core::progress::Progress;
 
 /// Most lines of a run's log that are kept.
@@ -48,44 +49,6 @@ impl Phase {
     }
 }
 
-/// What became of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum StepState {
-    /// It comes later.
-    Waiting,
-    /// It is at work.
-    Working,
-    /// It has ended.
-    Done,
-    /// An earlier run did it.
-    Earlier,
-}
-
-/// A step of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct StepShown {
-    /// What it does, in words.
-    pub name: String,
-    /// What became of it.
-    pub state: StepState,
-    /// How long it has worked, seconds.
-    pub seconds: f64,
-}
-
-/// What the step at work is at.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct PartShown {
-    /// What it does, in words.
-    pub what: String,
-    /// Which unit, such as a photo.
-    pub detail: String,
-    /// Units that are done.
-    pub done: u64,
-    /// All units; 0 where that is not known.
-    pub total: u64,
-}
-
 /// A run, or a training, as pages show it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct RunShown {
@@ -125,7 +88,7 @@ struct Inner {
     /// Counts changes, those of other things that pages show included.
     version: u64,
     began: Option<Instant>,
-    at: Option<(usize, Instant)>,
+    steps: Steps,
 }
 
 impl Run {
@@ -141,7 +104,7 @@ impl Run {
             phase: Phase::Running,
             ..RunShown::default()
         };
-        (inner.began, inner.at) = (Some(Instant::now()), None);
+        (inner.began, inner.steps) = (Some(Instant::now()), Steps::default());
         self.tell(inner);
         true
     }
@@ -149,10 +112,9 @@ impl Run {
     /// The run has ended like this; `outcome` sets what came out.
     pub fn end(&self, phase: Phase, outcome: impl FnOnce(&mut RunShown)) {
         let mut inner = self.inner();
-        inner.leave();
+        inner.steps.leave();
         inner.shown.seconds = inner.began.take().map_or(0.0, |b| b.elapsed().as_secs_f64());
         inner.shown.phase = phase;
-        inner.shown.part = PartShown::default();
         outcome(&mut inner.shown);
         self.tell(inner);
     }
@@ -180,11 +142,7 @@ impl Run {
         if let Some(began) = inner.began {
             shown.seconds = began.elapsed().as_secs_f64();
         }
-        if let Some((step, since)) = inner.at
-            && let Some(step) = shown.steps.get_mut(step)
-        {
-            step.seconds += since.elapsed().as_secs_f64();
-        }
+        (shown.steps, shown.part) = inner.steps.shown();
         (shown, inner.version)
     }
 
@@ -202,6 +160,13 @@ impl Run {
         drop(waited);
     }
 
+    /// The run tells of its steps.
+    fn step(&self, change: impl FnOnce(&mut Steps)) {
+        let mut inner = self.inner();
+        change(&mut inner.steps);
+        self.tell(inner);
+    }
+
     fn inner(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -213,75 +178,29 @@ impl Run {
     }
 }
 
-impl Inner {
-    /// The step at work has ended, or goes on later.
-    fn leave(&mut self) {
-        if let Some((step, since)) = self.at.take()
-            && let Some(step) = self.shown.steps.get_mut(step)
-        {
-            step.state = StepState::Done;
-            step.seconds += since.elapsed().as_secs_f64();
-        }
-    }
-}
-
 impl Progress for Run {
     fn begin(&self, what: &str, total: u64) {
-        let mut inner = self.inner();
-        inner.shown.part = PartShown {
-            what: what.to_owned(),
-            total,
-            ..PartShown::default()
-        };
-        self.tell(inner);
+        self.step(|steps| steps.begin(what, total));
     }
 
     fn advance(&self, units: u64) {
-        let mut inner = self.inner();
-        inner.shown.part.done += units;
-        self.tell(inner);
+        self.step(|steps| steps.advance(units));
     }
 
-    fn agenda(&self, steps: &[String]) {
-        let mut inner = self.inner();
-        inner.at = None;
-        let step = |name: &String| StepShown {
-            name: name.clone(),
-            state: StepState::Waiting,
-            seconds: 0.0,
-        };
-        inner.shown.steps = steps.iter().map(step).collect();
-        self.tell(inner);
+    fn agenda(&self, names: &[String]) {
+        self.step(|steps| steps.agenda(names));
     }
 
     fn enter(&self, step: usize) {
-        let mut inner = self.inner();
-        if inner.at.is_some_and(|(at, _)| at == step) {
-            return;
-        }
-        inner.leave();
-        inner.shown.part = PartShown::default();
-        if let Some(shown) = inner.shown.steps.get_mut(step) {
-            shown.state = StepState::Working;
-            inner.at = Some((step, Instant::now()));
-        }
-        self.tell(inner);
+        self.step(|steps| steps.enter(step));
     }
 
     fn take_over(&self, step: usize) {
-        let mut inner = self.inner();
-        if let Some(shown) = inner.shown.steps.get_mut(step)
-            && shown.state == StepState::Waiting
-        {
-            shown.state = StepState::Earlier;
-        }
-        self.tell(inner);
+        self.step(|steps| steps.take_over(step));
     }
 
     fn detail(&self, unit: &str) {
-        let mut inner = self.inner();
-        unit.clone_into(&mut inner.shown.part.detail);
-        self.tell(inner);
+        self.step(|steps| steps.detail(unit));
     }
 
     fn note(&self, line: &str) {
@@ -301,6 +220,7 @@ impl Progress for Run {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stonewise::StepState;
 
     #[test]
     fn steps_follow_what_a_run_says_of_itself() {

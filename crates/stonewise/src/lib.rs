@@ -30,6 +30,7 @@ mod storage;
 mod testing;
 mod truth;
 mod verify;
+mod watched;
 
 use stonewise_base::{
     address_space, error, files, messages as texts, part, processor, report_params, settings, stable,
@@ -65,3 +66,4 @@ pub use thresholds::{Levels, Measures, Thresholds, Zone};
 pub use truth::evaluate_truth;
 pub use verify::{Answer, Finding, Maker, Verification, verify};
 pub use warnings::Warning;
+pub use watched::{PartShown, StepShown, StepState, Steps, Told, told};

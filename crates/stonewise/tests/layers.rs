@@ -3,7 +3,7 @@
 
 /// Modules from the bottom up; those on one line do not use each other.
 const LAYERS: [&[&str]; 6] = [
-    &["kept", "truth"],
+    &["kept", "truth", "watched"],
     &["storage"],
     &["segmentation"],
     &["output"],

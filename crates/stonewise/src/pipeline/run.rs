@@ -11,6 +11,7 @@ use crate::project::Project;
 use crate::results::StoneRow;
 use crate::results::records::{Datum, Verdict};
 use crate::warnings::Warning;
+use crate::watched::Watched;
 use stonewise_core::epoch::EpochId;
 use stonewise_core::evaluate::Evaluation;
 use stonewise_core::progress::Progress;
@@ -69,15 +70,17 @@ impl Summary {
 pub fn run(project: &Project, out: &OutputFolder, until: Until, progress: &dyn Progress) -> Result<Summary> {
     forget(out.path())?;
     out.begin_results(project)?;
-    let mut context = Context::new(project, out, progress)?;
+    let watched = Watched::new(progress, out.path());
+    let mut context = Context::new(project, out, &watched)?;
     context.forced = Some(out.is_forced());
     context.agenda = agenda(project, until);
-    context.agenda.announce(progress);
+    context.agenda.announce(&watched);
     let summary = run_in(&context, until)?;
     if until == Until::Reported {
         context.store.remove_unused()?;
     }
     out.finish_results(project, until == Until::Reported)?;
+    watched.finish()?;
     Ok(summary)
 }
 
