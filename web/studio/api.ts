@@ -284,6 +284,16 @@ export interface ScoreShown {
   readonly recall?: number | null;
 }
 
+/** A photo that shows a stone. */
+export interface Sighting {
+  /** Width of the piece over its height. */
+  readonly aspect: number;
+  /** The stone's outline in the first epoch, in shares of the width and the height of the piece. */
+  readonly outline: readonly (readonly [number, number])[];
+  /** File name of the photo. */
+  readonly photo: string;
+}
+
 /** A signature. */
 export interface SignatureShown {
   /** Whether it is under the results as they are now. */
@@ -366,12 +376,16 @@ export interface TeachingShown {
 
 /** Results that are not finished: a run in a terminal works on them, or was interrupted. */
 export interface Unfinished {
+  /** Number of steps whose files are there. */
+  readonly finished: number;
   /** The step that finished last, as its folder is named. */
   readonly last_step?: string | null;
-  /** How long ago, seconds. */
+  /** What the step at work is at. */
+  readonly part: PartShown;
+  /** How long ago something was told or finished, seconds. */
   readonly seconds: number;
-  /** Number of steps whose files are there. */
-  readonly steps: number;
+  /** The steps in order, as the run told them; none where it tells nothing, as units of a plan. */
+  readonly steps: readonly (StepShown)[];
 }
 
 /** What a finding means for a run. */

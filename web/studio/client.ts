@@ -1,6 +1,6 @@
 // The way to the server: requests, and the state that it keeps telling.
 
-import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, NewStable, NewTeaching, OldRemark, ProjectChanges, ProjectShown, RemarksShown, State, TeachingShown } from "./api.ts";
+import type { EditsShown, MistakeShown, NewEdits, NewRemark, NewSignature, NewStable, NewTeaching, OldRemark, ProjectChanges, ProjectShown, RemarksShown, Sighting, State, TeachingShown } from "./api.ts";
 
 /** What the server says of a request that it refuses. */
 export class Refused extends Error {
@@ -41,6 +41,7 @@ export const server = {
   teach: (teaching: NewTeaching) => call<State>("POST", "/teaching", teaching),
   accept: () => call<TeachingShown>("POST", "/teaching/accept"),
   decline: () => call<TeachingShown>("DELETE", "/teaching"),
+  sightings: (epoch: number, stone: number) => call<readonly Sighting[]>("GET", `/epochs/${epoch}/stones/${stone}`),
   edits: () => call<EditsShown>("GET", "/edits"),
   edit: (edits: NewEdits) => again(() => call<EditsShown>("POST", "/edits", edits)),
   undo: (id: string) => again(() => call<EditsShown>("POST", "/edits/undo", { id })),

@@ -2,7 +2,7 @@
 
 import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
-import type { State, StepShown } from "./api.ts";
+import type { PartShown, State, StepShown } from "./api.ts";
 import { server } from "./client.ts";
 import { isAtWork, type Page } from "./page.ts";
 import { tx } from "./texts.ts";
@@ -57,20 +57,23 @@ export const runPage: Page = (place, live, until) => {
     skipped.replaceChildren(el("strong", {}, tx("skippedTitle")), el("ul", {}, ...run.skipped.map((d) => el("li", {}, d))));
     const other = run.phase === "idle" ? state.elsewhere : null;
     elsewhere.hidden = !other;
-    if (other) elsewhere.textContent = tx("elsewhere", { n: other.steps, step: other.last_step ?? "", ago: span(other.seconds) });
+    if (other) elsewhere.textContent = other.steps.length > 0
+      ? tx("elsewhereTold", { ago: span(other.seconds) })
+      : tx("elsewhere", { n: other.finished, step: other.last_step ?? "", ago: span(other.seconds) });
     if (run.error) {
       error.textContent = run.error;
       error.hidden = false;
     }
-    steps.replaceChildren(...run.steps.map((step) => line(step, state)));
-    steps.parentElement!.hidden = run.steps.length === 0;
+    const told = other && other.steps.length > 0 ? other : run;
+    steps.replaceChildren(...told.steps.map((step) => line(step, told.part)));
+    steps.parentElement!.hidden = told.steps.length === 0;
     lines.replaceChildren(...run.lines.map((text) => el("li", {}, text)));
     log.hidden = run.lines.length === 0;
     folder.textContent = tx("resultsIn", { folder: state.results_folder });
   }, until);
 };
 
-function line(step: StepShown, { run: { part } }: State): HTMLElement {
+function line(step: StepShown, part: PartShown): HTMLElement {
   const isNow = step.state === "working";
   const item = el("li", { class: step.state },
     el("span", { class: "mark", "aria-hidden": "true" }, MARKS[step.state]),

@@ -3,23 +3,32 @@
 import type { Report } from "../src/data.ts";
 import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
+import { Squares } from "../src/geometry.ts";
 import { Photos } from "../src/views/photos.ts";
-import type { Action, Change, Edit, EditsShown, ProjectShown, State } from "./api.ts";
+import type { Action, Change, Edit, EditsShown, ProjectShown, State, StoneChange } from "./api.ts";
+import { changeList, countChanges } from "./changes.ts";
 import { type Live, newId, server } from "./client.ts";
+import { compared } from "./compared.ts";
 import { type Area, Face, type Point, rectangle } from "./face.ts";
 import { isAtWork, type Page } from "./page.ts";
 import { loadReport } from "./report.ts";
+import { sightingsOf } from "./sightings.ts";
 import { teachingPanel } from "./teaching.ts";
 import { type Word, tx } from "./texts.ts";
 
 /** A stone whose points get less than this share of the photos' votes is worth a look. */
 const AGREEMENT = 0.7;
-/** So much larger or smaller than the median stone is worth a look. */
+/** So much larger or smaller than the median of the stones around it is worth a look. */
 const UNLIKE = 5;
+/** Stones are around one another within so many edges of the median stone of the wall. */
+const AROUND = 4;
 /** How far a stable area reaches in front of the surface and behind it, metres, unless somebody says otherwise. */
 const MARGIN_M = "0.15";
 /** Rows of the queue at most. */
 const ROWS = 200;
+
+/** The results that were shown last, to tell what a run changed. */
+let last: { readonly version: string; readonly report: Report } | null = null;
 
 export const stonesPage: Page = (place, live, until) => {
   const note = el("p", { class: "empty" }, tx("loadingStones"));
@@ -43,6 +52,8 @@ export const stonesPage: Page = (place, live, until) => {
       const [report, edits, project] = await Promise.all([loadReport(), server.edits(), server.project()]);
       if (mine.aborted || !report) return;
       const room = new Room(report, shown, edits, project, live, mine);
+      if (last && last.version !== shown) room.tell(compared(last.report, report));
+      last = { version: shown, report };
       place.replaceChildren(el("h1", { class: "unseen" }, tx("stones")), room.element);
     })();
   }, until);
@@ -65,6 +76,7 @@ class Room {
   readonly #zones = el("ul", { class: "zones" });
   readonly #stable = el("ol", { class: "zones" });
   readonly #selection = el("div", { class: "selection" });
+  readonly #outcome = el("section", { class: "outcome", hidden: true });
   readonly #undo: HTMLButtonElement;
   readonly #redo: HTMLButtonElement;
   readonly #apply: HTMLButtonElement;
@@ -73,6 +85,9 @@ class Room {
   readonly #made: number;
   #edits: EditsShown;
   #project: ProjectShown;
+  /** Stones that the last run changed, and those that another detector would change. */
+  #applied: readonly StoneChange[] = [];
+  #offered: readonly StoneChange[] = [];
   /** Acts are sent one after the other, in the order in which they were done. */
   #line: Promise<void> = Promise.resolve();
 
@@ -106,10 +121,16 @@ class Room {
     this.#showSelection();
   }
 
+  /** Whether nothing can be changed: the page is only for looking, or the project of these results is gone. */
+  get #isFixed(): boolean {
+    const { view, has_project } = this.#live.state!;
+    return view || !has_project;
+  }
+
   #toolbar(): HTMLElement {
     const tool = (word: Word, hint: Word, press: () => void) => {
       const element = button(tx(word), tx(hint), press);
-      element.disabled = this.#live.state!.view;
+      element.disabled = this.#isFixed;
       return element;
     };
     return el("div", { class: "toolbar", role: "toolbar", "aria-label": tx("tools") },
@@ -147,6 +168,7 @@ class Room {
       return el("li", {}, row);
     });
     return el("aside", {},
+      this.#outcome,
       this.#selection,
       el("section", {}, el("h2", {}, `${tx("queue")} (${this.#queue.length})`),
         el("p", { class: "note" }, this.#queue.length > 0 ? tx("queueKeys") : tx("queueEmpty")),
@@ -159,16 +181,37 @@ class Room {
       el("section", {}, el("h2", {}, tx("stableAreas")), el("p", { class: "note" }, tx("stableNote")), this.#stable),
       teachingPanel(this.#live, {
         show: (changes) => {
-          this.#face.changes = changes;
-          this.#face.redraw();
+          this.#offered = changes;
+          this.#showChanges();
         },
         look: ({ outline }) => this.#face.look(outline),
       }, until));
   }
 
+  /** Shows which stones the last run changed, until somebody puts it away. */
+  tell(changes: readonly StoneChange[]): void {
+    this.#applied = changes;
+    const away = button(tx("hide"), "", () => {
+      this.#outcome.hidden = true;
+      this.#applied = [];
+      this.#showChanges();
+    });
+    const { sentence } = this.#live.state!.run;
+    this.#outcome.replaceChildren(el("h2", {}, tx("outcome")), ...(sentence ? [el("p", {}, sentence)] : []),
+      el("p", { role: "status" }, changes.length > 0 ? tx("outcomeCount", countChanges(changes)) : tx("outcomeNone")),
+      changeList(changes, tx("outcome"), ({ outline }) => this.#face.look(outline)), away);
+    this.#outcome.hidden = false;
+    this.#showChanges();
+  }
+
+  #showChanges(): void {
+    this.#face.changes = [...this.#applied, ...this.#offered];
+    this.#face.redraw();
+  }
+
   #told(state: State): void {
     const isBusy = isAtWork(state), works = isBusy && state.run.job === "run";
-    this.#apply.hidden = state.view;
+    this.#apply.hidden = this.#isFixed;
     this.#apply.disabled = isBusy || !state.is_outdated;
     const { skipped } = state.run;
     this.#status.hidden = !works && skipped.length === 0;
@@ -179,13 +222,12 @@ class Room {
   /** Shows the edits and zones as they are. */
   #show(): void {
     const { edits, can_undo, can_redo } = this.#edits;
-    const view = this.#live.state!.view;
-    this.#undo.disabled = view || !can_undo;
-    this.#redo.disabled = view || !can_redo;
+    this.#undo.disabled = this.#isFixed || !can_undo;
+    this.#redo.disabled = this.#isFixed || !can_redo;
     const pending = edits.filter((edit) => Date.parse(edit.when) > this.#made);
     this.#face.pending = pending;
     this.#list.replaceChildren(...[...edits].reverse().map((edit) =>
-      el("li", {}, `${tx(`do_${edit.do}`)}, ${edit.who}, ${edit.why}`, pending.includes(edit) ? el("span", { class: "chip" }, tx("pending")) : null)));
+      el("li", {}, `${tx(`do_${edit.do}`)}, ${edit.who}, ${moment(edit.when)}: ${edit.why}`, pending.includes(edit) ? el("span", { class: "chip" }, tx("pending")) : null)));
     if (edits.length === 0) this.#list.replaceChildren(el("li", { class: "note" }, tx("noEdits")));
     const zones = zonesOf(this.#project);
     this.#face.zones = zones;
@@ -205,7 +247,7 @@ class Room {
   /** A button that takes an entry out of the project file. */
   #remove(hint: string, way: Change["way"]): HTMLButtonElement {
     const remove = button(tx("remove"), hint, () => void this.#take(server.change({ changes: [{ way, value: null }] })));
-    remove.hidden = this.#live.state!.view;
+    remove.hidden = this.#isFixed;
     return remove;
   }
 
@@ -221,9 +263,10 @@ class Room {
     if (chosen.length !== 1 || only === undefined) return this.#selection.replaceChildren(head);
     const status = document.statuses[stones.state[only]!];
     const facts = [`${fixed(stones.area[only]!, 3)} m²`, `${fixed(100 * stones.confidence[only]!, 0)} %`, status?.meaning ?? ""];
-    const photos = this.#photos.of(only);
+    const photos = this.#photos.of(only), { epochs } = this.#project;
     this.#selection.replaceChildren(head, el("p", { class: "note" }, facts.join(", ")),
-      ...(photos ? [el("h3", { class: "unseen" }, tx("stone", { id: stones.id[only]! })), photos] : []));
+      ...(photos ? [el("h3", { class: "unseen" }, tx("stone", { id: stones.id[only]! })), photos] : []),
+      ...(epochs.some((epoch) => epoch.photos > 0) ? [sightingsOf(stones.id[only]!, epochs, (message) => this.#fail(message))] : []));
   }
 
   /** Keys of the tools; not while somebody writes. */
@@ -237,7 +280,7 @@ class Room {
       else return;
       return e.preventDefault();
     }
-    if (e.altKey || this.#live.state!.view) return;
+    if (e.altKey || this.#isFixed) return;
     if (this.#face.isDrawing) {
       if (e.key === "Escape") this.#face.cancel();
       return;
@@ -411,8 +454,13 @@ class Room {
 /** Stones that a person should look at, those of the gravest reasons first. */
 function queue(report: Report): { stone: number; why: string }[] {
   const { stones, document } = report;
-  const areas = Array.from(stones.area).filter((area) => area > 0).sort((p, q) => p - q);
-  const median = areas[areas.length >> 1] ?? 0;
+  const median = (areas: readonly number[]) => [...areas].sort((p, q) => p - q)[areas.length >> 1] ?? 0;
+  const reach = AROUND * Math.sqrt(median(Array.from(stones.area).filter((area) => area > 0)));
+  const squares = new Squares(reach || 1);
+  for (let i = 0; i < stones.count; i++) {
+    const [a, u] = [stones.a[i]!, stones.u[i]!];
+    if (stones.area[i]! > 0) squares.add(i, a - reach, u - reach, a + reach, u + reach);
+  }
   const found: { stone: number; why: string; weight: number }[] = [];
   for (let i = 0; i < stones.count; i++) {
     const reasons: string[] = [];
@@ -426,7 +474,9 @@ function queue(report: Report): { stone: number; why: string }[] {
       reasons.push(tx("lowAgreement", { percent: fixed(100 * stones.confidence[i]!, 0) }));
       weight += 2 * (1 - stones.confidence[i]!);
     }
-    const ratio = stones.area[i]! / median;
+    const around = squares.at(stones.a[i]!, stones.u[i]!).filter((other) => other !== i);
+    const usual = median(around.map((other) => stones.area[other]!));
+    const ratio = usual > 0 ? stones.area[i]! / usual : 1;
     if (ratio > UNLIKE || ratio < 1 / UNLIKE) {
       reasons.push(tx("unlike", { times: fixed(ratio, ratio < 1 ? 2 : 1) }));
       weight += 1;
@@ -435,6 +485,13 @@ function queue(report: Report): { stone: number; why: string }[] {
     if (reasons.length > 0) found.push({ stone: i, why: reasons.join("; "), weight });
   }
   return found.sort((p, q) => q.weight - p.weight);
+}
+
+/** A date with its time of day, where it has one, as people of this place write it. */
+function moment(when: string): string {
+  const isDay = when.length <= 10, date = new Date(isDay ? `${when}T00:00` : when);
+  if (Number.isNaN(date.getTime())) return when;
+  return date.toLocaleString(document.documentElement.lang, { dateStyle: "short", ...(isDay ? {} : { timeStyle: "short" }) });
 }
 
 function text(value: string): HTMLInputElement {

@@ -3,6 +3,7 @@
 import { button, el } from "../src/dom.ts";
 import { fixed } from "../src/format.ts";
 import type { StoneChange, Offer, ScoreShown, State } from "./api.ts";
+import { changeList, countChanges } from "./changes.ts";
 import { type Live, server } from "./client.ts";
 import { isAtWork } from "./page.ts";
 import { tx } from "./texts.ts";
@@ -74,12 +75,6 @@ function offerOf(offer: Offer, view: boolean, wall: Wall, act: (call: () => Prom
     el("tr", {}, el("th", { scope: "row" }, tx(word)), ...[f1, recall, precision].map((share) => el("td", {}, percent(share))));
   const head = el("tr", {}, el("td", {}), ...(["f1", "recall", "precision"] as const).map((word) => el("th", { scope: "col" }, tx(word))));
   const gain = offer.gain_interval ? tx("gain", { low: fixed(100 * offer.gain_interval[0], 1), high: fixed(100 * offer.gain_interval[1], 1) }) : tx("gainUnknown");
-  const counts = { new: 0, gone: 0, changed: 0 };
-  for (const { fate } of offer.changes) counts[fate]++;
-  const rows = offer.changes.map((change) => {
-    const what = change.stones.length > 0 ? `${tx(`fate_${change.fate}`)}: ${change.stones.join(", ")}` : tx(`fate_${change.fate}`);
-    return el("li", {}, button(what, "", () => wall.look(change)));
-  });
   const accept = button(tx("accept"), "", act(server.accept));
   accept.className = "primary";
   return [
@@ -87,8 +82,8 @@ function offerOf(offer: Offer, view: boolean, wall: Wall, act: (call: () => Prom
     el("p", { class: "note" }, tx("offerFacts", { minutes: fixed(offer.minutes, 1), steps: offer.steps, corrected: offer.corrected, kept: offer.kept })),
     el("table", { class: "scores" }, head, row("scoreBefore", offer.before), row("scoreAfter", offer.after)),
     el("p", {}, gain, " ", offer.is_better ? tx("gainShown") : tx("gainNotShown")),
-    el("p", {}, offer.changes.length > 0 ? tx("changesCount", counts) : tx("noChanges")),
-    el("ol", { class: "queue", tabindex: 0, "aria-label": tx("offer") }, ...rows),
+    el("p", {}, offer.changes.length > 0 ? tx("changesCount", countChanges(offer.changes)) : tx("noChanges")),
+    changeList(offer.changes, tx("offer"), wall.look),
     ...(view ? [] : [el("p", { class: "group" }, accept, button(tx("decline"), "", act(server.decline)))]),
   ];
 }

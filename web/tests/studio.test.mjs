@@ -1,7 +1,7 @@
 // The studio in a real browser: from a folder of scans to corrected stones.
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { cpSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
@@ -62,7 +62,7 @@ async function studio(place, ...options) {
     child.once("exit", ended);
     child.kill("SIGINT");
   });
-  return { address, end };
+  return { address, end, server: child.pid };
 }
 
 /** Opens a page and notes what goes wrong: errors on the console, and requests beyond the studio. */
@@ -250,6 +250,17 @@ test("the whole story: folder, project, run, report, corrections, zone, apply", 
   const audit = readFileSync(join(survey, "results/audit_edits.csv"), "utf8");
   assert.match(audit, /merge/);
   assert.equal(rows(), before - 1, audit);
+  // What changed: one stone took in the other.
+  await page.waitForSelector(".outcome >> text=/new 0, gone 1, other border 1/");
+  assert.equal(await page.locator(".outcome li").count(), 2);
+  assert.match(await page.textContent(".edits li"), /joined, A\. Keller, .*\d.*: /);
+  await page.click(".outcome >> text=/other border: /");
+  // Two clicks to a stone in every photo of every epoch.
+  await click(0.4, 0.5);
+  await page.click("text=Show it in every photo");
+  await page.waitForFunction(() => [...document.querySelectorAll(".sightings img")].some((i) => i.complete && i.naturalWidth > 20));
+  assert.ok((await page.locator(".sightings figure polygon").count()) >= 2);
+  assert.deepEqual(await findings(page), [], "applied");
   await shot(page, "11-applied");
   assert.deepEqual(trouble, []);
   await close();
@@ -372,6 +383,70 @@ test("existing results open within a second, also narrow, dark and in German", a
   await end();
 });
 
+/** Frames a second while a script moves the wall for three seconds; `move` is the body of a function of the canvas and the number of the frame. */
+function frames(page, move) {
+  return page.evaluate(async (body) => {
+    const canvas = document.querySelector(".face canvas"), act = new Function("canvas", "n", body);
+    const began = performance.now();
+    let n = 0;
+    for (; performance.now() - began < 3000; n++) {
+      act(canvas, n);
+      await new Promise(requestAnimationFrame);
+    }
+    return (1e3 * n) / (performance.now() - began);
+  }, move);
+}
+
+const POINTER = `const box = canvas.getBoundingClientRect(), x = box.left + box.width / 2, y = box.top + box.height / 2;
+  const send = (kind, dx, dy) => canvas.dispatchEvent(new PointerEvent(kind, { pointerId: 1, clientX: x + dx, clientY: y + dy }));`;
+const PAN = `${POINTER} canvas.setPointerCapture = () => {}; if (n === 0) send("pointerdown", 0, 0); send("pointermove", 200 * Math.sin(n / 25), 60 * Math.sin(n / 40));`;
+const ZOOM = `${POINTER} if (n === 0) send("pointercancel", 0, 0);
+  canvas.dispatchEvent(new WheelEvent("wheel", { deltaY: Math.sin(n / 30) > 0 ? -20 : 20, clientX: x, clientY: y, cancelable: true }));`;
+
+test("ten thousand stones of results whose project is gone: first view, frames, memory", async () => {
+  const large = join(folder, "large"), lab = process.env["LAB"] ?? join(target, "debug/lab");
+  if (!process.env["LAB"]) execFileSync("cargo", ["build", "-q", "-p", "stonewise-lab"], { cwd: root, stdio: "inherit" });
+  execFileSync(lab, ["sample-report", "10000", large, "moved"]);
+  const { address, end, server } = await studio(large);
+  const { page, trouble, close } = await open(address);
+  const began = performance.now();
+  await page.click("nav >> text=Stones");
+  await page.waitForSelector(".face canvas[data-drawn]");
+  const outlines = performance.now() - began;
+  const still = () => page.waitForSelector(".face canvas[data-backdrop=true]");
+  await still();
+  console.log(`10,000 stones: outlines after ${(outlines / 1e3).toFixed(1)} s, photos after ${((performance.now() - began) / 1e3).toFixed(1)} s`);
+  assert.ok(await page.isDisabled(".toolbar >> text=Join"), "nothing can be changed without the project");
+
+  // There and back, the wall looks as before.
+  const picture = () => page.$eval(".face canvas", (shown) => shown.toDataURL());
+  await canvas(page).focus();
+  await page.keyboard.press("Home");
+  await still();
+  const before = await picture();
+  for (const key of ["ArrowRight", "ArrowUp", "+", "ArrowLeft", "Home"]) await page.keyboard.press(key);
+  await page.waitForTimeout(300);
+  await still();
+  assert.ok(before === (await picture()), "the wall looks different after it was moved");
+
+  for (const [times, presses] of [["1", 0], ["3.4", 3], ["11", 6]]) {
+    await page.keyboard.press("Home");
+    for (let n = 0; n < presses; n++) await page.keyboard.press("+");
+    await page.waitForTimeout(300);
+    await still();
+    const [pan, zoom] = [await frames(page, PAN), await frames(page, ZOOM)];
+    console.log(`${times} times as large as the whole wall: ${pan.toFixed(0)} frames a second while panning, ${zoom.toFixed(0)} while zooming`);
+    assert.ok(Math.min(pan, zoom) > 25, `${pan} ${zoom}`);
+  }
+  const heap = await page.evaluate(() => performance.memory.usedJSHeapSize);
+  const resident = existsSync(`/proc/${server}/status`) ? /VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${server}/status`, "utf8"))[1] / 1e3 : NaN;
+  console.log(`memory: ${(heap / 1e6).toFixed(0)} MB of JavaScript, ${resident.toFixed(0)} MB of the studio`);
+  assert.ok(heap < 500e6);
+  assert.deepEqual(trouble, []);
+  await close();
+  await end();
+});
+
 test("a run that was started in a terminal is told, and shares its lock", async () => {
   const survey = join(folder, "elsewhere");
   cpSync(join(folder, "made"), survey, { recursive: true });
@@ -381,6 +456,8 @@ test("a run that was started in a terminal is told, and shares its lock", async 
   const { page, close } = await open(address);
   await page.click("nav >> text=Run");
   await page.waitForSelector("text=A run that was started elsewhere");
+  await page.waitForSelector(".steps .working");
+  assert.ok((await page.locator(".steps li").count()) > 5);
   await page.click(".acts button.primary");
   await page.waitForSelector("text=another run works in this folder");
   await shot(page, "12-elsewhere");

@@ -4,7 +4,7 @@ import { test } from "node:test";
 import { gzipSync } from "node:zlib";
 import { load } from "./load.mjs";
 
-const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, TABLE, frame, movedBack, readTracks } =
+const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, mm, niceAbove, rotate, signedMm, ticks, unpack, Store, TABLE, compared, frame, movedBack, readTracks, shared } =
   await load(`
     export { Columns, unpack } from "./src/blocks.ts";
     export * from "./src/geometry.ts";
@@ -13,6 +13,7 @@ const { Columns, contains, count, crossings, eigen3, ellipse, faceAxes, fixed, m
     export { TABLE } from "./src/texts.ts";
     export { movedBack } from "./src/views/sections.ts";
     export { frame, readTracks } from "./src/views/tracks.ts";
+    export { compared, shared } from "./studio/compared.ts";
   `);
 
 test("columns come out of base64 of gzip, and missing values are NaN", async () => {
@@ -136,4 +137,23 @@ test("tracked stones are unpacked with the shifts of their photos", () => {
   assert.deepEqual([tracked(3).place, tracked(8).place, tracked(4)], [0, -1, undefined]);
   assert.deepEqual([tracked(8).clouds, tracked(8).single.length], [null, 0]);
   assert.deepEqual(tracked(3).single[1], { at: [0.002, -0.001], covariance: [1e-6, 0.5 * 0.001 * 0.002, 4e-6], later: true, photo: 1, weight: 0.5 });
+});
+
+test("what a run changed is found by numbers and outlines", () => {
+  const square = (x, y, side) => [[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
+  const report = (stones) => {
+    const ids = Object.keys(stones).map(Number), rings = Object.values(stones);
+    let end = 0;
+    return {
+      indexOfId: new Map(ids.map((id, i) => [id, i])),
+      stones: { a: new Float64Array(ids.length), u: new Float64Array(ids.length), ring: Float64Array.from(rings.flat(2)), ringEnd: rings.map((ring) => (end += ring.length)) },
+    };
+  };
+  const before = report({ 1: square(0, 0, 1), 2: square(1, 0, 1), 3: square(2, 0, 1), 4: square(5, 5, 1) });
+  // 1 takes in 2, 3 loses an edge of 2 %, 4 is untouched, 5 is new.
+  const after = report({ 1: [[0, 0], [2, 0], [2, 1], [0, 1]], 3: [[2, 0], [2.98, 0], [2.98, 1], [2, 1]], 4: square(5, 5, 1), 5: square(7, 0, 1) });
+  const found = compared(before, after);
+  assert.deepEqual(found.map(({ fate, stones }) => [fate, ...stones]), [["changed", 1], ["new", 5], ["gone", 2]]);
+  assert.deepEqual(found[2].outline, square(1, 0, 1));
+  assert.ok(Math.abs(shared([0, 0, 2, 0, 2, 1, 0, 1], [0, 0, 1, 0, 1, 1, 0, 1]) - 0.5) < 0.03);
 });

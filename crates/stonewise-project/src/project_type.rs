@@ -12,7 +12,8 @@ use stonewise_base::settings::{Align, Settings};
 use stonewise_core::change::M3c2Params;
 use stonewise_core::epoch::{EpochId, Epochs};
 use stonewise_core::evaluate::MotionField;
-use stonewise_io::cameras::{CameraFile, MapFrame, read_cameras_on_map};
+use stonewise_core::geometry::View;
+use stonewise_io::cameras::{CameraFile, MapFrame, find_photos, read_cameras_on_map};
 use stonewise_io::cloud::cloud_crs;
 use stonewise_segment::Weights;
 
@@ -95,6 +96,20 @@ impl Epoch {
             map.crs = map.crs.or(cloud_crs(cloud)?);
         }
         Ok(read_cameras_on_map(&photos.cameras, Some(&photos.images), &map)?)
+    }
+
+    /// The photos that are there and have a camera.
+    ///
+    /// # Errors
+    /// As [`Epoch::read_cameras`]; the folder of the photos cannot be read.
+    pub fn posed_photos(&self) -> Result<Vec<(View, PathBuf)>> {
+        let Some(files) = &self.photos else {
+            return Ok(Vec::new());
+        };
+        let cameras = self.read_cameras()?;
+        let photos = find_photos(&files.images, &cameras)?;
+        let posed = cameras.views.into_iter().zip(photos.paths);
+        Ok(posed.filter_map(|(view, path)| Some((view, path?))).collect())
     }
 }
 

@@ -20,6 +20,7 @@ mod journal;
 mod place;
 mod project_text;
 mod remarks;
+mod sightings;
 mod stable;
 mod studio;
 mod teaching;

@@ -78,6 +78,22 @@ fn a_folder_without_a_project_is_offered_the_one_that_init_writes() {
 }
 
 #[test]
+fn results_whose_project_is_gone_have_no_edits() {
+    let dir = support::survey();
+    fs::remove_file(dir.path().join("stonewise.toml")).unwrap();
+    for file in ["run.json", "stones.parquet"] {
+        fs::write(dir.path().join(file), "{}").unwrap();
+    }
+    let studio = Tested::of(dir, false);
+    assert_eq!(studio.get("/api/v1/state").json()["has_project"], false);
+    let shown = studio.get("/api/v1/edits");
+    assert_eq!(shown.status, 200, "{}", shown.body);
+    assert!(places(&shown.json()).is_empty());
+    let add = json!({ "id": "a", "edits": [edit(1.0)] });
+    assert_eq!(studio.send("POST", "/api/v1/edits", &add).status, 404);
+}
+
+#[test]
 fn edits_are_in_the_file_that_the_project_names_before_they_are_answered() {
     let studio = Tested::new();
     with_wall(studio.dir.path());

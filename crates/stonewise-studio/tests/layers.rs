@@ -14,7 +14,7 @@ const LAYERS: [&[&str]; 4] = [
         "wall",
         "work",
     ],
-    &["assets", "epochs", "guard", "stable"],
+    &["assets", "epochs", "guard", "sightings", "stable"],
     &["api"],
     &["studio"],
 ];

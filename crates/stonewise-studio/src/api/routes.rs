@@ -13,6 +13,7 @@ use crate::journal::Journal;
 use crate::place::Place;
 use crate::project_text::{self, Mistake, Step};
 use crate::remarks;
+use crate::sightings::{sighting, sightings};
 use crate::stable::{self, NewStable};
 use crate::teaching::{self, NewTeaching};
 use crate::wall::wall_of;
@@ -29,8 +30,8 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 use stonewise::check::{Depth, Finding, Verdict, check};
 use stonewise::edits::{Edit, EditsFile};
 use stonewise::project::{project_schema, propose};
-use stonewise::results::ResultSet;
 use stonewise::results::records::Timestamp;
+use stonewise::results::{ResultSet, read_outlines};
 use stonewise::{Error, Language, OutputFolder, Project, Until};
 use stonewise_base::files::write_text;
 use stonewise_core::progress::Silent;
@@ -55,6 +56,8 @@ pub struct Api {
     journal: Mutex<Option<Journal>>,
     /// One change of the project file at a time.
     project: Mutex<()>,
+    /// One photo in memory at a time.
+    photo: Mutex<()>,
     pages: Pages,
 }
 
@@ -144,6 +147,7 @@ impl Api {
             look: Mutex::default(),
             journal: Mutex::default(),
             project: Mutex::default(),
+            photo: Mutex::default(),
             pages: Pages::default(),
         });
         api.look_again();
@@ -216,7 +220,7 @@ impl Api {
             }
             (Delete, "/signature") => self.say(remarks::unsign),
             (Post, "/pdf") => self.pdf(),
-            (Get, call) => self.picture(call),
+            (Get, call) => self.of_epoch(call),
             _ => Err(unknown()),
         }
     }
@@ -252,14 +256,33 @@ impl Api {
         Ok(Response::new(200, assets::HTML, Body::Bytes(page.into_bytes().into())).sealed())
     }
 
-    fn picture(&self, call: &str) -> Answer {
-        let number = call
-            .strip_prefix("/epochs/")
-            .and_then(|c| c.strip_suffix("/picture"));
-        let number: usize = number.and_then(|n| n.parse().ok()).ok_or_else(unknown)?;
+    /// What is seen of an epoch: a picture of it, the photos that show a stone, a piece of one of them.
+    fn of_epoch(&self, call: &str) -> Answer {
+        let parts: Vec<&str> = call.strip_prefix("/epochs/").unwrap_or("").split('/').collect();
+        let number = |text: &str| text.parse::<usize>().map_err(|_| unknown());
+        let epoch = number(parts[0])?;
         let project = self.read_project()?;
-        let epoch = project.epochs.get(number).ok_or_else(unknown)?;
-        let jpeg = picture(epoch, &self.place).ok_or_else(unknown)?;
+        let epoch = project.epochs.get(epoch).ok_or_else(unknown)?;
+        let outline = |id: &str| {
+            let outlines = read_outlines(&self.place.results).map_err(|e| failed(&e))?;
+            let stone = outlines.into_iter().find(|(stone, _)| stone.to_string() == id);
+            stone.map(|(_, outline)| outline).ok_or_else(unknown)
+        };
+        let jpeg = match parts[1..] {
+            ["picture"] => picture(epoch, &self.place),
+            ["stones", id] => {
+                let seen = sightings(epoch, &outline(id)?, &self.place).map_err(|e| failed(&e))?;
+                return Ok(Response::json(200, &seen));
+            }
+            ["stones", id, photo] => {
+                let stone = outline(id)?;
+                // One at a time: a photo takes a hundred megabytes.
+                let _one = locked(&self.photo);
+                sighting(epoch, &stone, &self.place, number(photo)?).map_err(|e| failed(&e))?
+            }
+            _ => None,
+        };
+        let jpeg = jpeg.ok_or_else(unknown)?;
         Ok(Response::new(200, "image/jpeg", Body::Bytes(jpeg.into())))
     }
 
@@ -283,6 +306,10 @@ impl Api {
     fn project_path(&self) -> Result<&Path, Response> {
         let path = self.place.project.as_deref();
         path.ok_or_else(|| Response::error(404, "the project of these results is gone"))
+    }
+
+    fn has_project(&self) -> bool {
+        self.place.project.as_deref().is_some_and(Path::is_file)
     }
 
     fn project_text(&self) -> Result<(PathBuf, String), Response> {
@@ -317,7 +344,7 @@ impl Api {
             view: self.guard.is_view(),
             project_file: project.map(|p| p.display().to_string()),
             results_folder: results.display().to_string(),
-            has_project: project.is_some_and(Path::is_file),
+            has_project: self.has_project(),
             report: version(&report),
             offer: self.place.survey().and_then(|s| version(&teaching::offer_of(s))),
             is_outdated: inputs.into_iter().any(is_newer),
@@ -457,7 +484,7 @@ impl Api {
             look.is_stale = true;
             return;
         }
-        if !self.place.project.as_deref().is_some_and(Path::is_file) {
+        if !self.has_project() {
             return;
         }
         look.shown.is_running = true;
@@ -634,6 +661,9 @@ impl Api {
     }
 
     fn edits(&self) -> Result<EditsShown, Response> {
+        if !self.has_project() {
+            return Ok(EditsShown::default());
+        }
         let path = self.edits_path()?;
         let mut journal = locked(&self.journal);
         if self.guard.is_view() || (journal.is_none() && !path.exists()) {

@@ -131,7 +131,7 @@ pub struct Change {
 }
 
 /// `GET /edits`, and the answer to every act: the corrections by hand.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct EditsShown {
     /// The edits, as the file of edits holds them.
     pub edits: Vec<Edit>,

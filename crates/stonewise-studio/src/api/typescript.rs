@@ -2,6 +2,7 @@
 
 use super::types::{Act, EditsShown, NewEdits, ProjectChanges, ProjectShown, State};
 use crate::remarks::{NewSignature, OldRemark, RemarksShown};
+use crate::sightings::Sighting;
 use crate::stable::NewStable;
 use crate::teaching::{NewTeaching, TeachingShown};
 use schemars::SchemaGenerator;
@@ -23,6 +24,7 @@ pub fn typescript() -> String {
     generator.subschema_for::<RemarksShown>();
     generator.subschema_for::<OldRemark>();
     generator.subschema_for::<NewSignature>();
+    generator.subschema_for::<Sighting>();
     let mut text =
         "// Made from the types of crates/stonewise-studio; a cargo test writes and compares it.\n"
             .to_owned();
