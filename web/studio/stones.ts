@@ -70,7 +70,7 @@ class Room {
   readonly #status = el("p", { class: "note", role: "status" });
   readonly #who = el("input", { type: "text", autocomplete: "name", value: localStorage.getItem("who") ?? "" });
   readonly #why = el("input", { type: "text", value: localStorage.getItem("why") ?? tx("whySeen") });
-  readonly #list = el("ol", { class: "edits" });
+  readonly #list = el("ol", { class: "edits", tabindex: 0, "aria-label": tx("edits") });
   readonly #queue: readonly { readonly stone: number; readonly why: string }[];
   readonly #rows = new Map<number, HTMLButtonElement>();
   readonly #zones = el("ul", { class: "zones" });
@@ -106,9 +106,11 @@ class Room {
     this.#apply.classList.add("primary");
     this.#drawing = el("div", { class: "drawing", hidden: true }, el("p", {}, tx("drawHelp")),
       button(tx("finish"), "", () => this.#face.finish()), button(tx("cancel"), "", () => this.#face.cancel()));
-    this.element = el("div", { class: "room" }, this.#toolbar(), this.#status, this.#error,
+    // What is told lies over the wall: a line above it would move the wall under the pointer.
+    const told = el("div", { class: "told" }, this.#status, this.#error);
+    this.element = el("div", { class: "room" }, this.#toolbar(),
       el("div", { class: "work" },
-        el("div", { class: "wall" }, this.#face.element, this.#drawing, this.#views()),
+        el("div", { class: "wall" }, this.#face.element, this.#drawing, told, this.#views()),
         this.#side(until)));
     this.#face.onSelect = () => this.#showSelection();
     this.#face.onDrawing = (isDrawing) => (this.#drawing.hidden = !isDrawing);
@@ -491,7 +493,9 @@ function queue(report: Report): { stone: number; why: string }[] {
 function moment(when: string): string {
   const isDay = when.length <= 10, date = new Date(isDay ? `${when}T00:00` : when);
   if (Number.isNaN(date.getTime())) return when;
-  return date.toLocaleString(document.documentElement.lang, { dateStyle: "short", ...(isDay ? {} : { timeStyle: "short" }) });
+  // The month in letters: 11/12 is another day on either side of the Atlantic.
+  const place = document.documentElement.lang === "de" ? "de" : "en-GB";
+  return date.toLocaleString(place, { dateStyle: "medium", ...(isDay ? {} : { timeStyle: "short" }) });
 }
 
 function text(value: string): HTMLInputElement {
