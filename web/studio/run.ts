@@ -55,8 +55,9 @@ export const runPage: Page = (place, live, until) => {
     doubts.replaceChildren(el("strong", {}, tx("doubtsTitle")), el("ul", {}, ...run.doubts.map((d) => el("li", {}, d))));
     skipped.hidden = run.skipped.length === 0;
     skipped.replaceChildren(el("strong", {}, tx("skippedTitle")), el("ul", {}, ...run.skipped.map((d) => el("li", {}, d))));
-    const other = run.phase === "idle" ? state.elsewhere : null;
+    const other = run.phase === "idle" ? state.elsewhere ?? null : null;
     elsewhere.hidden = !other;
+    phase.hidden = other !== null;
     if (other) elsewhere.textContent = other.steps.length > 0
       ? tx("elsewhereTold", { ago: span(other.seconds) })
       : tx("elsewhere", { n: other.finished, step: other.last_step ?? "", ago: span(other.seconds) });
