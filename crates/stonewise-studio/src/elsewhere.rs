@@ -43,7 +43,7 @@ pub fn unfinished(results: &Path) -> Option<Unfinished> {
     let last = done.iter().max();
     let (told, ago) = told(results).ok().flatten().unzip();
     let finished = last.and_then(|(time, _)| time.elapsed().ok());
-    let (steps, part) = told.map_or_else(Default::default, |t| (t.steps, t.part));
+    let (steps, part) = told.map(|t| (t.steps, t.part)).unwrap_or_default();
     Some(Unfinished {
         last_step: last.map(|(_, name)| name.clone()),
         seconds: ago.into_iter().chain(finished).min().map_or(0, |t| t.as_secs()),

@@ -273,10 +273,9 @@ mod tests {
             states(),
             [StepState::Earlier, StepState::Working, StepState::Waiting]
         );
-        // What changes often is not written each time, but is there with the next step.
+        // What changes often is not written each time, but after a pause.
         run.begin("photos", 3);
         (0..1000).for_each(|_| run.advance(1));
-        assert_eq!(read().part.done, 0);
         std::thread::sleep(PAUSE);
         run.advance(1);
         assert_eq!((read().part.what.as_str(), read().part.done), ("photos", 1001));
