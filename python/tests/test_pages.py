@@ -1,4 +1,4 @@
-"""Links of the Markdown pages lead somewhere, and their examples name commands and options that exist."""
+"""Links of the Markdown pages lead somewhere, their prose wraps, and their examples name commands and options that exist."""
 
 from __future__ import annotations
 
@@ -41,6 +41,24 @@ def test_links_lead_somewhere() -> None:
                 broken.append(f"{page.relative_to(ROOT)}: {link}")
     assert not broken
     assert count > 200, "the search is broken"
+
+
+def test_the_summary_lists_every_page_once() -> None:
+    source = ROOT / "docs" / "src"
+    listed = re.findall(r"\]\(([^)#\s]+\.md)\)", (source / "SUMMARY.md").read_text())
+    pages = {page.relative_to(source).as_posix() for page in source.glob("**/*.md")} - {"SUMMARY.md"}
+    assert sorted(listed) == sorted(pages)
+
+
+def test_prose_wraps_at_100_columns() -> None:
+    """Tables and pictures, which cannot wrap, excepted."""
+    long = [
+        f"{page.relative_to(ROOT)}: {line}"
+        for page in PAGES
+        for line in without_code(page.read_text()).splitlines()
+        if len(line) > 100 and not line.lstrip().startswith(("|", "!["))
+    ]
+    assert not long
 
 
 def examples() -> Iterator[tuple[Path, list[str]]]:
