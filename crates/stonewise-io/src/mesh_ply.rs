@@ -89,6 +89,32 @@ mod tests {
         let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
         assert_eq!(bytes.len() - end, 3 * (24 + 3 + 4) + 13);
         assert_eq!(&bytes[end + 24..end + 27], [1, 2, 3]);
+        // What the header says of it, in the words of the format (Turk 1994).
+        let header: Vec<&str> = std::str::from_utf8(&bytes[..end]).unwrap().lines().collect();
+        let vertex = [
+            "double x",
+            "double y",
+            "double z",
+            "uchar red",
+            "uchar green",
+            "uchar blue",
+            "float scalar_d_out",
+        ];
+        let mut expected = vec![
+            "ply".to_owned(),
+            "format binary_little_endian 1.0".into(),
+            "element vertex 3".into(),
+        ];
+        expected.extend(vertex.map(|property| format!("property {property}")));
+        expected.push("element face 1".into());
+        expected.push("property list uchar uint vertex_indices".into());
+        expected.push("end_header".into());
+        assert_eq!(header, expected);
+        let read = crate::cloud::read_mesh(&path).unwrap();
+        assert_eq!(
+            (read.vertices(), read.triangles()),
+            (&mesh.vertices[..], &mesh.triangles[..])
+        );
         mesh.triangles.push([0, 1, 3]);
         assert!(write_coloured_mesh(&path, &mesh).is_err());
     }

@@ -127,6 +127,11 @@ mod tests {
             Ok::<(), CloudError>(())
         })
         .unwrap();
+        // The number of a point is single precision at the end of its record.
+        let records = las::Reader::from_path(&path).unwrap().read_all().unwrap();
+        for (i, record) in records.raw_bytes().chunks(records.record_len()).enumerate() {
+            assert_eq!(record[record.len() - 4..], (i as f32).to_le_bytes());
+        }
         let wrong = write_coloured_laz::<CloudError>(&path, &bounds, &dimensions, None, |p| {
             p.push(at(0), [0; 3], &[])
         });

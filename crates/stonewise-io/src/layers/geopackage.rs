@@ -403,11 +403,17 @@ mod tests {
         file.execute_batch("INSERT INTO stones (fid, geom) VALUES (50, x'00')")
             .unwrap();
         assert_eq!(count(), 3);
+        let entry = |id: i64| {
+            let sql = "SELECT minx, maxx, miny, maxy FROM rtree_stones_geom WHERE id = ?1";
+            let numbers = |r: &rusqlite::Row| Ok([r.get::<_, f64>(0)?, r.get(1)?, r.get(2)?, r.get(3)?]);
+            file.query_row(sql, [id], numbers).unwrap()
+        };
+        assert_eq!(entry(50), [1.0, 2.0, 3.0, 4.0]);
         file.execute_batch(
             "UPDATE stones SET fid = 51 WHERE fid = 50; UPDATE stones SET geom = x'01' WHERE fid = 51",
         )
         .unwrap();
-        assert_eq!(count(), 3);
+        assert_eq!((count(), entry(51)), (3, [1.0, 2.0, 3.0, 4.0]));
         file.execute_batch("UPDATE stones SET geom = NULL WHERE fid = 51; DELETE FROM stones WHERE fid = 1")
             .unwrap();
         assert_eq!(count(), 1);

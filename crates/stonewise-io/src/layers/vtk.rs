@@ -141,6 +141,13 @@ mod tests {
         all[8..].to_vec()
     }
 
+    fn whole(bytes: &[u8]) -> Vec<i64> {
+        let numbers = bytes.chunks(8);
+        numbers
+            .map(|c| i64::from_le_bytes(c.try_into().unwrap()))
+            .collect()
+    }
+
     #[test]
     fn a_triangle_and_a_square_are_two_cells() {
         let folder = tempfile::tempdir().unwrap();
@@ -165,13 +172,8 @@ mod tests {
         // Every element that opens is closed, as an XML reader sees it.
         let mut reader = quick_xml::Reader::from_str(&text);
         while reader.read_event().unwrap() != quick_xml::events::Event::Eof {}
-        let whole = |b: Vec<u8>| {
-            b.chunks(8)
-                .map(|c| i64::from_le_bytes(c.try_into().unwrap()))
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(whole(bytes(&text, "connectivity")), [0, 1, 2, 0, 1, 2, 3]);
-        assert_eq!(whole(bytes(&text, "offsets")), [3, 7]);
+        assert_eq!(whole(&bytes(&text, "connectivity")), [0, 1, 2, 0, 1, 2, 3]);
+        assert_eq!(whole(&bytes(&text, "offsets")), [3, 7]);
         assert_eq!(bytes(&text, "Points")[88..], 5.5f64.to_le_bytes());
         assert_eq!(bytes(&text, "d_out").len(), 16);
         assert_eq!(bytes(&text, "displacement")[16..24], 3f64.to_le_bytes());
@@ -183,7 +185,7 @@ mod tests {
     fn points_alone_are_cells() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.vtp");
-        let points = vec![Point3::origin(); 3];
+        let points = (0..3).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();
         write_vtp(
             &path,
             &PolyData {
@@ -194,5 +196,7 @@ mod tests {
         .unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.contains("NumberOfVerts=\"3\"") && text.contains("<Verts>"));
+        assert_eq!(whole(&bytes(&text, "connectivity")), [0, 1, 2]);
+        assert_eq!(whole(&bytes(&text, "offsets")), [1, 2, 3]);
     }
 }
