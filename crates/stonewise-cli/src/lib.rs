@@ -1,6 +1,12 @@
 //! The `stonewise` command: reads arguments, calls the library, prints.
 //!
-//! A library, so that the Python module has the same command and says the same of what goes wrong.
+//! A library, so that the Python module has the same command and says the same of what goes wrong:
+//!
+//! ```
+//! let words = ["stonewise", "explain", "not-converged"];
+//! let exit_code = stonewise_cli::main_with_args(words.map(Into::into));
+//! assert_eq!(exit_code, 0);
+//! ```
 
 mod args;
 mod commands;
