@@ -67,11 +67,10 @@ mod tests {
 
     #[test]
     fn work_on_one_thread_does_not_share() {
-        let (outside, inside) = (
-            rayon::current_num_threads(),
-            on_one_thread(rayon::current_num_threads),
-        );
-        assert!(outside >= 1);
-        assert_eq!(inside, 1);
+        let threads = || {
+            let inside = on_one_thread(rayon::current_num_threads);
+            (rayon::current_num_threads(), inside)
+        };
+        assert_eq!(stonewise_testing::on_threads(3, threads), (3, 1));
     }
 }

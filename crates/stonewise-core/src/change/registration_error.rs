@@ -101,5 +101,14 @@ mod tests {
         assert!((limits[0].unwrap() - 1.96e-3).abs() < 1e-6);
         assert!((limits[1].unwrap() - 9.8e-3).abs() < 1e-6);
         assert_eq!(limits[2], None);
+
+        // Student's quantile belongs to the spreads alone: 2.119905 for the 16 degrees of freedom of two means of
+        // nine points (tables of quantiles at 97.5 %).
+        let spread = ChangeField {
+            points: vec![point([0.01; 2], [9; 2])],
+        };
+        let found = spread.with_registration_errors(|_| 0.02).points[0].detection_limit_m;
+        let expected = 2.119_905 * (2.0 * 0.01f64.powi(2) / 9.0).sqrt() + 1.959_964 * 0.02;
+        assert!((found.unwrap() - expected).abs() < 1e-6, "{found:?} {expected}");
     }
 }

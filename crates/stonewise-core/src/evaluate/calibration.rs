@@ -130,8 +130,28 @@ mod tests {
     fn claims_that_are_half_too_small_are_found_out() {
         let proud = Calibration::of(&MotionSample::claims(&samples(2.0)));
         // A normal error of twice the claim stays inside with probability erf(0.98 / sqrt 2) = 0.673.
-        assert!((proud.coverage_95.up.unwrap() - 0.673).abs() < 0.012);
+        let coverage = &proud.coverage_95;
+        for share in [coverage.along, coverage.up, coverage.out] {
+            assert!((share.unwrap() - 0.673).abs() < 0.012, "{coverage:?}");
+        }
         assert!((proud.chi_square_mean.unwrap() - 12.0).abs() < 0.2);
+    }
+
+    #[test]
+    fn each_axis_has_the_coverage_of_its_own_claims() {
+        let claim = |error: [f64; 3], half_width: [Option<f64>; 3]| Claim {
+            error: error.into(),
+            half_width,
+            normalised: None,
+        };
+        let claims = [
+            claim([0.5, -2.0, 1.5], [Some(1.0), Some(1.0), None]),
+            claim([-0.5, 0.5, 1.5], [Some(1.0), Some(1.0), None]),
+            claim([0.5, 3.0, 0.0], [Some(1.0), None, None]),
+        ];
+        let found = Calibration::of(&claims).coverage_95;
+        // Along all three lie inside; up one of the two that claim anything; out nothing is claimed.
+        assert_eq!((found.along, found.up, found.out), (Some(1.0), Some(0.5), None));
     }
 
     #[test]

@@ -50,14 +50,14 @@ mod tests {
     #[test]
     fn only_tiles_that_hold_a_dropped_stone_are_written() {
         let cloud = || Cloud::from_world(Point3::origin(), vec![Point3::origin(); 3]);
-        let tiles = MemoryTiles::new(vec![cloud(), cloud()]);
+        let tiles = MemoryTiles::new(vec![cloud(), cloud(), cloud()]);
         let labels = |stone: [u32; 3]| TileLabels {
             stone: stone.to_vec(),
             confidence: vec![0.5; 3],
             seen: vec![true; 3],
         };
         let store = MemoryLabels {
-            tiles: vec![labels([4, 0, 5]), labels([5, 7, 4])],
+            tiles: vec![labels([4, 0, 5]), labels([5, 7, 4]), labels([4, 4, 0])],
         };
         let mut target = MemoryLabels::default();
         let changed = drop_stones(&tiles, &store, &mut target, &BTreeSet::from([7, 9]), &Silent).unwrap();

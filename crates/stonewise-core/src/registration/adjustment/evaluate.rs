@@ -353,7 +353,7 @@ mod tests {
             assert!(adjustment.stones.iter().all(|s| adjustment.is_due(s)));
         }
         for (found, truth) in adjustment.surface.noise.sigma_m.iter().zip(noise) {
-            assert!((found / truth - 1.0).abs() < 0.1, "{found} instead of {truth}");
+            assert!((found / truth - 1.0).abs() < 0.05, "{found} instead of {truth}");
         }
     }
 

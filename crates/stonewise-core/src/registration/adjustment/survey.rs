@@ -233,12 +233,28 @@ mod tests {
 
     #[test]
     fn one_pass_finds_spacing_batches_and_a_sample_from_everywhere() {
-        let pairs: Vec<PairPoints> = (0..400).map(|k| pair(k, 0.01, Vector3::zeros())).collect();
-        let pairs = MemoryPairs::new(pairs);
+        // One epoch of each stone has a point every 5 mm, the sparser one every centimetre.
+        let of_stone = |k: u32| {
+            let (sparse, dense) = (pair(k, 0.01, Vector3::zeros()), pair(k, 0.005, Vector3::zeros()));
+            match k.is_multiple_of(2) {
+                true => PairPoints {
+                    points_first: dense.points_first,
+                    ..sparse
+                },
+                false => PairPoints {
+                    points_second: dense.points_second,
+                    ..sparse
+                },
+            }
+        };
+        let pairs = MemoryPairs::new((0..400).map(of_stone).collect());
         let found = surveyed(&pairs);
         assert_eq!(found.stones.len(), 400);
-        assert!(found.stones.iter().all(|s| s.usable && s.counts == [400, 400]));
-        assert!((found.spacing_m / 0.01 - 1.0).abs() < 0.15, "{}", found.spacing_m);
+        for (k, stone) in found.stones.iter().enumerate() {
+            let counts = if k % 2 == 0 { [1600, 400] } else { [400, 1600] };
+            assert!(stone.usable && stone.counts == counts, "{k}: {:?}", stone.counts);
+        }
+        assert!((found.spacing_m / 0.01 - 1.0).abs() < 1e-6, "{}", found.spacing_m);
         let covered: Vec<usize> = found.points.batches.iter().cloned().flatten().collect();
         assert_eq!(covered, (0..400).collect::<Vec<_>>());
         let kept: Vec<usize> = found.points.sample.iter().map(|s| s.0).collect();

@@ -487,6 +487,10 @@ fn an_error_that_one_stable_area_alone_shows_is_named() {
     let lone = lone_area(shift, 1).expect("nothing confirms 25 mm");
     assert_eq!(lone.area, 0);
     assert!((lone.shift - shift).norm() < 1e-3, "{}", lone.shift);
+    // Twice the shift is twice as many standard deviations of the error without the area.
+    let twice = lone_area(2.0 * shift, 1).unwrap();
+    let ratio = twice.standard_deviations / lone.standard_deviations;
+    assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
     assert_eq!(lone_area(shift, 2), None, "the areas confirm each other");
 }
 

@@ -269,10 +269,22 @@ mod tests {
                 }
             })
             .collect();
-        let graph = Graph::new(&places, 2).unwrap();
-        let chart = unrolled(&graph);
-        let width = (chart[15][0] - chart[0][0]).abs();
-        assert!((width - 15.0 * 0.06 * radius_m).abs() < 0.02, "{width}");
-        assert!((chart[32][1] - chart[0][1] - 0.6).abs() < 1e-6);
+        // The unrolling begins at the first stone; in the second order it also steps back along ties. 7 x 7 = 1 (mod 48).
+        let mixed: Vec<Place> = (0..48).map(|i| places[7 * i % 48].clone()).collect();
+        for (places, step) in [(&places, 1), (&mixed, 7)] {
+            let chart = unrolled(&Graph::new(places, 2).unwrap());
+            let at = |k: usize| chart[step * k % 48];
+            let right = if at(15)[0] > at(0)[0] { 1.0 } else { -1.0 };
+            for k in 0..48 {
+                let along = right * (at(k)[0] - at(0)[0]);
+                let expected = (k % 16) as f64 * 0.06 * radius_m;
+                assert!(
+                    (along - expected).abs() < 0.02,
+                    "{k}: {along} instead of {expected}"
+                );
+                let up = at(k)[1] - at(0)[1];
+                assert!((up - 0.3 * (k / 16) as f64).abs() < 1e-6, "{k}: {up}");
+            }
+        }
     }
 }

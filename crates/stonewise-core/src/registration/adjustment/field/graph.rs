@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn every_edge_is_among_the_nearest_of_a_quadrant() {
+    fn edges_are_those_to_the_nearest_of_each_quadrant() {
         let per_quadrant = 2;
         let places = wall(7, 7);
         let graph = Graph::new(&places, per_quadrant).unwrap();
@@ -281,9 +281,14 @@ mod tests {
                 .filter(|&k| k != i && quadrant(i, k) == quadrant(i, j) && distance(k) < distance(j));
             nearer.count() < per_quadrant
         };
-        for edge in &graph.edges {
-            assert!(is_chosen(edge.low, edge.high) || is_chosen(edge.high, edge.low));
-        }
+        // All of them lie within the reach of an edge.
+        let count = places.len();
+        let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
+        let expected: Vec<_> = pairs
+            .filter(|&(i, j)| is_chosen(i, j) || is_chosen(j, i))
+            .collect();
+        let found: Vec<_> = graph.edges.iter().map(|e| (e.low, e.high)).collect();
+        assert_eq!(found, expected);
     }
 
     #[test]

@@ -170,9 +170,10 @@ mod tests {
     fn observed(stone: &StonePhotos) -> (SMatrix<f64, 4, 9>, Vector4<f64>, Matrix4<f64>, Matrix4<f64>) {
         let turn = stone.turn.as_ref().unwrap();
         let mut lever = SMatrix::<f64, 4, 9>::zeros();
-        lever
-            .fixed_view_mut::<3, 9>(0, 0)
-            .copy_from(&StonePhotos::lever(stone.place));
+        // A point at r moves by t + w x r.
+        let arm = Vector3::new(stone.place[0], stone.place[1], 0.0);
+        lever.fixed_view_mut::<3, 3>(0, 0).fill_with_identity();
+        lever.fixed_view_mut::<3, 3>(0, 3).copy_from(&-arm.cross_matrix());
         lever.fixed_view_mut::<1, 3>(3, 3).copy_from(&turn.by_rotation);
         let shown = stone.displacement().unwrap();
         let mut noise = Matrix4::zeros();
