@@ -52,10 +52,18 @@ fn weights_of_colour_alone_see_no_relief_to_the_bit() {
 #[test]
 fn a_file_says_how_many_channels_its_model_takes() {
     assert!(Weights::BuiltIn.takes_relief().unwrap());
+    let folder = tempfile::tempdir().unwrap();
+    let takes_relief = |bytes: &[u8]| {
+        let path = folder.path().join("model.safetensors");
+        std::fs::write(&path, bytes).unwrap();
+        Weights::File(path).takes_relief().unwrap()
+    };
     let bytes = of_colour_alone();
     assert_eq!(config_from_bytes(&bytes, "colour").unwrap().relief_channels, 0);
+    assert!(!takes_relief(&bytes));
     let bytes = weights_to_bytes(&opened(&bytes, true), Precision::Half).unwrap();
     assert_eq!(config_from_bytes(&bytes, "wider").unwrap().relief_channels, 4);
+    assert!(takes_relief(&bytes));
     // The configuration of a model of colour alone does not mention relief.
     let text = serde_json::to_string(&MaskRcnnConfig::light()).unwrap();
     assert!(!text.contains("relief"), "{text}");

@@ -354,7 +354,7 @@ fn scatter(patches: &[f32], geometry: &Geometry, x: &mut [f32]) {
 mod tests {
     use super::*;
 
-    const CASES: [Geometry; 5] = {
+    const CASES: [Geometry; 7] = {
         let base = Geometry {
             batch: 2,
             inputs: 3,
@@ -377,6 +377,18 @@ mod tests {
                 size: 7,
                 stride: 2,
                 rows: 2,
+                ..base
+            },
+            // So large that the rows of a result are computed in several blocks, and the inputs in shares of two.
+            Geometry {
+                inputs: 10,
+                columns: 300,
+                ..base
+            },
+            Geometry {
+                inputs: 64,
+                columns: 700,
+                size: 1,
                 ..base
             },
         ]
@@ -414,7 +426,7 @@ mod tests {
     fn assert_close(a: &[f32], b: &[f32]) {
         assert_eq!(a.len(), b.len());
         for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() < 1e-4, "{a} {b}");
+            assert!((a - b).abs() < 1e-4 * b.abs().max(1.0), "{a} {b}");
         }
     }
 
