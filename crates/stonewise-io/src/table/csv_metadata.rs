@@ -85,7 +85,7 @@ mod tests {
         table.push("stone_id", "", "number", vec![1u32, 2]).unwrap();
         table.push("dx", "m", "shift", vec![Some(0.5), None]).unwrap();
         table
-            .push("parts", "", "its parts", vec![vec![3, 14], vec![]])
+            .push("parts", "", "its parts", vec![vec![3u32, 14], vec![]])
             .unwrap();
         write_csv(&csv, &table, "Stones.", Some("stone_id")).unwrap();
         assert_eq!(
