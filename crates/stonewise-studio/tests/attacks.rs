@@ -185,6 +185,9 @@ fn nothing_outside_the_folders_is_served() {
         "//etc/passwd",
         "/api/v1/epochs/../picture",
         "/api/v1/epochs/7/picture",
+        "/api/v1/epochs/0/stones/1",
+        "/api/v1/epochs/0/stones/../../../secret.html",
+        "/api/v1/epochs/0/stones/1/0",
         "/api/v1/../../secret.html",
     ] {
         let answer = studio.get(path);
