@@ -190,6 +190,7 @@ fn recorded_for(folder: &Path, owner: &Owner) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stonewise_simulate::SurveyParams;
 
     fn ours(folder: &Path, owner: &Owner) -> bool {
         matches!(look(folder, owner).unwrap(), Found::Ours)
@@ -219,9 +220,20 @@ mod tests {
     fn seeds_and_sizes_are_told_apart() {
         let dir = tempfile::tempdir().unwrap();
         fs::create_dir_all(dir.path().join(WORK_DIR)).unwrap();
-        write(dir.path(), &Owner::survey(7, "width_m = 3.0")).unwrap();
-        assert!(ours(dir.path(), &Owner::survey(7, "width_m = 3.0")));
-        assert!(!ours(dir.path(), &Owner::survey(7, "width_m = 4.0")));
+        let owner = |params: &SurveyParams| {
+            let text = toml::to_string(params).unwrap();
+            Owner::survey(params.scene.seed, &text)
+        };
+        let survey = SurveyParams::demo();
+        write(dir.path(), &owner(&survey)).unwrap();
+        assert!(ours(dir.path(), &owner(&SurveyParams::demo())));
+        // The seed of motions and measurements alone, then the size alone.
+        let mut other = survey.clone();
+        other.scene.seed += 1;
+        assert!(!ours(dir.path(), &owner(&other)));
+        let mut other = survey;
+        other.scene.wall.width_m += 1.0;
+        assert!(!ours(dir.path(), &owner(&other)));
     }
 
     #[test]

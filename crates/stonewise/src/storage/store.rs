@@ -398,6 +398,16 @@ mod tests {
             }
         });
         assert_eq!(made.into_inner(), 2);
+        // Another process adds a version and finds those of the first.
+        let later = StepStore::new(work.path(), Keeps::Every).unwrap();
+        let origin = |version: i32| {
+            let key = Key::new("a", &version, &[]);
+            later.step("a", key, &[], |_| Ok(())).unwrap().1
+        };
+        assert_eq!(
+            [2, 0, 1].map(origin),
+            [Origin::Made, Origin::Found, Origin::Found]
+        );
         let newest = StepStore::new(work.path(), Keeps::Newest).unwrap();
         let other = newest.step("b", Key::new("b", &0, &[]), &[], |_| Ok(())).unwrap();
         assert_eq!(
@@ -450,20 +460,24 @@ mod tests {
         make(&store, name, 1);
         // What another step has made under the same key is found.
         assert_eq!(make(&store, name, 0).1, Origin::Found);
-        fs::write(work.path().join("match/thesis.tex"), "x").unwrap();
-        assert_eq!(count(), 3);
+        // The name of a version has sixteen digits; that of somebody else's folder may have sixteen letters.
+        let others = ["match/thesis.tex", "match/measured-by-hand"].map(|name| work.path().join(name));
+        fs::write(&others[0], "x").unwrap();
+        fs::create_dir(&others[1]).unwrap();
+        fs::write(others[1].join(DONE), "x").unwrap();
+        assert_eq!(count(), 4);
 
         let later = StepStore::new(work.path(), Keeps::Newest).unwrap();
         assert_eq!(make(&later, of_join, 0).1, Origin::Found);
         make(&later, name, 2);
-        assert_eq!(count(), 3);
+        assert_eq!(count(), 4);
         assert_eq!(make(&later, name, 2).1, Origin::Found);
 
         let last = StepStore::new(work.path(), Keeps::Newest).unwrap();
         make(&last, name, 2);
         last.remove_unused().unwrap();
-        assert_eq!(count(), 2);
-        assert!(work.path().join("match/thesis.tex").exists());
+        assert_eq!(count(), 3);
+        assert!(others.iter().all(|path| path.exists()));
     }
 
     #[test]

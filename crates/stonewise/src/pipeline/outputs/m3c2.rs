@@ -104,6 +104,7 @@ fn write_cloud(path: &Path, crs: Option<&Crs>, field: &ChangeField) -> Result<()
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
     use stonewise_testing::check_csv_metadata;
 
     #[test]
@@ -120,5 +121,65 @@ mod tests {
         let unit = |name| table.description(name).unwrap().0;
         let of_table = table.names().skip(3).map(|name| (name, unit(name)));
         assert!(DIMENSIONS.iter().map(|d| (d.name, d.unit)).eq(of_table));
+    }
+
+    #[test]
+    fn every_number_lies_under_its_name_in_cloud_and_table() {
+        let known = ChangePoint {
+            position: Point3::new(1.0, 2.0, 3.0),
+            normal: Vector3::new(0.6, -0.8, 0.0),
+            distance_m: Some(-0.011),
+            detection_limit_m: Some(0.005),
+            spread_m: [Some(0.003), Some(0.004)],
+            counts: [50, 60],
+        };
+        let unknown = ChangePoint {
+            distance_m: None,
+            detection_limit_m: None,
+            spread_m: [Some(0.007), None],
+            counts: [8, 0],
+            ..known
+        };
+        // In the order of the dimensions: normal, distance, limit, spreads, significant, counts.
+        let nan = f64::NAN;
+        let expected = [
+            [0.6, -0.8, 0.0, -0.011, 0.005, 0.003, 0.004, 1.0, 50.0, 60.0],
+            [0.6, -0.8, 0.0, nan, nan, 0.007, nan, 0.0, 8.0, 0.0],
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let field = ChangeField {
+            points: vec![known, unknown],
+        };
+        write_m3c2(folder.path(), EpochId::at(1), None, &field).unwrap();
+
+        let csv = std::fs::read_to_string(folder.path().join("m3c2.csv")).unwrap();
+        let cloud = las::Reader::from_path(folder.path().join("m3c2.laz"));
+        let cloud = cloud.unwrap().read_all().unwrap();
+        // Seven numbers of eight bytes, one of two and two of four.
+        let extra_bytes = 7 * 8 + 2 + 2 * 4;
+        let records = cloud.raw_bytes().chunks(cloud.record_len());
+        for ((record, line), expected) in records.zip(csv.lines().skip(1)).zip(expected) {
+            let extra = &record[record.len() - extra_bytes..];
+            let (reals, rest) = extra.split_at(56);
+            let reals = reals.chunks(8).map(|b| f64::from_le_bytes(b.try_into().unwrap()));
+            let significant = f64::from(u16::from_le_bytes(rest[..2].try_into().unwrap()));
+            let counts = rest[2..].chunks(4);
+            let counts = counts.map(|b| f64::from(u32::from_le_bytes(b.try_into().unwrap())));
+            let of_cloud = reals.chain([significant]).chain(counts);
+            let cells = line.split(',').skip(3);
+            let of_table = cells.map(|cell| {
+                if cell.is_empty() {
+                    nan
+                } else {
+                    cell.parse().unwrap()
+                }
+            });
+            for ((cloud, table), expected) in of_cloud.zip(of_table).zip(expected) {
+                let is_right =
+                    |found: f64| (found - expected).abs() < 1e-7 || (found.is_nan() && expected.is_nan());
+                assert!(is_right(cloud) && is_right(table), "{cloud} {table} {expected}");
+            }
+        }
+        assert_eq!((cloud.len(), csv.lines().count()), (2, 3));
     }
 }
