@@ -358,13 +358,14 @@ max_ratio = 0.5 # tuned
     fn new_tables_and_zones_come_last_and_read_as_they_were_meant() {
         let zone = json!({ "name": "crest", "polygon": [[0.0, 2.5], [4.0, 2.5], [4.0, 3.0]], "alarm_mm": 5 });
         let mut text = with(TEXT, &way(&["thresholds", "alarm_mm"]), &json!(12.5)).unwrap();
-        for place in ["0", "1"] {
-            text = with(&text, &way(&["thresholds", "zones", place]), &zone).unwrap();
+        let other = json!({ "name": "toe", "polygon": [[0.0, 0.0], [4.0, 0.0], [4.0, 0.5]], "alarm_mm": 2 });
+        for (place, zone) in [("0", &other), ("1", &zone)] {
+            text = with(&text, &way(&["thresholds", "zones", place]), zone).unwrap();
         }
         assert!(text.starts_with(TEXT), "{text}");
         // Read by another reader of TOML.
         let read: Json = serde_json::to_value(values(&text).unwrap()).unwrap();
-        assert_eq!(read["thresholds"]["zones"][1], zone);
+        assert_eq!(read["thresholds"]["zones"], json!([other, zone]));
         assert_eq!(read["thresholds"]["alarm_mm"], 12.5);
         let without = with(&text, &way(&["thresholds", "zones", "0"]), &Json::Null).unwrap();
         assert_eq!(values(&without).unwrap()["thresholds"]["zones"], json!([zone]));

@@ -254,10 +254,16 @@ fn a_page_for_looking_changes_nothing() {
         ("PATCH", "/api/v1/project"),
         ("POST", "/api/v1/edits"),
         ("POST", "/api/v1/edits/undo"),
+        ("POST", "/api/v1/edits/redo"),
         ("POST", "/api/v1/stable"),
         ("POST", "/api/v1/teaching"),
         ("POST", "/api/v1/teaching/accept"),
         ("DELETE", "/api/v1/teaching"),
+        ("POST", "/api/v1/remarks"),
+        ("DELETE", "/api/v1/remarks"),
+        ("POST", "/api/v1/signature"),
+        ("DELETE", "/api/v1/signature"),
+        ("POST", "/api/v1/pdf"),
     ] {
         assert_eq!(
             studio.send(method, path, &json!({})).status,
