@@ -105,6 +105,10 @@ mod tests {
             write_layers(folder.path()).unwrap();
             let json = std::fs::read(folder.path().join(GEOJSON)).unwrap();
             let json: Value = serde_json::from_slice(&json).unwrap();
+            let polygons = read_polygons(&folder.path().join(GEOPACKAGE), "stones").unwrap();
+            assert_eq!(polygons.len(), rows.len());
+            let vtp = std::fs::read_to_string(folder.path().join(DISPLACEMENTS_VTP)).unwrap();
+            assert!(vtp.contains("NumberOfPoints=\"0\""), "no stone was measured");
             json["features"].as_array().unwrap().clone()
         };
         assert_eq!(stones(&[]), [Value::Null; 0]);
